@@ -1,0 +1,172 @@
+"""The Fourier coefficients that a crystallographic group leaves alone (design point 3)."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+
+from orbiflow.errors import OrbiflowError
+from orbiflow.symmetry import CrystallographicGroup
+from orbiflow.symmetry.isometry import Array
+
+MAX_COEFFICIENTS = 2_000_000
+"""Largest number of real coefficients before symmetrization: about a gigabyte of work."""
+
+
+@dataclass(frozen=True, eq=False)
+class InvariantBasis:
+    """Orthonormal basis of the invariant real trigonometric vector fields of bounded frequency.
+
+    A field is V(p) = z_0 + sum over `frequencies` of sqrt(2) (a cos(phase) + b sin(phase)), where
+    phase = 2 pi k . B^-1 p and one of k, -k is listed. The flat coefficient vector holds, for each k,
+    a then b (d numbers each; for k = 0 the b are void). Entry (row, column, value) of the sparse
+    basis takes parameter `column` to coefficient `row`; columns are orthonormal, so the Euclidean norm
+    of the parameters is the root mean square of the field.
+
+    Args:
+        frequencies: (M, d) integers, k = 0 first.
+        rows, columns, values: (nnz,) each.
+        size: number of parameters P.
+        magnitude: (P,) |kappa| of each parameter, kappa = B^-T k, per unit of length.
+    """
+
+    frequencies: Array
+    rows: Array
+    columns: Array
+    values: Array
+    size: int
+    magnitude: Array
+
+
+def frequency_set(group: CrystallographicGroup, max_frequency: int) -> Array:
+    """(M, d) integer frequencies, one of each pair +-k, k = 0 first.
+
+    The box |k_i| <= max_frequency and its images under the dual point group: a set that is not a
+    union of orbits would lose symmetry (hexagonal groups).
+
+    Raises:
+        OrbiflowError: if `max_frequency` is negative or too large to handle.
+    """
+    if isinstance(max_frequency, bool) or int(max_frequency) != max_frequency or max_frequency < 0:
+        raise OrbiflowError(f"max_frequency must be an integer >= 0, got {max_frequency!r}")
+    side = 2 * int(max_frequency) + 1
+    if side**group.dim * group.dim > MAX_COEFFICIENTS:
+        raise OrbiflowError(
+            f"max_frequency {max_frequency} in {group.dim} dimensions needs "
+            f"{side**group.dim * group.dim:,} coefficients, over the limit of "
+            f"{MAX_COEFFICIENTS:,}; choose a smaller one"
+        )
+    axis = np.arange(-max_frequency, max_frequency + 1)
+    box = np.stack(np.meshgrid(*[axis] * group.dim, indexing="ij"), axis=-1).reshape(-1, group.dim)
+    images = np.concatenate([box @ m for m in np.unique(_integral_parts(group), axis=0)])
+    return np.unique(_half(images)[0], axis=0)
+
+
+def _integral_parts(group: CrystallographicGroup) -> Array:
+    """(|G|, d, d) integer matrices B^-1 R B; a frequency k (a row) goes to k @ M."""
+    m = group.inverse_lattice @ group.linear_parts @ group.lattice
+    return np.round(m).astype(np.int64)
+
+
+def _half(k: Array) -> tuple[Array, Array]:
+    """The lexicographically non-negative one of k and -k, and whether it was -k."""
+    first = np.zeros(len(k), dtype=np.int64)
+    for column in range(k.shape[1] - 1, -1, -1):
+        first = np.where(k[:, column] != 0, k[:, column], first)
+    flipped = first < 0
+    return np.where(flipped[:, None], -k, k), flipped
+
+
+def _index(frequencies: Array, k: Array) -> Array:
+    """Rows of `frequencies` (sorted lexicographically) at which the rows of `k` stand."""
+    base = int(np.abs(frequencies).max(initial=0)) * 2 + 3
+    radix = base ** np.arange(frequencies.shape[1] - 1, -1, -1, dtype=np.int64)
+    return np.searchsorted(frequencies @ radix, k @ radix)
+
+
+def _action(group: CrystallographicGroup, frequencies: Array) -> tuple[Array, Array]:
+    """Where each element sends each frequency, and the real (2d, 2d) block it applies on the way.
+
+    (g V)(p) = R^-1 V(R p + t) sends the coefficient at k to k M times R^-1 exp(2 pi i k . B^-1 t).
+    """
+    d = group.dim
+    integral = _integral_parts(group)
+    targets = np.empty((group.order, len(frequencies)), dtype=np.int64)
+    blocks = np.zeros((group.order, len(frequencies), 2, d, 2, d))
+    for g, element in enumerate(group.cosets):
+        image, flipped = _half(frequencies @ integral[g])
+        targets[g] = _index(frequencies, image)
+        turns = frequencies @ (group.inverse_lattice @ element.translation)
+        phase = 2 * np.pi * (turns - np.round(turns))
+        c, s = np.cos(phase)[:, None, None], np.sin(phase)[:, None, None]
+        sign = np.where(flipped, -1.0, 1.0)[:, None, None]
+        inverse = element.linear.T
+        # z = a - i b times exp(i phase); the complex conjugate where -k is the listed one
+        blocks[g, :, 0, :, 0, :] = c * inverse
+        blocks[g, :, 0, :, 1, :] = s * inverse
+        blocks[g, :, 1, :, 0, :] = -s * sign * inverse
+        blocks[g, :, 1, :, 1, :] = c * sign * inverse
+    return targets, blocks.reshape(group.order, len(frequencies), 2 * d, 2 * d)
+
+
+def _orthonormal_columns(projector: Array) -> Array:
+    """Basis of the range of an orthogonal projector, by Gram-Schmidt in a fixed order.
+
+    Deterministic, unlike eigenvectors of a repeated eigenvalue: saved parameters depend on it.
+    """
+    basis = np.empty((len(projector), 0))
+    for column in projector.T:
+        for _ in range(2):  # twice is enough (Kahan)
+            column = column - basis @ (basis.T @ column)
+        norm = np.linalg.norm(column)
+        if norm > 1e-3:
+            basis = np.column_stack([basis, column / norm])
+    return basis
+
+
+def invariant_basis(group: CrystallographicGroup, max_frequency: int) -> InvariantBasis:
+    """Build the basis orbit by orbit: the range of the mean over coset representatives.
+
+    Raises:
+        OrbiflowError: if `max_frequency` is negative or too large to handle.
+    """
+    d = group.dim
+    frequencies = frequency_set(group, max_frequency)
+    targets, blocks = _action(group, frequencies)
+    rows, columns, values, magnitude = [], [], [], []
+    orbit_of = targets.min(axis=0)
+    size = 0
+    for orbit in _members(orbit_of):
+        m = len(orbit)
+        local = np.searchsorted(orbit, targets[:, orbit])
+        projector = np.zeros((m, 2 * d, m, 2 * d))
+        for g, source in itertools.product(range(group.order), range(m)):
+            projector[local[g, source], :, source, :] += blocks[g, orbit[source]]
+        projector /= group.order
+        if not frequencies[orbit[0]].any():
+            projector[:, d:] = projector[:, :, :, d:] = 0.0
+        basis = _orthonormal_columns(projector.reshape(2 * d * m, 2 * d * m))
+        row, column = np.nonzero(np.abs(basis) > 1e-14)
+        values.append(basis[row, column])
+        rows.append(orbit[row // (2 * d)] * 2 * d + row % (2 * d))
+        columns.append(column + size)
+        kappa = np.linalg.norm(group.inverse_lattice.T @ frequencies[orbit[0]])
+        magnitude.append(np.full(basis.shape[1], kappa))
+        size += basis.shape[1]
+    return InvariantBasis(
+        frequencies,
+        np.concatenate(rows),
+        np.concatenate(columns),
+        np.concatenate(values),
+        size,
+        np.concatenate(magnitude),
+    )
+
+
+def _members(labels: Array) -> list[Array]:
+    """Positions that share a label, each list ascending, in the order of the labels."""
+    order = np.argsort(labels, kind="stable")
+    cuts = np.flatnonzero(np.diff(labels[order])) + 1
+    return np.split(order, cuts)

@@ -1,0 +1,82 @@
+"""Neural vector fields on a periodic space."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from orbiflow.errors import OrbiflowError
+from orbiflow.fields.symmetrize import Symmetrized
+from orbiflow.symmetry import CrystallographicGroup
+
+
+class PeriodicFeatures(nn.Module):
+    """Points (..., d) to cosines and sines of low frequencies, (..., 2 M): periodic by construction.
+
+    Args:
+        group: its lattice is the period.
+        max_frequency: all k in [-max, max]^d up to sign, without 0, if d <= 3; in higher dimensions
+            only the multiples 1..max of each axis.
+
+    Raises:
+        OrbiflowError: if `max_frequency` < 1.
+    """
+
+    frequencies: Tensor
+
+    def __init__(self, group: CrystallographicGroup, max_frequency: int = 1) -> None:
+        super().__init__()
+        if max_frequency < 1:
+            raise OrbiflowError(f"max_frequency must be at least 1, got {max_frequency}")
+        d = group.dim
+        if d <= 3:
+            box = itertools.product(range(-max_frequency, max_frequency + 1), repeat=d)
+            k = np.array([v for v in box if v > (0,) * d], dtype=np.float64)
+        else:
+            k = np.concatenate([m * np.eye(d) for m in range(1, max_frequency + 1)])
+        self.register_buffer(
+            "frequencies", torch.tensor(k @ group.inverse_lattice), persistent=False
+        )
+
+    @property
+    def size(self) -> int:
+        """Number of features 2 M."""
+        return 2 * self.frequencies.shape[0]
+
+    def forward(self, points: Tensor) -> Tensor:
+        """Features of shape (..., 2 M)."""
+        phase = 2.0 * math.pi * points @ self.frequencies.to(points).mT
+        return torch.cat([phase.cos(), phase.sin()], dim=-1)
+
+
+def neural_field(
+    group: CrystallographicGroup,
+    *,
+    hidden: tuple[int, ...] = (64, 64),
+    max_frequency: int = 1,
+    seed: int = 0,
+    dtype: torch.dtype = torch.float64,
+) -> Symmetrized:
+    """A multilayer perceptron on periodic features, symmetrized over `group`.
+
+    The last layer starts at zero, so the flow starts at the identity. The same seed gives the same
+    weights; the global random state is left alone.
+    """
+    features = PeriodicFeatures(group, max_frequency)
+    sizes = (features.size, *hidden, group.dim)
+    layers: list[nn.Module] = [features]
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(seed)
+        for i, (a, b) in enumerate(itertools.pairwise(sizes)):
+            layers.append(nn.Linear(a, b, dtype=dtype))
+            if i < len(sizes) - 2:
+                layers.append(nn.Tanh())
+    last = layers[-1]
+    assert isinstance(last, nn.Linear)  # by construction
+    nn.init.zeros_(last.weight)
+    nn.init.zeros_(last.bias)
+    return Symmetrized(nn.Sequential(*layers), group, periodic=True)

@@ -1,0 +1,122 @@
+"""Symmetrization: any vector field made to commute with a crystallographic group.
+
+The mean over coset representatives (Reynolds operator, design point 2) and the paper's three
+operators (equations for P_B, R_c^K and G_l^mu of section 3), which are unnormalised sums.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+
+import numpy as np
+import torch
+from numpy.typing import ArrayLike
+from torch import Tensor, nn
+
+from orbiflow.symmetry import CrystallographicGroup, Line, identity, rotation, transflection
+from orbiflow.symmetry.isometry import Isometry
+
+VectorField = Callable[[Tensor], Tensor]
+"""A map from points (..., d) to vectors (..., d)."""
+
+
+class Symmetrized(nn.Module):
+    """The field V(p) = 1/|G| sum_i R_i^-1 V0(R_i p + t_i), V0 made periodic first.
+
+    See `symmetrize`. Keeps `field` as a submodule if it is one, so its parameters are trained.
+    """
+
+    def __init__(
+        self, field: VectorField, group: CrystallographicGroup, *, periodic: bool = False
+    ) -> None:
+        super().__init__()
+        self.field = field
+        self.group = group
+        self.periodic = periodic
+
+    def forward(self, points: Tensor) -> Tensor:
+        """V at points (..., d)."""
+        images = self.group.images(points)
+        values = (
+            self.field(images) if self.periodic else blend(self.field, self.group.lattice, images)
+        )
+        linear = torch.tensor(self.group.linear_parts, dtype=values.dtype, device=values.device)
+        # the inverse of R acts on row vectors as multiplication by R
+        flat = values.reshape(self.group.order, -1, self.group.dim) @ linear
+        return flat.mean(dim=0).reshape(points.shape)
+
+    def extra_repr(self) -> str:
+        return f"{self.group!r}, periodic={self.periodic}"
+
+
+def symmetrize(
+    field: VectorField, group: CrystallographicGroup, *, periodic: bool = False
+) -> Symmetrized:
+    """Make any field commute with `group`: V(g p) = R_g V(p).
+
+    Args:
+        field: any callable from points (..., d) to vectors of the same shape: a torch module, a
+            function, a lambda. It need not be periodic: translates of it are blended smoothly over
+            neighbouring cells (2^d evaluations). A field that commutes already is left unchanged.
+        group: of R^d.
+        periodic: set it if `field` is known to be periodic under the group's lattice (for instance a
+            network behind `PeriodicFeatures`): skips the blending.
+
+    >>> import torch
+    >>> from orbiflow.symmetry import wallpaper_group
+    >>> group = wallpaper_group("p3")
+    >>> field = symmetrize(lambda p: torch.tanh(p), group)
+    >>> p = torch.tensor([0.3, -0.2], dtype=torch.float64)
+    >>> g = group.cosets[1]
+    >>> bool(torch.allclose(field(g(p)), g.push(field(p))))
+    True
+    """
+    return Symmetrized(field, group, periodic=periodic)
+
+
+def blend(field: VectorField, lattice: ArrayLike, points: Tensor) -> Tensor:
+    """A periodic field from any field: sum over n of w(u - n) field(B (u - n)), u = B^-1 p.
+
+    w(u) = prod cos^2(pi u_i / 2) on [-1, 1]^d sums to one over the translates, so a periodic field is
+    unchanged and a smooth field stays continuously differentiable.
+    """
+    basis = torch.as_tensor(np.array(lattice), dtype=points.dtype, device=points.device)
+    u = points @ torch.linalg.inv(basis).mT
+    u = u - u.detach().floor()
+    corners = itertools.product((0.0, 1.0), repeat=basis.shape[0])
+    shifted = torch.stack([u - u.new_tensor(corner) for corner in corners])
+    weight = torch.cos(shifted * (torch.pi / 2)).square().prod(dim=-1, keepdim=True)
+    return (weight * field(shifted @ basis.mT)).sum(dim=0)
+
+
+def periodic_operator(field: VectorField, lattice: ArrayLike) -> VectorField:
+    """P_B(V) = B o V o B^-1: a field with period 1 on each axis becomes B-periodic (eq. P_B)."""
+    basis = torch.as_tensor(np.array(lattice), dtype=torch.float64)
+
+    def operated(points: Tensor) -> Tensor:
+        b = basis.to(points)
+        return field(points @ torch.linalg.inv(b).mT) @ b.mT
+
+    return operated
+
+
+def rotation_operator(field: VectorField, center: ArrayLike, order: int) -> VectorField:
+    """R_c^K(V) = sum over k = 1..K of R_o^-k o V o R_c^k (eq. R_c^K): a sum, not a mean."""
+    turn = rotation(center, order)
+    powers = [identity(2)]
+    for _ in range(order - 1):
+        powers.append(turn @ powers[-1])
+    return _summed(field, powers)
+
+
+def transflection_operator(field: VectorField, line: Line, mu: float) -> VectorField:
+    """G_l^mu(V) = V + M_l0 o V o T_l^mu o M_l (eq. G_l^mu): a sum, not a mean."""
+    return _summed(field, [identity(2), transflection(line, mu)])
+
+
+def _summed(field: VectorField, elements: list[Isometry]) -> VectorField:
+    def operated(points: Tensor) -> Tensor:
+        return torch.stack([g.inverse().push(field(g(points))) for g in elements]).sum(dim=0)
+
+    return operated

@@ -1,0 +1,253 @@
+"""Crystallographic groups of R^d: a lattice and coset representatives modulo it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from orbiflow.errors import GroupError, LatticeMismatchError, NotDiscreteError
+from orbiflow.symmetry.isometry import TOLERANCE, Array, Isometry, Points, identity, matching
+
+
+def _checked_lattice(lattice: ArrayLike) -> Array:
+    basis = np.array(lattice, dtype=np.float64)
+    if basis.ndim != 2 or basis.shape[0] != basis.shape[1] or basis.size == 0:
+        raise GroupError(
+            f"a lattice is a (d, d) matrix with basis vectors as columns, got shape {basis.shape}"
+        )
+    lengths = np.linalg.norm(basis, axis=0)
+    if not np.isfinite(basis).all() or lengths.min() == 0.0:
+        raise GroupError("the lattice basis has a zero, NaN or infinite column")
+    if abs(np.linalg.det(basis / lengths)) < 1e-6:
+        raise GroupError("the lattice basis vectors are (nearly) linearly dependent")
+    basis.setflags(write=False)
+    return basis
+
+
+@dataclass(frozen=True, eq=False)
+class CrystallographicGroup:
+    """A discrete group of isometries whose translations contain a full lattice.
+
+    Build one with `generate`; the constructor trusts its arguments.
+
+    Args:
+        lattice: (d, d), basis vectors as columns.
+        cosets: one representative of each coset of the lattice, the identity first, with
+            translations in the cell (fractional coordinates in [0, 1)).
+        name: for people to read, such as "pgg".
+
+    Reference: design points 1 and 2; the paper's operators are generators of such a group.
+    """
+
+    lattice: Array
+    cosets: tuple[Isometry, ...]
+    name: str = field(default="")
+
+    @classmethod
+    def generate(
+        cls,
+        lattice: ArrayLike,
+        generators: Iterable[Isometry] = (),
+        *,
+        name: str = "",
+        max_order: int = 2048,
+    ) -> CrystallographicGroup:
+        """Close `generators` modulo the translations of `lattice`.
+
+        Raises:
+            LatticeMismatchError: if a generator does not map the lattice to itself.
+            NotDiscreteError: if the closure modulo the lattice has over `max_order` elements.
+            GroupError: for a degenerate lattice or a generator of another dimension.
+
+        >>> from orbiflow.symmetry.plane import rotation
+        >>> CrystallographicGroup.generate(np.eye(2), [rotation((0.0, 0.0), 4)]).order
+        4
+        """
+        basis = _checked_lattice(lattice)
+        reduced = []
+        for number, generator in enumerate(generators):
+            _check_maps_lattice(basis, generator, number)
+            reduced.append(_reduce_translation(basis, generator))
+        return cls(basis, _closure(basis, reduced, max_order), name)
+
+    @property
+    def dim(self) -> int:
+        """Dimension d of the space."""
+        return self.lattice.shape[0]
+
+    @property
+    def order(self) -> int:
+        """Number of cosets of the lattice: |G| in the paper's sums."""
+        return len(self.cosets)
+
+    @property
+    def cell_volume(self) -> float:
+        """|det B|, the volume of a lattice cell."""
+        return float(abs(np.linalg.det(self.lattice)))
+
+    @cached_property
+    def inverse_lattice(self) -> Array:
+        """B^-1: takes points to fractional coordinates."""
+        return np.linalg.inv(self.lattice)
+
+    @cached_property
+    def linear_parts(self) -> Array:
+        """(|G|, d, d) linear parts of the coset representatives."""
+        return np.stack([g.linear for g in self.cosets])
+
+    @cached_property
+    def translations(self) -> Array:
+        """(|G|, d) translations of the coset representatives."""
+        return np.stack([g.translation for g in self.cosets])
+
+    def contains(self, isometry: Isometry, tolerance: float = TOLERANCE) -> bool:
+        """Whether `isometry` is an element of the group, within `tolerance` of the cell's size."""
+        if isometry.dim != self.dim:
+            return False
+        offset = (isometry.translation - self.translations) @ self.inverse_lattice.T
+        offset -= np.round(offset)
+        same_linear = np.abs(self.linear_parts - isometry.linear).max(axis=(1, 2)) <= tolerance
+        return bool((same_linear & (np.abs(offset).max(axis=1) <= tolerance)).any())
+
+    def wrap(self, points: Points) -> Points:
+        """Move points, shape (..., d), by lattice vectors into the cell B [0, 1)^d."""
+        fractional = points @ matching(self.inverse_lattice, points).T
+        if isinstance(fractional, np.ndarray):
+            floor = np.floor(fractional)
+        else:
+            floor = fractional.detach().floor()
+        return points - floor @ matching(self.lattice, points).T
+
+    def images(self, points: Points) -> Points:
+        """Images under the coset representatives, shape (|G|, ..., d)."""
+        linear, shift = (matching(a, points) for a in (self.linear_parts, self.translations))
+        flat = points.reshape(1, -1, self.dim)
+        moved = flat @ linear.swapaxes(-1, -2) + shift[:, None, :]
+        return moved.reshape(self.order, *points.shape)
+
+    def elements_near(
+        self, center: ArrayLike, radius: float, *, source: ArrayLike | None = None
+    ) -> list[Isometry]:
+        """All elements that take the point `source` within `radius` of `center`, nearest first.
+
+        With the bounding disc of a tile as source, and radius = tile radius + region radius, these
+        are the elements whose image of the tile can meet the region.
+
+        Args:
+            center: (d,) point.
+            radius: in the units of the points.
+            source: (d,) point, default `center`.
+        """
+        center = np.asarray(center, dtype=np.float64)
+        source = center if source is None else np.asarray(source, dtype=np.float64)
+        found: list[tuple[float, Isometry]] = []
+        reach = radius * np.linalg.norm(self.inverse_lattice, axis=1)
+        for coset in self.cosets:
+            middle = self.inverse_lattice @ (center - coset(source))
+            ranges = [
+                np.arange(np.ceil(m - r), np.floor(m + r) + 1)
+                for m, r in zip(middle, reach, strict=True)
+            ]
+            steps = np.stack(np.meshgrid(*ranges, indexing="ij"), axis=-1).reshape(-1, self.dim)
+            shifts = steps @ self.lattice.T + coset.translation
+            distance = np.linalg.norm(coset.linear @ source + shifts - center, axis=1)
+            for i in np.flatnonzero(distance <= radius):
+                found.append((float(distance[i]), Isometry(coset.linear, shifts[i])))
+        found.sort(key=lambda item: item[0])
+        return [element for _, element in found]
+
+    def conjugate(
+        self, linear: ArrayLike, offset: ArrayLike | None = None
+    ) -> CrystallographicGroup:
+        """The group M G M^-1 for the affine map M: p -> linear p + offset.
+
+        If a map D commutes with G then M o D carries tiles of G to tiles of M G M^-1. `linear` may
+        be any similarity, or any map that commutes with the point group (lattice freedom).
+
+        Raises:
+            NotAnIsometryError: if M G M^-1 is not made of isometries.
+        """
+        m = np.asarray(linear, dtype=np.float64)
+        v = np.zeros(self.dim) if offset is None else np.asarray(offset, dtype=np.float64)
+        inverse = np.linalg.inv(m)
+        basis = _checked_lattice(m @ self.lattice)
+        cosets = []
+        for g in self.cosets:
+            rotated = m @ g.linear @ inverse
+            cosets.append(Isometry(rotated, m @ g.translation + v - rotated @ v))
+        return CrystallographicGroup(
+            basis, tuple(_reduce_translation(basis, g) for g in cosets), self.name
+        )
+
+    def __repr__(self) -> str:
+        label = f"{self.name}, " if self.name else ""
+        basis = (self.lattice.round(6) + 0.0).tolist()
+        return f"CrystallographicGroup({label}order {self.order}, lattice {basis})"
+
+
+def _check_maps_lattice(basis: Array, generator: Isometry, number: int) -> None:
+    d = basis.shape[0]
+    if generator.dim != d:
+        raise GroupError(
+            f"generator {number} acts on R^{generator.dim}, the lattice lives in R^{d}"
+        )
+    integral = np.linalg.solve(basis, generator.linear @ basis)
+    deviation = np.abs(integral - np.round(integral)).max()
+    if deviation > TOLERANCE:
+        raise LatticeMismatchError(
+            f"generator {number}, {generator!r}, does not map the lattice to itself: a basis "
+            f"vector's image misses the lattice by {deviation:.2e} (fractional). "
+            "Change the generator or the lattice."
+        )
+
+
+def _reduce_translation(basis: Array, element: Isometry) -> Isometry:
+    fractional = np.linalg.solve(basis, element.translation)
+    # translations within rounding of a lattice vector must come out as zero, not as one
+    fractional = fractional - np.floor(fractional + TOLERANCE)
+    fractional[np.abs(fractional) < TOLERANCE] = 0.0
+    return Isometry(element.linear, basis @ fractional)
+
+
+class _Seen:
+    """Elements already found, looked up by integral linear part and translation modulo lattice."""
+
+    def __init__(self, basis: Array) -> None:
+        self._basis = basis
+        self._translations: dict[bytes, list[Array]] = {}
+
+    def add(self, element: Isometry) -> bool:
+        """Record `element`; False if it was known."""
+        integral = np.linalg.solve(self._basis, element.linear @ self._basis)
+        key = np.round(integral).astype(np.int64).tobytes()
+        fractional = np.linalg.solve(self._basis, element.translation)
+        known = self._translations.setdefault(key, [])
+        if known:
+            offset = np.stack(known) - fractional
+            if (np.abs(offset - np.round(offset)).max(axis=1) <= 10 * TOLERANCE).any():
+                return False
+        known.append(fractional)
+        return True
+
+
+def _closure(basis: Array, generators: Sequence[Isometry], max_order: int) -> tuple[Isometry, ...]:
+    elements = [identity(basis.shape[0])]
+    seen = _Seen(basis)
+    seen.add(elements[0])
+    for element in elements:  # grows while it is walked
+        for number, generator in enumerate(generators):
+            product = _reduce_translation(basis, generator @ element)
+            if not seen.add(product):
+                continue
+            if len(elements) >= max_order:
+                raise NotDiscreteError(
+                    f"the closure modulo the lattice has more than {max_order} elements; generator "
+                    f"{number}, {generator!r}, was the last to add one. With this lattice the "
+                    "generators do not make a discrete group: check centres, lines and mu."
+                )
+            elements.append(product)
+    return tuple(elements)

@@ -1,0 +1,123 @@
+"""Isometries of R^d: p -> R p + t, with R orthogonal."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, TypeAlias, TypeVar, cast
+
+import numpy as np
+import torch
+from numpy.typing import ArrayLike, NDArray
+
+from orbiflow.errors import GroupError, NotAnIsometryError
+
+Array: TypeAlias = NDArray[Any]
+Points = TypeVar("Points", Array, torch.Tensor)
+
+TOLERANCE = 1e-9
+"""Largest deviation from orthogonality, or from a lattice vector, that is read as rounding."""
+
+
+def matching(array: Array, like: Points) -> Points:
+    """Return a float64 array as an array of the kind, dtype and device of `like`."""
+    if isinstance(like, torch.Tensor):
+        return torch.tensor(array, dtype=like.dtype, device=like.device)
+    return cast(Points, array)
+
+
+@dataclass(frozen=True, eq=False)
+class Isometry:
+    """The map p -> linear @ p + translation.
+
+    Args:
+        linear: (d, d) orthogonal matrix.
+        translation: (d,) vector, in the units of the points.
+
+    Raises:
+        NotAnIsometryError: if `linear` is not orthogonal within 1e-9 or the shapes disagree.
+
+    >>> quarter = Isometry(np.array([[0.0, -1.0], [1.0, 0.0]]), np.zeros(2))
+    >>> (quarter @ quarter)(np.array([1.0, 2.0])).tolist()
+    [-1.0, -2.0]
+    """
+
+    linear: Array
+    translation: Array
+
+    def __post_init__(self) -> None:
+        linear = np.array(self.linear, dtype=np.float64)
+        translation = np.array(self.translation, dtype=np.float64)
+        d = translation.size
+        if translation.shape != (d,) or d == 0 or linear.shape != (d, d):
+            raise NotAnIsometryError(
+                f"expected a (d, d) matrix and a (d,) translation, got shapes {linear.shape} "
+                f"and {translation.shape}"
+            )
+        if not (np.isfinite(linear).all() and np.isfinite(translation).all()):
+            raise NotAnIsometryError("the matrix or the translation has NaN or infinite entries")
+        deviation = np.abs(linear.T @ linear - np.eye(d)).max()
+        if deviation > TOLERANCE:
+            raise NotAnIsometryError(
+                f"the linear part is not orthogonal: R^T R differs from the identity by "
+                f"{deviation:.2e}; give a rotation or reflection matrix"
+            )
+        linear.setflags(write=False)
+        translation.setflags(write=False)
+        object.__setattr__(self, "linear", linear)
+        object.__setattr__(self, "translation", translation)
+
+    @property
+    def dim(self) -> int:
+        """Dimension d of the space."""
+        return self.translation.size
+
+    @property
+    def determinant(self) -> int:
+        """+1 for a direct isometry, -1 for one that reverses orientation."""
+        return 1 if np.linalg.det(self.linear) > 0 else -1
+
+    def __call__(self, points: Points) -> Points:
+        """Image of points, shape (..., d), NumPy or torch."""
+        linear, translation = (matching(a, points) for a in (self.linear, self.translation))
+        return points @ linear.T + translation
+
+    def push(self, vectors: Points) -> Points:
+        """Push-forward of tangent vectors, shape (..., d): the linear part alone."""
+        return vectors @ matching(self.linear, vectors).T
+
+    def __matmul__(self, other: Isometry) -> Isometry:
+        """Composition: `(g @ h)(p) == g(h(p))`."""
+        if not isinstance(other, Isometry):
+            return NotImplemented
+        if other.dim != self.dim:
+            raise GroupError(f"cannot compose isometries of R^{self.dim} and R^{other.dim}")
+        return Isometry(
+            self.linear @ other.linear, self.linear @ other.translation + self.translation
+        )
+
+    def inverse(self) -> Isometry:
+        """The isometry that undoes this one."""
+        return Isometry(self.linear.T, -self.linear.T @ self.translation)
+
+    def is_close(self, other: Isometry, tolerance: float = TOLERANCE) -> bool:
+        """Whether both parts agree within `tolerance`."""
+        return (
+            other.dim == self.dim
+            and bool(np.abs(self.linear - other.linear).max() <= tolerance)
+            and bool(np.abs(self.translation - other.translation).max() <= tolerance)
+        )
+
+    def __repr__(self) -> str:
+        linear, translation = self.linear.round(6) + 0.0, self.translation.round(6) + 0.0
+        return f"Isometry(linear={linear.tolist()}, translation={translation.tolist()})"
+
+
+def identity(dim: int) -> Isometry:
+    """The identity of R^dim."""
+    return Isometry(np.eye(dim), np.zeros(dim))
+
+
+def translation(vector: ArrayLike) -> Isometry:
+    """Translation by `vector`, shape (d,)."""
+    vector = np.asarray(vector, dtype=np.float64)
+    return Isometry(np.eye(vector.size), vector)
