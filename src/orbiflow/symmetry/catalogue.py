@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from orbiflow.errors import GroupError, NotAnIsometryError
-from orbiflow.symmetry.group import CrystallographicGroup
+from orbiflow.symmetry.group import CrystallographicGroup, checked_lattice
 from orbiflow.symmetry.isometry import Isometry
 from orbiflow.symmetry.plane import Line, rotation, transflection
 
@@ -79,6 +79,8 @@ def wallpaper_group(name: str, lattice: ArrayLike | None = None) -> Crystallogra
         )
     row = WALLPAPER_GROUPS[name]
     basis = np.asarray(LATTICES[row.system] if lattice is None else lattice, dtype=np.float64)
+    if checked_lattice(basis).shape != (2, 2):
+        raise GroupError(f"a wallpaper group needs a (2, 2) lattice, got shape {basis.shape}")
     inverse = np.linalg.inv(basis)
     try:
         generators = [

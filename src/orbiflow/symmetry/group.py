@@ -13,7 +13,8 @@ from orbiflow.errors import GroupError, LatticeMismatchError, NotDiscreteError
 from orbiflow.symmetry.isometry import TOLERANCE, Array, Isometry, Points, identity, matching
 
 
-def _checked_lattice(lattice: ArrayLike) -> Array:
+def checked_lattice(lattice: ArrayLike) -> Array:
+    """A read-only float64 copy of a lattice basis, refused with GroupError if degenerate."""
     basis = np.array(lattice, dtype=np.float64)
     if basis.ndim != 2 or basis.shape[0] != basis.shape[1] or basis.size == 0:
         raise GroupError(
@@ -67,7 +68,7 @@ class CrystallographicGroup:
         >>> CrystallographicGroup.generate(np.eye(2), [rotation((0.0, 0.0), 4)]).order
         4
         """
-        basis = _checked_lattice(lattice)
+        basis = checked_lattice(lattice)
         reduced = []
         for number, generator in enumerate(generators):
             _check_maps_lattice(basis, generator, number)
@@ -170,11 +171,17 @@ class CrystallographicGroup:
 
         Raises:
             NotAnIsometryError: if M G M^-1 is not made of isometries.
+            GroupError: if `linear` is singular or a shape is wrong.
         """
         m = np.asarray(linear, dtype=np.float64)
         v = np.zeros(self.dim) if offset is None else np.asarray(offset, dtype=np.float64)
+        if m.shape != self.lattice.shape or v.shape != (self.dim,):
+            raise GroupError(
+                f"expected a ({self.dim}, {self.dim}) matrix and a ({self.dim},) offset, got "
+                f"shapes {m.shape} and {v.shape}"
+            )
+        basis = checked_lattice(m @ self.lattice)
         inverse = np.linalg.inv(m)
-        basis = _checked_lattice(m @ self.lattice)
         cosets = []
         for g in self.cosets:
             rotated = m @ g.linear @ inverse
@@ -235,19 +242,34 @@ class _Seen:
 
 
 def _closure(basis: Array, generators: Sequence[Isometry], max_order: int) -> tuple[Isometry, ...]:
+    elements = _finite_closure(basis, generators, max_order)
+    if elements is not None:
+        return elements
+    number = len(generators) - 1
+    for i in range(number):
+        if _finite_closure(basis, generators[: i + 1], max_order) is None:
+            number = i
+            break
+    raise NotDiscreteError(
+        f"the closure modulo the lattice has more than {max_order} elements; generator {number}, "
+        f"{generators[number]!r}, is the first that makes it so together with those before it. "
+        "With this lattice they do not make a discrete group: check centres, lines and mu."
+    )
+
+
+def _finite_closure(
+    basis: Array, generators: Sequence[Isometry], max_order: int
+) -> tuple[Isometry, ...] | None:
+    """All products modulo the lattice, breadth first, or None if there are over `max_order`."""
     elements = [identity(basis.shape[0])]
     seen = _Seen(basis)
     seen.add(elements[0])
     for element in elements:  # grows while it is walked
-        for number, generator in enumerate(generators):
+        for generator in generators:
             product = _reduce_translation(basis, generator @ element)
             if not seen.add(product):
                 continue
             if len(elements) >= max_order:
-                raise NotDiscreteError(
-                    f"the closure modulo the lattice has more than {max_order} elements; generator "
-                    f"{number}, {generator!r}, was the last to add one. With this lattice the "
-                    "generators do not make a discrete group: check centres, lines and mu."
-                )
+                return None
             elements.append(product)
     return tuple(elements)

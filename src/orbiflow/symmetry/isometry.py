@@ -19,8 +19,14 @@ TOLERANCE = 1e-9
 
 
 def matching(array: Array, like: Points) -> Points:
-    """Return a float64 array as an array of the kind, dtype and device of `like`."""
+    """A float64 array as it is for NumPy, as a tensor of the dtype and device of `like` for torch.
+
+    Raises:
+        GroupError: for an integer tensor, in which a rotation would be truncated.
+    """
     if isinstance(like, torch.Tensor):
+        if not like.is_floating_point():
+            raise GroupError(f"expected points of a floating-point dtype, got {like.dtype}")
         return torch.tensor(array, dtype=like.dtype, device=like.device)
     return cast(Points, array)
 

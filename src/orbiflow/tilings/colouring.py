@@ -1,0 +1,132 @@
+"""Colourings in which tiles that share an edge differ: periodic, with few colours."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orbiflow.symmetry import Isometry
+from orbiflow.tilings.graph_colouring import Graph, colour_graph
+from orbiflow.tilings.neighbours import neighbours
+from orbiflow.tilings.patch import Cell, coset_and_cell
+from orbiflow.tilings.tile import Tile
+
+Sublattice: TypeAlias = tuple[int, int, int]
+"""(a, b, c): spanned by a B_1 and b B_1 + c B_2, with 0 <= b < a; its index is a c."""
+
+_MAX_INDEX = 9
+
+
+@dataclass(frozen=True, eq=False)
+class Colouring:
+    """A colour for each tile g(T), the same for tiles that differ by a vector of a sublattice.
+
+    Args:
+        tile: the tile at the identity.
+        count: number of colours.
+        sublattice: in Hermite normal form, over the basis of the group's lattice.
+        table: (order, a, c) colour by coset and by cell modulo the sublattice.
+    """
+
+    tile: Tile
+    count: int
+    sublattice: Sublattice
+    table: NDArray[np.int64]
+
+    def colour(self, element: Isometry) -> int:
+        """Colour, 0 ... count - 1, of the tile element(T).
+
+        Raises:
+            OrbiflowError: for an isometry that is not in the tile's group.
+        """
+        coset, cell = coset_and_cell(self.tile, element)
+        first, second = reduce_cell(cell, self.sublattice)
+        return int(self.table[coset, first, second])
+
+
+def colouring(tile: Tile) -> Colouring:
+    """A proper colouring with the fewest colours that a small sublattice allows; deterministic.
+
+    Exact search on the quotient of the tiling by each sublattice of index up to 9, for 1, 2, 3 ...
+    colours in turn; among equals the smallest index, so that colours follow the aspects where they
+    can. Colour 0 is the most frequent, and so on down. Never fails: extremely skew lattices, whose
+    tiles meet their own translates modulo all those sublattices, get a larger one.
+
+    Raises:
+        OrbiflowError: if polygon and group are of very different size.
+
+    >>> from orbiflow.tilings.classes import isohedral_class
+    >>> hexagons = isohedral_class("IH1")
+    >>> colouring(Tile(hexagons.template(), hexagons.group())).count
+    3
+    """
+    links = _links(tile)
+    graphs = _loop_free_quotients(links)
+    most = max(len(near) for _, graph in graphs for near in graph) + 1
+    for count in range(1, most + 1):
+        for sublattice, graph in graphs:
+            colours = colour_graph(graph, count)
+            if colours is not None:
+                shape = (tile.group.order, sublattice[0], sublattice[2])
+                table = _most_frequent_first(np.array(colours)).reshape(shape)
+                return Colouring(tile, count, sublattice, table)
+    raise RuntimeError("unreachable: maximal degree + 1 colours always suffice")
+
+
+def reduce_cell(cell: Cell, sublattice: Sublattice) -> Cell:
+    """Representative (0 <= m < a, 0 <= n < c) of lattice coordinates modulo the sublattice."""
+    a, b, c = sublattice
+    wraps, second = divmod(cell[1], c)
+    return (cell[0] - wraps * b) % a, second
+
+
+_Links: TypeAlias = list[list[tuple[int, Cell]]]
+
+
+def _links(tile: Tile) -> _Links:
+    """Per coset i: (coset, offset) of the neighbours of the tile of coset i in cell (0, 0)."""
+    shared = neighbours(tile).edge
+    return [[coset_and_cell(tile, g @ element) for element in shared] for g in tile.group.cosets]
+
+
+def _loop_free_quotients(links: _Links) -> list[tuple[Sublattice, Graph]]:
+    sublattices = [h for index in range(1, _MAX_INDEX + 1) for h in _sublattices(index)]
+    size = _MAX_INDEX
+    while True:
+        graphs = [(h, _quotient(links, h)) for h in sublattices]
+        usable = [(h, g) for h, g in graphs if all(i not in near for i, near in enumerate(g))]
+        if usable:
+            return usable
+        size *= 2
+        sublattices = [(size, 0, size)]
+
+
+def _sublattices(index: int) -> Iterator[Sublattice]:
+    # square-like ones first, so that a tie does not go to a long thin period
+    divisors = [a for a in range(1, index + 1) if index % a == 0]
+    for a in sorted(divisors, key=lambda a: abs(a * a - index)):
+        for b in range(a):
+            yield a, b, index // a
+
+
+def _quotient(links: _Links, sublattice: Sublattice) -> Graph:
+    """Adjacency of tiles modulo the sublattice; node (i, m, n) is number (i a + m) c + n."""
+    a, _, c = sublattice
+    graph: Graph = []
+    for near in links:
+        for m in range(a):
+            for n in range(c):
+                cells = [(k, reduce_cell((m + u, n + v), sublattice)) for k, (u, v) in near]
+                graph.append({(k * a + p) * c + q for k, (p, q) in cells})
+    return graph
+
+
+def _most_frequent_first(colours: NDArray[np.int64]) -> NDArray[np.int64]:
+    order: Sequence[int] = np.argsort(-np.bincount(colours), kind="stable").tolist()
+    rank = np.empty(len(order), dtype=np.int64)
+    rank[order] = np.arange(len(order))
+    return rank[colours]

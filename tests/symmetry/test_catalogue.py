@@ -1,0 +1,148 @@
+"""The tables of wallpaper groups and identification spaces."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from orbiflow.errors import GroupError
+from orbiflow.symmetry import (
+    IDENTIFICATION_SPACES,
+    LATTICES,
+    WALLPAPER_GROUPS,
+    Line,
+    identification_group,
+    rotation,
+    transflection,
+    wallpaper_group,
+)
+from strategies import lattices
+
+# counted by hand from the diagrams of the International Tables: largest rotation, then whether the
+# point group holds a reflection, and whether some mirror line exists (pg and pgg only glide)
+POINT_GROUPS = {
+    "p1": (1, False, False),
+    "p2": (2, False, False),
+    "pm": (1, True, True),
+    "pg": (1, True, False),
+    "cm": (1, True, True),
+    "pmm": (2, True, True),
+    "pmg": (2, True, True),
+    "pgg": (2, True, False),
+    "cmm": (2, True, True),
+    "p4": (4, False, False),
+    "p4m": (4, True, True),
+    "p4g": (4, True, True),
+    "p3": (3, False, False),
+    "p3m1": (3, True, True),
+    "p31m": (3, True, True),
+    "p6": (6, False, False),
+    "p6m": (6, True, True),
+}
+
+
+def mirror_exists(group):
+    """Whether some element reverses orientation and has no glide component modulo the lattice."""
+    for g in group.elements_near(group.lattice.sum(axis=1) / 2, 3 * np.abs(group.lattice).sum()):
+        if g.determinant == -1 and np.allclose((g @ g).translation, 0, atol=1e-9):
+            return True
+    return False
+
+
+def test_there_are_seventeen():
+    assert set(POINT_GROUPS) == set(WALLPAPER_GROUPS)
+    assert len(WALLPAPER_GROUPS) == 17
+
+
+@pytest.mark.parametrize("name", WALLPAPER_GROUPS)
+def test_order_is_that_of_the_point_group(name):
+    largest, reflects, _ = POINT_GROUPS[name]
+    assert WALLPAPER_GROUPS[name].order == largest * (2 if reflects else 1)
+
+
+@given(st.data(), st.sampled_from(sorted(WALLPAPER_GROUPS)))
+def test_order_is_that_of_the_table_on_any_lattice(data, name):
+    row = WALLPAPER_GROUPS[name]
+    group = wallpaper_group(name, data.draw(lattices(row.system)))
+    assert group.order == row.order
+    assert group.name == name
+
+
+@pytest.mark.parametrize("name", WALLPAPER_GROUPS)
+def test_rotations_and_mirrors_are_those_of_the_diagrams(name):
+    largest, reflects, mirrors = POINT_GROUPS[name]
+    group = wallpaper_group(name)
+    assert sum(g.determinant == 1 for g in group.cosets) == largest
+    assert any(g.determinant == -1 for g in group.cosets) == reflects
+    assert mirror_exists(group) == mirrors
+
+
+def centres_off_mirrors(name):
+    """Whether some 3-fold or 4-fold centre of the group lies on no mirror."""
+    group = wallpaper_group(name)
+    near = group.elements_near(np.zeros(2), 2.5)
+    mirrors = [g for g in near if g.determinant == -1 and np.allclose((g @ g).translation, 0)]
+    for g in near:
+        if g.determinant == 1 and abs(np.trace(g.linear) - (-1 if "3" in name else 0)) < 1e-9:
+            centre = np.linalg.solve(np.eye(2) - g.linear, g.translation)
+            if np.linalg.norm(centre) < 1 and not any(
+                np.allclose(m(centre), centre, atol=1e-9) for m in mirrors
+            ):
+                return True
+    return False
+
+
+@pytest.mark.parametrize(
+    ("name", "off"), [("p3m1", False), ("p31m", True), ("p4m", False), ("p4g", True)]
+)
+def test_look_alikes_differ_by_their_centres(name, off):
+    assert centres_off_mirrors(name) == off
+
+
+@pytest.mark.parametrize("system", LATTICES)
+def test_default_lattices_are_not_degenerate(system):
+    assert abs(np.linalg.det(LATTICES[system])) > 0.5
+
+
+@pytest.mark.parametrize(
+    ("name", "system"),
+    [("p4", "rectangular"), ("p3", "square"), ("pm", "oblique"), ("cm", "rectangular")],
+)
+def test_a_lattice_of_another_system_is_refused(name, system):
+    with pytest.raises(GroupError, match=f"{name} needs a"):
+        wallpaper_group(name, LATTICES[system])
+
+
+@pytest.mark.parametrize("lattice", [np.ones((2, 2)), np.eye(3), np.zeros(2)])
+def test_lattices_that_are_none_are_refused(lattice):
+    with pytest.raises(GroupError, match="lattice"):
+        wallpaper_group("p2", lattice)
+
+
+def test_unknown_names_are_refused_with_the_known_ones():
+    with pytest.raises(GroupError, match="unknown wallpaper group 'p5'; the 17 are p1, "):
+        wallpaper_group("p5")
+    with pytest.raises(GroupError, match="unknown space 'cube'; the four are torus"):
+        identification_group("cube")
+
+
+def test_the_identification_spaces_are_those_of_the_paper():
+    generators = {
+        "torus": [],
+        "sphere": [rotation((1.0, 1.0), 4), rotation((0.0, 0.0), 4)],
+        "klein-bottle": [transflection(Line((0.5, 0.0), (0.0, 1.0)), 1.0)],
+        "projective-plane": [
+            transflection(Line((0.0, 0.5), (1.0, 0.0)), 1.0),
+            transflection(Line((0.5, 0.0), (0.0, 1.0)), 1.0),
+        ],
+    }
+    assert set(generators) == set(IDENTIFICATION_SPACES)
+    for space, expected in generators.items():
+        assert all(identification_group(space).contains(g) for g in expected)
+
+
+@pytest.mark.parametrize("space", IDENTIFICATION_SPACES)
+def test_the_canonical_square_is_a_fundamental_domain_by_area(space):
+    group = identification_group(space)
+    assert group.cell_volume / group.order == pytest.approx(1.0, abs=1e-15)
+    assert group.name == IDENTIFICATION_SPACES[space].group

@@ -1,0 +1,296 @@
+"""Crystallographic groups: closure, membership, cells, images, conjugation, refusals."""
+
+import itertools
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from orbiflow.errors import GroupError, LatticeMismatchError, NotAnIsometryError, NotDiscreteError
+from orbiflow.symmetry import (
+    CrystallographicGroup,
+    Isometry,
+    Line,
+    identity,
+    rotation,
+    rotation_matrix,
+    transflection,
+    translation,
+    wallpaper_group,
+)
+from strategies import (
+    SPACE_GROUPS,
+    angles,
+    elements,
+    fractional_group,
+    groups,
+    lattices,
+    plane_groups,
+    random_orthogonal,
+    random_points,
+    seeds,
+    space_group,
+)
+
+
+def fractional(group, vectors):
+    return vectors @ np.linalg.inv(group.lattice).T
+
+
+def is_lattice_vector(group, vectors, tolerance=1e-9):
+    steps = fractional(group, vectors)
+    return np.abs(steps - np.round(steps)).max(initial=0.0) <= tolerance
+
+
+@given(groups)
+def test_products_and_inverses_of_cosets_are_contained(group):
+    for g, h in itertools.product(group.cosets, repeat=2):
+        assert group.contains(g @ h)
+        assert group.contains(g.inverse())
+
+
+@pytest.mark.parametrize("name", SPACE_GROUPS)
+def test_space_groups_have_the_order_of_the_international_tables(name):
+    assert space_group(name, seed=1).order == SPACE_GROUPS[name][1]
+
+
+def test_the_largest_space_group_is_closed():
+    group = space_group("Fm-3m", seed=2)
+    rng = np.random.default_rng(0)
+    for i, j in rng.integers(0, group.order, (300, 2)):
+        assert group.contains(group.cosets[i] @ group.cosets[j].inverse())
+
+
+@given(groups)
+def test_cosets_are_distinct_modulo_the_lattice(group):
+    for g, h in itertools.combinations(group.cosets, 2):
+        difference = g.inverse() @ h
+        same = np.allclose(difference.linear, np.eye(group.dim), atol=1e-9)
+        assert not (same and is_lattice_vector(group, difference.translation, 1e-6))
+
+
+@given(groups)
+def test_the_identity_comes_first_and_translations_lie_in_the_cell(group):
+    assert group.cosets[0].is_close(identity(group.dim), 0.0)
+    steps = fractional(group, group.translations)
+    assert steps.min() >= -1e-12
+    assert steps.max() < 1 - 1e-9
+
+
+@given(st.data())
+def test_a_group_does_not_depend_on_the_order_of_its_generators(data):
+    group = data.draw(groups)
+    generators = data.draw(st.permutations(group.cosets))
+    again = CrystallographicGroup.generate(group.lattice, generators)
+    assert again.order == group.order
+    assert all(group.contains(g) for g in again.cosets)
+
+
+@given(st.data())
+def test_every_product_with_a_lattice_translation_is_contained(data):
+    group = data.draw(groups)
+    assert group.contains(data.draw(elements(group)))
+
+
+@given(st.data(), st.floats(1e-3, 0.05))
+def test_elements_moved_off_the_lattice_are_not_contained(data, amount):
+    group = data.draw(groups)
+    g = data.draw(elements(group))
+    off = translation(group.lattice @ np.full(group.dim, amount)) @ g
+    assert not group.contains(off)
+
+
+def test_isometries_of_another_dimension_are_not_contained():
+    assert not wallpaper_group("p1").contains(identity(3))
+
+
+@given(groups, seeds)
+def test_wrap_lands_in_the_cell(group, seed):
+    steps = fractional(group, group.wrap(random_points(seed, 3, 4, group.dim, size=20.0)))
+    assert steps.min() >= -1e-12
+    assert steps.max() < 1 + 1e-12
+
+
+@given(groups, seeds)
+def test_wrap_moves_by_lattice_vectors(group, seed):
+    p = random_points(seed, 3, 4, group.dim, size=20.0)
+    assert is_lattice_vector(group, group.wrap(p) - p, 1e-12)
+
+
+@given(groups, seeds, st.sampled_from([(torch.float64, 1e-12), (torch.float32, 1e-5)]))
+def test_wrap_agrees_for_torch(group, seed, kind):
+    dtype, tolerance = kind
+    p = random_points(seed, 5, group.dim)
+    difference = group.wrap(torch.tensor(p, dtype=dtype)).numpy() - group.wrap(p)
+    assert is_lattice_vector(group, difference, tolerance)
+
+
+def test_wrap_has_the_identity_as_derivative():
+    p = torch.tensor([[3.3, -2.7]], dtype=torch.float64, requires_grad=True)
+    wallpaper_group("p6").wrap(p).sum().backward()
+    assert p.grad is not None
+    assert p.grad.tolist() == [[1.0, 1.0]]
+
+
+@given(groups, seeds)
+def test_images_are_those_of_the_coset_representatives(group, seed):
+    p = random_points(seed, 2, 3, group.dim)
+    expected = np.stack([g(p) for g in group.cosets])
+    np.testing.assert_allclose(group.images(p), expected, atol=1e-13)
+    np.testing.assert_allclose(group.images(torch.tensor(p)).numpy(), expected, atol=1e-13)
+
+
+@settings(max_examples=20)
+@given(plane_groups, seeds, st.floats(0.0, 3.0))
+def test_elements_near_are_those_of_a_brute_force_search(group, seed, radius):
+    center, source = random_points(seed, 2, 2)
+    found = group.elements_near(center, radius, source=source)
+    expected = []
+    for coset in group.cosets:
+        # the window holds every translate within reach: the shortest height of the cell bounds it
+        heights = 1 / np.linalg.norm(np.linalg.inv(group.lattice), axis=1)
+        reach = int(np.ceil((radius + np.linalg.norm(coset(source) - center)) / heights.min()))
+        axis = range(-reach, reach + 1)
+        for step in itertools.product(axis, repeat=2):
+            image = coset(source) + group.lattice @ np.array(step, dtype=float)
+            if np.linalg.norm(image - center) <= radius:
+                expected.append(translation(group.lattice @ np.array(step, dtype=float)) @ coset)
+    key = [tuple(np.round([*g.linear.ravel(), *g.translation], 6) + 0.0) for g in found]
+    assert len(set(key)) == len(found) == len(expected)
+    assert all(any(g.is_close(h) for h in found) for g in expected)
+
+
+@given(st.data(), seeds)
+def test_elements_near_come_nearest_first(data, seed):
+    group = data.draw(groups)
+    center = random_points(seed, group.dim)
+    size = group.cell_volume ** (1 / group.dim)
+    found = group.elements_near(center, 1.5 * size)
+    distances = [np.linalg.norm(g(center) - center) for g in found]
+    assert found[0].is_close(identity(group.dim))
+    assert distances == sorted(distances) or np.diff(distances).min() > -1e-12
+
+
+@given(st.data(), angles, st.floats(0.3, 3), seeds)
+def test_conjugating_by_a_similarity_carries_elements_along(data, angle, scale, seed):
+    group = data.draw(plane_groups)
+    m, v = scale * rotation_matrix(angle), random_points(seed, 2)
+    moved = group.conjugate(m, v)
+    g = data.draw(elements(group))
+    carried = Isometry(m @ g.linear @ np.linalg.inv(m), m @ g.translation + v)
+    carried = Isometry(carried.linear, carried.translation - carried.linear @ v)
+    assert moved.contains(carried, 1e-8)
+    assert moved.order == group.order
+    assert moved.cell_volume == pytest.approx(scale**2 * group.cell_volume, rel=1e-12)
+
+
+@given(seeds, seeds)
+def test_conjugation_works_in_three_dimensions(seed, other):
+    group = space_group("P2_1/c", seed)
+    rng = np.random.default_rng(other)
+    m, v = random_orthogonal(rng, 3), rng.normal(size=3)
+    moved = group.conjugate(m, v)
+    p = rng.normal(size=3)
+    for g in group.cosets:
+        h = Isometry(m @ g.linear @ m.T, m @ g.translation + v - m @ g.linear @ m.T @ v)
+        assert moved.contains(h, 1e-8)
+        np.testing.assert_allclose(h(m @ p + v), m @ g(p) + v, atol=1e-12)
+
+
+@given(lattices("oblique"), st.floats(0.2, 3), st.floats(-1, 1))
+def test_any_linear_map_conjugates_p2_to_p2(lattice, stretch, shear):
+    moved = wallpaper_group("p2", lattice).conjugate([[stretch, shear], [0.0, 1.0]])
+    assert moved.order == 2
+    np.testing.assert_allclose(moved.lattice, np.array([[stretch, shear], [0, 1.0]]) @ lattice)
+
+
+@pytest.mark.parametrize("name", ["p3", "p4", "p6", "p4m", "pmm"])
+def test_a_shear_does_not_normalise_a_group_with_more_than_half_turns(name):
+    with pytest.raises(NotAnIsometryError, match="not orthogonal"):
+        wallpaper_group(name).conjugate([[1.0, 0.3], [0.0, 1.0]])
+
+
+def test_a_singular_conjugation_is_refused():
+    with pytest.raises(GroupError, match="linearly dependent"):
+        wallpaper_group("p1").conjugate(np.ones((2, 2)))
+
+
+@pytest.mark.parametrize(("linear", "offset"), [(np.eye(3), None), (np.eye(2), np.zeros(3))])
+def test_a_conjugation_of_another_dimension_is_refused(linear, offset):
+    with pytest.raises(GroupError, match=r"expected a \(2, 2\) matrix"):
+        wallpaper_group("p1").conjugate(linear, offset)
+
+
+def test_a_five_fold_rotation_is_refused_by_number():
+    half_turn = rotation((0.0, 0.0), 2)
+    with pytest.raises(LatticeMismatchError, match=r"generator 1, .*does not map the lattice"):
+        CrystallographicGroup.generate(np.eye(2), [half_turn, rotation((0.0, 0.0), 5)])
+
+
+@given(lattices("square"), st.floats(0.05, 0.7))
+def test_a_mirror_askew_to_the_lattice_is_refused(lattice, angle):
+    direction = rotation_matrix(angle) @ lattice[:, 0]
+    with pytest.raises(LatticeMismatchError, match="generator 0"):
+        CrystallographicGroup.generate(lattice, [transflection(Line((0, 0), direction), 0.0)])
+
+
+@pytest.mark.parametrize("number", [0, 1, 2])
+def test_an_irrational_glide_is_refused_by_number(number):
+    generators = [transflection(Line((0.0, 0.0), (0.0, 1.0)), 0.0), rotation((0.0, 0.0), 2)]
+    generators.insert(number, transflection(Line((0.0, 0.0), (1.0, 0.0)), np.sqrt(2)))
+    with pytest.raises(NotDiscreteError, match=f"more than 500 elements; generator {number}, "):
+        CrystallographicGroup.generate(np.eye(2), generators, max_order=500)
+
+
+def test_two_centres_at_an_irrational_distance_are_refused():
+    centres = [(0.0, 0.0), (np.sqrt(2) / 3, 0.0)]
+    with pytest.raises(NotDiscreteError, match="generator 1, "):
+        CrystallographicGroup.generate(np.eye(2), [rotation(c, 2) for c in centres], max_order=100)
+
+
+@given(st.integers(2, 12))
+def test_a_glide_by_a_fraction_of_the_lattice_multiplies_the_order(parts):
+    glide = transflection(Line((0.0, 0.3), (1.0, 0.0)), 1.0 / parts)
+    order = CrystallographicGroup.generate(np.eye(2), [glide]).order
+    assert order == (parts if parts % 2 == 0 else 2 * parts)
+
+
+@pytest.mark.parametrize(
+    ("lattice", "match"),
+    [
+        ([[1.0, 2.0], [1.0, 2.0]], "linearly dependent"),
+        ([[1.0, 1.0], [0.0, 1e-8]], "linearly dependent"),
+        ([[1.0, 0.0], [0.0, 0.0]], "zero"),
+        ([[1.0, np.nan], [0.0, 1.0]], "zero, NaN or infinite"),
+        ([[1.0, 0.0]], r"\(d, d\) matrix"),
+        ([1.0, 1.0], r"\(d, d\) matrix"),
+        (np.zeros((0, 0)), r"\(d, d\) matrix"),
+    ],
+)
+def test_degenerate_lattices_are_refused(lattice, match):
+    with pytest.raises(GroupError, match=match):
+        CrystallographicGroup.generate(lattice)
+
+
+def test_generators_of_another_dimension_are_refused():
+    with pytest.raises(GroupError, match=r"generator 0 acts on R\^3, the lattice lives in R\^2"):
+        CrystallographicGroup.generate(np.eye(2), [identity(3)])
+
+
+def test_a_lattice_is_kept_apart_from_the_callers_array():
+    lattice = np.eye(2)
+    group = CrystallographicGroup.generate(lattice)
+    lattice[0, 0] = 7.0
+    assert group.cell_volume == 1.0
+    with pytest.raises(ValueError, match="read-only"):
+        group.lattice[0, 0] = 7.0
+
+
+def test_a_screw_axis_closes_after_its_number_of_turns():
+    group = fractional_group(
+        np.diag([1.0, 1.0, 4.0]), [([[0, -1, 0], [1, 0, 0], [0, 0, 1]], (0, 0, 0.25))], "P4_1"
+    )
+    heights = sorted(group.translations[:, 2].round(12).tolist())
+    assert heights == [0.0, 1.0, 2.0, 3.0]

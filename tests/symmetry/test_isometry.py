@@ -1,0 +1,125 @@
+"""Isometries of R^d as a group acting on points and vectors."""
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import given
+from hypothesis import strategies as st
+
+from orbiflow.errors import GroupError, NotAnIsometryError
+from orbiflow.symmetry import Isometry, identity, translation
+from strategies import isometries, random_points, seeds
+
+dims = st.sampled_from((1, 2, 3, 5))
+triples = dims.flatmap(lambda d: st.tuples(isometries(d), isometries(d), isometries(d)))
+single = dims.flatmap(isometries)
+
+
+@given(triples)
+def test_composition_is_associative(three):
+    f, g, h = three
+    assert ((f @ g) @ h).is_close(f @ (g @ h), 1e-13)
+
+
+@given(triples, seeds)
+def test_a_product_acts_as_one_map_after_the_other(three, seed):
+    f, g, _ = three
+    p = random_points(seed, 4, 3, f.dim)
+    np.testing.assert_allclose((f @ g)(p), f(g(p)), atol=1e-13)
+
+
+@given(single)
+def test_inverse_undoes_from_either_side(g):
+    assert (g.inverse() @ g).is_close(identity(g.dim), 1e-13)
+    assert (g @ g.inverse()).is_close(identity(g.dim), 1e-13)
+
+
+@given(triples)
+def test_determinant_is_multiplicative(three):
+    f, g, _ = three
+    assert (f @ g).determinant == f.determinant * g.determinant
+
+
+@given(single, seeds)
+def test_push_is_the_difference_of_two_images(g, seed):
+    p, v = random_points(seed, 2, 6, g.dim)
+    np.testing.assert_allclose(g.push(v), g(p + v) - g(p), atol=1e-13)
+
+
+@given(single, seeds)
+def test_distances_are_kept(g, seed):
+    p, q = random_points(seed, 2, 6, g.dim)
+    np.testing.assert_allclose(
+        np.linalg.norm(g(p) - g(q), axis=-1), np.linalg.norm(p - q, axis=-1), rtol=1e-13
+    )
+
+
+@given(single, seeds, st.sampled_from([(torch.float64, 1e-14), (torch.float32, 5e-6)]))
+def test_torch_and_numpy_agree(g, seed, kind):
+    dtype, tolerance = kind
+    p = random_points(seed, 5, g.dim)
+    moved, pushed = g(torch.tensor(p, dtype=dtype)), g.push(torch.tensor(p, dtype=dtype))
+    assert moved.dtype == pushed.dtype == dtype
+    np.testing.assert_allclose(moved.numpy(), g(p), atol=tolerance)
+    np.testing.assert_allclose(pushed.numpy(), g.push(p), atol=tolerance)
+
+
+def test_gradients_pass_through_the_action():
+    g = Isometry(np.array([[0.0, -1.0], [1.0, 0.0]]), np.ones(2))
+    p = torch.zeros(2, dtype=torch.float64, requires_grad=True)
+    g(p)[0].backward()
+    assert p.grad is not None
+    assert p.grad.tolist() == [0.0, -1.0]
+
+
+@given(st.lists(st.floats(-5, 5), min_size=1, max_size=4))
+def test_translation_adds_its_vector(vector):
+    g = translation(vector)
+    assert g(np.zeros(len(vector))).tolist() == vector
+    assert g.push(np.ones(len(vector))).tolist() == [1.0] * len(vector)
+
+
+def test_parts_cannot_be_changed_from_outside():
+    linear = np.eye(2)
+    g = Isometry(linear, np.zeros(2))
+    linear[0, 0] = 5.0
+    assert g.linear[0, 0] == 1.0
+    with pytest.raises(ValueError, match="read-only"):
+        g.translation[0] = 1.0
+
+
+@given(single, st.floats(1e-7, 1.0))
+def test_a_stretch_is_refused(g, amount):
+    with pytest.raises(NotAnIsometryError, match="not orthogonal"):
+        Isometry(g.linear * (1 + amount), g.translation)
+
+
+@pytest.mark.parametrize(
+    ("linear", "shift"),
+    [
+        (np.eye(2), np.zeros(3)),
+        (np.eye(3)[:2], np.zeros(2)),
+        (np.eye(2), np.zeros((2, 1))),
+        (np.zeros((0, 0)), np.zeros(0)),
+    ],
+)
+def test_shapes_that_disagree_are_refused(linear, shift):
+    with pytest.raises(NotAnIsometryError, match="shapes"):
+        Isometry(linear, shift)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_entries_that_are_not_finite_are_refused(bad):
+    with pytest.raises(NotAnIsometryError, match="NaN or infinite"):
+        Isometry(np.eye(2), np.array([0.0, bad]))
+
+
+def test_dimensions_do_not_mix():
+    with pytest.raises(GroupError, match="R\\^2 and R\\^3"):
+        _ = identity(2) @ identity(3)
+    assert not identity(2).is_close(identity(3))
+
+
+def test_integer_tensors_are_refused_rather_than_truncated():
+    with pytest.raises(GroupError, match="floating-point"):
+        identity(2)(torch.tensor([1, 2]))
