@@ -15,14 +15,21 @@ def jacobian(field: VectorField, points: Tensor) -> Tensor:
     closed = getattr(field, "jacobian", None)
     if closed is not None:
         return closed(points)
+    # the result is differentiable if the values are: in the points or in anything the field holds
+    keep = torch.is_grad_enabled() and (points.requires_grad or field(points).requires_grad)
     with torch.enable_grad():
-        keep = torch.is_grad_enabled() and (points.requires_grad or _has_parameters(field))
         inputs = points if points.requires_grad else points.detach().requires_grad_()
         values = field(inputs)
+        if not values.requires_grad:  # a constant field
+            return points.new_zeros(*points.shape, points.shape[-1])
         rows = [
-            torch.autograd.grad(values[..., i].sum(), inputs, create_graph=keep, retain_graph=True)[
-                0
-            ]
+            torch.autograd.grad(
+                values[..., i].sum(),
+                inputs,
+                create_graph=keep,
+                retain_graph=True,
+                materialize_grads=True,
+            )[0]
             for i in range(points.shape[-1])
         ]
     return torch.stack(rows, dim=-2)
@@ -42,7 +49,3 @@ def with_divergence(field: VectorField) -> Callable[[Tensor], tuple[Tensor, Tens
     if joint is not None:
         return joint()
     return lambda points: (field(points), divergence(field, points))
-
-
-def _has_parameters(field: VectorField) -> bool:
-    return isinstance(field, torch.nn.Module) and any(p.requires_grad for p in field.parameters())

@@ -60,23 +60,39 @@ class FourierField(nn.Module):
     ) -> None:
         super().__init__()
         self.group = group
-        self.max_frequency = max_frequency
         self.smoothness = smoothness
         self.basis: InvariantBasis = invariant_basis(group, max_frequency)
+        self.max_frequency = int(max_frequency)
         self.size = self.basis.size
         shape = (self.size,) if batch is None else (batch, self.size)
         self.parameters_ = nn.Parameter(torch.zeros(shape, dtype=dtype, device=device))
-        self._orders = tuple(np.abs(self.basis.frequencies).max(axis=0).tolist())
-        rows, columns, values = tensor_layout(self.basis, self._orders)
-        self._buffer("rows", torch.from_numpy(rows).to(device))
-        self._buffer("columns", torch.from_numpy(columns).to(device))
-        self._buffer("values", torch.as_tensor(values, dtype=dtype, device=device))
-        self._buffer("frame", torch.as_tensor(group.inverse_lattice, dtype=dtype, device=device))
-        weights = self.sobolev_weights(smoothness)
-        self._buffer("scale", torch.as_tensor(weights, dtype=dtype, device=device))
+        self._orders: tuple[int, ...] = tuple(np.abs(self.basis.frequencies).max(axis=0).tolist())
+        self._fill_buffers()
 
-    def _buffer(self, name: str, value: Tensor) -> None:
-        self.register_buffer(name, value, persistent=False)
+    def _fill_buffers(self) -> None:
+        dtype, device = self.parameters_.dtype, self.parameters_.device
+        rows, columns, values = tensor_layout(self.basis, self._orders)
+        scale = self.sobolev_weights(self.smoothness)
+        for name, index in (("rows", rows), ("columns", columns)):
+            self.register_buffer(name, torch.tensor(index, device=device), persistent=False)
+        for name, real in (
+            ("values", values),
+            ("frame", self.group.inverse_lattice),
+            ("scale", scale),
+        ):
+            tensor = torch.tensor(real, dtype=dtype, device=device)
+            self.register_buffer(name, tensor, persistent=False)
+
+    def _apply(self, fn: Callable[[Tensor], Tensor], recurse: bool = True) -> FourierField:
+        # a float32 field made float64 must be as symmetric as one born in float64
+        super()._apply(fn, recurse)
+        self._fill_buffers()
+        return self
+
+    @staticmethod
+    def _stacked(parameters: Tensor) -> Tensor:
+        # not reshape(-1, P): P is 0 for Omega = 0 and a group without invariant vectors
+        return parameters if parameters.dim() == 2 else parameters.unsqueeze(0)
 
     def sobolev_weights(self, smoothness: float) -> np.ndarray:
         """(P,) factors (1 + |kappa|^2 vol^(2/d))^(-smoothness / 2), free of the unit of length."""
@@ -85,7 +101,7 @@ class FourierField(nn.Module):
 
     def weights(self) -> Tensor:
         """Fourier weights in the tensor basis of `series`: (S, d, A_1, ..., A_d), S = 1 if single."""
-        flat = self.parameters_.reshape(-1, self.size) * self.scale
+        flat = self._stacked(self.parameters_) * self.scale
         shape = (self.group.dim, *(2 * k + 1 for k in self._orders))
         weights = flat.new_zeros(flat.shape[0], math.prod(shape))
         weights = weights.index_add(1, self.rows, flat[:, self.columns] * self.values)
@@ -130,7 +146,7 @@ class FourierField(nn.Module):
         Shape () or (S,). Rigorous but pessimistic; a step h with h * bound < log 2 keeps every
         explicit Runge-Kutta step of order up to 4 injective (design point 5).
         """
-        flat = self.parameters_.detach().reshape(-1, self.size) * self.scale
+        flat = self._stacked(self.parameters_.detach()) * self.scale
         d = self.group.dim
         count = len(self.basis.frequencies)
         z = flat.new_zeros(flat.shape[0], 2 * d * count)

@@ -51,7 +51,8 @@ def frequency_set(group: CrystallographicGroup, max_frequency: int) -> Array:
     """
     if isinstance(max_frequency, bool) or int(max_frequency) != max_frequency or max_frequency < 0:
         raise OrbiflowError(f"max_frequency must be an integer >= 0, got {max_frequency!r}")
-    side = 2 * int(max_frequency) + 1
+    max_frequency = int(max_frequency)
+    side = 2 * max_frequency + 1
     if side**group.dim * group.dim > MAX_COEFFICIENTS:
         raise OrbiflowError(
             f"max_frequency {max_frequency} in {group.dim} dimensions needs "

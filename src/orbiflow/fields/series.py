@@ -111,8 +111,11 @@ class _Series(torch.autograd.Function):
         (grad,) = grads
         weights, u, *rest = ctx.saved_tensors
         if torch.is_grad_enabled():  # second derivatives were asked for: let autograd have them
-            wanted = [t for t, need in zip((weights, u), ctx.needs_input_grad, strict=True) if need]
-            plain = evaluate_plainly(weights, u)
+            # views: were u to depend on weights, a gradient with respect to weights itself would
+            # also follow that path, which the outer pass follows as well
+            inputs = weights.view_as(weights), u.view_as(u)
+            wanted = [t for t, need in zip(inputs, ctx.needs_input_grad, strict=True) if need]
+            plain = evaluate_plainly(*inputs)
             found = iter(torch.autograd.grad(plain, wanted, grad, create_graph=True))
             return tuple(next(found) if need else None for need in ctx.needs_input_grad)
         dim = u.shape[1]
@@ -137,6 +140,7 @@ class _Series(torch.autograd.Function):
 
 def evaluate_plainly(weights: Tensor, u: Tensor) -> Tensor:
     """The same values by ordinary differentiable operations, for derivatives of any order."""
+    u = u - u.detach().round()
     for i in range(u.shape[1] - 1, -1, -1):
         order = (weights.shape[2 + i] - 1) // 2
         angle = u[:, i, None, :] * _frequencies(order, u)[:, None]

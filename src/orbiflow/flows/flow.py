@@ -57,7 +57,10 @@ class Flow(nn.Module):
         duration: float = 1.0,
     ) -> None:
         super().__init__()
-        listed = [fields] if callable(fields) else list(fields)
+        if isinstance(fields, nn.ModuleList) or not callable(fields):
+            listed = list(fields)
+        else:
+            listed = [fields]
         if not listed:
             raise OrbiflowError("a flow needs at least one vector field")
         self.segments = nn.ModuleList(f if isinstance(f, nn.Module) else _Plain(f) for f in listed)

@@ -1,0 +1,66 @@
+"""All files of an escherization: a folder a class, and an overview."""
+
+from __future__ import annotations
+
+import io
+import multiprocessing
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+
+import torch
+from PIL import Image
+
+from orbiflow.draw.files import write_atomic
+from orbiflow.draw.folder import write_tile_folder
+from orbiflow.draw.raster import overlay_png, tiling_png
+from orbiflow.escher.result import TileResult
+from orbiflow.escher.target import Target
+
+_PANEL = 560  # pixels
+
+
+def write_gallery(
+    results: Sequence[TileResult], target: Target, out: Path, *, workers: int = 1
+) -> None:
+    """Write each class's folder and `overview.png`, in `workers` processes.
+
+    Raises:
+        OutputError: if a file cannot be written.
+    """
+    folders = [out / result.name for result in results]
+    targets = [target] * len(results)
+    if workers == 1:
+        for result, folder in zip(results, folders, strict=True):
+            write_tile_folder(result, target, folder)
+    else:
+        methods = multiprocessing.get_all_start_methods()
+        context = multiprocessing.get_context("forkserver" if "forkserver" in methods else "spawn")
+        with ProcessPoolExecutor(workers, context, torch.set_num_threads, (1,)) as pool:
+            for _ in pool.map(write_tile_folder, results, targets, folders):
+                pass
+    write_atomic(out / "overview.png", overview_png(results, target))
+
+
+def overview_png(results: Sequence[TileResult], target: Target) -> bytes:
+    """PNG of all tiles, best first: each over its target, and its tiling."""
+    columns = min(3, len(results))
+    rows = -(-len(results) // columns)
+    sheet = Image.new("RGB", (columns * 2 * _PANEL, rows * _PANEL), "white")
+    for i, result in enumerate(results):
+        label = f"{result.name}   IoU {result.metrics.iou:.3f}"
+        pictures = (
+            overlay_png(
+                result.tile, target.outline, y_down=target.y_down, label=label, width_px=900
+            ),
+            tiling_png(result.tile, y_down=target.y_down, width_px=900),
+        )
+        for j, picture in enumerate(pictures):
+            panel = Image.open(io.BytesIO(picture)).convert("RGB")
+            panel.thumbnail((_PANEL - 24, _PANEL - 24), Image.Resampling.LANCZOS)
+            left = (2 * (i % columns) + j) * _PANEL + (_PANEL - panel.width) // 2
+            top = (i // columns) * _PANEL + (_PANEL - panel.height) // 2
+            sheet.paste(panel, (left, top))
+    buffer = io.BytesIO()
+    sheet.save(buffer, "PNG", optimize=True)
+    return buffer.getvalue()

@@ -1,0 +1,73 @@
+"""What every reader of silhouettes hands back, and how a file's bytes are fetched."""
+
+import stat
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orbiflow.errors import InputFileError
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A silhouette as found in a file.
+
+    - `outline`: (N, 2), simple closed ring without a repeated last vertex, in the file's own units.
+    - `y_down`: whether the file's y axis points down.
+    - `kind`: "image", "svg", "dat", "json".
+    - `size`: width and height of the picture or drawing, where the file states one.
+    - `notes`: what was decided for the user, in plain words.
+    """
+
+    outline: NDArray[np.float64]
+    y_down: bool
+    kind: str
+    size: tuple[float, float] | None
+    notes: tuple[str, ...]
+
+
+def check_file(path: Path) -> int:
+    """Size of the regular file at `path` in bytes; `InputFileError` where there is none to read."""
+    try:
+        status = path.stat()
+    except FileNotFoundError as exc:
+        raise InputFileError(f"{path}: no such file; check the path") from exc
+    except (OSError, ValueError) as exc:
+        raise InputFileError(f"{path}: cannot be reached ({exc}); check the path") from exc
+    if stat.S_ISDIR(status.st_mode):
+        raise InputFileError(f"{path}: is a directory; give a file inside it")
+    if not stat.S_ISREG(status.st_mode):
+        raise InputFileError(f"{path}: is not a regular file; give an image, SVG or polygon file")
+    if status.st_size == 0:
+        raise InputFileError(f"{path}: the file is empty; export or download it again")
+    return status.st_size
+
+
+def read_bytes(path: Path, limit: int) -> bytes:
+    """Content of the file at `path`; refused when it is larger than `limit` bytes."""
+    try:
+        with path.open("rb") as file:
+            data = file.read(limit + 1)
+    except OSError as exc:
+        raise InputFileError(
+            f"{path}: cannot be read ({exc.strerror}); check its permissions"
+        ) from exc
+    if len(data) > limit:
+        raise InputFileError(
+            f"{path}: larger than {limit / 2**20:.0f} MB, the most that is read of this kind of "
+            "file; simplify or downscale it"
+        )
+    return data
+
+
+def read_head(path: Path, n: int) -> bytes:
+    """First `n` bytes of the file at `path`, or all of a shorter one."""
+    try:
+        with path.open("rb") as file:
+            return file.read(n)
+    except OSError as exc:
+        raise InputFileError(
+            f"{path}: cannot be read ({exc.strerror}); check its permissions"
+        ) from exc

@@ -1,0 +1,86 @@
+"""The `result.json` of an escherization (schema: docs/result.schema.json)."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+import shapely
+import torch
+
+from orbiflow import __version__
+from orbiflow.escher.occupancy import OccupancySettings
+from orbiflow.escher.result import ClassFailure, TileResult
+from orbiflow.escher.target import Target
+from orbiflow.symmetry import CrystallographicGroup
+
+SCHEMA_VERSION = 1
+
+
+def group_json(group: CrystallographicGroup) -> dict[str, Any]:
+    """Lattice (basis vectors as columns) and coset representatives as nested lists."""
+    return {
+        "name": group.name,
+        "lattice": group.lattice.tolist(),
+        "cosets": [
+            {"linear": g.linear.tolist(), "translation": g.translation.tolist()}
+            for g in group.cosets
+        ],
+    }
+
+
+def tile_json(result: TileResult) -> dict[str, Any]:
+    """One entry of `tiles`: polygon and group in the input's own coordinates."""
+    ring = result.tile.polygon
+    return {
+        "class": result.name,
+        "metrics": result.metrics.as_dict(),
+        "certificate": result.certificate.as_dict(),
+        "polygon": np.concatenate([ring, ring[:1]]).tolist(),
+        "corners": list(result.tile.corners),
+        "group": group_json(result.tile.group),
+        "starts": result.starts,
+        "dropped": result.dropped,
+        "seconds": round(result.seconds, 3),
+    }
+
+
+def report(
+    target: Target,
+    results: Sequence[TileResult],
+    failures: Sequence[ClassFailure],
+    settings: OccupancySettings,
+    *,
+    seconds: float,
+    workers: int,
+) -> dict[str, Any]:
+    """The whole document, ready for JSON, tiles best first.
+
+    Args:
+        seconds: wall-clock time of the search.
+        workers: processes that were used.
+    """
+    return {
+        "schema_version": SCHEMA_VERSION,
+        "method": "occupancy",
+        "seed": settings.seed,
+        "settings": asdict(settings),
+        "versions": {
+            "orbiflow": __version__,
+            "python": platform.python_version(),
+            "torch": torch.__version__,
+            "numpy": np.__version__,
+            "shapely": shapely.__version__,
+        },
+        "timings": {
+            "wall_seconds": round(seconds, 3),
+            "core_seconds": round(sum(r.seconds for r in results), 3),
+            "workers": workers,
+        },
+        "input": target.report(),
+        "tiles": [tile_json(result) for result in results],
+        "failed": [{"class": f.name, "reason": f.reason} for f in failures],
+    }

@@ -1,0 +1,96 @@
+"""What an escherization gives: the tile, how good it is, and the proof that it tiles."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import shapely
+
+from orbiflow.errors import CertificationError
+from orbiflow.escher.boundary import extract_tile
+from orbiflow.escher.metrics import ShapeMetrics, compare
+from orbiflow.escher.model import TileModel
+from orbiflow.escher.storage import SavedModel
+from orbiflow.escher.target import Target
+from orbiflow.tilings import Certificate, Tile, certify
+
+
+@dataclass(frozen=True, eq=False)
+class TileResult:
+    """The best tile of one isohedral class.
+
+    - `name`: of the class, such as "IH4".
+    - `group_name`: such as "p2".
+    - `tile`: in the input's own coordinates.
+    - `normal_tile`: in the target's normal form (y up, area 1, centroid 0).
+    - `metrics`: of the certified polygon against the target.
+    - `certificate`: of `tile`, in the input's coordinates.
+    - `model`: the diffeomorphism, into the target's normal form.
+    - `starts`, `dropped`: starting poses tried; finalists that gave no certified tile.
+    - `seconds`: of computing, on one core.
+    """
+
+    name: str
+    group_name: str
+    tile: Tile
+    normal_tile: Tile
+    metrics: ShapeMetrics
+    certificate: Certificate
+    model: SavedModel
+    starts: int
+    dropped: int
+    seconds: float
+
+
+@dataclass(frozen=True)
+class ClassFailure:
+    """A class that gave no certified tile, and why."""
+
+    name: str
+    reason: str
+
+
+def best_tile(
+    target: Target, model: TileModel, *, starts: int, seconds: float, force: bool = False
+) -> TileResult:
+    """Turn finalists into polygons, certify them, and keep the one with the largest IoU.
+
+    Raises:
+        CertificationError: if no finalist is certified and `force` is not set.
+    """
+    found: list[TileResult] = []
+    reasons: list[str] = []
+    for index in range(model.size):
+        try:
+            result = _result(target, model.take([index]), starts, seconds, force=force)
+            if not force:
+                result.certificate.require()
+            found.append(result)
+        except CertificationError as error:
+            reasons.append(str(error))
+    if not found:
+        raise CertificationError("; ".join(dict.fromkeys(reasons)))
+    best = max(found, key=lambda r: (r.certificate.valid, r.metrics.iou))
+    return TileResult(**{**best.__dict__, "dropped": len(reasons)})
+
+
+def _result(
+    target: Target, model: TileModel, starts: int, seconds: float, *, force: bool
+) -> TileResult:
+    tile, fine = extract_tile(model, force=force)
+    placed = tile.transformed(target.linear, target.offset)
+    # a forced tile may cross itself: measure the region that it covers
+    shape = shapely.Polygon(placed.polygon)
+    region = shape if shape.is_valid else shapely.make_valid(shape).buffer(0)
+    return TileResult(
+        name=model.isohedral_class.name,
+        group_name=model.isohedral_class.group_name,
+        tile=placed,
+        normal_tile=tile,
+        metrics=compare(region, target.outline),  # pyright: ignore[reportArgumentType]
+        certificate=certify(placed),
+        model=SavedModel.of(fine),
+        starts=starts,
+        dropped=0,
+        seconds=seconds,
+    )

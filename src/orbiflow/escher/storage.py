@@ -1,0 +1,132 @@
+"""A fitted tile on disk: safetensors, never pickle."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from safetensors import SafetensorError
+from safetensors.numpy import load, save
+
+from orbiflow.errors import InputFileError, OrbiflowError
+from orbiflow.escher.model import TileModel
+from orbiflow.symmetry.isometry import Array
+from orbiflow.tilings import isohedral_class
+
+FORMAT = "orbiflow-tile/1"
+MAX_BYTES = 64 * 2**20
+
+
+@dataclass(frozen=True, eq=False)
+class SavedModel:
+    """A single candidate as plain arrays: what is sent between processes and kept in files.
+
+    - `settings`: class, max_frequency, segments, smoothness, steps, method, mirrored.
+    - `arrays`: float64 parameters by name, without the candidate axis.
+    """
+
+    settings: dict[str, Any]
+    arrays: dict[str, Array]
+
+    @classmethod
+    def of(cls, model: TileModel) -> SavedModel:
+        """Take a single candidate apart."""
+        if model.size != 1:
+            raise OrbiflowError(f"take one candidate first: this model holds {model.size}")
+        settings = {
+            "class": model.isohedral_class.name,
+            "max_frequency": model.max_frequency,
+            "segments": model.segments,
+            "smoothness": model.smoothness,
+            "steps": model.flow.steps,
+            "method": model.flow.method,
+            "mirrored": bool(model.mirror[0]),
+        }
+        arrays = {
+            name: parameter.detach().double().cpu().numpy()[0].copy()
+            for name, parameter in model.named_parameters()
+        }
+        return cls(settings, arrays)
+
+    def restore(self) -> TileModel:
+        """The model again, float64, one candidate.
+
+        Raises:
+            OrbiflowError: if settings or arrays do not fit together.
+        """
+        try:
+            model = TileModel(
+                isohedral_class(self.settings["class"]),
+                torch.zeros(1, dtype=torch.float64),
+                mirrored=torch.tensor([bool(self.settings["mirrored"])]),
+                max_frequency=_whole(self.settings["max_frequency"], 256),
+                segments=_whole(self.settings["segments"], 64),
+                smoothness=float(self.settings["smoothness"]),
+                steps=_whole(self.settings["steps"], 1_000_000),
+                method=str(self.settings["method"]),
+            )
+        except (KeyError, TypeError) as error:
+            raise OrbiflowError(f"the model's settings are incomplete: {error}") from error
+        with torch.no_grad():
+            for name, parameter in model.named_parameters():
+                stored = self.arrays.get(name)
+                if stored is None or stored.shape != tuple(parameter.shape[1:]):
+                    found = "nothing" if stored is None else f"shape {stored.shape}"
+                    raise OrbiflowError(
+                        f"the model's {name} should have shape {tuple(parameter.shape[1:])}, "
+                        f"found {found}"
+                    )
+                if not np.isfinite(stored).all():
+                    raise OrbiflowError(f"the model's {name} has NaN or infinite entries")
+                parameter.copy_(torch.tensor(stored)[None])
+        return model
+
+    def to_bytes(self) -> bytes:
+        """The contents of a `model.safetensors` file."""
+        metadata = {"format": FORMAT, "settings": json.dumps(self.settings)}
+        arrays = {name: np.ascontiguousarray(array) for name, array in self.arrays.items()}
+        return save(arrays, metadata=metadata)
+
+
+def load_model(path: str | Path) -> TileModel:
+    """Read a `model.safetensors` that `orbiflow escherize` wrote.
+
+    Returns:
+        One candidate, float64, in the target's normal form (y up, area 1, centroid 0).
+
+    Raises:
+        InputFileError: for a file that is missing, too large or not such a model.
+    """
+    path = Path(path)
+    try:
+        size = path.stat().st_size
+        if size > MAX_BYTES:
+            raise InputFileError(f"{path}: {size:,} bytes is too large for a tile model")
+        data = path.read_bytes()
+    except OSError as error:
+        raise InputFileError(f"{path}: cannot be read: {error.strerror or error}") from error
+    try:
+        arrays = load(data)
+        header = json.loads(data[8 : 8 + int.from_bytes(data[:8], "little")])
+        metadata = header.get("__metadata__", {})
+        if metadata.get("format") != FORMAT:
+            raise InputFileError(
+                f"{path}: not an orbiflow tile model (format {metadata.get('format')!r}, "
+                f"expected {FORMAT!r})"
+            )
+        settings = json.loads(metadata["settings"])
+        return SavedModel(dict(settings), dict(arrays)).restore()
+    except InputFileError:
+        raise
+    except (SafetensorError, ValueError, KeyError, TypeError) as error:
+        raise InputFileError(f"{path}: not an orbiflow tile model: {error}") from error
+
+
+def _whole(value: Any, most: int) -> int:
+    if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= most:
+        raise OrbiflowError(f"expected a whole number from 1 to {most}, got {value!r}")
+    return value

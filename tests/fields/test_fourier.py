@@ -1,0 +1,435 @@
+"""Fourier fields: symmetry, parameters, values, derivatives, precision."""
+
+import copy
+import itertools
+import math
+
+import mpmath
+import numpy as np
+import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from orbiflow.errors import OrbiflowError
+from orbiflow.fields import FourierField, jacobian, symmetrize
+from orbiflow.fields.invariants import frequency_set
+from orbiflow.symmetry import (
+    IDENTIFICATION_SPACES,
+    WALLPAPER_GROUPS,
+    CrystallographicGroup,
+    identification_group,
+    wallpaper_group,
+)
+from orbiflow.tilings.classes import CLASSES
+from strategies import (
+    SMALL_SPACE_GROUPS,
+    central_difference,
+    equivariance_error,
+    groups,
+    largest,
+    plane_groups,
+    random_field,
+    random_tensor,
+    seeds,
+    space_group,
+    space_groups,
+    wallpaper_groups,
+)
+
+TABLED = {
+    **{name: row.group() for name, row in CLASSES.items()},
+    **{name: identification_group(name) for name in IDENTIFICATION_SPACES},
+}
+small_fields = st.builds(random_field, groups, st.integers(1, 2), seeds)
+plane_fields = st.builds(random_field, plane_groups, st.integers(1, 5), seeds)
+
+
+def coefficients(field):
+    """(M, 2, d) cosine and sine coefficients of a single field, from its basis."""
+    basis = field.basis
+    flat = np.zeros(len(basis.frequencies) * 2 * field.group.dim)
+    parameters = (field.parameters_ * field.scale).detach().numpy()
+    np.add.at(flat, basis.rows, parameters[basis.columns] * basis.values)
+    return flat.reshape(len(basis.frequencies), 2, field.group.dim)
+
+
+def naive_field(field, point, lib=math):
+    """The field at one point, mode by mode."""
+    u = [lib.fsum(a * x for a, x in zip(row, point, strict=True)) for row in inverse_rows(field)]
+    total = [0.0 if lib is math else lib.mpf(0)] * field.group.dim
+    for k, (a, b) in zip(field.basis.frequencies, coefficients(field), strict=True):
+        norm = lib.sqrt(2) if k.any() else 1.0
+        phase = 2 * lib.pi * lib.fsum(int(n) * x for n, x in zip(k, u, strict=True))
+        c, s = norm * lib.cos(phase), norm * lib.sin(phase)
+        total = [t + float(x) * c + float(y) * s for t, x, y in zip(total, a, b, strict=True)]
+    return total
+
+
+def inverse_rows(field):
+    return field.group.inverse_lattice.tolist()
+
+
+def brute_force_dimension(group, max_frequency):
+    """Trace of the projector: mean over elements of the trace of their action (characters)."""
+    box = itertools.product(range(-max_frequency, max_frequency + 1), repeat=group.dim)
+    duals = [np.round(group.inverse_lattice @ g.linear @ group.lattice) for g in group.cosets]
+    modes = {tuple((np.array(k) @ m).astype(int)) for k in box for m in duals}
+    total = 0.0
+    for g, m in zip(group.cosets, duals, strict=True):
+        shift = group.inverse_lattice @ g.translation
+        for k in modes:
+            if np.array_equal(np.array(k) @ m, k):
+                total += math.cos(2 * math.pi * float(np.dot(k, shift))) * np.trace(g.linear)
+    return total / group.order
+
+
+@pytest.mark.parametrize("max_frequency", [1, 5, 10])
+@pytest.mark.parametrize("name", TABLED)
+def test_equivariance_holds_to_rounding_for_every_class_and_space(name, max_frequency):
+    group = TABLED[name]
+    for seed in range(3):
+        field = random_field(group, max_frequency, seed)
+        assert equivariance_error(field, group, random_tensor(seed, 20, 2)) < 1e-11
+
+
+@settings(max_examples=20)
+@given(wallpaper_groups(), st.sampled_from((1, 5, 10)), seeds)
+def test_equivariance_holds_to_rounding_on_any_lattice(group, max_frequency, seed):
+    field = random_field(group, max_frequency, seed)
+    assert equivariance_error(field, group, random_tensor(seed, 20, 2)) < 1e-11
+
+
+@settings(max_examples=15)
+@given(space_groups(SMALL_SPACE_GROUPS), seeds)
+def test_equivariance_holds_to_rounding_in_space(group, seed):
+    field = random_field(group, 2, seed)
+    assert equivariance_error(field, group, random_tensor(seed, 6, 3)) < 1e-11
+
+
+def test_equivariance_holds_to_rounding_for_the_largest_space_group():
+    group = space_group("Fm-3m", 3)
+    field = random_field(group, 1, 0)
+    assert field.size > 0
+    assert equivariance_error(field, group, random_tensor(0, 6, 3), cells=0) < 1e-11
+
+
+@pytest.mark.parametrize(
+    ("name", "size"),
+    [("p1", 242), ("p2", 120), ("pg", 121), ("pgg", 60), ("p3", 120), ("p4", 60), ("p6", 60)],
+)
+def test_parameter_counts_at_frequency_five(name, size):
+    assert FourierField(wallpaper_group(name), 5).size == size
+
+
+@pytest.mark.parametrize(
+    ("name", "size"), [("p1", 2), ("pm", 1), ("pg", 1), ("p2", 0), ("p3", 0), ("p6m", 0)]
+)
+def test_frequency_zero_leaves_the_invariant_translations(name, size):
+    field = random_field(wallpaper_group(name), 0, 0)
+    points = random_tensor(0, 5, 2)
+    assert field.size == size
+    torch.testing.assert_close(field(points), field(points[:1]).expand(5, 2), rtol=0, atol=0)
+    assert float(field.lipschitz_bound()) == 0.0
+
+
+@settings(max_examples=40)
+@given(groups, st.integers(0, 3))
+def test_the_number_of_parameters_is_the_trace_of_the_projector(group, max_frequency):
+    max_frequency = min(max_frequency, 2) if group.dim == 3 else max_frequency
+    size = FourierField(group, max_frequency).size
+    assert size == pytest.approx(brute_force_dimension(group, max_frequency), abs=1e-8)
+
+
+@given(st.builds(FourierField, groups, st.integers(0, 2)))
+def test_the_basis_is_orthonormal(field):
+    basis = field.basis
+    dense = np.zeros((len(basis.frequencies) * 2 * field.group.dim, basis.size))
+    dense[basis.rows, basis.columns] = basis.values
+    np.testing.assert_allclose(dense.T @ dense, np.eye(basis.size), atol=1e-13)
+
+
+@settings(max_examples=20)
+@given(small_fields, seeds)
+def test_symmetrizing_leaves_the_field_unchanged(field, seed):
+    points = random_tensor(seed, 5, field.group.dim)
+    again = symmetrize(field, field.group, periodic=True)(points)
+    torch.testing.assert_close(again, field(points), rtol=0, atol=1e-12)
+
+
+@settings(max_examples=20)
+@given(plane_groups, seeds)
+def test_every_symmetrized_trigonometric_field_is_one_of_these(group, seed):
+    bare = CrystallographicGroup.generate(group.lattice)
+    target = symmetrize(random_field(bare, 2, seed), group, periodic=True)
+    basis = FourierField(group, 2)
+    points = torch.tensor(np.random.default_rng(seed).uniform(0, 1, (150, 2)) @ group.lattice.T)
+    stack = FourierField(group, 2, batch=basis.size)
+    with torch.no_grad():
+        stack.parameters_.copy_(torch.eye(basis.size))
+        matrix = stack(points.expand(basis.size, -1, -1)).reshape(basis.size, -1).T
+        goal = target(points).reshape(-1)
+        fitted = torch.linalg.lstsq(matrix, goal).solution
+    torch.testing.assert_close(matrix @ fitted, goal, rtol=0, atol=1e-10)
+
+
+@given(small_fields, seeds)
+def test_values_are_those_of_the_sum_over_modes(field, seed):
+    points = random_tensor(seed, 2, field.group.dim)
+    expected = [naive_field(field, p) for p in points.tolist()]
+    np.testing.assert_allclose(field(points).detach().numpy(), expected, atol=1e-11)
+
+
+@pytest.mark.parametrize("name", ["IH4", "IH6", "IH21"])
+def test_values_are_right_to_the_last_digits(name):
+    field = random_field(TABLED[name], 10, 5)
+    points = random_tensor(1, 2, 2, size=1.0)
+    with mpmath.workdps(40):
+        for p, value in zip(points.tolist(), field(points).tolist(), strict=True):
+            exact = naive_field(field, [mpmath.mpf(x) for x in p], mpmath)
+            assert max(abs(v - e) for v, e in zip(value, exact, strict=True)) < 1e-12
+
+
+@settings(max_examples=15)
+@given(st.builds(random_field, groups, st.integers(0, 2), seeds, rms=st.floats(0.1, 10)))
+def test_the_norm_of_the_parameters_is_the_root_mean_square_of_the_field(field):
+    group = field.group
+    # the trapezoidal rule is exact for the squares of these modes
+    sides = [4 * int(k) + 2 for k in np.abs(field.basis.frequencies).max(axis=0)]
+    axes = [np.arange(n) / n for n in sides]
+    grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, group.dim)
+    values = field(torch.tensor(grid @ group.lattice.T))
+    rms = values.square().sum(dim=-1).mean().sqrt().item()
+    assert rms == pytest.approx(field.parameters_.norm().item(), rel=1e-12)
+
+
+@settings(max_examples=20)
+@given(small_fields, seeds)
+def test_the_jacobian_agrees_with_autograd(field, seed):
+    points = random_tensor(seed, 4, field.group.dim)
+    by_autograd = jacobian(lambda p: field(p), points)
+    torch.testing.assert_close(field.jacobian(points), by_autograd, rtol=1e-11, atol=1e-10)
+
+
+@settings(max_examples=20)
+@given(small_fields, seeds)
+def test_the_jacobian_agrees_with_finite_differences(field, seed):
+    points = random_tensor(seed, 4, field.group.dim)
+    slopes = central_difference(field, points)
+    torch.testing.assert_close(field.jacobian(points), slopes, rtol=1e-8, atol=1e-7)
+
+
+@given(small_fields, seeds)
+def test_the_divergence_is_the_trace_of_the_jacobian(field, seed):
+    points = random_tensor(seed, 3, 4, field.group.dim)
+    trace = field.jacobian(points).diagonal(dim1=-2, dim2=-1).sum(dim=-1)
+    torch.testing.assert_close(field.divergence(points), trace, rtol=1e-12, atol=1e-11)
+
+
+@given(small_fields, seeds)
+def test_bound_forms_give_the_same_values(field, seed):
+    points = random_tensor(seed, 4, field.group.dim)
+    values, divergence = field.bound_with_divergence()(points)
+    torch.testing.assert_close(field.bound()(points), field(points), rtol=0, atol=0)
+    torch.testing.assert_close(values, field(points), rtol=0, atol=1e-13)
+    torch.testing.assert_close(divergence, field.divergence(points), rtol=1e-13, atol=1e-12)
+
+
+@settings(max_examples=10)
+@given(wallpaper_groups(), seeds)
+def test_gradients_of_parameters_and_points_pass_gradcheck(group, seed):
+    field = random_field(group, 2, seed, smoothness=1.0)
+
+    def values(parameters, points):
+        return torch.func.functional_call(field, {"parameters_": parameters}, (points,))
+
+    inputs = (
+        field.parameters_.detach().clone().requires_grad_(),
+        random_tensor(seed, 3, 2).requires_grad_(),
+    )
+    assert torch.autograd.gradcheck(values, inputs, atol=1e-6, rtol=1e-5)
+
+
+@pytest.mark.parametrize("quantity", ["forward", "divergence", "jacobian"])
+@pytest.mark.parametrize("dim", [1, 2, 3])
+def test_a_batch_of_fields_is_the_fields_one_by_one(quantity, dim):
+    group = {
+        1: CrystallographicGroup.generate([[1.3]]),
+        2: wallpaper_group("p6"),
+        3: space_group("P2_1/c", 0),
+    }[dim]
+    batch = random_field(group, 2, 0, batch=3)
+    points = random_tensor(1, 3, 4, 2, dim)
+    together = getattr(batch, quantity)(points)
+    for s in range(3):
+        single = FourierField(group, 2)
+        with torch.no_grad():
+            single.parameters_.copy_(batch.parameters_[s])
+        alone = getattr(single, quantity)(points[s])
+        torch.testing.assert_close(together[s], alone, rtol=1e-13, atol=1e-13)
+
+
+def test_a_batch_has_one_lipschitz_bound_a_field():
+    batch = random_field(wallpaper_group("p4"), 3, 0, batch=3)
+    bounds = batch.lipschitz_bound()
+    for s in range(3):
+        single = FourierField(batch.group, 3)
+        with torch.no_grad():
+            single.parameters_.copy_(batch.parameters_[s])
+        assert float(single.lipschitz_bound()) == pytest.approx(float(bounds[s]), rel=1e-14)
+
+
+@pytest.mark.parametrize("shape", [(2,), (0, 2), (1, 2), (3, 4, 5, 2)])
+def test_shapes_of_points_are_kept(shape):
+    field = random_field(wallpaper_group("p3"), 2, 0)
+    points = torch.zeros(shape, dtype=torch.float64)
+    assert field(points).shape == shape
+    assert field.divergence(points).shape == shape[:-1]
+    assert field.jacobian(points).shape == (*shape, 2)
+
+
+@pytest.mark.parametrize("name", ["IH1", "IH6", "IH21"])
+def test_single_precision_is_close_to_double(name):
+    field = random_field(TABLED[name], 10, 0)
+    points = random_tensor(0, 200, 2)
+    single = random_field(TABLED[name], 10, 0, dtype=torch.float32)
+    assert single(points.float()).dtype == torch.float32
+    # coordinates of size 3 are rounded by 1.2e-7 and the field's slope is about 2 pi 10
+    error = single(points.float()).double() - field(points)
+    assert largest(error) < 1e-4
+    error = single.divergence(points.float()).double() - field.divergence(points)
+    assert largest(error) < 1e-4 * 2 * math.pi * 10
+
+
+def test_conversion_to_single_precision_converts_all_of_a_field():
+    field = random_field(wallpaper_group("p6"), 4, 0)
+    points = random_tensor(0, 50, 2, size=1.0)
+    expected = field(points).detach()
+    converted = copy.deepcopy(field).float()
+    assert largest(converted(points.float()) - expected) < 2e-5
+
+
+@pytest.mark.parametrize(("dtype", "away"), [(torch.float64, 2.0**20), (torch.float32, 2.0**8)])
+def test_far_away_points_are_as_accurate_as_near_ones(dtype, away):
+    field = random_field(wallpaper_group("p4g", np.eye(2)), 10, 0, dtype=dtype)
+    grid = np.random.default_rng(1).integers(0, 4096, (50, 2)) / 4096
+    near = torch.tensor(grid, dtype=dtype)
+    error = largest(field(near + away) - field(near))
+    assert error < 20 * torch.finfo(dtype).eps
+
+
+@settings(max_examples=20)
+@given(plane_fields, seeds)
+def test_no_sampled_jacobian_exceeds_the_lipschitz_bound(field, seed):
+    norms = torch.linalg.matrix_norm(field.jacobian(random_tensor(seed, 100, 2)), ord=2)
+    assert largest(norms) <= field.lipschitz_bound().item() * (1 + 1e-12)
+
+
+def test_the_lipschitz_bound_is_attained_by_a_single_mode():
+    field = FourierField(CrystallographicGroup.generate([[0.7]]), 3)
+    for index in range(1, field.size):
+        with torch.no_grad():
+            field.parameters_.zero_()
+            field.parameters_[index] = 1.0
+        grid = torch.linspace(0, 0.7, 8401, dtype=torch.float64)[:, None]
+        steepest = largest(field.jacobian(grid))
+        assert steepest == pytest.approx(float(field.lipschitz_bound()), rel=1e-6)
+
+
+@settings(max_examples=15)
+@given(wallpaper_groups(), st.floats(0.5, 4), seeds)
+def test_smoothness_scales_the_parameter_of_each_frequency(group, smoothness, seed):
+    smooth = random_field(group, 3, seed, smoothness=smoothness)
+    plain = FourierField(group, 3)
+    kappa = torch.tensor(plain.basis.magnitude)
+    factor = (1 + kappa**2 * group.cell_volume) ** (-smoothness / 2)
+    with torch.no_grad():
+        plain.parameters_.copy_(smooth.parameters_ * factor)
+    points = random_tensor(seed, 5, 2)
+    torch.testing.assert_close(smooth(points), plain(points), rtol=0, atol=1e-12)
+
+
+@given(wallpaper_groups(), st.floats(0.1, 10))
+def test_smoothness_does_not_depend_on_the_unit_of_length(group, unit):
+    weights = FourierField(group, 3).sobolev_weights(2.0)
+    scaled = FourierField(group.conjugate(unit * np.eye(2)), 3).sobolev_weights(2.0)
+    np.testing.assert_allclose(scaled, weights, rtol=1e-10)
+
+
+@given(wallpaper_groups(), st.integers(0, 6))
+def test_magnitudes_are_lengths_of_dual_vectors(group, max_frequency):
+    field = FourierField(group, max_frequency)
+    lengths = np.linalg.norm(field.basis.frequencies @ group.inverse_lattice, axis=1)
+    mode = field.basis.rows // 4
+    np.testing.assert_allclose(
+        lengths[mode], field.basis.magnitude[field.basis.columns], rtol=1e-9, atol=1e-12
+    )
+
+
+@given(groups, st.integers(0, 2))
+def test_the_frequency_set_is_closed_under_the_dual_point_group(group, max_frequency):
+    half = frequency_set(group, max_frequency)
+    both = {tuple(k) for k in half.tolist()} | {tuple(k) for k in (-half).tolist()}
+    assert len(both) == 2 * len(half) - 1
+    for g in group.cosets:
+        dual = np.round(group.inverse_lattice @ g.linear @ group.lattice).astype(int)
+        assert {tuple(k) for k in (np.array(sorted(both)) @ dual).tolist()} == both
+
+
+@pytest.mark.parametrize("name", WALLPAPER_GROUPS)
+def test_the_frequency_set_holds_the_box(name):
+    found = {tuple(k) for k in frequency_set(wallpaper_group(name), 3).tolist()}
+    for k in itertools.product(range(-3, 4), repeat=2):
+        assert k in found or (-k[0], -k[1]) in found
+
+
+def test_two_fields_built_alike_have_the_same_basis():
+    first, second = (FourierField(wallpaper_group("p31m"), 4).basis for _ in range(2))
+    assert np.array_equal(first.rows, second.rows)
+    assert np.array_equal(first.values, second.values)
+
+
+def test_a_saved_field_is_restored():
+    field = random_field(wallpaper_group("pgg"), 4, 0)
+    other = FourierField(wallpaper_group("pgg"), 4)
+    other.load_state_dict(field.state_dict())
+    points = random_tensor(0, 5, 2)
+    assert set(field.state_dict()) == {"parameters_"}
+    assert torch.equal(field(points), other(points))
+
+
+def test_a_whole_float_is_taken_as_an_integer():
+    field = FourierField(wallpaper_group("p4"), 5.0)  # pyright: ignore[reportArgumentType]
+    assert field(torch.zeros(2, dtype=torch.float64)).tolist() == [0.0, 0.0]
+    assert field.max_frequency == 5
+
+
+@pytest.mark.parametrize("bad", [-1, 2.5, True])
+def test_frequencies_that_are_no_count_are_refused(bad):
+    with pytest.raises(OrbiflowError, match="max_frequency must be an integer >= 0"):
+        FourierField(wallpaper_group("p1"), bad)
+
+
+@pytest.mark.parametrize(("group", "bad"), [("p1", 1000), ("p6m", 500), ("P1", 50)])
+def test_frequencies_beyond_memory_are_refused(group, bad):
+    made = wallpaper_group(group) if group in WALLPAPER_GROUPS else space_group(group, 0)
+    with pytest.raises(OrbiflowError, match=r"coefficients, over the limit .* choose a smaller"):
+        FourierField(made, bad)
+
+
+@pytest.mark.parametrize("shape", [(3,), (5, 3), (2, 1)])
+def test_points_of_another_dimension_are_refused(shape):
+    with pytest.raises(OrbiflowError, match=r"expected points of shape \(\.\.\., 2\), got"):
+        FourierField(wallpaper_group("p1"), 1)(torch.zeros(shape, dtype=torch.float64))
+
+
+@pytest.mark.parametrize("shape", [(2,), (4, 2), (5, 3, 2)])
+def test_points_of_another_batch_are_refused(shape):
+    with pytest.raises(OrbiflowError, match=r"expected points of shape \(3, \.\.\., 2\), got"):
+        FourierField(wallpaper_group("p1"), 1, batch=3)(torch.zeros(shape, dtype=torch.float64))
+
+
+def test_a_field_born_in_single_precision_becomes_exact_in_double():
+    group = wallpaper_group("p6m")
+    field = random_field(group, 5, 0, dtype=torch.float32).double()
+    assert equivariance_error(field, group, random_tensor(0, 10, 2)) < 1e-11

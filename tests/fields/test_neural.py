@@ -1,0 +1,87 @@
+"""Networks on periodic features."""
+
+import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from orbiflow.errors import OrbiflowError
+from orbiflow.fields import PeriodicFeatures, neural_field
+from orbiflow.symmetry import CrystallographicGroup, wallpaper_group
+from strategies import equivariance_error, groups, largest, random_tensor, seeds
+
+
+def disturbed(field, seed):
+    """The field with random weights everywhere, the last layer included."""
+    generator = torch.Generator().manual_seed(seed)
+    with torch.no_grad():
+        for parameter in field.parameters():
+            noise = torch.randn(parameter.shape, generator=generator, dtype=parameter.dtype)
+            parameter.add_(0.3 * noise)
+    return field
+
+
+@settings(max_examples=20)
+@given(groups, st.integers(0, 1000))
+def test_equivariance_holds_to_rounding(group, seed):
+    field = disturbed(neural_field(group, hidden=(8,), seed=seed), seed)
+    assert equivariance_error(field, group, random_tensor(seed, 8, group.dim)) < 1e-11
+
+
+def test_a_new_field_is_zero():
+    field = neural_field(wallpaper_group("p4"))
+    assert largest(field(random_tensor(0, 10, 2))) == 0.0
+
+
+def test_the_same_seed_gives_the_same_weights():
+    first, second, other = (
+        torch.cat(
+            [p.detach().ravel() for p in neural_field(wallpaper_group("p2"), seed=s).parameters()]
+        )
+        for s in (3, 3, 4)
+    )
+    assert torch.equal(first, second)
+    assert not torch.equal(first, other)
+
+
+def test_the_global_random_state_is_left_alone():
+    torch.manual_seed(11)
+    expected = torch.rand(3)
+    torch.manual_seed(11)
+    neural_field(wallpaper_group("p2"), seed=5)
+    assert torch.equal(torch.rand(3), expected)
+
+
+@given(groups, seeds)
+def test_features_are_periodic(group, seed):
+    features = PeriodicFeatures(group, 2)
+    points = random_tensor(seed, 4, group.dim)
+    for vector in torch.tensor(group.lattice).mT:
+        torch.testing.assert_close(
+            features(points + 2 * vector), features(points), rtol=0, atol=1e-12
+        )
+
+
+@pytest.mark.parametrize(
+    ("dim", "max_frequency", "size"), [(1, 3, 6), (2, 1, 8), (2, 2, 24), (3, 1, 26), (4, 2, 16)]
+)
+def test_features_are_cosines_and_sines_of_half_the_box(dim, max_frequency, size):
+    group = CrystallographicGroup.generate(torch.eye(dim).numpy())
+    features = PeriodicFeatures(group, max_frequency)
+    values = features(random_tensor(0, 50, dim))
+    assert features.size == values.shape[-1] == size
+    half = size // 2
+    torch.testing.assert_close(
+        values[:, :half].square() + values[:, half:].square(),
+        torch.ones(50, half, dtype=torch.float64),
+    )
+
+
+def test_single_precision_networks_take_single_precision_points():
+    field = disturbed(neural_field(wallpaper_group("p3"), dtype=torch.float32), 0)
+    assert field(random_tensor(0, 5, 2, dtype=torch.float32)).dtype == torch.float32
+
+
+def test_features_without_a_frequency_are_refused():
+    with pytest.raises(OrbiflowError, match="max_frequency must be at least 1, got 0"):
+        PeriodicFeatures(wallpaper_group("p1"), 0)

@@ -1,0 +1,507 @@
+"""The flow of vector fields: map, inverse, log-determinant, gradients, equivariance."""
+
+import copy
+import io
+import math
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+from torch import nn
+
+from orbiflow.errors import OrbiflowError
+from orbiflow.fields import FourierField, neural_field, symmetrize
+from orbiflow.flows import METHODS, Flow
+from orbiflow.symmetry import (
+    IDENTIFICATION_SPACES,
+    identification_group,
+    rotation_matrix,
+    wallpaper_group,
+)
+from orbiflow.tilings.classes import CLASSES
+from strategies import (
+    groups,
+    largest,
+    map_equivariance_error,
+    plane_groups,
+    random_field,
+    random_tensor,
+    seeds,
+    space_group,
+    wallpaper_groups,
+)
+
+TABLED = {
+    **{name: row.group() for name, row in CLASSES.items()},
+    **{name: identification_group(name) for name in IDENTIFICATION_SPACES},
+}
+names = st.sampled_from(sorted(METHODS))
+
+
+def gentle_field(group, max_frequency, seed, slope=1.0):
+    """A random field whose Lipschitz bound is `slope`: how far a flow can stretch in unit time."""
+    field = random_field(group, max_frequency, seed)
+    bound = field.lipschitz_bound()
+    if float(bound) > 0:
+        with torch.no_grad():
+            field.parameters_.mul_(slope / bound)
+    return field
+
+
+def several(group, seed, segments=3, slope=1.0):
+    return [gentle_field(group, 2, seed + i, slope) for i in range(segments)]
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_convergence_has_the_order_of_the_method_on_a_fourier_field(name):
+    field = gentle_field(wallpaper_group("pgg"), 2, 0, slope=2.0)
+    points = random_tensor(0, 50, 2)
+    with torch.no_grad():
+        exact = Flow(field, steps=128, method="rk5")(points)
+        errors = [largest(Flow(field, steps=n, method=name)(points) - exact) for n in (16, 32)]
+    assert math.log2(errors[0] / errors[1]) == pytest.approx(METHODS[name].order, abs=0.3)
+
+
+@pytest.mark.parametrize("name", ["IH1", "IH6", "IH21", "sphere"])
+def test_the_flow_agrees_with_an_adaptive_integrator(name):
+    field = gentle_field(TABLED[name], 3, 0, slope=4.0)
+    points = random_tensor(0, 6, 2)
+    bound = field.bound()
+
+    def slope(_, y):
+        with torch.no_grad():
+            return bound(torch.tensor(y.reshape(-1, 2))).numpy().ravel()
+
+    solution = solve_ivp(
+        slope, (0.0, 1.0), points.numpy().ravel(), method="DOP853", rtol=1e-13, atol=1e-13
+    )
+    with torch.no_grad():
+        moved = Flow(field, steps=200, method="rk5")(points)
+    np.testing.assert_allclose(moved.numpy().ravel(), solution.y[:, -1], rtol=0, atol=1e-10)
+
+
+@settings(max_examples=10)
+@given(groups, seeds, st.sampled_from([("rk4", 64), ("rk5", 24)]))
+def test_the_inverse_undoes_the_flow(group, seed, scheme):
+    method, steps = scheme
+    flow = Flow(gentle_field(group, 1, seed), steps=steps, method=method)
+    points = random_tensor(seed, 5, group.dim)
+    with torch.no_grad():
+        error = max(
+            largest(flow.inverse(flow(points)) - points),
+            largest(flow(flow.inverse(points)) - points),
+        )
+    assert error <= 1e-8
+
+
+@pytest.mark.parametrize("name", TABLED)
+def test_the_inverse_undoes_the_flow_of_every_class_and_space(name):
+    flow = Flow(gentle_field(TABLED[name], 5, 0, slope=6.0), steps=128)
+    points = random_tensor(0, 50, 2)
+    with torch.no_grad():
+        assert largest(flow.inverse(flow(points)) - points) <= 1e-8
+
+
+def test_segments_follow_one_another():
+    fields = several(wallpaper_group("p3"), 0)
+    points = random_tensor(0, 10, 2)
+    one_by_one = points
+    for field in fields:
+        one_by_one = Flow(field, steps=8)(one_by_one)
+    assert torch.equal(Flow(fields, steps=8)(points), one_by_one)
+    backwards = points
+    for field in reversed(fields):
+        backwards = Flow(field, steps=8).inverse(backwards)
+    assert torch.equal(Flow(fields, steps=8).inverse(points), backwards)
+
+
+@settings(max_examples=10)
+@given(wallpaper_groups(), seeds)
+def test_the_inverse_undoes_several_segments(group, seed):
+    flow = Flow(several(group, seed), steps=24, method="rk5")
+    points = random_tensor(seed, 5, 2)
+    with torch.no_grad():
+        assert largest(flow.inverse(flow(points)) - points) <= 1e-8
+
+
+def test_twice_the_duration_is_the_flow_twice():
+    field = gentle_field(wallpaper_group("p2"), 2, 0)
+    points = random_tensor(0, 10, 2)
+    long = Flow(field, steps=20, duration=2.0)(points)
+    once = Flow(field, steps=10)
+    torch.testing.assert_close(long, once(once(points)), rtol=0, atol=1e-13)
+
+
+def test_a_negative_duration_is_the_inverse():
+    field = gentle_field(wallpaper_group("p2"), 2, 0)
+    points = random_tensor(0, 10, 2)
+    backwards = Flow(field, steps=10, duration=-1.0)(points)
+    assert torch.equal(backwards, Flow(field, steps=10).inverse(points))
+
+
+@pytest.mark.parametrize("name", METHODS)
+@pytest.mark.parametrize("steps", [1, 3])
+def test_a_linear_field_gives_the_truncated_exponential(name, steps):
+    # up to order 4 with as many stages, a step is the Taylor polynomial of exp(h M)
+    matrix = random_tensor(0, 2, 2, size=0.5)
+    points = random_tensor(1, 4, 2)
+    moved = Flow(lambda p: p @ matrix.mT, steps=steps, method=name)(points)
+    h = matrix / steps
+    order = METHODS[name].order
+    step = sum(torch.linalg.matrix_power(h, k) / math.factorial(k) for k in range(order + 1))
+    if name == "rk5":  # its sixth stage adds a term of order six
+        a = np.zeros((6, 6))
+        for i, row in enumerate(METHODS[name].stages):
+            a[i + 1, : len(row)] = row
+        sixth = float(np.array(METHODS[name].weights) @ np.linalg.matrix_power(a, 5).sum(axis=1))
+        step = step + sixth * torch.linalg.matrix_power(h, 6)
+    expected = points @ torch.linalg.matrix_power(torch.as_tensor(step), steps).mT
+    torch.testing.assert_close(moved, expected, rtol=1e-13, atol=1e-13)
+
+
+@settings(max_examples=10)
+@given(groups, seeds)
+def test_the_log_determinant_is_that_of_the_jacobian_of_the_flow(group, seed):
+    flow = Flow(gentle_field(group, 1, seed), steps=16, method="rk5")
+    points = random_tensor(seed, 3, group.dim)
+    stacked = torch.autograd.functional.jacobian(lambda p: flow(p).sum(dim=0), points)
+    assert isinstance(stacked, torch.Tensor)
+    expected = torch.linalg.slogdet(stacked.movedim(0, 1))
+    assert expected.sign.tolist() == [1.0] * 3
+    torch.testing.assert_close(
+        flow.log_abs_det_jacobian(points).detach(), expected.logabsdet, rtol=0, atol=1e-8
+    )
+
+
+def test_the_log_determinant_of_a_linear_flow_is_its_trace():
+    matrix = random_tensor(0, 2, 2)
+    flow = Flow(lambda p: p @ matrix.mT, steps=3, duration=0.5)
+    found = flow.log_abs_det_jacobian(random_tensor(1, 4, 2))
+    torch.testing.assert_close(found, (0.5 * matrix.trace()).expand(4), rtol=1e-13, atol=1e-13)
+
+
+def test_a_constant_field_translates_and_keeps_volume():
+    points = random_tensor(0, 4, 2)
+    moved, log_det = Flow(torch.ones_like, steps=2).forward_and_log_det(points)
+    torch.testing.assert_close(moved, points + 1)
+    assert log_det.tolist() == [0.0] * 4
+
+
+@settings(max_examples=10)
+@given(plane_groups, seeds, st.integers(1, 3))
+def test_log_determinants_forth_and_back_cancel(group, seed, segments):
+    flow = Flow(several(group, seed, segments), steps=24, method="rk5")
+    points = random_tensor(seed, 5, 2)
+    with torch.no_grad():
+        moved, there = flow.forward_and_log_det(points)
+        back, home = flow.inverse_and_log_det(moved)
+    torch.testing.assert_close(back, points, rtol=0, atol=1e-8)
+    torch.testing.assert_close(there, -home, rtol=0, atol=1e-8)
+
+
+@given(plane_groups, seeds, names)
+def test_points_move_alike_with_and_without_the_log_determinant(group, seed, method):
+    flow = Flow(several(group, seed), steps=2, method=method)
+    points = random_tensor(seed, 5, 2)
+    with torch.no_grad():
+        moved, log_det = flow.forward_and_log_det(points)
+        assert log_det.shape == (5,)
+        torch.testing.assert_close(moved, flow(points), rtol=0, atol=1e-13)
+        moved, _ = flow.inverse_and_log_det(points)
+        torch.testing.assert_close(moved, flow.inverse(points), rtol=0, atol=1e-13)
+
+
+def test_a_closed_form_and_autograd_give_the_same_log_determinant():
+    field = gentle_field(wallpaper_group("pgg"), 2, 0)
+    points = random_tensor(0, 6, 2)
+    closed = Flow(field, steps=4).log_abs_det_jacobian(points)
+    by_autograd = Flow(lambda p: field(p), steps=4).log_abs_det_jacobian(points)
+    torch.testing.assert_close(by_autograd, closed, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "field",
+    [
+        lambda p: torch.tanh(p) * p.flip(-1),
+        neural_field(wallpaper_group("p4"), hidden=(4,)),
+        symmetrize(torch.tanh, wallpaper_group("p2")),
+        nn.Linear(2, 2).double(),
+    ],
+    ids=["function", "network", "symmetrized", "module"],
+)
+def test_any_callable_serves_as_a_field(field):
+    flow = Flow(field, steps=24, method="rk5")
+    points = random_tensor(0, 4, 2)
+    moved, there = flow.forward_and_log_det(points)
+    back, home = flow.inverse_and_log_det(moved)
+    torch.testing.assert_close(back, points, rtol=0, atol=1e-8)
+    torch.testing.assert_close(there, -home, rtol=0, atol=1e-8)
+
+
+def test_a_module_list_is_taken_as_its_members():
+    fields = several(wallpaper_group("p2"), 0)
+    points = random_tensor(0, 4, 2)
+    assert torch.equal(Flow(nn.ModuleList(fields))(points), Flow(fields)(points))
+
+
+def test_trajectories_run_from_the_points_to_their_images():
+    flow = Flow(several(wallpaper_group("p4"), 0), steps=5)
+    points = random_tensor(0, 4, 2)
+    paths = flow.trajectories(points)
+    assert paths.shape == (16, 4, 2)
+    assert torch.equal(paths[0], points)
+    assert torch.equal(paths[-1], flow(points))
+    assert torch.equal(paths[5], Flow(flow.segments[0], steps=5)(points))
+
+
+@pytest.mark.parametrize("inverse", [False, True])
+@pytest.mark.parametrize("name", METHODS)
+def test_the_error_estimate_falls_at_the_order_of_the_method(name, inverse):
+    flow = Flow(gentle_field(wallpaper_group("p3"), 2, 0, slope=2.0), steps=16, method=name)
+    points = random_tensor(0, 50, 2)
+    first = flow.error_estimate(points, inverse=inverse)
+    flow.steps = 32
+    second = flow.error_estimate(points, inverse=inverse)
+    assert math.log2(first / second) == pytest.approx(METHODS[name].order, abs=0.3)
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_the_error_estimate_predicts_the_error(name):
+    flow = Flow(gentle_field(wallpaper_group("p3"), 2, 0, slope=2.0), steps=16, method=name)
+    points = random_tensor(0, 50, 2)
+    with torch.no_grad(), flow.with_steps(512):
+        exact = flow(points)
+    with torch.no_grad():
+        error = float((flow(points) - exact).norm(dim=-1).max())
+    power = 2 ** METHODS[name].order
+    assert flow.error_estimate(points) * power / (power - 1) == pytest.approx(error, rel=0.2)
+    assert flow.steps == 16
+
+
+@pytest.mark.parametrize(("method", "steps"), [("euler", 1), ("rk4", 1), ("rk5", 7)])
+@pytest.mark.parametrize("name", TABLED)
+def test_equivariance_holds_to_rounding_at_any_step_count(name, method, steps):
+    group = TABLED[name]
+    fields = [random_field(group, 5, seed) for seed in range(2)]
+    flow = Flow(fields, method=method, steps=steps, duration=0.1)
+    assert map_equivariance_error(flow, group, random_tensor(0, 20, 2)) < 1e-11
+    assert map_equivariance_error(flow.inverse, group, random_tensor(1, 20, 2)) < 1e-11
+
+
+@settings(max_examples=20)
+@given(groups, seeds, names, st.integers(1, 4))
+def test_equivariance_holds_to_rounding_for_any_group(group, seed, method, steps):
+    flow = Flow(random_field(group, 1, seed), method=method, steps=steps, duration=0.1)
+    assert map_equivariance_error(flow, group, random_tensor(seed, 8, group.dim)) < 1e-11
+
+
+def test_the_log_determinant_is_invariant():
+    group = wallpaper_group("p4g")
+    flow = Flow(gentle_field(group, 3, 0), steps=2)
+    points = random_tensor(0, 20, 2)
+    with torch.no_grad():
+        expected = flow.log_abs_det_jacobian(points)
+        for g in group.cosets:
+            found = flow.log_abs_det_jacobian(g(points))
+            torch.testing.assert_close(found, expected, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["IH2", "IH3", "IH5", "IH6", "IH21"])
+@given(angle=st.floats(-3, 3), scale=st.floats(0.3, 3), seed=seeds)
+@settings(max_examples=8)
+def test_a_similarity_composed_with_a_flow_commutes_with_the_conjugate_group(
+    name, angle, scale, seed
+):
+    group = CLASSES[name].group()
+    matrix, offset = scale * rotation_matrix(angle), np.array([0.3, -1.2])
+    a, v = torch.tensor(matrix), torch.tensor(offset)
+    flow = Flow(random_field(group, 3, seed), steps=1, method="euler", duration=0.2)
+
+    def moved(z):
+        return flow((z - v) @ torch.linalg.inv(a).mT) @ a.mT + v
+
+    assert map_equivariance_error(
+        moved, group.conjugate(matrix, offset), random_tensor(seed, 10, 2)
+    ) < 1e-11 * max(1.0, scale)
+
+
+@pytest.mark.parametrize("angle", [0.3, 1.1])
+def test_flowing_along_the_papers_field_breaks_glide_symmetry(angle):
+    group = CLASSES["IH2"].group()
+    matrix = rotation_matrix(angle)
+    field = random_field(group, 3, 0)
+    flow = Flow(lambda z: field(z @ torch.tensor(matrix)), steps=4, duration=0.2)
+    error = map_equivariance_error(flow, group.conjugate(matrix), random_tensor(0, 40, 2))
+    assert error > 0.05  # a field of size one, followed for a time of 0.2
+
+
+@pytest.mark.parametrize("quantity", ["moved", "log_det"])
+@pytest.mark.parametrize("segments", [1, 2])
+def test_gradients_of_parameters_agree_with_finite_differences(quantity, segments):
+    fields = several(wallpaper_group("pg"), 0, segments)
+    flow = Flow(fields, steps=3)
+    points = random_tensor(0, 6, 2)
+
+    def loss():
+        moved, log_det = flow.forward_and_log_det(points)
+        return (moved.sin() if quantity == "moved" else log_det.square()).sum()
+
+    parameters = fields[0].parameters_
+    (gradient,) = torch.autograd.grad(loss(), parameters)
+    step = 1e-5
+    for i in range(0, parameters.numel(), 5):
+        with torch.no_grad():
+            parameters[i] += step
+            above = loss().item()
+            parameters[i] -= 2 * step
+            below = loss().item()
+            parameters[i] += step
+        slope = (above - below) / (2 * step)
+        assert gradient[i].item() == pytest.approx(slope, rel=1e-6, abs=1e-8)
+
+
+def test_gradients_of_points_agree_with_the_jacobian_of_the_inverse():
+    flow = Flow(gentle_field(wallpaper_group("p6"), 2, 0), steps=24, method="rk5")
+    p = random_tensor(0, 2)
+    q = flow(p).detach()
+    there = torch.autograd.functional.jacobian(flow, p)  # pyright: ignore[reportArgumentType]
+    back = torch.autograd.functional.jacobian(flow.inverse, q)
+    assert isinstance(there, torch.Tensor)
+    assert isinstance(back, torch.Tensor)
+    torch.testing.assert_close(there @ back, torch.eye(2).double(), rtol=0, atol=1e-8)
+
+
+def test_second_derivatives_pass_through_several_steps():
+    # inside an integrator the points depend on the parameters from the second stage on
+    field = gentle_field(wallpaper_group("p4"), 2, 0)
+    flow = Flow(field, steps=3, method="midpoint")
+    points = random_tensor(0, 4, 2)
+
+    def loss(parameters):
+        with torch.no_grad():
+            field.parameters_.copy_(parameters)
+        return flow(points).sin().sum()
+
+    start = field.parameters_.detach().clone()
+    (plain,) = torch.autograd.grad(loss(start), field.parameters_)
+    (gradient,) = torch.autograd.grad(loss(start), field.parameters_, create_graph=True)
+    torch.testing.assert_close(gradient.detach(), plain, rtol=1e-12, atol=1e-12)
+    direction = random_tensor(1, field.size)
+    (curvature,) = torch.autograd.grad(gradient @ direction, field.parameters_)
+    step = 1e-5
+    above, below = (
+        torch.autograd.grad(loss(start + sign * step * direction), field.parameters_)[0]
+        for sign in (1, -1)
+    )
+    torch.testing.assert_close(curvature, (above - below) / (2 * step), rtol=1e-5, atol=1e-7)
+
+
+def test_gradients_of_the_log_determinant_reach_tensors_that_a_function_closes_over():
+    scale = torch.tensor(0.7, dtype=torch.float64, requires_grad=True)
+    flow = Flow(lambda p: scale * p.sin(), steps=4)
+    points = random_tensor(0, 5, 2)
+    (gradient,) = torch.autograd.grad(flow.log_abs_det_jacobian(points).sum(), scale)
+    totals = []
+    for sign in (1, -1):
+        with torch.no_grad():
+            scale += sign * 1e-5
+            totals.append(float(flow.log_abs_det_jacobian(points).sum()))
+            scale -= sign * 1e-5
+    assert gradient.item() == pytest.approx((totals[0] - totals[1]) / 2e-5, rel=1e-7)
+
+
+def test_a_batch_of_fields_carries_a_batch_of_points():
+    batch = random_field(wallpaper_group("p3"), 2, 0, batch=3, rms=0.2)
+    points = random_tensor(0, 3, 5, 2)
+    moved, log_det = Flow(batch, steps=4).forward_and_log_det(points)
+    for s in range(3):
+        single = FourierField(batch.group, 2)
+        with torch.no_grad():
+            single.parameters_.copy_(batch.parameters_[s])
+        alone, alone_log_det = Flow(single, steps=4).forward_and_log_det(points[s])
+        torch.testing.assert_close(moved[s], alone, rtol=0, atol=1e-13)
+        torch.testing.assert_close(log_det[s], alone_log_det, rtol=0, atol=1e-13)
+
+
+def test_space_flows_work():
+    group = space_group("P2_1/c", 0)
+    flow = Flow(gentle_field(group, 1, 0), steps=24, method="rk5")
+    points = random_tensor(0, 5, 3)
+    with torch.no_grad():
+        moved, there = flow.forward_and_log_det(points)
+        back, home = flow.inverse_and_log_det(moved)
+    torch.testing.assert_close(back, points, rtol=0, atol=1e-8)
+    torch.testing.assert_close(there, -home, rtol=0, atol=1e-8)
+
+
+def test_single_precision_is_close_to_double():
+    flow = Flow(gentle_field(wallpaper_group("p6"), 5, 0), steps=8)
+    single = copy.deepcopy(flow).float()
+    points = random_tensor(0, 50, 2)
+    moved, log_det = single.forward_and_log_det(points.float())
+    assert moved.dtype == log_det.dtype == torch.float32
+    assert largest(moved - flow(points)) < 2e-5
+    assert largest(log_det - flow.log_abs_det_jacobian(points)) < 2e-4
+
+
+def test_a_flow_is_saved_and_restored_inside_a_module():
+    group = wallpaper_group("pgg")
+    model = nn.Sequential(Flow(several(group, 0)), nn.Linear(2, 1).double())
+    buffer = io.BytesIO()
+    torch.save(model.state_dict(), buffer)
+    buffer.seek(0)
+    other = nn.Sequential(
+        Flow([FourierField(group, 2) for _ in range(3)]), nn.Linear(2, 1).double()
+    )
+    points = random_tensor(0, 5, 2)
+    assert not torch.equal(other(points), model(points))
+    other.load_state_dict(torch.load(buffer, weights_only=True))
+    assert torch.equal(other(points), model(points))
+
+
+def test_parameters_of_every_segment_are_found():
+    fields = several(wallpaper_group("pgg"), 0)
+    assert {id(p) for p in Flow(fields).parameters()} == {id(f.parameters_) for f in fields}
+
+
+@pytest.mark.parametrize("shape", [(2,), (0, 2), (3, 4, 2)])
+def test_shapes_of_points_are_kept(shape):
+    flow = Flow(gentle_field(wallpaper_group("p4"), 2, 0), steps=2)
+    points = torch.zeros(shape, dtype=torch.float64)
+    moved, log_det = flow.forward_and_log_det(points)
+    assert moved.shape == shape
+    assert log_det.shape == shape[:-1]
+
+
+def test_with_steps_sets_and_restores():
+    flow = Flow(torch.sin, steps=4)
+    with flow.with_steps(9) as same:
+        assert same is flow
+        assert flow.steps == 9
+    assert flow.steps == 4
+
+
+def test_with_steps_restores_after_an_error():
+    flow = Flow(torch.sin, steps=4)
+    with pytest.raises(RuntimeError, match="inside"), flow.with_steps(9):
+        raise RuntimeError("inside")
+    assert flow.steps == 4
+
+
+@pytest.mark.parametrize("bad", [0, -3, 2.5, True])
+def test_steps_that_are_no_count_are_refused(bad):
+    with pytest.raises(OrbiflowError, match="steps must be an integer of at least 1"):
+        Flow(torch.sin, steps=bad)
+
+
+def test_an_unknown_method_is_refused():
+    with pytest.raises(OrbiflowError, match="unknown integrator 'heun'"):
+        Flow(torch.sin, method="heun")
+
+
+def test_a_flow_of_no_field_is_refused():
+    with pytest.raises(OrbiflowError, match="at least one vector field"):
+        Flow([])
