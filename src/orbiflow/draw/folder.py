@@ -49,7 +49,7 @@ def write_tile_folder(result: TileResult, target: Target, folder: Path) -> list[
     title = f"{target.source.rsplit('/', 1)[-1]}, {result.name} ({result.group_name})"
     if not result.certificate.valid:
         title += ", NOT CERTIFIED"
-    label = f"{result.name} ({result.group_name})   IoU {result.metrics.iou:.3f}"
+    label = f"{result.name} ({result.group_name})"
     contents: dict[str, Callable[[], str | bytes]] = {
         "tile.svg": lambda: tile_svg(result.tile, y_down=y_down, title=title),
         "tiling.svg": lambda: tiling_svg(result.tile, y_down=y_down, title=title, colours=colours),

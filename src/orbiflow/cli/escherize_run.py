@@ -1,0 +1,119 @@
+"""What `orbiflow escherize` does."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import typer
+from rich.table import Table
+
+from orbiflow.cli.console import errors, output
+from orbiflow.cli.progress import watched
+from orbiflow.draw import write_atomic
+from orbiflow.draw.folder import make_folder
+from orbiflow.draw.gallery import write_gallery
+from orbiflow.errors import OrbiflowError
+from orbiflow.escher import ClassFailure, OccupancySettings, Target, TileResult
+from orbiflow.escher import escherize as search
+from orbiflow.escher.report import report
+from orbiflow.tilings import CLASSES, isohedral_class
+
+
+@dataclass(frozen=True)
+class Request:
+    """The options of the command."""
+
+    image: Path
+    out: Path
+    classes: str
+    max_frequency: int
+    seed: int
+    turns: int
+    iterations: int
+    workers: int | None
+    threshold: float | None
+    invert: bool | None
+    force: bool
+
+
+def run(request: Request) -> None:
+    """Read, fit, certify, draw, and say what came of it.
+
+    Raises:
+        OrbiflowError: for anything that the user can mend.
+        typer.Exit: with status 1 if no class gave a certified tile.
+    """
+    begin = time.perf_counter()
+    names = _class_names(request.classes)
+    settings = OccupancySettings(
+        max_frequency=request.max_frequency,
+        seed=request.seed,
+        turns=request.turns,
+        iterations=request.iterations,
+    )
+    count = min(_workers(request.workers), len(names))
+    target = Target.read(request.image, threshold=request.threshold, invert=request.invert)
+    out = make_folder(request.out)
+    for note in target.notes:
+        output.print(f"  {note}", highlight=False)
+    with watched(names) as watch:
+        results, failures = search(
+            target, names, settings, workers=count, force=request.force, watch=watch
+        )
+    seconds = time.perf_counter() - begin
+    document = report(target, results, failures, settings, seconds=seconds, workers=count)
+    write_atomic(out / "result.json", json.dumps(document, allow_nan=False))
+    if results:
+        with output.status("drawing"):
+            write_gallery(results, target, out, workers=count)
+        output.print(_table(results))
+    for failure in failures:
+        _explain(failure)
+    total = time.perf_counter() - begin
+    if not results:
+        errors.print(f"no certified tile was found; see {out / 'result.json'}")
+        raise typer.Exit(1)
+    output.print(f"written to {out} in {total:.0f} s; look at {out / 'overview.png'} first")
+
+
+def _class_names(text: str) -> list[str]:
+    if text.strip().lower() == "all":
+        return list(CLASSES)
+    parts = [part for part in re.split(r"[,\s]+", text) if part]
+    if not parts:
+        raise OrbiflowError(f"--classes names no class; the nine are {', '.join(CLASSES)}, or all")
+    return [isohedral_class(part).name for part in parts]
+
+
+def _workers(asked: int | None) -> int:
+    if asked is not None and asked < 1:
+        raise OrbiflowError(f"--workers must be at least 1, got {asked}")
+    return asked or os.cpu_count() or 1
+
+
+def _table(results: list[TileResult]) -> Table:
+    table = Table(title="Tiles, best first")
+    for column in ("class", "group", "IoU", "Dice", "Hausdorff", "certified", "edges", "seconds"):
+        table.add_column(column, justify="left" if column in ("class", "group") else "right")
+    for result in results:
+        metrics, certificate = result.metrics, result.certificate
+        table.add_row(
+            result.name,
+            result.group_name,
+            f"{metrics.iou:.4f}",
+            f"{metrics.dice:.4f}",
+            f"{metrics.hausdorff:.3f}",
+            "yes" if certificate.valid else "[red]NO[/]",
+            f"{certificate.edge_mismatch:.0e}",
+            f"{result.seconds:.1f}",
+        )
+    return table
+
+
+def _explain(failure: ClassFailure) -> None:
+    errors.print(f"{failure.name}: no tile: {failure.reason}", highlight=False, soft_wrap=True)
