@@ -8,6 +8,7 @@ Without images: the bundled ones, and the shared data's bat and squirrel where t
 from __future__ import annotations
 
 import argparse
+import os
 import time
 from pathlib import Path
 
@@ -43,7 +44,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("images", nargs="*", type=Path)
     parser.add_argument("--quick", action="store_true", help="one image, few iterations")
-    parser.add_argument("--workers", type=int, default=None)
+    parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
     options = parser.parse_args()
     images = options.images or inputs()[: 1 if options.quick else None]
     settings = OccupancySettings(iterations=60) if options.quick else OccupancySettings()

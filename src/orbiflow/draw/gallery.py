@@ -9,7 +9,7 @@ from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 import torch
-from PIL import Image
+from PIL import Image, ImageDraw, ImageFont
 
 from orbiflow.draw.files import write_atomic
 from orbiflow.draw.folder import write_tile_folder
@@ -17,7 +17,7 @@ from orbiflow.draw.raster import overlay_png, tiling_png
 from orbiflow.escher.result import TileResult
 from orbiflow.escher.target import Target
 
-_PANEL = 560  # pixels
+_PANEL, _HEADER = 560, 60  # pixels
 
 
 def write_gallery(
@@ -46,21 +46,23 @@ def overview_png(results: Sequence[TileResult], target: Target) -> bytes:
     """PNG of all tiles, best first: each over its target, and its tiling."""
     columns = min(3, len(results))
     rows = -(-len(results) // columns)
-    sheet = Image.new("RGB", (columns * 2 * _PANEL, rows * _PANEL), "white")
+    sheet = Image.new("RGB", (columns * 2 * _PANEL, rows * (_PANEL + _HEADER)), "white")
+    pen = ImageDraw.Draw(sheet)
+    font = ImageFont.load_default(size=30)
     for i, result in enumerate(results):
-        label = f"{result.name}   IoU {result.metrics.iou:.3f}"
+        left, top = (i % columns) * 2 * _PANEL, (i // columns) * (_PANEL + _HEADER)
+        proof = "certified" if result.certificate.valid else "NOT CERTIFIED"
+        title = f"{result.name}  {result.group_name}    IoU {result.metrics.iou:.3f}    {proof}"
+        pen.text((left + 24, top + 14), title, fill="#1a1a1a", font=font)
         pictures = (
-            overlay_png(
-                result.tile, target.outline, y_down=target.y_down, label=label, width_px=900
-            ),
+            overlay_png(result.tile, target.outline, y_down=target.y_down, width_px=900),
             tiling_png(result.tile, y_down=target.y_down, width_px=900),
         )
         for j, picture in enumerate(pictures):
             panel = Image.open(io.BytesIO(picture)).convert("RGB")
             panel.thumbnail((_PANEL - 24, _PANEL - 24), Image.Resampling.LANCZOS)
-            left = (2 * (i % columns) + j) * _PANEL + (_PANEL - panel.width) // 2
-            top = (i // columns) * _PANEL + (_PANEL - panel.height) // 2
-            sheet.paste(panel, (left, top))
+            x = left + j * _PANEL + (_PANEL - panel.width) // 2
+            sheet.paste(panel, (x, top + _HEADER + (_PANEL - panel.height) // 2))
     buffer = io.BytesIO()
     sheet.save(buffer, "PNG", optimize=True)
     return buffer.getvalue()

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import multiprocessing
-import os
 import queue
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -40,7 +40,7 @@ def escherize(
     classes: Iterable[str] = tuple(CLASSES),
     settings: OccupancySettings | None = None,
     *,
-    workers: int | None = None,
+    workers: int = 1,
     force: bool = False,
     watch: Watcher | None = None,
 ) -> tuple[list[TileResult], list[ClassFailure]]:
@@ -50,7 +50,8 @@ def escherize(
         target: the silhouette.
         classes: names; each is done once, in its own process.
         settings: of the occupancy method.
-        workers: processes; default the number of cores. 1 stays in this process.
+        workers: processes; 1 stays in this process. A script that asks for more must do its work
+            under `if __name__ == "__main__":`, as always with multiprocessing.
         force: return tiles that are not certified, too; their certificates say why.
         watch: called in this process with every `Event`.
 
@@ -59,15 +60,15 @@ def escherize(
         same tiles, whatever the number of workers. After Ctrl-C: what was finished by then.
 
     Raises:
-        OrbiflowError: for an unknown class or a setting out of range.
+        OrbiflowError: for an unknown class, a setting out of range, or workers that die.
     """
     names = list(dict.fromkeys(isohedral_class(name).name for name in classes))
     if not names:
         raise OrbiflowError(f"no isohedral class was given; the nine are {', '.join(CLASSES)}")
     settings = settings or OccupancySettings()
-    count = min(workers or os.cpu_count() or 1, len(names))
-    if count < 1:
+    if workers < 1:
         raise OrbiflowError(f"workers must be at least 1, got {workers}")
+    count = min(workers, len(names))
     watch = watch or _ignore
     run = _run_here if count == 1 else _run_pool
     outcomes = []
@@ -172,6 +173,11 @@ def _run_pool(
             while pending:
                 done, pending = wait(pending, return_when=FIRST_COMPLETED)
                 yield from _in_order(done)
+        except BrokenProcessPool as error:
+            raise OrbiflowError(
+                "a worker process died: was memory short, or is the script that called this "
+                'without `if __name__ == "__main__":`? Try workers=1'
+            ) from error
         except KeyboardInterrupt:
             for process in list((pool._processes or {}).values()):
                 process.terminate()

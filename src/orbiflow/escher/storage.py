@@ -88,7 +88,7 @@ class SavedModel:
     def to_bytes(self) -> bytes:
         """The contents of a `model.safetensors` file."""
         metadata = {"format": FORMAT, "settings": json.dumps(self.settings)}
-        arrays = {name: np.ascontiguousarray(array) for name, array in self.arrays.items()}
+        arrays = {name: np.array(a, order="C") for name, a in self.arrays.items()}  # keeps 0-d
         return save(arrays, metadata=metadata)
 
 
