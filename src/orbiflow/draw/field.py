@@ -10,10 +10,11 @@ import torch
 
 from orbiflow.draw.canvas import blank_figure, plane_axes, png_bytes
 from orbiflow.draw.flow_lines import flow_lines, symmetric_seeds
-from orbiflow.draw.marks import mark_symmetry, outline_cell, reduced_basis
+from orbiflow.draw.marks import mark_symmetry, outline_cell
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import CrystallographicGroup
 from orbiflow.symmetry.isometry import Array
+from orbiflow.symmetry.lattices import reduced_basis
 from orbiflow.tilings import Tile
 from orbiflow.tilings.patch import Window
 

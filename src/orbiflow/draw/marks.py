@@ -13,6 +13,7 @@ import numpy as np
 from orbiflow.symmetry import CrystallographicGroup
 from orbiflow.symmetry.elements import symmetry_elements
 from orbiflow.symmetry.isometry import Array
+from orbiflow.symmetry.lattices import reduced_basis
 from orbiflow.tilings.patch import Window
 
 if TYPE_CHECKING:
@@ -80,21 +81,3 @@ def cell_ring(group: CrystallographicGroup, middle: Array) -> Array:
     corners = [center.point for center in found if center.order == highest] or [middle - half]
     corner = min(corners, key=lambda point: round(float(np.linalg.norm(point + half - middle)), 9))
     return corner + np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]]) @ basis.T
-
-
-def reduced_basis(lattice: Array) -> Array:
-    """Shortest basis (columns) of a plane lattice, with an angle of 60 to 120 degrees.
-
-    Lagrange's and Gauss's reduction.
-
-    >>> reduced_basis(np.array([[1.0, 7.0], [0.0, 1.0]])).tolist()
-    [[1.0, 0.0], [0.0, 1.0]]
-    """
-    first, second = lattice.T
-    while True:
-        if first @ first > second @ second:
-            first, second = second, first
-        steps = round(float(first @ second) / float(first @ first) * (1 - 1e-12))
-        if steps == 0:
-            return np.stack([first, second], axis=1)
-        second = second - steps * first

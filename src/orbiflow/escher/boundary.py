@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -31,10 +32,13 @@ def converge(model: TileModel, points: torch.Tensor, *, tolerance: float = 1e-7)
         tolerance: on the flow's step-doubling estimate, in the group's units.
 
     Raises:
-        CertificationError: if 1,024 steps are not enough: the field is too steep.
+        CertificationError: if 1,024 steps are not enough: the field is too steep; or if the flow
+            has no finite values.
     """
     while True:
         error = model.flow.error_estimate(points)
+        if not math.isfinite(error):
+            raise CertificationError("the flow has no finite values: lower the learning rate")
         if error <= tolerance:
             model.flow.steps *= 2
             return error
@@ -61,7 +65,8 @@ def extract_tile(model: TileModel, *, force: bool = False) -> tuple[Tile, TileMo
         The tile, and the float64 model with the integration steps that made it.
 
     Raises:
-        CertificationError: if no sampling gives a simple polygon: the candidate has folded.
+        CertificationError: if no sampling gives a simple polygon: the candidate has folded. With
+            `force`, only if coordinates are not finite.
     """
     kind = model.isohedral_class
     model = model.take([0]).double()
@@ -73,6 +78,8 @@ def extract_tile(model: TileModel, *, force: bool = False) -> tuple[Tile, TileMo
         if not force:
             raise
     dense = model(dense_template)[0].numpy()
+    if not np.isfinite(dense).all():
+        raise CertificationError(f"{kind.name}: the boundary has no finite coordinates")
     for polygon, corners in _polygons(kind, dense):
         tile = Tile(polygon, model.placed_group(), kind.name, corners)
         if shapely.Polygon(polygon).is_valid:

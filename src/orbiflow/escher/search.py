@@ -97,7 +97,8 @@ def escherize_class(
     kind = isohedral_class(name)
     watch = watch or _ignore
     begin = time.perf_counter()
-    own = replace(settings, seed=settings.seed * 1009 + list(CLASSES).index(kind.name))
+    number = list(CLASSES).index(kind.name)
+    own = replace(settings, seed=(settings.seed * 1009 + number) % 2**32)
     with _one_thread():
         model = fit_occupancy(
             target, kind, own, lambda share, loss: watch(Event(kind.name, share, loss))

@@ -14,6 +14,7 @@ from safetensors.numpy import load, save
 
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.escher.model import TileModel
+from orbiflow.escher.occupancy import MAX_FREQUENCY
 from orbiflow.symmetry.isometry import Array
 from orbiflow.tilings import isohedral_class
 
@@ -58,14 +59,15 @@ class SavedModel:
         Raises:
             OrbiflowError: if settings or arrays do not fit together.
         """
+        self._check_segments()
         try:
             model = TileModel(
                 isohedral_class(self.settings["class"]),
                 torch.zeros(1, dtype=torch.float64),
                 mirrored=torch.tensor([bool(self.settings["mirrored"])]),
-                max_frequency=_whole(self.settings["max_frequency"], 256),
+                max_frequency=_whole(self.settings["max_frequency"], MAX_FREQUENCY),
                 segments=_whole(self.settings["segments"], 64),
-                smoothness=float(self.settings["smoothness"]),
+                smoothness=_exponent(self.settings["smoothness"]),
                 steps=_whole(self.settings["steps"], 1_000_000),
                 method=str(self.settings["method"]),
             )
@@ -84,6 +86,15 @@ class SavedModel:
                     raise OrbiflowError(f"the model's {name} has NaN or infinite entries")
                 parameter.copy_(torch.tensor(stored)[None])
         return model
+
+    def _check_segments(self) -> None:
+        # before anything is built: each segment takes time and memory
+        stored = sum(name.startswith("flow.") for name in self.arrays)
+        if self.settings.get("segments") != stored:
+            raise OrbiflowError(
+                f"the model's settings say {self.settings.get('segments')!r} segments, "
+                f"its arrays hold {stored}"
+            )
 
     def to_bytes(self) -> bytes:
         """The contents of a `model.safetensors` file."""
@@ -122,8 +133,15 @@ def load_model(path: str | Path) -> TileModel:
         return SavedModel(dict(settings), dict(arrays)).restore()
     except InputFileError:
         raise
-    except (SafetensorError, ValueError, KeyError, TypeError) as error:
+    except (SafetensorError, ValueError, KeyError, TypeError, RecursionError) as error:
         raise InputFileError(f"{path}: not an orbiflow tile model: {error}") from error
+
+
+def _exponent(value: Any) -> float:
+    number = float(value)
+    if not 0.0 <= number <= 100.0:
+        raise OrbiflowError(f"expected a smoothness from 0 to 100, got {value!r}")
+    return number
 
 
 def _whole(value: Any, most: int) -> int:

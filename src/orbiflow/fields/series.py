@@ -3,7 +3,8 @@
 A stack of C scalar series in d variables is an array `weights` of shape (S, C, A_1, ..., A_d),
 A_i = 2 K_i + 1, in the tensor basis 1, cos, ..., cos K, sin, ..., sin K (angles 2 pi k u_i) of each
 axis; S counts independent stacks. Points lie last: `u` is (S, d, N), values are (S, C, N). One matrix
-product over the last axis does nearly all the work (design point 4).
+product over the last axis does nearly all the work (design point 4). The backward pass works the
+tables out anew, block by block: no slower than reading them back, and it needs no memory.
 """
 
 from __future__ import annotations
@@ -14,6 +15,9 @@ from typing import Any
 
 import torch
 from torch import Tensor
+
+BLOCK_BYTES = 3 * 2**20
+"""Size of the working arrays for one block of points; measured best between 1 and 4 MiB."""
 
 
 def trigonometric_table(u: Tensor, order: int) -> Tensor:
@@ -79,37 +83,71 @@ def _partial_sums(weights: Tensor, tables: list[Tensor]) -> Tensor:
     return flat.reshape(*weights.shape[:-1], points)
 
 
-def _forward(
-    weights: Tensor, u: Tensor, *, keep: bool
-) -> tuple[Tensor, list[Tensor], list[Tensor]]:
-    """Values, tables, and the partial sums before each contraction (last variable first)."""
-    dim = u.shape[1]
+def _tables(weights: Tensor, u: Tensor) -> list[Tensor]:
     orders = [(a - 1) // 2 for a in weights.shape[2:]]
     if len(set(orders)) == 1:
-        tables = list(trigonometric_table(u, orders[0]).unbind(dim=1))
-    else:
-        tables = [trigonometric_table(u[:, i], orders[i]) for i in range(dim)]
-    sums = _partial_sums(weights, tables)
-    kept = []
-    for level in range(dim - 2, -1, -1):
-        table = _align(tables[level], level)
-        if keep:
-            kept.append(sums)
-        sums = (sums * table if keep else sums.mul_(table)).sum(dim=-2)
-    return sums, tables, kept
+        return list(trigonometric_table(u, orders[0]).unbind(dim=1))
+    return [trigonometric_table(u[:, i], order) for i, order in enumerate(orders)]
+
+
+def _blocks(weights: Tensor, points: int) -> list[slice]:
+    """Ranges of points whose tables and partial sums stay in a processor's cache."""
+    if weights.device.type != "cpu" or points == 0:
+        return [slice(0, points)]
+    rows = math.prod(weights.shape[:-1]) + weights.shape[0] * sum(weights.shape[2:])
+    size = max(1024, BLOCK_BYTES // (rows * weights.element_size()))
+    count = max(1, -(-points // size))
+    size = -(-points // count)
+    return [slice(start, start + size) for start in range(0, points, size)]
+
+
+def _forward(weights: Tensor, u: Tensor) -> Tensor:
+    dim, points = u.shape[1], u.shape[2]
+    values = u.new_empty(weights.shape[0], weights.shape[1], points)
+    for block in _blocks(weights, points):
+        tables = _tables(weights, u[..., block])
+        sums = _partial_sums(weights, tables)
+        for level in range(dim - 2, -1, -1):
+            sums = sums.mul_(_align(tables[level], level)).sum(dim=-2)
+        values[..., block] = sums
+    return values
+
+
+def _backward_block(
+    weights: Tensor, u: Tensor, grad: Tensor, want_points: bool
+) -> tuple[Tensor, Tensor | None]:
+    """Cotangents of the flattened weights and of u, the partial sums worked out anew."""
+    dim = u.shape[1]
+    tables = _tables(weights, u)
+    flat = weights.reshape(weights.shape[0], -1, weights.shape[-1])
+    before = [_partial_sums(weights, tables)] if want_points and dim > 1 else []
+    for level in range(dim - 2, 0, -1) if want_points else ():
+        before.append((before[-1] * _align(tables[level], level)).sum(dim=-2))
+    point_grads = []
+    dual = grad  # cotangent of the partial sums, level by level
+    for level in range(dim - 1):
+        if want_points:
+            shared = before.pop().mul_(dual.unsqueeze(-2)).flatten(1, -3).sum(dim=1)
+            point_grads.append(_derivative_dot(tables[level], shared))
+        dual = dual.unsqueeze(-2) * _align(tables[level], level)
+    dual = dual.flatten(1, -2)
+    if want_points:
+        point_grads.append(_derivative_dot(tables[-1], flat.mT @ dual))
+    return dual @ tables[-1].mT, torch.stack(point_grads, dim=1) if want_points else None
 
 
 class _Series(torch.autograd.Function):
+    """Keeps its arguments only: memory does not grow with the number of modes."""
+
     @staticmethod
     def forward(ctx: Any, weights: Tensor, u: Tensor) -> Tensor:
-        values, tables, kept = _forward(weights, u, keep=True)
-        ctx.save_for_backward(weights, u, *tables, *kept)
-        return values
+        ctx.save_for_backward(weights, u)
+        return _forward(weights, u)
 
     @staticmethod
     def backward(ctx: Any, *grads: Tensor) -> tuple[Tensor | None, ...]:
         (grad,) = grads
-        weights, u, *rest = ctx.saved_tensors
+        weights, u = ctx.saved_tensors
         if torch.is_grad_enabled():  # second derivatives were asked for: let autograd have them
             # views: were u to depend on weights, a gradient with respect to weights itself would
             # also follow that path, which the outer pass follows as well
@@ -118,24 +156,15 @@ class _Series(torch.autograd.Function):
             plain = evaluate_plainly(*inputs)
             found = iter(torch.autograd.grad(plain, wanted, grad, create_graph=True))
             return tuple(next(found) if need else None for need in ctx.needs_input_grad)
-        dim = u.shape[1]
-        tables, kept = rest[:dim], rest[dim:][::-1]
         want_weights, want_points = ctx.needs_input_grad
-        point_grads = []
-        dual = grad  # cotangent of the partial sums, level by level
-        for level in range(dim - 1):
-            if want_points:
-                shared = (dual.unsqueeze(-2) * kept[level]).flatten(1, -3).sum(dim=1)
-                point_grads.append(_derivative_dot(tables[level], shared))
-            dual = dual.unsqueeze(-2) * _align(tables[level], level)
-        dual = dual.flatten(1, -2)
-        flat = weights.reshape(weights.shape[0], -1, weights.shape[-1])
-        if want_points:
-            point_grads.append(_derivative_dot(tables[-1], flat.mT @ dual))
-        return (
-            (dual @ tables[-1].mT).reshape(weights.shape) if want_weights else None,
-            torch.stack(point_grads, dim=1) if want_points else None,
-        )
+        grad_weights = torch.zeros_like(weights)
+        grad_points = torch.empty_like(u) if want_points else None
+        for block in _blocks(weights, u.shape[2]):
+            part, moved = _backward_block(weights, u[..., block], grad[..., block], want_points)
+            grad_weights += part.reshape(weights.shape)
+            if grad_points is not None and moved is not None:
+                grad_points[..., block] = moved
+        return grad_weights if want_weights else None, grad_points
 
 
 def evaluate_plainly(weights: Tensor, u: Tensor) -> Tensor:
@@ -165,4 +194,4 @@ def evaluate(weights: Tensor, u: Tensor) -> Tensor:
     """
     if torch.is_grad_enabled() and (weights.requires_grad or u.requires_grad):
         return _Series.apply(weights, u)  # type: ignore[no-any-return]
-    return _forward(weights, u, keep=False)[0]
+    return _forward(weights, u)

@@ -21,6 +21,7 @@ from orbiflow.symmetry import (
     transflection,
 )
 from orbiflow.symmetry.isometry import Array, Points
+from orbiflow.symmetry.lattices import reduced_basis
 from orbiflow.tilings.class_table import (
     CLASS_TABLE,
     ClassRow,
@@ -142,9 +143,9 @@ class IsohedralClass:
             rotation_matrix(math.radians(vector.degrees)) @ self._point(vector.coefficients)
             for vector in self.row.lattice
         ]
-        return CrystallographicGroup.generate(
-            np.stack(columns, axis=1), self.generators(), name=self.row.group
-        )
+        # another basis of the paper's lattice: with the shortest, |k_i| <= Omega is isotropic
+        basis = reduced_basis(np.stack(columns, axis=1))
+        return CrystallographicGroup.generate(basis, self.generators(), name=self.row.group)
 
     def _point(self, coefficients: Coefficients) -> Array:
         terms = [c * self._default[k] for k, c in coefficients.items()]
