@@ -202,3 +202,10 @@ def test_two_thousand_vertices_are_fast(make_tile: Any) -> None:
     start = time.perf_counter()
     assert certify(tile).valid
     assert time.perf_counter() - start < 1.0  # 0.1 s measured; room for a busy machine
+
+
+@pytest.mark.parametrize("angle", np.linspace(-3.0, 3.0, 61))
+def test_edges_that_agree_but_for_rounding_do_not_fool_the_overlay(angle: float) -> None:
+    kind = isohedral_class("IH2")
+    tile = Tile(kind.template(), kind.group()).transformed(rotation_matrix(angle), np.zeros(2))
+    assert certify(tile).valid

@@ -19,6 +19,9 @@ from orbiflow.tilings.tile import Tile
 
 EdgeMatching: TypeAlias = Literal["segments", "curves", "none"]
 
+# On edges that agree but for rounding, GEOS without a grid is plainly wrong in about 3 % of turned
+# hexagons (an overlap of 0.93 for neighbours that only touch); snapping to a grid is safe.
+_GRID = 1e-12
 _MARGIN = 0.05  # width of the ring around the tile that must be covered; any positive width will do
 
 
@@ -204,7 +207,7 @@ def _areas(around: Surroundings) -> tuple[float, float, float]:
     region = shapely.buffer(polygon, _MARGIN, quad_segs=2)
     shapely.prepare(region)
     images = images[shapely.intersects(region, images)]
-    common = shapely.area(shapely.intersection(polygon, images))
-    covered = shapely.union_all([polygon, *images])
-    uncovered = shapely.area(shapely.difference(region, covered))
+    common = shapely.area(shapely.intersection(polygon, images, grid_size=_GRID))
+    covered = shapely.union_all([polygon, *images], grid_size=_GRID)
+    uncovered = shapely.area(shapely.difference(region, covered, grid_size=_GRID))
     return float(common.max(initial=0.0)), float(common.sum()), float(uncovered)
