@@ -7,7 +7,7 @@ import multiprocessing
 import queue
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, replace
@@ -72,10 +72,13 @@ def escherize(
     watch = watch or _ignore
     run = _run_here if count == 1 else _run_pool
     outcomes = []
-    with contextlib.suppress(KeyboardInterrupt):
-        for outcome in run(target, names, settings, count, force, watch):
+    with (
+        contextlib.suppress(KeyboardInterrupt),
+        contextlib.closing(run(target, names, settings, count, force, watch)) as found,
+    ):
+        for outcome in found:
+            outcomes.append(outcome)  # before it is told: an interrupt must not lose it
             watch(Event(outcome.name, 1.0, float("nan"), outcome))
-            outcomes.append(outcome)
     results = [outcome for outcome in outcomes if isinstance(outcome, TileResult)]
     failures = [outcome for outcome in outcomes if isinstance(outcome, ClassFailure)]
     missing = [name for name in names if name not in {outcome.name for outcome in outcomes}]
@@ -133,7 +136,7 @@ def _run_here(
     _count: int,
     force: bool,
     watch: Watcher,
-) -> Iterator[TileResult | ClassFailure]:
+) -> Generator[TileResult | ClassFailure, None, None]:
     for name in names:
         yield escherize_class(target, name, settings, force=force, watch=watch)
 
@@ -159,7 +162,7 @@ def _run_pool(
     count: int,
     force: bool,
     watch: Watcher,
-) -> Iterator[TileResult | ClassFailure]:
+) -> Generator[TileResult | ClassFailure, None, None]:
     methods = multiprocessing.get_all_start_methods()
     context = multiprocessing.get_context("forkserver" if "forkserver" in methods else "spawn")
     if context.get_start_method() == "forkserver":
@@ -179,7 +182,7 @@ def _run_pool(
                 "a worker process died: was memory short, or is the script that called this "
                 'without `if __name__ == "__main__":`? Try workers=1'
             ) from error
-        except KeyboardInterrupt:
+        except (KeyboardInterrupt, GeneratorExit):  # here, or in the caller's loop
             for process in list((pool._processes or {}).values()):
                 process.terminate()
             pool.shutdown(wait=False, cancel_futures=True)

@@ -1,0 +1,214 @@
+"""Real runs, with few iterations."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import jsonschema
+import numpy as np
+import pytest
+import shapely
+import torch
+from PIL import Image, ImageDraw
+
+from orbiflow import __version__
+from orbiflow.draw.folder import write_tile_folder
+from orbiflow.escher import Target, TileModel, load_model, search
+from orbiflow.escher.boundary import extract_tile
+from orbiflow.escher.result import best_tile
+from orbiflow.tilings import CLASSES
+
+DOCS = Path(__file__).parents[2] / "docs"
+FILES = {"tile.svg", "tiling.svg", "tiling.png", "overlay.png", "field.png", "model.safetensors"}
+FEW = ["--iterations", 8, "--turns", 1, "--max-frequency", 2]
+
+# a shape in pixels with nothing symmetric about it
+BOOT = [(60, 20), (210, 20), (230, 80), (170, 95), (160, 190), (100, 145), (45, 80)]
+
+
+def crossed() -> TileModel:
+    """A candidate whose template crosses itself."""
+    model = TileModel(CLASSES["IH21"], torch.zeros(1), max_frequency=1)
+    model.shape.data += 2.0
+    return model
+
+
+@pytest.fixture(scope="module", name="folder")
+def folder_fixture(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Of a run on a picture of the boot, two classes, one named in small letters."""
+    folder = tmp_path_factory.mktemp("run")
+    image = Image.new("L", (300, 220), 255)
+    ImageDraw.Draw(image).polygon(BOOT, fill=0)
+    image.save(folder / "boot.png")
+    command = [sys.executable, "-m", "orbiflow", "escherize", folder / "boot.png"]
+    command += ["--out", folder / "new" / "out", "--classes", "IH4,ih6", "--workers", 2, *FEW]
+    done = subprocess.run(
+        [str(c) for c in command], capture_output=True, text=True, timeout=200, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+    for name in ("IH4", "IH6"):
+        assert f"{name}: IoU" in done.stdout
+    assert "dark on light" in done.stdout
+    return folder
+
+
+@pytest.fixture(scope="module", name="document")
+def document_fixture(folder: Path) -> dict[str, Any]:
+    return json.loads((folder / "new" / "out" / "result.json").read_text(encoding="utf-8"))
+
+
+def test_all_files_are_there(folder: Path) -> None:
+    out = folder / "new" / "out"
+    assert {p.name for p in out.iterdir()} == {"IH4", "IH6", "overview.png", "result.json"}
+    for name in ("IH4", "IH6"):
+        assert {p.name for p in (out / name).iterdir()} == FILES
+
+
+def test_the_document_is_valid(document: dict[str, Any]) -> None:
+    schema = json.loads((DOCS / "result.schema.json").read_text(encoding="utf-8"))
+    jsonschema.Draft202012Validator(schema).validate(document)
+    assert document["settings"]["iterations"] == 8
+    assert document["input"]["kind"] == "image"
+    assert document["input"]["size"] == [300, 220]
+    assert document["input"]["y_down"] is True
+    assert document["timings"]["workers"] == 2
+    assert document["failed"] == []
+    assert sorted(entry["class"] for entry in document["tiles"]) == ["IH4", "IH6"]
+    assert all(entry["certificate"]["valid"] for entry in document["tiles"])
+
+
+def test_tiles_lie_upright_on_the_silhouette(folder: Path, document: dict[str, Any]) -> None:
+    # pixel centres are at halves, and drawn polygons include their border
+    drawn = shapely.Polygon(np.array(BOOT) + 0.5).buffer(0.5)
+    goal = shapely.Polygon(Target.read(folder / "boot.png").outline)
+    assert goal.symmetric_difference(drawn).area < 0.02 * drawn.area
+    for entry in document["tiles"]:
+        tile = shapely.Polygon(entry["polygon"])
+        iou = tile.intersection(goal).area / tile.union(goal).area
+        assert iou == pytest.approx(entry["metrics"]["iou"], abs=1e-9)
+        own = tile.intersection(drawn).area / tile.union(drawn).area
+        assert own == pytest.approx(iou, abs=0.02)
+        assert own > 0.6
+        flipped = shapely.Polygon([(x, 210 - y) for x, y in entry["polygon"]])
+        assert flipped.intersection(drawn).area / flipped.union(drawn).area < own
+
+
+def test_the_model_reproduces_the_polygon(folder: Path, document: dict[str, Any]) -> None:
+    target = Target.read(folder / "boot.png")
+    for entry in document["tiles"]:
+        model = load_model(folder / "new" / "out" / entry["class"] / "model.safetensors")
+        assert model.isohedral_class.name == entry["class"]
+        tile, _ = extract_tile(model)
+        polygon = np.array(entry["polygon"][:-1])
+        assert np.abs(target.to_input(tile.polygon) - polygon).max() < 1e-9
+
+
+def test_pictures_open(folder: Path) -> None:
+    out = folder / "new" / "out"
+    for name in ("IH4", "IH6"):
+        for file, width in {"tiling.png": 1800, "overlay.png": 1600}.items():
+            with Image.open(out / name / file) as image:
+                image.load()
+                assert image.width == width
+                assert len(image.getcolors(2**24) or []) > 2
+        with Image.open(out / name / "field.png") as image:
+            image.load()
+            assert min(image.size) >= 400
+    with Image.open(out / "overview.png") as image:
+        image.load()
+        assert image.width == 4 * 560
+
+
+def test_drawings_parse(folder: Path, document: dict[str, Any]) -> None:
+    svg = "{http://www.w3.org/2000/svg}"
+    for entry in document["tiles"]:
+        tile = ElementTree.parse(folder / "new" / "out" / entry["class"] / "tile.svg").getroot()
+        tiling = ElementTree.parse(folder / "new" / "out" / entry["class"] / "tiling.svg").getroot()
+        assert tile.tag == tiling.tag == f"{svg}svg"
+        title = tile.find(f".//{svg}title")
+        assert title is not None
+        assert title.text is not None
+        assert title.text.startswith(f"boot.png, {entry['class']}")
+        assert "NOT CERTIFIED" not in title.text
+        assert len(list(tiling.iter())) > len(list(tile.iter()))
+
+
+def test_a_run_on_a_polygon_with_y_up(tmp_path: Path, orbiflow) -> None:
+    path = tmp_path / "boot.json"
+    path.write_text(json.dumps(BOOT))
+    outcome = orbiflow(
+        "escherize", path, "-o", tmp_path / "o", "--classes", "28", "--workers", 1, *FEW
+    )
+    assert outcome.status == 0
+    assert "overview.png first" in outcome.out
+    document = json.loads((tmp_path / "o" / "result.json").read_text(encoding="utf-8"))
+    assert document["input"]["y_down"] is False
+    (entry,) = document["tiles"]
+    tile, goal = shapely.Polygon(entry["polygon"]), shapely.Polygon(BOOT)
+    iou = tile.intersection(goal).area / tile.union(goal).area
+    assert iou == pytest.approx(entry["metrics"]["iou"], abs=1e-9)
+    assert {p.name for p in (tmp_path / "o" / "IH28").iterdir()} == FILES
+
+
+def test_no_tile_is_status_one(tmp_path: Path, orbiflow, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "boot.json"
+    path.write_text(json.dumps(BOOT))
+    monkeypatch.setattr(search, "fit_occupancy", lambda *_: crossed())
+    options = ["--classes", "IH21", "--workers", 1, *FEW]
+    outcome = orbiflow("escherize", path, "-o", tmp_path / "o", *options)
+    assert outcome.status == 1
+    assert "IH21: no tile: IH21: the boundary crosses itself" in outcome.err
+    assert {p.name for p in (tmp_path / "o").iterdir()} == {"result.json"}
+    document = json.loads((tmp_path / "o" / "result.json").read_text(encoding="utf-8"))
+    assert document["tiles"] == []
+    assert [entry["class"] for entry in document["failed"]] == ["IH21"]
+
+
+def test_a_forced_tile_is_marked(tmp_path: Path) -> None:
+    target = Target.from_polygon(BOOT, source="some/boot.json")
+    result = best_tile(target, crossed(), starts=1, seconds=0.0, force=True)
+    written = write_tile_folder(result, target, tmp_path / "IH21")
+    assert {path.name for path in written} == FILES
+    for name in ("tile.svg", "tiling.svg"):
+        assert "boot.json, IH21 (p6), NOT CERTIFIED" in (tmp_path / "IH21" / name).read_text()
+
+
+def test_classes(tmp_path: Path, orbiflow) -> None:
+    path = tmp_path / "classes.png"
+    outcome = orbiflow("classes", "--out", path)
+    assert outcome.status == 0
+    assert all(name in outcome.out for name in CLASSES)
+    assert "0~2" in outcome.out  # the glide of IH6
+    with Image.open(path) as image:
+        image.load()
+        assert min(image.size) > 500
+
+
+def test_help_and_version(orbiflow, orbiflow_process) -> None:
+    for outcome in (orbiflow("--version"), orbiflow_process("--version")):
+        assert (outcome.status, outcome.out, outcome.err) == (0, f"orbiflow {__version__}\n", "")
+    outcome = orbiflow("--help")
+    assert outcome.status == 0
+    assert "escherize" in outcome.out
+    assert "classes" in outcome.out
+    outcome = orbiflow("escherize", "--help")
+    assert outcome.status == 0
+    for option in ("--out", "--classes", "--max-frequency", "--seed", "--workers", "--force"):
+        assert option in outcome.out
+
+
+def test_help_does_not_import_torch() -> None:
+    code = (
+        "import sys; sys.argv = ['orbiflow', 'escherize', '--help']\n"
+        "from orbiflow.cli.app import main\n"
+        "try: main()\n"
+        "except SystemExit: pass\n"
+        "sys.exit('torch' in sys.modules)"
+    )
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True).returncode == 0

@@ -1,0 +1,186 @@
+"""A user's mistakes: status 2, one message that says what is wrong, nothing written."""
+
+from __future__ import annotations
+
+import json
+import struct
+import zlib
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image, ImageDraw
+
+from orbiflow.tilings import CLASSES
+
+SQUARE = [[0, 0], [1, 0], [1, 1], [0, 1]]
+
+
+def polygon(points: object) -> Callable[[Path], Path]:
+    def write(folder: Path) -> Path:
+        path = folder / "polygon.json"
+        path.write_text(json.dumps(points))
+        return path
+
+    return write
+
+
+def text(name: str, content: str) -> Callable[[Path], Path]:
+    def write(folder: Path) -> Path:
+        (folder / name).write_text(content)
+        return folder / name
+
+    return write
+
+
+def picture(width: int, height: int, level: int = 255) -> Callable[[Path], Path]:
+    def write(folder: Path) -> Path:
+        Image.new("L", (width, height), level).save(folder / "picture.png")
+        return folder / "picture.png"
+
+    return write
+
+
+def disc(folder: Path) -> Path:
+    image = Image.new("L", (60, 60), 255)
+    ImageDraw.Draw(image).ellipse([10, 15, 45, 50], fill=0)
+    image.save(folder / "disc.png")
+    return folder / "disc.png"
+
+
+def chunk(kind: bytes, data: bytes) -> bytes:
+    return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+
+def header_of(width: int, height: int) -> Callable[[Path], Path]:
+    """A PNG that promises so many pixels and holds none: decoding it would fail otherwise."""
+
+    def write(folder: Path) -> Path:
+        data = b"\x89PNG\r\n\x1a\n"
+        data += chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0))
+        data += chunk(b"IDAT", b"") + chunk(b"IEND", b"")
+        (folder / "promise.png").write_bytes(data)
+        return folder / "promise.png"
+
+    return write
+
+
+BAD_INPUTS: dict[str, tuple[Callable[[Path], Path], str]] = {
+    "missing": (lambda folder: folder / "none.png", "no such file"),
+    "a folder": (lambda folder: folder, "is a directory"),
+    "not an image": (text("noise.png", "this is no picture at all\n" * 30), "noise.png"),
+    "empty": (text("empty.png", ""), "the file is empty"),
+    "blank": (picture(40, 30), "blank"),
+    "one pixel": (picture(1, 1), "1 x 1 pixels cannot hold a silhouette"),
+    "100 megapixels": (header_of(10_000, 10_000), "10000 x 10000 pixels (100 megapixels)"),
+    "a bomb": (header_of(100_000, 100_000), "megapixels"),
+    "cut short": (header_of(50, 40), "damaged or cut short"),
+    "no closed path": (
+        text("open.svg", '<svg xmlns="http://www.w3.org/2000/svg" width="9" height="9"/>'),
+        "open.svg",
+    ),
+    "crosses itself": (polygon([[0, 0], [2, 2], [2, 0], [0, 2]]), "cross"),
+    "NaN": (polygon([[0, 0], [1, 0], [float("nan"), 1]]), "finite"),
+    "infinite": (text("far.json", "[[0, 0], [1, 0], [1e999, 1]]"), "finite"),
+    "NaN in dat": (text("nan.dat", "3\n0 0\n1 0\nnan 1\n"), "line 4"),
+    "two corners": (polygon([[0, 0], [1, 0]]), "2"),
+    "no area": (polygon([[0, 0], [1, 0], [2, 0]]), "area"),
+    "no polygon": (polygon({"points": SQUARE}), '"polygon"'),
+    "broken JSON": (text("half.json", "[[0, 0], [1,"), "half.json"),
+}
+
+
+@pytest.mark.parametrize("case", BAD_INPUTS)
+def test_bad_inputs(case: str, tmp_path: Path, orbiflow) -> None:
+    make, message = BAD_INPUTS[case]
+    path = make(tmp_path)
+    out = tmp_path / "out"
+    outcome = orbiflow("escherize", path, "--out", out)
+    assert outcome.status == 2
+    assert message in outcome.err
+    assert str(path) in outcome.err
+    assert outcome.err.startswith("error: ")
+    assert "Traceback" not in outcome.err
+    assert not out.exists()
+
+
+BAD_OPTIONS: dict[str, tuple[list[str], str]] = {
+    "class": (["--classes", "IH4,IH8"], "unknown isohedral class 'IH8'"),
+    "no class": (["--classes", " , "], "--classes names no class"),
+    "frequency 0": (["--max-frequency", "0"], "max_frequency must be at least 1, got 0"),
+    "frequency -1": (["--max-frequency", "-1"], "max_frequency must be at least 1, got -1"),
+    "frequency 10000": (["--max-frequency", "10000"], "from 1 to 60, got 10000"),
+    "frequency 2.5": (["--max-frequency", "2.5"], "--max-frequency"),
+    "workers 0": (["--workers", "0"], "--workers must be at least 1, got 0"),
+    "workers -2": (["--workers", "-2"], "--workers must be at least 1, got -2"),
+    "iterations": (["--iterations", "0"], "iterations must be at least 1, got 0"),
+    "turns": (["--turns", "0"], "turns must be at least 1, got 0"),
+    "threshold 7": (["--threshold", "7"], "threshold must lie between 0 and 1, got 7"),
+    "threshold nan": (["--threshold", "nan"], "threshold must lie between 0 and 1, got nan"),
+    "seed": (["--seed", "-1"], "seed must be from 0 to 2^32 - 1, got -1"),
+    "seed 2^32": (["--seed", str(2**32)], f"got {2**32}"),
+    "method": (["--method", "magic"], "magic"),
+    "no such option": (["--clases", "IH4"], "--clases"),
+}
+
+
+@pytest.mark.parametrize("case", BAD_OPTIONS)
+def test_bad_options(case: str, tmp_path: Path, orbiflow) -> None:
+    options, message = BAD_OPTIONS[case]
+    out = tmp_path / "out"
+    outcome = orbiflow("escherize", disc(tmp_path), "--out", out, *options)
+    assert outcome.status == 2
+    assert message in outcome.err
+    assert "Traceback" not in outcome.err
+    assert not out.exists()
+
+
+def test_an_unknown_class_is_answered_with_the_nine(tmp_path: Path, orbiflow) -> None:
+    outcome = orbiflow("escherize", disc(tmp_path), "--out", tmp_path / "out", "--classes", "p6")
+    assert outcome.status == 2
+    assert all(name in outcome.err for name in CLASSES)
+
+
+@pytest.mark.parametrize("below", ["", "sub", "sub/folder"])
+def test_a_file_in_the_way_of_the_folder(below: str, tmp_path: Path, orbiflow) -> None:
+    wall = tmp_path / "wall"
+    wall.write_text("keep me")
+    outcome = orbiflow("escherize", disc(tmp_path), "--out", wall / below, "--classes", "IH4")
+    assert outcome.status == 2
+    assert f"cannot write into {wall / below}" in outcome.err
+    assert "choose another --out" in outcome.err
+    assert "Traceback" not in outcome.err
+    assert wall.read_text() == "keep me"
+
+
+def test_a_markup_like_name_is_printed_as_it_is(tmp_path: Path, orbiflow) -> None:
+    outcome = orbiflow("escherize", tmp_path / "[bold]x[/bold].png", "--out", tmp_path / "out")
+    assert "[bold]x[/bold].png" in outcome.err
+
+
+def test_a_picture_of_the_classes_that_cannot_be_written(tmp_path: Path, orbiflow) -> None:
+    outcome = orbiflow("classes", "--out", tmp_path / "none" / "classes.png")
+    assert outcome.status == 2
+    assert "there is no folder" in outcome.err
+    assert "Traceback" not in outcome.err
+
+
+def test_a_mistake_in_a_process_of_its_own(tmp_path: Path, orbiflow_process) -> None:
+    outcome = orbiflow_process("escherize", tmp_path / "none.png", "--out", tmp_path / "out")
+    assert outcome.status == 2
+    assert "no such file" in outcome.err
+    assert "Traceback" not in outcome.err
+    assert outcome.out == ""
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_missing_argument(orbiflow) -> None:
+    outcome = orbiflow("escherize")
+    assert outcome.status == 2
+    assert "Missing argument" in outcome.err
+
+
+def test_the_disc_is_a_good_input(tmp_path: Path) -> None:
+    # the options above must be what is wrong
+    assert 0 < np.mean(np.asarray(Image.open(disc(tmp_path))) == 0) < 0.5

@@ -1,0 +1,207 @@
+"""Fitted tiles on disk."""
+
+import json
+import pickle
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from safetensors.numpy import save
+
+from orbiflow.errors import InputFileError, OrbiflowError
+from orbiflow.escher.boundary import extract_tile
+from orbiflow.escher.model import TileModel
+from orbiflow.escher.storage import FORMAT, MAX_BYTES, SavedModel, load_model
+from orbiflow.tilings import CLASSES
+from strategies import seeds
+
+
+def candidate(name: str, seed: int = 0, segments: int = 1, size: int = 1) -> TileModel:
+    """Candidates with random parameters and a small flow."""
+    rng = np.random.default_rng(seed)
+    model = TileModel(
+        CLASSES[name],
+        torch.tensor(rng.uniform(-3, 3, size)),
+        mirrored=torch.tensor(rng.random(size) < 0.5),
+        max_frequency=2,
+        segments=segments,
+        smoothness=1.25,
+        steps=12,
+        method="rk3",
+    )
+    with torch.no_grad():
+        for parameter in model.parameters():
+            parameter.add_(torch.tensor(rng.uniform(-0.05, 0.05, parameter.shape)))
+    return model
+
+
+def assert_same(one: TileModel, other: TileModel) -> None:
+    assert one.isohedral_class is other.isohedral_class
+    assert torch.equal(one.mirror, other.mirror)
+    for what in ("max_frequency", "segments", "smoothness"):
+        assert getattr(one, what) == getattr(other, what)
+    assert (one.flow.steps, one.flow.method) == (other.flow.steps, other.flow.method)
+    mine, theirs = dict(one.named_parameters()), dict(other.named_parameters())
+    assert list(mine) == list(theirs)
+    assert all(torch.equal(mine[name], theirs[name]) for name in mine)
+
+
+@settings(max_examples=15)
+@given(st.sampled_from(list(CLASSES)), seeds, st.integers(1, 3))
+def test_round_trip(name: str, seed: int, segments: int) -> None:
+    model = candidate(name, seed, segments)
+    assert_same(model, SavedModel.of(model).restore())
+
+
+@pytest.mark.parametrize("name", CLASSES)
+def test_round_trip_through_a_file(name: str, tmp_path: Path) -> None:
+    model = candidate(name, 7, 2)
+    path = tmp_path / "model.safetensors"
+    path.write_bytes(SavedModel.of(model).to_bytes())
+    loaded = load_model(path)
+    assert_same(model, loaded)
+
+
+def test_a_restored_model_gives_the_same_polygon(tmp_path: Path) -> None:
+    tile, fine = extract_tile(candidate("IH6", 3))
+    path = tmp_path / "model.safetensors"
+    path.write_bytes(SavedModel.of(fine).to_bytes())
+    again, _ = extract_tile(load_model(str(path)))
+    assert np.array_equal(tile.polygon, again.polygon)
+    assert np.array_equal(tile.group.lattice, again.group.lattice)
+
+
+def test_single_precision_is_widened() -> None:
+    model = candidate("IH5").float()
+    restored = SavedModel.of(model).restore()
+    assert restored.angle.dtype == torch.float64
+    assert torch.equal(restored.angle.float(), model.angle)
+
+
+def test_a_stack_is_refused() -> None:
+    with pytest.raises(OrbiflowError, match="take one candidate first: this model holds 2"):
+        SavedModel.of(candidate("IH4", size=2))
+
+
+def with_settings(**changes: Any) -> Callable[[], bytes]:
+    def make() -> bytes:
+        saved = SavedModel.of(candidate("IH4"))
+        return SavedModel({**saved.settings, **changes}, saved.arrays).to_bytes()
+
+    return make
+
+
+def with_array(name: str, array: np.ndarray | None) -> Callable[[], bytes]:
+    def make() -> bytes:
+        saved = SavedModel.of(candidate("IH4"))
+        arrays = {key: value for key, value in saved.arrays.items() if key != name}
+        return SavedModel(
+            saved.settings, arrays if array is None else {**arrays, name: array}
+        ).to_bytes()
+
+    return make
+
+
+def with_metadata(metadata: dict[str, str] | None) -> Callable[[], bytes]:
+    def make() -> bytes:
+        arrays = SavedModel.of(candidate("IH4")).arrays
+        return save({name: np.array(a) for name, a in arrays.items()}, metadata=metadata)
+
+    return make
+
+
+def good() -> bytes:
+    return SavedModel.of(candidate("IH4")).to_bytes()
+
+
+FIELD = "flow.segments.0.parameters_"
+NESTED = "[" * 100_000 + "]" * 100_000
+BAD_FILES: dict[str, tuple[Callable[[], bytes], str]] = {
+    "empty": (lambda: b"", "not an orbiflow tile model"),
+    "pickle": (lambda: pickle.dumps({"angle": 0.0}), "not an orbiflow tile model"),
+    "text": (lambda: b"hello, world, this is no model\n" * 9, "not an orbiflow tile model"),
+    "cut in the header": (lambda: good()[:100], "not an orbiflow tile model"),
+    "cut in the data": (lambda: good()[:-8], "not an orbiflow tile model"),
+    "one byte more": (lambda: good() + b"\0", "not an orbiflow tile model"),
+    "header length": (lambda: b"\xff" * 8 + good()[8:], "not an orbiflow tile model"),
+    "no metadata": (with_metadata(None), "format None"),
+    "other format": (with_metadata({"format": "pt"}), "format 'pt', expected 'orbiflow-tile/1'"),
+    "no settings": (with_metadata({"format": FORMAT}), "settings"),
+    "settings no JSON": (with_metadata({"format": FORMAT, "settings": "{"}), "not an orbiflow"),
+    "settings a list": (with_metadata({"format": FORMAT, "settings": "[1, 2]"}), "not an orb"),
+    "settings empty": (with_metadata({"format": FORMAT, "settings": "{}"}), "settings"),
+    "settings nested": (with_metadata({"format": FORMAT, "settings": NESTED}), "not an orbiflow"),
+    "unknown class": (with_settings(**{"class": "IH8"}), "unknown isohedral class 'IH8'"),
+    "class a number": (with_settings(**{"class": 1e300}), "unknown isohedral class"),
+    "other class": (with_settings(**{"class": "IH28"}), "shape"),
+    "frequency huge": (with_settings(max_frequency=10**30), "from 1 to 60, got 1000"),
+    "frequency 61": (with_settings(max_frequency=61), "from 1 to 60, got 61"),
+    "frequency 0": (with_settings(max_frequency=0), "from 1 to 60, got 0"),
+    "frequency 2.5": (with_settings(max_frequency=2.5), "whole number from 1 to 60, got 2.5"),
+    "frequency other": (with_settings(max_frequency=3), "should have shape"),
+    "segments huge": (with_settings(segments=10**9), "say 1000000000 segments"),
+    "segments two": (with_settings(segments=2), "say 2 segments, its arrays hold 1"),
+    "steps huge": (with_settings(steps=10**12), "whole number from 1 to 1000000"),
+    "steps true": (with_settings(steps=True), "whole number from 1 to 1000000, got True"),
+    "method": (with_settings(method="rk99"), "rk99"),
+    "smoothness NaN": (with_settings(smoothness=float("nan")), "smoothness from 0 to 100"),
+    "smoothness huge": (with_settings(smoothness=1e308), "smoothness from 0 to 100"),
+    "smoothness null": (with_settings(smoothness=None), "settings"),
+    "angle missing": (with_array("angle", None), "angle should have shape .* found nothing"),
+    "angle a vector": (with_array("angle", np.zeros(1)), "angle should have shape"),
+    "offset too long": (with_array("offset", np.zeros(3)), r"found shape \(3,\)"),
+    "field too long": (with_array(FIELD, np.zeros(7)), r"found shape \(7,\)"),
+    "angle NaN": (with_array("angle", np.array(np.nan)), "angle has NaN or infinite entries"),
+    "offset infinite": (with_array("offset", np.array([0.0, np.inf])), "offset has NaN or inf"),
+}
+
+
+@pytest.mark.parametrize("case", BAD_FILES)
+def test_bad_files_are_refused(case: str, tmp_path: Path) -> None:
+    make, message = BAD_FILES[case]
+    path = tmp_path / "model.safetensors"
+    path.write_bytes(make())
+    with pytest.raises(InputFileError, match=message) as caught:
+        load_model(path)
+    assert str(path) in str(caught.value)
+
+
+def test_files_that_cannot_be_read(tmp_path: Path) -> None:
+    with pytest.raises(InputFileError, match="cannot be read: No such file"):
+        load_model(tmp_path / "none.safetensors")
+    with pytest.raises(InputFileError, match="cannot be read: Is a directory"):
+        load_model(tmp_path)
+    large = tmp_path / "large.safetensors"
+    with large.open("wb") as file:
+        file.truncate(MAX_BYTES + 1)  # sparse
+    with pytest.raises(InputFileError, match="67,108,865 bytes is too large"):
+        load_model(large)
+
+
+@settings(max_examples=60)
+@given(data=st.data())
+def test_a_damaged_file_never_gives_anything_but_an_error(
+    data: st.DataObject, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    content = bytearray(good())
+    header = 8 + int.from_bytes(content[:8], "little")
+    position = data.draw(st.integers(0, header - 1))
+    content[position] ^= data.draw(st.integers(1, 255))
+    path = tmp_path_factory.mktemp("damaged") / "model.safetensors"
+    path.write_bytes(content)
+    try:
+        model = load_model(path)
+    except InputFileError:
+        return
+    assert all(torch.isfinite(p).all() for p in model.parameters())
+
+
+def test_settings_are_plain_json() -> None:
+    saved = SavedModel.of(candidate("IH2", 5))
+    assert json.loads(json.dumps(saved.settings)) == saved.settings
+    assert all(array.dtype == np.float64 for array in saved.arrays.values())
