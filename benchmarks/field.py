@@ -25,10 +25,13 @@ from __future__ import annotations
 
 import argparse
 import math
+import os
 import statistics
 import time
 from collections.abc import Callable
 from typing import NamedTuple
+
+os.environ.setdefault("KINETO_LOG_LEVEL", "99")  # the memory profiler chats otherwise
 
 import torch
 from torch import Tensor, nn

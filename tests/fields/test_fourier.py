@@ -437,8 +437,17 @@ def test_a_field_born_in_single_precision_becomes_exact_in_double():
 
 @pytest.mark.parametrize(
     ("name", "size"),
-    [("IH1", 242), ("IH2", 121), ("IH3", 121), ("IH4", 120), ("IH5", 60), ("IH6", 60)]
-    + [("IH7", 120), ("IH21", 60), ("IH28", 60)],
+    {
+        "IH1": 242,
+        "IH2": 121,
+        "IH3": 121,
+        "IH4": 120,
+        "IH5": 60,
+        "IH6": 60,
+        "IH7": 120,
+        "IH21": 60,
+        "IH28": 60,
+    }.items(),
 )
 def test_each_class_has_the_parameters_of_the_design_at_omega_5(name, size):
     assert FourierField(CLASSES[name].group(), 5).size == size

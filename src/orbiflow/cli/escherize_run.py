@@ -21,6 +21,7 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.escher import ClassFailure, OccupancySettings, Target, TileResult
 from orbiflow.escher import escherize as search
 from orbiflow.escher.report import report
+from orbiflow.escher.search import INTERRUPTED
 from orbiflow.tilings import CLASSES, isohedral_class
 
 
@@ -72,13 +73,17 @@ def run(request: Request) -> None:
         with output.status("drawing"):
             write_gallery(results, target, out, workers=count)
         output.print(_table(results))
+    interrupted = any(failure.reason == INTERRUPTED for failure in failures)
     for failure in failures:
         _explain(failure)
-    total = time.perf_counter() - begin
-    if not results:
+    if not results and not interrupted:
         errors.print(f"no certified tile was found; see {out / 'result.json'}")
         raise typer.Exit(1)
-    output.print(f"written to {out} in {total:.0f} s; look at {out / 'overview.png'} first")
+    if results:
+        total = time.perf_counter() - begin
+        output.print(f"written to {out} in {total:.0f} s; look at {out / 'overview.png'} first")
+    if interrupted:
+        raise typer.Exit(130)
 
 
 def _class_names(text: str) -> list[str]:

@@ -66,6 +66,13 @@ class OccupancySettings:
         for name in ("max_frequency", "turns", "finalists", "iterations", "points", "segments"):
             if getattr(self, name) < 1:
                 raise OrbiflowError(f"{name} must be at least 1, got {getattr(self, name)}")
+        for name in ("affine_iterations", "smoothness"):
+            if not getattr(self, name) >= 0:
+                raise OrbiflowError(f"{name} must not be negative, got {getattr(self, name)}")
+        for name in ("hardness", "penalty", "learning_rate"):
+            values = getattr(self, name)
+            if not all(value > 0 for value in np.ravel(values)):
+                raise OrbiflowError(f"{name} must be positive, got {values}")
         if self.max_frequency > MAX_FREQUENCY:
             raise OrbiflowError(
                 f"max_frequency must be from 1 to {MAX_FREQUENCY}, got {self.max_frequency}: "

@@ -22,6 +22,9 @@ from orbiflow.escher.starts import initial_poses
 from orbiflow.escher.target import Target
 from orbiflow.tilings import CLASSES, isohedral_class
 
+INTERRUPTED = "interrupted"
+"""The reason given for a class that Ctrl-C left undone."""
+
 Watcher = Callable[["Event"], None]
 
 
@@ -82,7 +85,7 @@ def escherize(
     results = [outcome for outcome in outcomes if isinstance(outcome, TileResult)]
     failures = [outcome for outcome in outcomes if isinstance(outcome, ClassFailure)]
     missing = [name for name in names if name not in {outcome.name for outcome in outcomes}]
-    failures += [ClassFailure(name, "interrupted") for name in missing]
+    failures += [ClassFailure(name, INTERRUPTED) for name in missing]
     # ties are broken by the order in which the classes were asked for
     results.sort(key=lambda r: (-r.metrics.iou, names.index(r.name)))
     return results, failures

@@ -98,7 +98,8 @@ class SavedModel:
 
     def to_bytes(self) -> bytes:
         """The contents of a `model.safetensors` file."""
-        metadata = {"format": FORMAT, "settings": json.dumps(self.settings)}
+        # one entry: the library writes several in random order, and the same seed gives one file
+        metadata = {FORMAT: json.dumps(self.settings, sort_keys=True)}
         arrays = {name: np.array(a, order="C") for name, a in self.arrays.items()}  # keeps 0-d
         return save(arrays, metadata=metadata)
 
@@ -124,12 +125,9 @@ def load_model(path: str | Path) -> TileModel:
         arrays = load(data)
         header = json.loads(data[8 : 8 + int.from_bytes(data[:8], "little")])
         metadata = header.get("__metadata__", {})
-        if metadata.get("format") != FORMAT:
-            raise InputFileError(
-                f"{path}: not an orbiflow tile model (format {metadata.get('format')!r}, "
-                f"expected {FORMAT!r})"
-            )
-        settings = json.loads(metadata["settings"])
+        if FORMAT not in metadata:
+            raise InputFileError(f"{path}: not an orbiflow tile model: no {FORMAT!r} in its header")
+        settings = json.loads(metadata[FORMAT])
         return SavedModel(dict(settings), dict(arrays)).restore()
     except InputFileError:
         raise

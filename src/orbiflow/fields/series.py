@@ -10,33 +10,37 @@ tables out anew, block by block: no slower than reading them back, and it needs 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from functools import lru_cache
 from typing import Any
 
 import torch
 from torch import Tensor
 
-BLOCK_BYTES = 3 * 2**20
-"""Size of the working arrays for one block of points; measured best between 1 and 4 MiB."""
+BLOCK_BYTES = 2**21
+"""Size of the working arrays for one block of points; measured best between 1 and 3 MiB."""
 
 
-def trigonometric_table(u: Tensor, order: int) -> Tensor:
+def trigonometric_table(u: Tensor, order: int, out: Tensor | None = None) -> Tensor:
     """Rows 1, cos 2 pi u, ..., cos 2 pi K u, sin 2 pi u, ..., sin 2 pi K u.
 
     Args:
         u: (..., N) fractional coordinates.
         order: K.
+        out: where to put the result.
 
     Returns:
         (..., 2 K + 1, N), not tracked by autograd.
     """
-    angle = (u - u.round())[..., None, :] * _frequencies(order, u)[:, None]
+    if out is None:
+        out = u.new_empty(*u.shape[:-1], 2 * order + 1, u.shape[-1])
+    out[..., 0, :] = 1.0
+    angle = out[..., order + 1 :, :]
+    torch.mul((u - u.round())[..., None, :], _frequencies(order, u)[:, None], out=angle)
     # measured faster, and more accurate, than recurrences: sine and cosine are vectorised
-    table = u.new_empty(*u.shape[:-1], 2 * order + 1, u.shape[-1])
-    table[..., 0, :] = 1.0
-    torch.cos(angle, out=table[..., 1 : order + 1, :])
-    torch.sin(angle, out=table[..., order + 1 :, :])
-    return table
+    torch.cos(angle, out=out[..., 1 : order + 1, :])
+    torch.sin(angle, out=angle)
+    return out
 
 
 @lru_cache(maxsize=256)
@@ -76,18 +80,26 @@ def _align(table: Tensor, level: int) -> Tensor:
     return table.reshape(table.shape[0], *(1,) * (level + 1), *table.shape[1:])
 
 
-def _partial_sums(weights: Tensor, tables: list[Tensor]) -> Tensor:
+def _partial_sums(weights: Tensor, table: Tensor, out: Tensor | None = None) -> Tensor:
     """Contract the last variable: one matrix product."""
-    size, points = weights.shape[0], tables[-1].shape[-1]
-    flat = weights.reshape(size, -1, weights.shape[-1]) @ tables[-1]
-    return flat.reshape(*weights.shape[:-1], points)
+    flat = weights.reshape(weights.shape[0], -1, weights.shape[-1])
+    target = None if out is None else out.view(*flat.shape[:-1], -1)
+    return torch.bmm(flat, table, out=target).reshape(*weights.shape[:-1], table.shape[-1])
 
 
-def _tables(weights: Tensor, u: Tensor) -> list[Tensor]:
-    orders = [(a - 1) // 2 for a in weights.shape[2:]]
-    if len(set(orders)) == 1:
-        return list(trigonometric_table(u, orders[0]).unbind(dim=1))
-    return [trigonometric_table(u[:, i], order) for i, order in enumerate(orders)]
+class _Room:
+    """Working arrays for blocks of `size` points, used again and again: fresh memory is slow."""
+
+    def __init__(self, weights: Tensor, size: int) -> None:
+        self.size = size
+        self.orders = [(a - 1) // 2 for a in weights.shape[2:]]
+        self.tables = [weights.new_empty(weights.shape[0], a, size) for a in weights.shape[2:]]
+        self.sums = weights.new_empty(*weights.shape[:-1], size)
+
+    def fill(self, u: Tensor) -> list[Tensor]:
+        for i, (order, table) in enumerate(zip(self.orders, self.tables, strict=True)):
+            trigonometric_table(u[:, i], order, table)
+        return self.tables
 
 
 def _blocks(weights: Tensor, points: int) -> list[slice]:
@@ -101,12 +113,21 @@ def _blocks(weights: Tensor, points: int) -> list[slice]:
     return [slice(start, start + size) for start in range(0, points, size)]
 
 
+def _in_blocks(weights: Tensor, points: int) -> Iterator[tuple[slice, _Room]]:
+    room = None
+    for block in _blocks(weights, points):
+        size = min(block.stop, points) - block.start
+        if room is None or room.size != size:
+            room = _Room(weights, size)
+        yield block, room
+
+
 def _forward(weights: Tensor, u: Tensor) -> Tensor:
     dim, points = u.shape[1], u.shape[2]
     values = u.new_empty(weights.shape[0], weights.shape[1], points)
-    for block in _blocks(weights, points):
-        tables = _tables(weights, u[..., block])
-        sums = _partial_sums(weights, tables)
+    for block, room in _in_blocks(weights, points):
+        tables = room.fill(u[..., block])
+        sums = _partial_sums(weights, tables[-1], room.sums)
         for level in range(dim - 2, -1, -1):
             sums = sums.mul_(_align(tables[level], level)).sum(dim=-2)
         values[..., block] = sums
@@ -114,13 +135,13 @@ def _forward(weights: Tensor, u: Tensor) -> Tensor:
 
 
 def _backward_block(
-    weights: Tensor, u: Tensor, grad: Tensor, want_points: bool
+    weights: Tensor, u: Tensor, grad: Tensor, want_points: bool, room: _Room
 ) -> tuple[Tensor, Tensor | None]:
     """Cotangents of the flattened weights and of u, the partial sums worked out anew."""
     dim = u.shape[1]
-    tables = _tables(weights, u)
+    tables = room.fill(u)
     flat = weights.reshape(weights.shape[0], -1, weights.shape[-1])
-    before = [_partial_sums(weights, tables)] if want_points and dim > 1 else []
+    before = [_partial_sums(weights, tables[-1], room.sums)] if want_points and dim > 1 else []
     for level in range(dim - 2, 0, -1) if want_points else ():
         before.append((before[-1] * _align(tables[level], level)).sum(dim=-2))
     point_grads = []
@@ -129,7 +150,9 @@ def _backward_block(
         if want_points:
             shared = before.pop().mul_(dual.unsqueeze(-2)).flatten(1, -3).sum(dim=1)
             point_grads.append(_derivative_dot(tables[level], shared))
-        dual = dual.unsqueeze(-2) * _align(tables[level], level)
+        # at the last level the partial sums have been used up: their room is free
+        free = room.sums if level == dim - 2 else None
+        dual = torch.mul(dual.unsqueeze(-2), _align(tables[level], level), out=free)
     dual = dual.flatten(1, -2)
     if want_points:
         point_grads.append(_derivative_dot(tables[-1], flat.mT @ dual))
@@ -159,8 +182,10 @@ class _Series(torch.autograd.Function):
         want_weights, want_points = ctx.needs_input_grad
         grad_weights = torch.zeros_like(weights)
         grad_points = torch.empty_like(u) if want_points else None
-        for block in _blocks(weights, u.shape[2]):
-            part, moved = _backward_block(weights, u[..., block], grad[..., block], want_points)
+        for block, room in _in_blocks(weights, u.shape[2]):
+            part, moved = _backward_block(
+                weights, u[..., block], grad[..., block], want_points, room
+            )
             grad_weights += part.reshape(weights.shape)
             if grad_points is not None and moved is not None:
                 grad_points[..., block] = moved
@@ -175,7 +200,7 @@ def evaluate_plainly(weights: Tensor, u: Tensor) -> Tensor:
         angle = u[:, i, None, :] * _frequencies(order, u)[:, None]
         table = torch.cat([torch.ones_like(u[:, i, None, :]), angle.cos(), angle.sin()], dim=1)
         if i == u.shape[1] - 1:
-            sums = _partial_sums(weights, [table])
+            sums = _partial_sums(weights, table)
         else:
             sums = (sums * _align(table, i)).sum(dim=-2)
     return sums
