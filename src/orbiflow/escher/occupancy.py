@@ -22,6 +22,9 @@ from orbiflow.tilings import IsohedralClass
 MAX_FREQUENCY = 60
 """Largest Omega that a fit takes on; time and memory grow with its square."""
 
+SHAPE_PENALTY = 0.02
+"""Factor of the squared displacement of a pentagon's free vertex: keeps the template simple."""
+
 Progress = Callable[[float, float], None]
 """Called with the share of the work done and the best loss so far."""
 
@@ -187,7 +190,8 @@ def _affine_phase(
     for _ in range(settings.affine_iterations):
         points, inside = samples.draw(512)
         optimizer.zero_grad()
-        occupancy_loss(model, points, inside, 15.0, affine=True).sum().backward()
+        loss = occupancy_loss(model, points, inside, 15.0, affine=True)
+        (loss + _shape_penalty(model)).sum().backward()
         optimizer.step()
     ranked = _ranked(model, samples, 15.0, keep=model.size, affine=True)
     return ranked.take(_distinct(ranked, settings.finalists))
@@ -233,7 +237,8 @@ def _flow_phase(
         optimizer.zero_grad()
         points, inside = samples.draw(settings.points)
         loss = occupancy_loss(model, points, inside, _between(settings.hardness, done))
-        (loss + _between(settings.penalty, done) * _energy(model)).sum().backward()
+        energy = _between(settings.penalty, done) * _energy(model)
+        (loss + energy + _shape_penalty(model)).sum().backward()
         optimizer.step()
         report((i + 1) / settings.iterations, float(loss.detach().min()))
     return model
@@ -242,6 +247,10 @@ def _flow_phase(
 def _energy(model: TileModel) -> Tensor:
     squares = [p.square().sum(dim=-1) for p in model.flow.parameters()]
     return torch.stack(squares).sum(dim=0)
+
+
+def _shape_penalty(model: TileModel) -> Tensor:
+    return SHAPE_PENALTY * model.shape.square().sum(dim=-1)
 
 
 def _between(ends: tuple[float, float], share: float) -> float:
