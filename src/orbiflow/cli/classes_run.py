@@ -32,7 +32,7 @@ def run(out: Path | None) -> None:
     output.print(table)
     if out is not None:
         write_atomic(out, classes_png())
-        output.print(f"drawn in {out}")
+        output.print(f"drawn in {out}", soft_wrap=True)
 
 
 def _row(kind: IsohedralClass) -> tuple[str, ...]:

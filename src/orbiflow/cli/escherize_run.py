@@ -61,7 +61,7 @@ def run(request: Request) -> None:
     target = Target.read(request.image, threshold=request.threshold, invert=request.invert)
     out = make_folder(request.out)
     for note in target.notes:
-        output.print(f"  {note}", highlight=False)
+        output.print(f"  {note}", highlight=False, soft_wrap=True)
     with watched(names) as watch:
         results, failures = search(
             target, names, settings, workers=count, force=request.force, watch=watch
@@ -77,11 +77,15 @@ def run(request: Request) -> None:
     for failure in failures:
         _explain(failure)
     if not results and not interrupted:
-        errors.print(f"no certified tile was found; see {out / 'result.json'}")
+        errors.print(f"no certified tile was found; see {out / 'result.json'}", soft_wrap=True)
         raise typer.Exit(1)
     if results:
         total = time.perf_counter() - begin
-        output.print(f"written to {out} in {total:.0f} s; look at {out / 'overview.png'} first")
+        # a path broken over two lines cannot be copied
+        output.print(
+            f"written to {out} in {total:.0f} s; look at {out / 'overview.png'} first",
+            soft_wrap=True,
+        )
     if interrupted:
         raise typer.Exit(130)
 
