@@ -20,7 +20,8 @@ from orbiflow import __version__
 from orbiflow.draw.folder import write_tile_folder
 from orbiflow.escher import Target, TileModel, load_model, search
 from orbiflow.escher.boundary import extract_tile
-from orbiflow.escher.result import best_tile
+from orbiflow.escher.fit import Fit
+from orbiflow.escher.result import best_tiles
 from orbiflow.tilings import CLASSES
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -172,7 +173,7 @@ def test_no_tile_is_status_one(tmp_path: Path, orbiflow, monkeypatch: pytest.Mon
 
 def test_a_forced_tile_is_marked(tmp_path: Path) -> None:
     target = Target.from_polygon(BOOT, source="some/boot.json")
-    result = best_tile(target, crossed(), starts=1, seconds=0.0, force=True)
+    result = best_tiles(target, Fit(crossed(), 1, 0, 1), force=True)[0]
     written = write_tile_folder(result, target, tmp_path / "IH21")
     assert {path.name for path in written} == FILES
     for name in ("tile.svg", "tiling.svg"):

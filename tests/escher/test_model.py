@@ -152,9 +152,9 @@ def test_take_keeps_the_values(kind: IsohedralClass, seed: int) -> None:
     assert largest(taken.offset - model.offset[[2, 0]] - 1.0) < 1e-12
 
 
-def test_template_boundary_is_even_on_every_edge() -> None:
+def test_boundary_is_even_on_every_edge() -> None:
     model = random_model(CLASSES["IH28"], 3, 2)
-    points = model.template_boundary(4).detach()
+    points = model.boundary(4).detach()
     corners = model.template().detach()
     assert points.shape == (2, 20, 2)
     assert torch.equal(points[:, ::4], corners)

@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from orbiflow.errors import OrbiflowError
+from orbiflow.escher.fit import Fit
 from orbiflow.escher.model import TileModel
 from orbiflow.escher.occupancy import (
     MAX_FREQUENCY,
@@ -21,7 +22,7 @@ from orbiflow.escher.occupancy import (
     fit_occupancy,
     occupancy_loss,
 )
-from orbiflow.escher.result import best_tile
+from orbiflow.escher.result import best_tiles
 from orbiflow.escher.target import Target
 from orbiflow.tilings import CLASSES
 from strategies import seeds
@@ -226,7 +227,7 @@ def test_a_real_silhouette() -> None:
     target = Target.read(DATA / "nagata" / "squirrel1_60.dat")
     own = OccupancySettings(iterations=60, turns=8)
     model = fit_occupancy(target, CLASSES["IH5"], own)
-    result = best_tile(target, model, starts=16, seconds=0.0)
+    result = best_tiles(target, Fit(model, 16, 0, model.size))[0]
     assert result.certificate.valid
     assert result.certificate.edge_mismatch < 1e-12
     assert result.metrics.iou > 0.78

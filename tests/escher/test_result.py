@@ -5,12 +5,20 @@ import shapely
 import torch
 
 from orbiflow.errors import CertificationError
+from orbiflow.escher.fit import Fit
 from orbiflow.escher.model import TileModel
-from orbiflow.escher.result import best_tile
+from orbiflow.escher.result import TileResult, best_tiles
 from orbiflow.escher.target import Target
 from orbiflow.tilings import CLASSES, certify
 
 KIND = CLASSES["IH21"]
+
+
+def best_tile(
+    target: Target, model: TileModel, *, starts: int, seconds: float, force: bool = False
+) -> TileResult:
+    fit = Fit(model, starts, 0, model.size)
+    return best_tiles(target, fit, seconds=seconds, force=force)[0]
 
 
 def finalists(*shapes: float, angles: tuple[float, ...] | None = None) -> TileModel:

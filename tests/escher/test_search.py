@@ -8,7 +8,7 @@ import pytest
 import torch
 
 from orbiflow.errors import OrbiflowError
-from orbiflow.escher import search
+from orbiflow.escher import methods
 from orbiflow.escher.model import TileModel
 from orbiflow.escher.occupancy import OccupancySettings
 from orbiflow.escher.result import ClassFailure, TileResult
@@ -77,7 +77,7 @@ def test_a_fit_that_runs_away_is_a_failure(force: bool) -> None:
 
 
 def test_a_class_whose_finalists_all_fold(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(search, "fit_occupancy", crossed)
+    monkeypatch.setattr(methods, "fit_occupancy", crossed)
     events: list[Event] = []
     results, failures = escherize(TARGET, ["IH21"], QUICK, watch=events.append)
     assert results == []

@@ -12,7 +12,16 @@ import typer
 class Method(StrEnum):
     """How tiles are fitted."""
 
+    DESCENT = "descent"
     OCCUPANCY = "occupancy"
+
+
+class Effort(StrEnum):
+    """How long the descent searches."""
+
+    FAST = "fast"
+    NORMAL = "normal"
+    BEST = "best"
 
 
 def escherize(
@@ -29,17 +38,42 @@ def escherize(
     classes: Annotated[
         str, typer.Option(help="Isohedral classes, such as IH4,IH6, or all.")
     ] = "all",
+    effort: Annotated[
+        Effort, typer.Option(help="Seconds, a quarter of a minute, or minutes.")
+    ] = Effort.NORMAL,
+    emphasis: Annotated[
+        Path | None,
+        typer.Option(
+            help="A mask, white where the silhouette must survive: a head, a tail.",
+            show_default=False,
+        ),
+    ] = None,
+    strength: Annotated[
+        float, typer.Option(help="How many times more the mask's white part counts.")
+    ] = 4.0,
+    per_class: Annotated[
+        int, typer.Option(help="Tiles of each class, the best and others that differ from it.")
+    ] = 1,
     max_frequency: Annotated[
-        int, typer.Option(help="Detail of the deformation (Omega in the paper), 1 to 60.")
-    ] = 10,
+        int | None,
+        typer.Option(
+            help="Detail of the deformation (Omega in the paper), 1 to 60; default 10, or 15 for "
+            "effort best.",
+            show_default=False,
+        ),
+    ] = None,
     seed: Annotated[int, typer.Option(help="Same seed, same machine: same tiles.")] = 0,
-    method: Annotated[  # noqa: ARG001 - one so far; results name it
-        Method, typer.Option(help="How tiles are fitted.")
-    ] = Method.OCCUPANCY,
-    turns: Annotated[int, typer.Option(help="Starting rotations of each template.")] = 12,
+    method: Annotated[
+        Method, typer.Option(help="The descent, or the paper's occupancy loss for comparison.")
+    ] = Method.DESCENT,
+    turns: Annotated[
+        int | None,
+        typer.Option(help="Occupancy: starting rotations, default 12.", show_default=False),
+    ] = None,
     iterations: Annotated[
-        int, typer.Option(help="Steps of the fit: more is better, slower.")
-    ] = 200,
+        int | None,
+        typer.Option(help="Occupancy: steps of the fit, default 200.", show_default=False),
+    ] = None,
     workers: Annotated[
         int | None, typer.Option(help="Processes; default one a core.", show_default=False)
     ] = None,
@@ -69,6 +103,11 @@ def escherize(
             image=image,
             out=out,
             classes=classes,
+            method=method.value,
+            effort=effort.value,
+            emphasis=emphasis,
+            strength=strength,
+            per_class=per_class,
             max_frequency=max_frequency,
             seed=seed,
             turns=turns,

@@ -9,6 +9,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+import torch
 import typer
 from rich.table import Table
 
@@ -18,8 +19,16 @@ from orbiflow.draw import write_atomic
 from orbiflow.draw.folder import make_folder
 from orbiflow.draw.gallery import write_gallery
 from orbiflow.errors import OrbiflowError
-from orbiflow.escher import ClassFailure, OccupancySettings, Target, TileResult
+from orbiflow.escher import (
+    ClassFailure,
+    DescentSettings,
+    Emphasis,
+    OccupancySettings,
+    Target,
+    TileResult,
+)
 from orbiflow.escher import escherize as search
+from orbiflow.escher.methods import Settings
 from orbiflow.escher.report import report
 from orbiflow.escher.search import INTERRUPTED
 from orbiflow.tilings import CLASSES, isohedral_class
@@ -32,10 +41,15 @@ class Request:
     image: Path
     out: Path
     classes: str
-    max_frequency: int
+    method: str
+    effort: str
+    emphasis: Path | None
+    strength: float
+    per_class: int
+    max_frequency: int | None
     seed: int
-    turns: int
-    iterations: int
+    turns: int | None
+    iterations: int | None
     workers: int | None
     threshold: float | None
     invert: bool | None
@@ -51,20 +65,26 @@ def run(request: Request) -> None:
     """
     begin = time.perf_counter()
     names = _class_names(request.classes)
-    settings = OccupancySettings(
-        max_frequency=request.max_frequency,
-        seed=request.seed,
-        turns=request.turns,
-        iterations=request.iterations,
-    )
+    settings = _settings(request)
+    torch.set_num_threads(1)  # many small operations; and workers may be forked
     count = min(_workers(request.workers), len(names))
     target = Target.read(request.image, threshold=request.threshold, invert=request.invert)
+    emphasis = None
+    if request.emphasis is not None:
+        emphasis = Emphasis.read(request.emphasis, target, strength=request.strength)
     out = make_folder(request.out)
-    for note in target.notes:
+    for note in (*target.notes, *(emphasis.notes if emphasis else ())):
         output.print(f"  {note}", highlight=False, soft_wrap=True)
     with watched(names) as watch:
         results, failures = search(
-            target, names, settings, workers=count, force=request.force, watch=watch
+            target,
+            names,
+            settings,
+            emphasis=emphasis,
+            per_class=request.per_class,
+            workers=count,
+            force=request.force,
+            watch=watch,
         )
     seconds = time.perf_counter() - begin
     document = report(target, results, failures, settings, seconds=seconds, workers=count)
@@ -88,6 +108,29 @@ def run(request: Request) -> None:
         )
     if interrupted:
         raise typer.Exit(130)
+
+
+def _settings(request: Request) -> Settings:
+    """Of the method asked for.
+
+    Raises:
+        OrbiflowError: for values out of range, and for options of the other method.
+    """
+    asked = {
+        name: value
+        for name in ("max_frequency", "turns", "iterations")
+        if (value := getattr(request, name)) is not None
+    }
+    if request.method == "occupancy":
+        if request.emphasis is not None:
+            raise OrbiflowError("--emphasis needs --method descent")
+        return OccupancySettings(seed=request.seed, **asked)
+    for name in ("turns", "iterations"):
+        if name in asked:
+            raise OrbiflowError(
+                f"--{name} belongs to --method occupancy; the descent has --effort instead"
+            )
+    return DescentSettings.for_effort(request.effort, seed=request.seed, **asked)
 
 
 def _class_names(text: str) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
@@ -26,9 +27,17 @@ def watched(names: Sequence[str]) -> Iterator[Watcher]:
     )
     with Progress(*columns, console=output, transient=True) as progress:
         task = progress.add_task("fitting", total=float(len(names)), best="")
+        begin = time.perf_counter()
 
         def watch(event: Event) -> None:
             shares[event.name] = max(shares[event.name], event.share)
+            if event.preview is not None:
+                best.append(event.preview)
+                output.print(
+                    f"  first tile after {time.perf_counter() - begin:.1f} s: {event.name}, "
+                    f"IoU {event.preview.metrics.iou:.4f}, certified",
+                    highlight=False,
+                )
             if isinstance(event.outcome, TileResult):
                 best.append(event.outcome)
                 best.sort(key=lambda r: -r.metrics.iou)

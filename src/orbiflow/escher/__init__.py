@@ -1,5 +1,9 @@
 """Escherization: targets, the occupancy method, metrics and results."""
 
+from orbiflow.escher.descent_settings import DescentSettings
+from orbiflow.escher.emphasis import Emphasis
+from orbiflow.escher.fit import Fit
+from orbiflow.escher.fit_descent import fit_descent
 from orbiflow.escher.metrics import ShapeMetrics, compare, dice, hausdorff, iou, pixel_accuracy
 from orbiflow.escher.model import TileModel
 from orbiflow.escher.occupancy import (
@@ -16,7 +20,10 @@ from orbiflow.escher.target import Target
 
 __all__ = [
     "ClassFailure",
+    "DescentSettings",
+    "Emphasis",
     "Event",
+    "Fit",
     "OccupancySamples",
     "OccupancySettings",
     "SavedModel",
@@ -28,6 +35,7 @@ __all__ = [
     "dice",
     "escherize",
     "escherize_class",
+    "fit_descent",
     "fit_occupancy",
     "hausdorff",
     "iou",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 import shapely
@@ -13,41 +13,54 @@ from orbiflow.errors import CertificationError
 from orbiflow.escher.model import TileModel
 from orbiflow.symmetry.isometry import Array
 from orbiflow.tilings import IsohedralClass, Tile
+from orbiflow.tilings.class_table import EdgePair
 
-DENSE = 768
-"""Samples along each edge of the template from which vertices are chosen: even, for midpoints."""
+DENSE = (960, 4320)
+"""Least number of samples around the tile from which vertices are chosen; the second if need be."""
+
+MAX_STEPS = 1024
+"""Integration steps of a segment beyond which a field counts as too steep."""
 
 TOLERANCES = (5e-4, 1e-4, 2e-5, 0.0)
 """Largest deviation of the polygon from the sampled curve, in square roots of the tile's area."""
 
 
-def converge(model: TileModel, points: torch.Tensor, *, tolerance: float = 1e-7) -> float:
-    """Double the integration steps until the flow is accurate; returns the error estimate.
+@torch.no_grad()
+def converge(
+    model: TileModel, points: torch.Tensor, *, tolerance: float = 1e-7, force: bool = False
+) -> tuple[torch.Tensor, float]:
+    """Double the integration steps until the flow is accurate.
 
     Quality is judged at the steps set here, never at those of the optimisation (design point 5).
 
     Args:
         model: a single candidate; its number of steps is changed.
         points: (1, N, 2) in the group's frame.
-        tolerance: on the flow's step-doubling estimate, in the group's units.
+        tolerance: on the change of the flow when its steps are doubled, in the group's units.
+        force: give what there is after `MAX_STEPS` steps, accurate or not.
+
+    Returns:
+        The points carried at the doubled steps, and the error estimate.
 
     Raises:
-        CertificationError: if 1,024 steps are not enough: the field is too steep; or if the flow
+        CertificationError: if `MAX_STEPS` are not enough: the field is too steep; or if the flow
             has no finite values.
     """
+    coarse = model.flow(points)
     while True:
-        error = model.flow.error_estimate(points)
+        model.flow.steps *= 2
+        fine = model.flow(points)
+        error = float((fine - coarse).abs().max())
         if not math.isfinite(error):
             raise CertificationError("the flow has no finite values: lower the learning rate")
-        if error <= tolerance:
-            model.flow.steps *= 2
-            return error
-        if model.flow.steps >= 1024:
+        if error <= tolerance or (force and model.flow.steps >= MAX_STEPS):
+            return fine, error
+        if model.flow.steps >= MAX_STEPS:
             raise CertificationError(
                 f"the flow is not accurate after {model.flow.steps} steps (error {error:.1e}): "
                 "the field is too steep; lower max-frequency or raise the penalty"
             )
-        model.flow.steps *= 2
+        coarse = fine
 
 
 @torch.no_grad()
@@ -70,46 +83,78 @@ def extract_tile(model: TileModel, *, force: bool = False) -> tuple[Tile, TileMo
     """
     kind = model.isohedral_class
     model = model.take([0]).double()
-    model.flow.method, model.flow.steps = "rk4", 8
-    dense_template = model.template_boundary(DENSE)
-    try:
-        converge(model, dense_template[:, :: DENSE // 32])
-    except CertificationError:
-        if not force:
-            raise
-    dense = model(dense_template)[0].numpy()
-    if not np.isfinite(dense).all():
-        raise CertificationError(f"{kind.name}: the boundary has no finite coordinates")
-    for polygon, corners in _polygons(kind, dense):
-        tile = Tile(polygon, model.placed_group(), kind.name, corners)
-        if shapely.Polygon(polygon).is_valid:
-            return tile, model
-    if force:
+    model.flow.method, model.flow.steps = "rk4", max(1, 8 // model.segments)
+    sides = model.prototile()[0].shape[1]
+    tile = None
+    for count in DENSE:
+        pieces = 2 * -(-count // (2 * sides))  # even: centres are sampled
+        edges = _flowed_edges(model, pieces, force)
+        for polygon, starts in _polygons(kind, edges):
+            tile = Tile(polygon, model.placed_group(), kind.name, starts)
+            if shapely.Polygon(polygon).is_valid:
+                return tile, model
+    if force and tile is not None:
         return tile, model
     raise CertificationError(
-        f"{kind.name}: the boundary crosses itself even with {DENSE} samples an edge"
+        f"{kind.name}: the boundary crosses itself even with {DENSE[-1]} samples"
     )
 
 
-def _polygons(kind: IsohedralClass, dense: Array) -> Iterator[tuple[Array, tuple[int, ...]]]:
-    edges = dense.reshape(-1, DENSE, 2)
-    closed = np.concatenate([edges, np.roll(edges, -1, axis=0)[:, :1]], axis=1)
+def _flowed_edges(model: TileModel, pieces: int, force: bool) -> list[Array]:
+    """Samples along each edge of the tile, both ends included, at converged steps.
+
+    Half of them are carried by the flow, the others are their images: the flow commutes with the
+    group, step for step.
+    """
+    kind, placed = model.isohedral_class, _placement(model)
+    before = model.boundary(pieces)[0]
+    closed = torch.cat([before, before[:1]])
+    first = [*(model.prototile()[1][0] * pieces).tolist(), len(before)]
+    spans = {}
+    for pair in kind.identified_edges:
+        start, end = first[pair.first], first[pair.first + 1]
+        spans[pair] = slice(start, (start + end) // 2 + 1 if _turns_over(pair) else end + 1)
+    points = torch.cat([closed[span] for span in spans.values()])[None]
+    flowed = converge(model, points, force=force)[0][0].numpy()
+    ends = np.cumsum([span.stop - span.start for span in spans.values()])
+    edges: dict[int, Array] = {}
+    for pair, own in zip(spans, np.split(flowed, ends[:-1]), strict=True):
+        image = kind.edge_isometry(pair)(own)
+        if _turns_over(pair):
+            edges[pair.first] = np.concatenate([own, image[-2::-1]])
+        else:
+            edges[pair.first] = own
+            edges[pair.second] = image[::-1] if pair.reversed else image
+    return [placed(edges[i]) for i in range(len(edges))]
+
+
+def _placement(model: TileModel) -> Callable[[Array], Array]:
+    linear, offset = (t.detach().numpy()[0] for t in (model.linear(), model.offset))
+    return lambda points: points @ linear.T + offset
+
+
+def _turns_over(pair: EdgePair) -> bool:
+    return pair.first == pair.second  # a 2-fold centre at the midpoint
+
+
+def _polygons(kind: IsohedralClass, edges: list[Array]) -> Iterator[tuple[Array, tuple[int, ...]]]:
     for tolerance in TOLERANCES:
-        chosen = _chosen_samples(kind, closed, tolerance)
-        kept = [edge[mask[:-1]] for edge, mask in zip(edges, chosen, strict=True)]
+        chosen = _chosen_samples(kind, edges, tolerance)
+        kept = [edge[:-1][mask[:-1]] for edge, mask in zip(edges, chosen, strict=True)]
         starts = np.cumsum([0] + [len(edge) for edge in kept[:-1]])
         yield np.concatenate(kept), tuple(int(start) for start in starts)
 
 
-def _chosen_samples(kind: IsohedralClass, closed: Array, tolerance: float) -> list[Array]:
-    """For each edge, which of its DENSE + 1 samples to keep: matching on identified edges."""
+def _chosen_samples(kind: IsohedralClass, closed: list[Array], tolerance: float) -> list[Array]:
+    """For each edge, which of its samples to keep, both ends included: matching on identified edges."""
     masks: dict[int, Array] = {}
     for pair in kind.identified_edges:
-        if pair.first == pair.second:  # a 2-fold centre at the midpoint
-            half = _simplified(closed[pair.first][: DENSE // 2 + 1], tolerance)
+        curve = closed[pair.first]
+        if _turns_over(pair):
+            half = _simplified(curve[: len(curve) // 2 + 1], tolerance)
             masks[pair.first] = np.concatenate([half, half[-2::-1]])
             continue
-        mask = _simplified(closed[pair.first], tolerance)
+        mask = _simplified(curve, tolerance)
         masks[pair.first] = mask
         masks[pair.second] = mask[::-1] if pair.reversed else mask
     return [masks[i] for i in range(len(closed))]

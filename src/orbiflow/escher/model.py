@@ -9,6 +9,7 @@ import torch
 from torch import Tensor, nn
 
 from orbiflow.errors import OrbiflowError
+from orbiflow.escher.prototiles import Prototiles
 from orbiflow.fields import FourierField
 from orbiflow.flows import Flow
 from orbiflow.symmetry import CrystallographicGroup
@@ -32,17 +33,21 @@ class TileModel(nn.Module):
         smoothness: Sobolev exponent of the fields' parameters.
         steps, method: of the integrator.
         dtype: of all parameters.
+        prototiles: S start tiles with their poses, in place of the template; `angles` and `mirrored`
+            are then taken from them.
 
     Shapes:
         points (S, N, 2) throughout.
     """
 
     mirror: Tensor
+    outline: Tensor | None
+    corners: Tensor | None
 
     def __init__(
         self,
         isohedral_class: IsohedralClass,
-        angles: Tensor,
+        angles: Tensor | None = None,
         *,
         mirrored: Tensor | None = None,
         max_frequency: int = 10,
@@ -51,8 +56,14 @@ class TileModel(nn.Module):
         steps: int = 8,
         method: str = "rk4",
         dtype: torch.dtype = torch.float64,
+        prototiles: Prototiles | None = None,
     ) -> None:
         super().__init__()
+        if prototiles is not None:
+            angles = torch.as_tensor(prototiles.angle)
+            mirrored = torch.as_tensor(prototiles.mirrored)
+        if angles is None:
+            raise OrbiflowError("a tile model needs angles or prototiles")
         size = len(angles)
         self.isohedral_class = isohedral_class
         self.group: CrystallographicGroup = isohedral_class.group()
@@ -72,10 +83,20 @@ class TileModel(nn.Module):
         self.max_frequency = max_frequency
         self.segments = segments
         self.smoothness = smoothness
-        with torch.no_grad():  # the template's centre at the target's centroid
-            linear = self.linear()
-            center = self.template().mean(dim=-2, keepdim=True) @ linear.mT
-            self.offset.copy_(-center[:, 0])
+        self._start_from(prototiles)
+
+    @torch.no_grad()
+    def _start_from(self, prototiles: Prototiles | None) -> None:
+        if prototiles is None:
+            self.register_buffer("outline", None)
+            self.register_buffer("corners", None)
+            self.recentre()
+            return
+        # float64 whatever the parameters are: its edges match to rounding
+        self.register_buffer("outline", torch.tensor(prototiles.outline, dtype=torch.float64))
+        self.register_buffer("corners", torch.tensor(prototiles.corners))
+        for name in ("log_scale", "offset", "stretch"):
+            getattr(self, name).copy_(torch.as_tensor(getattr(prototiles, name)))
 
     @property
     def size(self) -> int:
@@ -95,6 +116,12 @@ class TileModel(nn.Module):
             self.log_scale.exp()[:, None, None] * turn @ self.isohedral_class.stretch(self.stretch)
         )
 
+    @torch.no_grad()
+    def recentre(self) -> None:
+        """Put each template's centre at the target's centroid, by the offset."""
+        center = self.template().mean(dim=-2, keepdim=True) @ self.linear().mT
+        self.offset.copy_(-center[:, 0])
+
     def place(self, points: Tensor) -> Tensor:
         """A o L at points (S, N, 2) of the group's frame."""
         return points @ self.linear().mT + self.offset[:, None, :]
@@ -111,36 +138,61 @@ class TileModel(nn.Module):
         """D^-1 at points (N, 2) or (S, N, 2) of the target's normal form."""
         return self.flow.inverse(self.unplace(points))
 
-    def template_boundary(self, per_edge: int) -> Tensor:
-        """Points (S, K per_edge, 2) along the template, evenly spaced on each edge.
+    def prototile(self) -> tuple[Tensor, Tensor]:
+        """What the flow starts from: vertices (S, N, 2) and the corners' indices (S, K)."""
+        if self.outline is None or self.corners is None:
+            template = self.template()
+            corners = torch.arange(template.shape[1], device=template.device)
+            return template, corners.expand(len(template), -1)
+        return self.outline.to(self.angle.dtype), self.corners
 
-        Even spacing makes the samples of identified edges correspond, whichever way they run.
+    def boundary(self, pieces: int) -> Tensor:
+        """Points (S, N pieces, 2) along the prototile, `pieces` evenly spaced on each side.
+
+        Identified edges have as many sides each, so their samples correspond.
         """
-        corners = self.template()
-        t = torch.linspace(0, 1, per_edge + 1, dtype=corners.dtype, device=corners.device)[
-            :-1, None
-        ]
-        edges = corners.roll(-1, dims=-2) - corners
-        return (corners[:, :, None] + t * edges[:, :, None]).flatten(1, 2)
+        vertices, _ = self.prototile()
+        t = torch.arange(pieces, dtype=vertices.dtype, device=vertices.device)[:, None] / pieces
+        sides = vertices.roll(-1, dims=-2) - vertices
+        return (vertices[:, :, None] + t * sides[:, :, None]).flatten(1, 2)
 
     def take(self, indices: list[int]) -> TileModel:
         """A new model with the candidates at `indices` only, at the same parameters."""
-        smaller = TileModel(
+        fields = [field.parameters_.detach()[indices] for field in self.fourier_fields()]
+        return self.with_fields(fields, indices)
+
+    def fourier_fields(self) -> list[FourierField]:
+        """The segments of the flow."""
+        return [field for field in self.flow.segments if isinstance(field, FourierField)]
+
+    @torch.no_grad()
+    def with_fields(self, fields: list[Tensor], indices: list[int] | None = None) -> TileModel:
+        """The candidates at `indices` (default all) with another flow: one segment for each field.
+
+        Args:
+            fields: parameters (len(indices), P) of each segment, under this model's smoothness.
+            indices: of the candidates.
+        """
+        chosen = list(range(self.size)) if indices is None else indices
+        model = TileModel(
             self.isohedral_class,
-            self.angle.detach()[indices],
-            mirrored=self.mirror[indices],
+            self.angle.detach()[chosen],
+            mirrored=self.mirror[chosen],
             max_frequency=self.max_frequency,
-            segments=self.segments,
+            segments=len(fields),
             smoothness=self.smoothness,
             steps=self.flow.steps,
             method=self.flow.method,
             dtype=self.angle.dtype,
         ).to(self.angle.device)
-        with torch.no_grad():
-            own = dict(self.named_parameters())
-            for name, parameter in smaller.named_parameters():
-                parameter.copy_(own[name][indices])
-        return smaller
+        for name in ("log_scale", "offset", "shape", "stretch"):
+            getattr(model, name).copy_(getattr(self, name)[chosen])
+        if self.outline is not None and self.corners is not None:
+            model.outline = self.outline[chosen].clone()
+            model.corners = self.corners[chosen].clone()
+        for own, parameters in zip(model.fourier_fields(), fields, strict=True):
+            own.parameters_.copy_(parameters)
+        return model
 
     def placed_group(self) -> CrystallographicGroup:
         """The group of a single candidate's tile, in the target's normal form.

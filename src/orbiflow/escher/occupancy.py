@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,6 +12,7 @@ import torch.nn.functional as F
 from torch import Tensor
 
 from orbiflow.errors import OrbiflowError
+from orbiflow.escher.fit import Progress
 from orbiflow.escher.model import TileModel
 from orbiflow.escher.signed_distance import signed_distance
 from orbiflow.escher.starts import initial_poses, template_symmetries
@@ -24,9 +24,6 @@ MAX_FREQUENCY = 60
 
 SHAPE_PENALTY = 0.02
 """Factor of the squared displacement of a pentagon's free vertex: keeps the template simple."""
-
-Progress = Callable[[float, float], None]
-"""Called with the share of the work done and the best loss so far."""
 
 
 @dataclass(frozen=True)

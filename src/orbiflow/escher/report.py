@@ -12,7 +12,7 @@ import shapely
 import torch
 
 from orbiflow import __version__
-from orbiflow.escher.occupancy import OccupancySettings
+from orbiflow.escher.methods import Settings, method_name
 from orbiflow.escher.result import ClassFailure, TileResult
 from orbiflow.escher.target import Target
 from orbiflow.symmetry import CrystallographicGroup
@@ -52,7 +52,7 @@ def report(
     target: Target,
     results: Sequence[TileResult],
     failures: Sequence[ClassFailure],
-    settings: OccupancySettings,
+    settings: Settings,
     *,
     seconds: float,
     workers: int,
@@ -65,7 +65,7 @@ def report(
     """
     return {
         "schema_version": SCHEMA_VERSION,
-        "method": "occupancy",
+        "method": method_name(settings),
         "seed": settings.seed,
         "settings": asdict(settings),
         "versions": {

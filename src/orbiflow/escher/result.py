@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import shapely
 
 from orbiflow.errors import CertificationError
 from orbiflow.escher.boundary import extract_tile
+from orbiflow.escher.fit import Fit
 from orbiflow.escher.metrics import ShapeMetrics, compare
 from orbiflow.escher.model import TileModel
 from orbiflow.escher.storage import SavedModel
@@ -26,8 +27,10 @@ class TileResult:
     - `metrics`: of the certified polygon against the target.
     - `certificate`: of `tile`, in the input's coordinates.
     - `model`: the diffeomorphism, into the target's normal form.
-    - `starts`, `dropped`: starting poses tried; finalists that gave no certified tile.
+    - `starts`, `dropped`: starts of the fit; those whose boundary crossed itself on the way, or that
+      gave no certified tile.
     - `seconds`: of computing, on one core.
+    - `others`: more tiles of the class, if they were asked for.
     """
 
     name: str
@@ -40,6 +43,16 @@ class TileResult:
     starts: int
     dropped: int
     seconds: float
+    others: tuple[TileResult, ...] = ()
+
+    @property
+    def score(self) -> float:
+        """What tiles are ranked by."""
+        return self.metrics.iou
+
+    def family(self) -> tuple[TileResult, ...]:
+        """This tile and the others of its class."""
+        return (self, *self.others)
 
 
 @dataclass(frozen=True)
@@ -50,28 +63,33 @@ class ClassFailure:
     reason: str
 
 
-def best_tile(
-    target: Target, model: TileModel, *, starts: int, seconds: float, force: bool = False
-) -> TileResult:
-    """Turn finalists into polygons, certify them, and keep the one with the largest IoU.
+def best_tiles(
+    target: Target, fit: Fit, *, seconds: float = 0.0, force: bool = False
+) -> list[TileResult]:
+    """Turn finalists into polygons and certify them, best first, until there are enough.
+
+    Returns:
+        Certified tiles, largest IoU first.
 
     Raises:
         CertificationError: if no finalist is certified and `force` is not set.
     """
     found: list[TileResult] = []
     reasons: list[str] = []
-    for index in range(model.size):
+    for index in range(fit.model.size):
         try:
-            result = _result(target, model.take([index]), starts, seconds, force=force)
+            result = _result(target, fit.model.take([index]), fit.starts, seconds, force=force)
             if not force:
                 result.certificate.require()
             found.append(result)
         except CertificationError as error:
             reasons.append(str(error))
+        if len(found) == fit.enough:
+            break
     if not found:
         raise CertificationError("; ".join(dict.fromkeys(reasons)))
-    best = max(found, key=lambda r: (r.certificate.valid, r.metrics.iou))
-    return TileResult(**{**best.__dict__, "dropped": len(reasons)})
+    found.sort(key=lambda r: (not r.certificate.valid, -r.metrics.iou))
+    return [replace(result, dropped=fit.crossed + len(reasons)) for result in found]
 
 
 def _result(

@@ -7,6 +7,7 @@ import multiprocessing
 import queue
 import threading
 import time
+import warnings
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
@@ -16,9 +17,11 @@ from typing import Any
 import torch
 
 from orbiflow.errors import CertificationError, OrbiflowError
-from orbiflow.escher.occupancy import OccupancySettings, fit_occupancy
-from orbiflow.escher.result import ClassFailure, TileResult, best_tile
-from orbiflow.escher.starts import initial_poses
+from orbiflow.escher.descent_settings import DescentSettings
+from orbiflow.escher.emphasis import Emphasis
+from orbiflow.escher.methods import Settings, fit
+from orbiflow.escher.preview import quick_tile
+from orbiflow.escher.result import ClassFailure, TileResult, best_tiles
 from orbiflow.escher.target import Target
 from orbiflow.tilings import CLASSES, isohedral_class
 
@@ -26,23 +29,45 @@ INTERRUPTED = "interrupted"
 """The reason given for a class that Ctrl-C left undone."""
 
 Watcher = Callable[["Event"], None]
+Outcome = TileResult | ClassFailure
 
 
 @dataclass(frozen=True)
 class Event:
-    """News from a search: `share` of a class's work is done, or its `outcome` is there."""
+    """News from a search.
+
+    - `name`: of the class.
+    - `share`: of the class's work that is done.
+    - `loss`: best so far in the method's own measure; for the descent 1 - IoU.
+    - `outcome`: what the class gave, once it is there.
+    - `preview`: a first certified tile, which the search is going to improve on.
+    """
 
     name: str
     share: float
     loss: float
-    outcome: TileResult | ClassFailure | None = None
+    outcome: Outcome | None = None
+    preview: TileResult | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """What is to be done for each class: arguments as in `escherize`."""
+
+    target: Target
+    settings: Settings
+    emphasis: Emphasis | None = None
+    per_class: int = 1
+    force: bool = False
 
 
 def escherize(
     target: Target,
     classes: Iterable[str] = tuple(CLASSES),
-    settings: OccupancySettings | None = None,
+    settings: Settings | None = None,
     *,
+    emphasis: Emphasis | None = None,
+    per_class: int = 1,
     workers: int = 1,
     force: bool = False,
     watch: Watcher | None = None,
@@ -52,15 +77,19 @@ def escherize(
     Args:
         target: the silhouette.
         classes: names; each is done once, in its own process.
-        settings: of the occupancy method.
+        settings: of the descent (`DescentSettings`, the default) or of the paper's method
+            (`OccupancySettings`).
+        emphasis: what must survive.
+        per_class: tiles of each class at most, no two of them twins.
         workers: processes; 1 stays in this process. A script that asks for more must do its work
             under `if __name__ == "__main__":`, as always with multiprocessing.
         force: return tiles that are not certified, too; their certificates say why.
         watch: called in this process with every `Event`.
 
     Returns:
-        Certified tiles, largest IoU first, and the classes that gave none. The same seed gives the
-        same tiles, whatever the number of workers. After Ctrl-C: what was finished by then.
+        Certified tiles, best first (`TileResult.score`), and the classes that gave none. The same
+        seed gives the same tiles, whatever the number of workers. After Ctrl-C: what was found by
+        then.
 
     Raises:
         OrbiflowError: for an unknown class, a setting out of range, or workers that die.
@@ -68,53 +97,79 @@ def escherize(
     names = list(dict.fromkeys(isohedral_class(name).name for name in classes))
     if not names:
         raise OrbiflowError(f"no isohedral class was given; the nine are {', '.join(CLASSES)}")
-    settings = settings or OccupancySettings()
-    if workers < 1:
-        raise OrbiflowError(f"workers must be at least 1, got {workers}")
+    for what, number in (("workers", workers), ("per_class", per_class)):
+        if number < 1:
+            raise OrbiflowError(f"{what} must be at least 1, got {number}")
+    task = Task(target, settings or DescentSettings(), emphasis, per_class, force)
     count = min(workers, len(names))
     watch = watch or _ignore
     run = _run_here if count == 1 else _run_pool
-    outcomes = []
+    outcomes: list[Outcome] = []
+    previews: list[TileResult] = []
+
+    def note(event: Event) -> None:
+        if event.preview is not None:
+            previews.append(event.preview)
+        watch(event)
+
     with (
         contextlib.suppress(KeyboardInterrupt),
-        contextlib.closing(run(target, names, settings, count, force, watch)) as found,
+        contextlib.closing(run(task, names, count, note)) as found,
     ):
         for outcome in found:
             outcomes.append(outcome)  # before it is told: an interrupt must not lose it
             watch(Event(outcome.name, 1.0, float("nan"), outcome))
-    results = [outcome for outcome in outcomes if isinstance(outcome, TileResult)]
-    failures = [outcome for outcome in outcomes if isinstance(outcome, ClassFailure)]
     missing = [name for name in names if name not in {outcome.name for outcome in outcomes}]
+    outcomes += [preview for preview in previews if preview.name in missing]
+    results = [o for best in outcomes if isinstance(best, TileResult) for o in best.family()]
+    failures = [outcome for outcome in outcomes if isinstance(outcome, ClassFailure)]
     failures += [ClassFailure(name, INTERRUPTED) for name in missing]
     # ties are broken by the order in which the classes were asked for
-    results.sort(key=lambda r: (-r.metrics.iou, names.index(r.name)))
+    results.sort(key=lambda r: (-r.score, names.index(r.name)))
     return results, failures
 
 
 def escherize_class(
     target: Target,
     name: str,
-    settings: OccupancySettings,
+    settings: Settings,
     *,
+    emphasis: Emphasis | None = None,
+    per_class: int = 1,
     force: bool = False,
     watch: Watcher | None = None,
-) -> TileResult | ClassFailure:
-    """Fit and certify one class in this process, on one thread."""
+) -> Outcome:
+    """Fit and certify one class in this process, on one thread; arguments as in `escherize`."""
+    return _work_on(Task(target, settings, emphasis, per_class, force), name, watch or _ignore)
+
+
+def _work_on(task: Task, name: str, watch: Watcher) -> Outcome:
     kind = isohedral_class(name)
-    watch = watch or _ignore
     begin = time.perf_counter()
-    number = list(CLASSES).index(kind.name)
-    own = replace(settings, seed=(settings.seed * 1009 + number) % 2**32)
     with _one_thread():
-        model = fit_occupancy(
-            target, kind, own, lambda share, loss: watch(Event(kind.name, share, loss))
+        found = fit(
+            task.target,
+            kind,
+            task.settings,
+            emphasis=task.emphasis,
+            per_class=task.per_class,
+            progress=lambda share, loss: watch(Event(kind.name, share, loss)),
         )
-        starts = len(initial_poses(kind, settings.turns)[0])
         try:
-            result = best_tile(target, model, starts=starts, seconds=0.0, force=force)
+            tiles = best_tiles(task.target, found, force=task.force)
         except CertificationError as error:
             return ClassFailure(kind.name, str(error))
-    return replace(result, seconds=time.perf_counter() - begin)
+    best, *others = (replace(tile, seconds=time.perf_counter() - begin) for tile in tiles)
+    return replace(best, others=tuple(others[: task.per_class - 1]))
+
+
+def _preview(task: Task, names: Sequence[str], watch: Watcher) -> None:
+    """A first tile to look at, while the others are on their way."""
+    if isinstance(task.settings, DescentSettings) and task.settings.starts == "outline":
+        with _one_thread():
+            tile = quick_tile(task.target, names)
+        if tile is not None:
+            watch(Event(tile.name, 0.0, 1 - tile.metrics.iou, preview=tile))
 
 
 def _ignore(_event: Event) -> None:
@@ -133,15 +188,11 @@ def _one_thread() -> Iterator[None]:
 
 
 def _run_here(
-    target: Target,
-    names: Sequence[str],
-    settings: OccupancySettings,
-    _count: int,
-    force: bool,
-    watch: Watcher,
-) -> Generator[TileResult | ClassFailure, None, None]:
+    task: Task, names: Sequence[str], _count: int, watch: Watcher
+) -> Generator[Outcome, None, None]:
+    _preview(task, names, watch)
     for name in names:
-        yield escherize_class(target, name, settings, force=force, watch=watch)
+        yield _work_on(task, name, watch)
 
 
 _events: Any = None  # the queue of a worker process
@@ -152,31 +203,24 @@ def _set_up_worker(events: Any) -> None:
     _events = events
 
 
-def _work(
-    target: Target, name: str, settings: OccupancySettings, force: bool
-) -> TileResult | ClassFailure:
-    return escherize_class(target, name, settings, force=force, watch=_events.put)
+def _work(task: Task, name: str) -> Outcome:
+    return _work_on(task, name, _events.put)
 
 
 def _run_pool(
-    target: Target,
-    names: Sequence[str],
-    settings: OccupancySettings,
-    count: int,
-    force: bool,
-    watch: Watcher,
-) -> Generator[TileResult | ClassFailure, None, None]:
-    methods = multiprocessing.get_all_start_methods()
-    context = multiprocessing.get_context("forkserver" if "forkserver" in methods else "spawn")
-    if context.get_start_method() == "forkserver":
-        context.set_forkserver_preload(["orbiflow.escher.search"])
+    task: Task, names: Sequence[str], count: int, watch: Watcher
+) -> Generator[Outcome, None, None]:
+    context = _process_context()
     events = context.Queue()
+    _preview(task, names, watch)
     with (
         ProcessPoolExecutor(count, context, _set_up_worker, (events,)) as pool,
         _relayed(events, watch),
     ):
-        pending = {pool.submit(_work, target, name, settings, force) for name in names}
         try:
+            with warnings.catch_warnings():  # of a fork: see _process_context
+                warnings.simplefilter("ignore", DeprecationWarning)
+                pending = {pool.submit(_work, task, name) for name in _longest_first(names)}
             while pending:
                 done, pending = wait(pending, return_when=FIRST_COMPLETED)
                 yield from _in_order(done)
@@ -192,9 +236,25 @@ def _run_pool(
             raise
 
 
-def _in_order(
-    done: Iterable[Future[TileResult | ClassFailure]],
-) -> list[TileResult | ClassFailure]:
+def _process_context() -> Any:
+    """How workers start: forked where that is safe, which saves them two seconds of imports.
+
+    A fork is safe as long as this process has no other thread and torch has not been allowed any.
+    """
+    methods = multiprocessing.get_all_start_methods()
+    if "fork" in methods and torch.get_num_threads() == 1 and threading.active_count() == 1:
+        return multiprocessing.get_context("fork")
+    context = multiprocessing.get_context("forkserver" if "forkserver" in methods else "spawn")
+    if context.get_start_method() == "forkserver":
+        context.set_forkserver_preload(["orbiflow.escher.search"])
+    return context
+
+
+def _longest_first(names: Sequence[str]) -> list[str]:
+    return sorted(names, key=lambda name: -isohedral_class(name).stretch_dim)
+
+
+def _in_order(done: Iterable[Future[Outcome]]) -> list[Outcome]:
     return sorted((future.result() for future in done), key=lambda outcome: outcome.name)
 
 

@@ -13,6 +13,7 @@ from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
 from orbiflow.errors import InputFileError, OrbiflowError
+from orbiflow.escher.descent_settings import MAX_SEGMENTS
 from orbiflow.escher.model import TileModel
 from orbiflow.escher.occupancy import MAX_FREQUENCY
 from orbiflow.symmetry.isometry import Array
@@ -20,6 +21,8 @@ from orbiflow.tilings import isohedral_class
 
 FORMAT = "orbiflow-tile/1"
 MAX_BYTES = 64 * 2**20
+MAX_SIDES = 100_000
+OUTLINE, CORNERS = "prototile.outline", "prototile.corners"
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +30,8 @@ class SavedModel:
     """A single candidate as plain arrays: what is sent between processes and kept in files.
 
     - `settings`: class, max_frequency, segments, smoothness, steps, method, mirrored.
-    - `arrays`: float64 parameters by name, without the candidate axis.
+    - `arrays`: float64 parameters by name, without the candidate axis; and the start tile, if it is
+      not the template.
     """
 
     settings: dict[str, Any]
@@ -51,6 +55,9 @@ class SavedModel:
             name: parameter.detach().double().cpu().numpy()[0].copy()
             for name, parameter in model.named_parameters()
         }
+        if model.outline is not None and model.corners is not None:
+            arrays[OUTLINE] = model.outline.double().cpu().numpy()[0].copy()
+            arrays[CORNERS] = model.corners.cpu().numpy()[0].copy()
         return cls(settings, arrays)
 
     def restore(self) -> TileModel:
@@ -66,7 +73,7 @@ class SavedModel:
                 torch.zeros(1, dtype=torch.float64),
                 mirrored=torch.tensor([bool(self.settings["mirrored"])]),
                 max_frequency=_whole(self.settings["max_frequency"], MAX_FREQUENCY),
-                segments=_whole(self.settings["segments"], 64),
+                segments=_whole(self.settings["segments"], MAX_SEGMENTS),
                 smoothness=_exponent(self.settings["smoothness"]),
                 steps=_whole(self.settings["steps"], 1_000_000),
                 method=str(self.settings["method"]),
@@ -85,7 +92,32 @@ class SavedModel:
                 if not np.isfinite(stored).all():
                     raise OrbiflowError(f"the model's {name} has NaN or infinite entries")
                 parameter.copy_(torch.tensor(stored)[None])
+        if OUTLINE in self.arrays or CORNERS in self.arrays:
+            outline, corners = self._prototile(len(model.template()[0]))
+            model.outline, model.corners = torch.tensor(outline)[None], torch.tensor(corners)[None]
         return model
+
+    def _prototile(self, count: int) -> tuple[Array, Array]:
+        outline = np.asarray(self.arrays.get(OUTLINE, np.zeros((0, 2))), dtype=np.float64)
+        corners = np.asarray(self.arrays.get(CORNERS, np.zeros(0)))
+        if outline.ndim != 2 or outline.shape[1] != 2 or not count <= len(outline) <= MAX_SIDES:
+            raise OrbiflowError(
+                f"the model's {OUTLINE} should have shape (N, 2) with N from {count} to "
+                f"{MAX_SIDES}, found {outline.shape}"
+            )
+        if not np.isfinite(outline).all():
+            raise OrbiflowError(f"the model's {OUTLINE} has NaN or infinite entries")
+        if (
+            corners.shape != (count,)
+            or corners.dtype.kind != "i"
+            or corners[0] != 0
+            or (np.diff(corners, append=len(outline)) < 1).any()
+        ):
+            raise OrbiflowError(
+                f"the model's {CORNERS} should be {count} increasing indices from 0, "
+                f"less than {len(outline)}"
+            )
+        return outline, corners.astype(np.int64)
 
     def _check_segments(self) -> None:
         # before anything is built: each segment takes time and memory

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import lru_cache
 
 import numpy as np
 import torch
@@ -11,7 +12,7 @@ from torch import Tensor, nn
 
 from orbiflow.errors import OrbiflowError
 from orbiflow.fields.invariants import InvariantBasis, invariant_basis
-from orbiflow.fields.series import differentiate, evaluate
+from orbiflow.fields.series import differentiate, evaluate, weight_cotangent
 from orbiflow.symmetry import CrystallographicGroup
 
 
@@ -112,6 +113,29 @@ class FourierField(nn.Module):
         weights = self.weights()
         return lambda points: self._values(weights, points)
 
+    @torch.no_grad()
+    def adjoint(self, points: Tensor, forces: Tensor) -> Tensor:
+        """Gradient of sum forces . V(points) in the parameters, without autograd: the force's work.
+
+        The projection of a force on the invariant fields (design point 10). V is linear in the
+        parameters, so their values do not matter.
+
+        Args:
+            points, forces: (N, d), or (S, N, d) for a stack.
+
+        Returns:
+            (P,) or (S, P).
+        """
+        flat, cotangents = (
+            t.reshape(self._stacked(self.parameters_).shape[0], -1, self.group.dim)
+            for t in (points, forces)
+        )
+        shape = (len(flat), self.group.dim, *(2 * k + 1 for k in self._orders))
+        table = weight_cotangent(shape, self.frame @ flat.mT, cotangents.mT).flatten(1)
+        gradient = flat.new_zeros(len(flat), self.size)
+        gradient.index_add_(1, self.columns, table[:, self.rows] * self.values)
+        return (gradient * self.scale).reshape(self.parameters_.shape)
+
     def forward(self, points: Tensor) -> Tensor:
         """V at points (..., d): vectors of the same shape."""
         return self._values(self.weights(), points)
@@ -184,6 +208,7 @@ class FourierField(nn.Module):
         return f"{self.group!r}, max_frequency={self.max_frequency}, parameters={self.size}"
 
 
+@lru_cache(maxsize=64)  # bases hash by identity
 def tensor_layout(
     basis: InvariantBasis, orders: tuple[int, ...]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

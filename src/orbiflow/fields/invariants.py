@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -127,6 +128,7 @@ def _orthonormal_columns(projector: Array) -> Array:
     return basis
 
 
+@lru_cache(maxsize=64)  # groups hash by identity; a flow of many segments shares one basis
 def invariant_basis(group: CrystallographicGroup, max_frequency: int) -> InvariantBasis:
     """Build the basis orbit by orbit: the range of the mean over coset representatives.
 

@@ -220,3 +220,23 @@ def evaluate(weights: Tensor, u: Tensor) -> Tensor:
     if torch.is_grad_enabled() and (weights.requires_grad or u.requires_grad):
         return _Series.apply(weights, u)  # type: ignore[no-any-return]
     return _forward(weights, u)
+
+
+@torch.no_grad()
+def weight_cotangent(shape: tuple[int, ...], u: Tensor, grad: Tensor) -> Tensor:
+    """Gradient of sum grad . values in the weights; it depends on the points alone.
+
+    Args:
+        shape: of the weights, (S, C, A_1, ..., A_d).
+        u: (S, d, N).
+        grad: (S, C, N).
+
+    Returns:
+        As the weights.
+    """
+    weights = u.new_zeros(shape)
+    total = torch.zeros_like(weights)
+    for block, room in _in_blocks(weights, u.shape[2]):
+        part, _ = _backward_block(weights, u[..., block], grad[..., block], False, room)
+        total += part.reshape(shape)
+    return total

@@ -1,0 +1,125 @@
+"""Knobs of the descent, and the three levels of effort."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+from orbiflow.errors import OrbiflowError
+from orbiflow.escher.occupancy import MAX_FREQUENCY
+
+MAX_SEGMENTS = 2000
+"""Of a flow; the descent adds one a step."""
+
+
+@dataclass(frozen=True)
+class DescentSettings:
+    """Knobs of the descent; the defaults are effort "normal", measured on the paper's goals.
+
+    - `max_frequency`: Omega, at least 1.
+    - `starts`: "outline" (tiles that are near the target's outline already) or "template" (the
+      template turned and stretched; also what is left when no outline start is simple).
+    - `candidates`: outline starts that the descent begins with.
+    - `resolutions`: points of the outline from which starts are made.
+    - `turns`, `stretch`: of template starts.
+    - `stages`: (steps, survivors) of the successive halving; a step is a segment of the flow.
+    - `boundary`: boundary points of each candidate; divided by each resolution and by 5 and 6.
+    - `smoothness`: exponent s of the damping (1 + |kappa|^2)^-s, first and last.
+    - `momentum`: share of the last field that is kept.
+    - `reach`: how far a boundary point may move in a step, first and last; the target has area 1.
+    - `blur`: of the target's edge, first and last.
+    - `lattice`: whether the lattice freedom takes part.
+    - `polish`: L-BFGS iterations on the exact IoU for each survivor of the last stage; 0 for none.
+    - `finalists`: candidates turned into certified tiles, so that one that fails has a substitute.
+    - `seed`: moves the starts.
+    """
+
+    max_frequency: int = 10
+    starts: str = "outline"
+    candidates: int = 48
+    resolutions: tuple[int, ...] = (40, 60, 80)
+    turns: int = 12
+    stretch: float = 0.25
+    stages: tuple[tuple[int, int], ...] = ((25, 12), (35, 4), (40, 2))
+    boundary: int = 240
+    smoothness: tuple[float, float] = (2.0, 1.25)
+    momentum: float = 0.8
+    reach: tuple[float, float] = (0.02, 0.002)
+    blur: tuple[float, float] = (0.05, 0.006)
+    lattice: bool = True
+    polish: int = 30
+    finalists: int = 2
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        for name in ("max_frequency", "candidates", "turns", "finalists"):
+            if getattr(self, name) < 1:
+                raise OrbiflowError(f"{name} must be at least 1, got {getattr(self, name)}")
+        if self.max_frequency > MAX_FREQUENCY:
+            raise OrbiflowError(
+                f"max_frequency must be from 1 to {MAX_FREQUENCY}, got {self.max_frequency}: "
+                "10 is plenty for most silhouettes"
+            )
+        if self.starts not in ("outline", "template"):
+            raise OrbiflowError(f'starts must be "outline" or "template", got {self.starts!r}')
+        if self.boundary < 60 or self.boundary % 30:
+            raise OrbiflowError(f"boundary must be a multiple of 30 from 60, got {self.boundary}")
+        for points in self.resolutions:
+            if points < 24 or self.boundary % points:
+                raise OrbiflowError(
+                    f"resolutions must be at least 24 and divide boundary = {self.boundary}, "
+                    f"got {points}"
+                )
+        if not self.stages or any(steps < 1 or kept < 1 for steps, kept in self.stages):
+            raise OrbiflowError(f"stages need steps and survivors of at least 1: {self.stages}")
+        if self.iterations >= MAX_SEGMENTS:
+            raise OrbiflowError(f"stages must have less than {MAX_SEGMENTS} steps in all")
+        if not 0 <= self.polish <= 1000:
+            raise OrbiflowError(f"polish must be from 0 to 1000, got {self.polish}")
+        if not 0 <= self.seed < 2**32:
+            raise OrbiflowError(f"seed must be from 0 to 2^32 - 1, got {self.seed}")
+
+    @property
+    def iterations(self) -> int:
+        """Steps of all stages."""
+        return sum(steps for steps, _ in self.stages)
+
+    @classmethod
+    def for_effort(cls, effort: str, **changes: object) -> DescentSettings:
+        """The settings of a level of effort: "fast", "normal" or "best".
+
+        Args:
+            effort: the level.
+            changes: settings that differ from it, by name.
+
+        >>> DescentSettings.for_effort("fast", seed=3).seed
+        3
+        """
+        if effort not in EFFORTS:
+            raise OrbiflowError(f"effort must be one of {', '.join(EFFORTS)}, got {effort!r}")
+        known = {field.name for field in fields(cls)}
+        unknown = [name for name in changes if name not in known]
+        if unknown:
+            raise OrbiflowError(f"unknown settings {', '.join(unknown)}")
+        return cls(**{**EFFORTS[effort], **changes})  # type: ignore[arg-type]
+
+
+EFFORTS: dict[str, dict[str, object]] = {
+    "fast": {
+        "candidates": 8,
+        "resolutions": (60,),
+        "stages": ((12, 2), (16, 1)),
+        "boundary": 120,
+        "polish": 0,
+        "finalists": 1,
+    },
+    "normal": {},
+    "best": {
+        "max_frequency": 15,
+        "candidates": 240,
+        "resolutions": (30, 40, 60, 80, 120),
+        "stages": ((30, 80), (40, 24), (60, 8), (70, 4)),
+        "polish": 100,
+        "finalists": 4,
+    },
+}
+"""What each level changes."""

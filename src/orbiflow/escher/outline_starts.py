@@ -1,0 +1,193 @@
+"""Starts that find the good basin: tiles of a class that are near the target's outline already."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from orbiflow.escher.nearest_tile import NearestTiles, nearest_tiles
+from orbiflow.escher.outline import reverse
+from orbiflow.escher.placements import best_placements
+from orbiflow.escher.prototiles import Prototiles
+from orbiflow.escher.starts import template_symmetries
+from orbiflow.escher.target import Target
+from orbiflow.symmetry import rotation_matrix
+from orbiflow.symmetry.isometry import Array
+from orbiflow.tilings import IsohedralClass
+from orbiflow.tilings.class_table import EdgePair
+
+APART = 0.025
+"""Starts differ by this share of the outline in where some corner sits, or they are twins."""
+
+PROJECTED, MEASURED = 1000, 200
+"""Of each resolution: placements projected, and of these the nearest whose overlap is measured."""
+
+
+@dataclass(frozen=True)
+class Starts:
+    """The best starts of a search, and how many were looked at.
+
+    - `prototiles`: best overlap first.
+    - `iou`: (S,) of each before the descent.
+    - `tried`: placements that were projected.
+    """
+
+    prototiles: Prototiles
+    iou: Array
+    tried: int
+
+
+def resampled(ring: Array, count: int, phase: float = 0.0) -> Array:
+    """`count` points (count, 2) evenly spaced along the closed `ring` (N, 2).
+
+    `phase` moves them along by that share of their spacing.
+
+    >>> square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+    >>> resampled(square, 4, phase=0.5).tolist()
+    [[0.5, 0.0], [1.0, 0.5], [0.5, 1.0], [0.0, 0.5]]
+    """
+    closed = np.concatenate([ring, ring[:1]])
+    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(closed, axis=0), axis=1))])
+    at = (np.arange(count) + phase) / count * along[-1]
+    return np.stack([np.interp(at, along, closed[:, i]) for i in (0, 1)], axis=-1)
+
+
+def outline_starts(
+    target: Target,
+    kind: IsohedralClass,
+    *,
+    count: int,
+    resolutions: Sequence[int] = (40, 60, 80),
+    vertices: int = 240,
+    phase: float = 0.0,
+) -> Starts:
+    """The best start tiles of one class for a target, no two of them twins.
+
+    Args:
+        target: the silhouette.
+        kind: the class.
+        count: how many at most; fewer if the rest cross themselves.
+        resolutions: points of the outline, several for the sake of thin limbs: the fewer, the
+            smoother the start. Each divides `vertices`.
+        vertices: of every start tile.
+        phase: of the points along the outline, in spacings; what a seed changes.
+    """
+    parts: list[Prototiles] = []
+    scores: list[Array] = []
+    places: list[Array] = []
+    tried = 0
+    for mirrored in (False,) if mirror_closed(kind) else (False, True):
+        ring = reverse(target.normal * (1.0, -1.0)) if mirrored else target.normal
+        for points in resolutions:
+            outline = resampled(ring, points, phase) @ [1, 1j]
+            found = best_placements(kind, outline, PROJECTED)
+            tiles = nearest_tiles(kind, outline, found)
+            tried += len(found.starts)
+            nearest = np.argsort(tiles.distance, kind="stable")[:MEASURED]
+            index, score = _simple(ring, tiles, nearest)
+            parts.append(Prototiles.of(kind, tiles.take(index), vertices, mirrored=mirrored))
+            scores.append(score)
+            places.append((found.starts[:, None] + tiles.corners)[index] / points)
+    iou, all_tiles = np.concatenate(scores), Prototiles.joined(parts)
+    chosen = _apart(iou, np.concatenate(places), all_tiles.mirrored, count)
+    return Starts(all_tiles.take(chosen), iou[chosen], tried)
+
+
+def template_starts(
+    kind: IsohedralClass, *, turns: int, stretch: float, vertices: int = 240, phase: float = 0.0
+) -> Prototiles:
+    """The template itself, turned and stretched: starts that know nothing of the target.
+
+    Args:
+        kind: the class.
+        turns: angles, over the range in which the template does not look the same; twice as many
+            for classes without lattice freedom.
+        stretch: size of the starting stretches along each axis of the lattice freedom, besides none.
+        vertices: of every start tile, a multiple of the template's.
+        phase: of the angles, in steps.
+    """
+    order, symmetric = template_symmetries(kind)
+    stretches = [np.zeros(kind.stretch_dim)]
+    for axis, sign in itertools.product(np.eye(kind.stretch_dim), (1.0, -1.0)):
+        stretches.append(sign * stretch * axis)
+    turns *= 1 if kind.stretch_dim else 2
+    step = 2 * np.pi / order / turns
+    sides = (False,) if symmetric else (False, True)
+    poses = list(itertools.product(sides, (np.arange(turns) + phase) * step, stretches))
+    corners = kind.template()
+    pieces = vertices // len(corners)
+    t = np.arange(pieces)[:, None] / pieces
+    outline = corners[:, None] + t * (np.roll(corners, -1, axis=0) - corners)[:, None]
+    count = len(poses)
+    area = kind.group().cell_volume / kind.group().order
+    mirrored = np.array([side for side, _, _ in poses])
+    angle = np.array([turn for _, turn, _ in poses])
+    pull = np.array([pull for _, _, pull in poses])
+    scale = area**-0.5
+    turned = np.array([rotation_matrix(a) for a in angle])
+    turned[mirrored, :, 1] *= -1
+    center = scale * turned @ kind.stretch(pull) @ corners.mean(axis=0)
+    return Prototiles(
+        np.tile(outline.reshape(1, -1, 2), (count, 1, 1)),
+        np.tile(np.arange(len(corners)) * pieces, (count, 1)),
+        angle,
+        np.full(count, np.log(scale)),
+        -center,
+        pull,
+        mirrored,
+    )
+
+
+def mirror_closed(kind: IsohedralClass) -> bool:
+    """Whether reading the template's edges backwards gives the same identifications.
+
+    Then the mirror image of a tile of the class is a tile of the class under another placement.
+    """
+    size = len(kind.template())
+    own = {(frozenset((p.first, p.second)), _turn_order(kind, p)) for p in kind.identified_edges}
+    for k in range(size):
+        image = {(frozenset(((k - e) % size) for e in edges), turn) for edges, turn in own}
+        if image == own:
+            return True
+    return False
+
+
+def _turn_order(kind: IsohedralClass, pair: EdgePair) -> int:
+    linear = kind.edge_isometry(pair).linear
+    if np.linalg.det(linear) < 0:
+        return -1
+    return round(np.degrees(abs(np.arctan2(linear[1, 0], linear[0, 0]))))
+
+
+def _simple(
+    ring: Array, tiles: NearestTiles, candidates: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], Array]:
+    """Those of the candidates that do not cross themselves, and their IoU with the ring."""
+    goal = shapely.Polygon(ring)
+    shapely.prepare(goal)
+    vertices = tiles.vertices[candidates]
+    polygons = np.asarray(shapely.polygons(np.stack([vertices.real, vertices.imag], axis=-1)))
+    upright = np.linalg.det(tiles.linear[candidates]) > 1e-6
+    good = np.flatnonzero(shapely.is_valid(polygons) & upright)
+    common = shapely.area(shapely.intersection(polygons[good], goal))
+    whole = shapely.area(polygons[good]) + goal.area - common
+    return candidates[good], common / whole
+
+
+def _apart(scores: Array, places: Array, mirrored: NDArray[np.bool_], count: int) -> list[int]:
+    """Greedily the best scores whose corners are not where those of a better one are."""
+    chosen: list[int] = []
+    for index in np.argsort(-scores, kind="stable"):
+        gap = abs(places[chosen] - places[index]) % 1.0
+        near = np.minimum(gap, 1 - gap).max(axis=1) < APART
+        if (near & (mirrored[chosen] == mirrored[index])).any():
+            continue
+        chosen.append(int(index))
+        if len(chosen) == count:
+            break
+    return chosen
