@@ -164,7 +164,7 @@ def test_exif_orientation(tmp_path: Path) -> None:
     path = save(tmp_path, stored, "mask.jpg", exif=exif, quality=95)
     emphasis = Emphasis.read(path, target)
     assert_emphasised(emphasis, target, "top left")
-    assert emphasis.notes == ("turned the mask as its EXIF orientation asks",)
+    assert emphasis.notes == ("turned the image as its EXIF orientation asks",)
 
 
 # Sizes
@@ -336,8 +336,8 @@ def test_masks_that_emphasise_nothing(tmp_path: Path, case: str) -> None:
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        (b"this is no picture at all\n" * 30, "not an image that is read; give the mask as PNG"),
-        (b"<svg xmlns='http://www.w3.org/2000/svg'/>", "not an image that is read"),
+        (b"this is no picture at all\n" * 30, "or it is none; give a PNG"),
+        (b"<svg xmlns='http://www.w3.org/2000/svg'/>", "or it is none"),
         (b"", "the file is empty"),
         (header_of(200, 100), "damaged or cut short"),
         (header_of(10_000, 5000), r"10000 x 5000 pixels \(50 megapixels\), at most 40"),

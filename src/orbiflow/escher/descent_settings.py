@@ -43,7 +43,7 @@ class DescentSettings:
     boundary: int = 240
     smoothness: tuple[float, float] = (2.0, 1.25)
     momentum: float = 0.8
-    reach: tuple[float, float] = (0.02, 0.002)
+    reach: tuple[float, float] = (0.02, 0.0005)
     blur: tuple[float, float] = (0.05, 0.006)
     lattice: bool = True
     polish: int = 30

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import re
-import warnings
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
@@ -11,21 +9,11 @@ from typing import Any, Self
 import numpy as np
 import shapely
 from numpy.typing import ArrayLike, NDArray
-from PIL import Image, ImageOps, UnidentifiedImageError
 from scipy.ndimage import gaussian_filter, map_coordinates
 
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.escher.outline import clean_ring, percent
-from orbiflow.escher.readers.raster import (
-    _DAMAGED,
-    _FORMATS,
-    MAX_BYTES,
-    MAX_SIDE,
-    MIN_CONTRAST,
-    _check_size,
-    _deep_channel,
-    _too_large,
-)
+from orbiflow.escher.readers.mask import MaskReading, read_mask
 from orbiflow.escher.readers.reading import check_file, read_bytes
 from orbiflow.escher.readers.svg import MAX_BYTES as MAX_SVG_BYTES
 from orbiflow.escher.readers.svg_shapes import Drawing
@@ -42,7 +30,6 @@ MAX_SMOOTHING = 32.0  # pixels: a bound of the work
 TOUCH = 0.01  # of full emphasis: what is nowhere above this on the silhouette does not touch it
 GRID = 512  # pixels along a side of the grids that integrals are taken on
 
-_PAINT = "paint what must survive white and the rest black"
 _OUTLINE_BOX = "the outline's bounding box"
 
 Box = tuple[float, float, float, float]
@@ -107,7 +94,7 @@ class Emphasis:
         part of the silhouette; `OrbiflowError` for a strength that is not above 1 and at most 100.
         """
         path = Path(path)
-        picture = _open(path)
+        picture = read_mask(path)
         box, covered = _covered(target)
         placed = _check_aspect(path, picture, box, covered)
         levels = picture.levels
@@ -205,89 +192,6 @@ def _contains(ring: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray
     return shapely.contains_xy(region, points[:, 0], points[:, 1])
 
 
-@dataclass(frozen=True)
-class _Picture:
-    """Levels (H, W) from 0 to 1; each is an average of `reduced` x `reduced` of the mask's pixels."""
-
-    levels: NDArray[np.float64]
-    size: tuple[int, int]
-    reduced: int
-    notes: tuple[str, ...]
-
-
-def _open(path: Path) -> _Picture:
-    n_bytes = check_file(path)
-    if n_bytes > MAX_BYTES:
-        raise InputFileError(
-            f"{path}: {n_bytes / 2**20:.0f} MB, images over {MAX_BYTES / 2**20:.0f} MB are not "
-            "read; downscale it"
-        )
-    try:
-        with warnings.catch_warnings():
-            # Pillow warns of damaged metadata and of sizes that are refused here anyway.
-            warnings.simplefilter("ignore")
-            with Image.open(path, formats=_FORMATS) as image:
-                _check_size(path, image.size)
-                return _decode(path, image)
-    except InputFileError:
-        raise
-    except Image.DecompressionBombError as exc:
-        n_pixels = max(map(int, re.findall(r"\d+", str(exc))), default=0)
-        raise InputFileError(_too_large(path, f"{n_pixels / 1e6:.0f} megapixels")) from exc
-    except PermissionError as exc:
-        raise InputFileError(f"{path}: cannot be read; check its permissions") from exc
-    except UnidentifiedImageError as exc:
-        raise InputFileError(
-            f"{path}: not an image that is read; give the mask as PNG, JPEG or WebP, {_PAINT}"
-        ) from exc
-    except _DAMAGED as exc:
-        raise InputFileError(
-            f"{path}: the image is damaged or cut short ({exc}); export or download it again"
-        ) from exc
-
-
-def _decode(path: Path, image: Image.Image) -> _Picture:
-    notes = []
-    if getattr(image, "n_frames", 1) > 1:
-        notes.append("took the first frame of several")
-    turned = ImageOps.exif_transpose(image)
-    if image.getexif().get(0x0112, 1) not in (0, 1):
-        notes.append("turned the mask as its EXIF orientation asks")
-    band, band_notes = _channel(path, turned)
-    full_scale = 255.0 if band.mode == "L" else 1.0
-    reduced = -(-max(turned.size) // MAX_SIDE)
-    levels = np.asarray(band.reduce(reduced), dtype=np.float64) / full_scale
-    low, high = float(levels.min()), float(levels.max())
-    if high < MIN_CONTRAST:
-        raise InputFileError(f"{path}: the mask is all black and emphasises nothing; {_PAINT}")
-    if high - low < MIN_CONTRAST:
-        raise InputFileError(
-            f"{path}: the mask is uniform, its levels are {low:.2f} to {high:.2f} of white, and "
-            f"emphasises nothing above the rest; {_PAINT}"
-        )
-    return _Picture(levels, turned.size, reduced, (*notes, *band_notes))
-
-
-def _channel(path: Path, image: Image.Image) -> tuple[Image.Image, list[str]]:
-    """The channel that emphasises: mode "L" (0 to 255) or "F" (0 to 1)."""
-    if image.mode.startswith(("I", "F")):
-        return _deep_channel(path, image), []
-    if not image.has_transparency_data:
-        return image.convert("L"), []
-    rgba = image.convert("RGBA")
-    alpha = rgba.getchannel("A")
-    values = np.asarray(alpha)
-    low, high = int(values.min()), int(values.max())
-    if high - low >= MIN_CONTRAST * 255:
-        return alpha, ["took the mask's alpha channel: opaque is emphasised, whatever its colour"]
-    if high < MIN_CONTRAST * 255:
-        raise InputFileError(
-            f"{path}: the mask is wholly transparent and emphasises nothing; paint what must "
-            "survive opaque"
-        )
-    return rgba.convert("RGB").convert("L"), []
-
-
 def _covered(target: Target) -> tuple[Box, str]:
     """What a mask covers, (xmin, ymin, xmax, ymax) in input units, and its name."""
     if target.size is None:
@@ -313,7 +217,7 @@ def _page_corner(target: Target) -> tuple[float, float]:
     return box[0], box[1]
 
 
-def _check_aspect(path: Path, picture: _Picture, box: Box, covered: str) -> list[str]:
+def _check_aspect(path: Path, picture: MaskReading, box: Box, covered: str) -> list[str]:
     """Notes of how the mask was laid over what it covers; an error where it does not fit."""
     (width, height), wide, high = picture.size, box[2] - box[0], box[3] - box[1]
     mask, size = f"{width} x {height} pixels", f"{wide:.6g} x {high:.6g}"

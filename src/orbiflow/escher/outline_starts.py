@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d
 
 from orbiflow.escher.nearest_tile import NearestTiles, nearest_tiles
 from orbiflow.escher.outline import reverse
-from orbiflow.escher.placements import best_placements
+from orbiflow.escher.placements import Complex, Placements, best_placements
 from orbiflow.escher.prototiles import Prototiles
 from orbiflow.escher.starts import template_symmetries
 from orbiflow.escher.target import Target
@@ -26,6 +27,9 @@ APART = 0.025
 
 PROJECTED, MEASURED = 1000, 200
 """Of each resolution: placements projected, and of these the nearest whose overlap is measured."""
+
+SMOOTHING = (0.0, 1.0, 2.0)
+"""Standard deviations, in points, of the smoothing of outlines whose nearest tile crosses itself."""
 
 
 @dataclass(frozen=True)
@@ -86,13 +90,11 @@ def outline_starts(
         for points in resolutions:
             outline = resampled(ring, points, phase) @ [1, 1j]
             found = best_placements(kind, outline, PROJECTED)
-            tiles = nearest_tiles(kind, outline, found)
             tried += len(found.starts)
-            nearest = np.argsort(tiles.distance, kind="stable")[:MEASURED]
-            index, score = _simple(ring, tiles, nearest)
-            parts.append(Prototiles.of(kind, tiles.take(index), vertices, mirrored=mirrored))
-            scores.append(score)
-            places.append((found.starts[:, None] + tiles.corners)[index] / points)
+            for tiles, placements, score in _simple_tiles(kind, ring, outline, found):
+                parts.append(Prototiles.of(kind, tiles, vertices, mirrored=mirrored))
+                scores.append(score)
+                places.append((placements.starts[:, None] + tiles.corners) / points)
     iou, all_tiles = np.concatenate(scores), Prototiles.joined(parts)
     chosen = _apart(iou, np.concatenate(places), all_tiles.mirrored, count)
     return Starts(all_tiles.take(chosen), iou[chosen], tried)
@@ -164,19 +166,39 @@ def _turn_order(kind: IsohedralClass, pair: EdgePair) -> int:
     return round(np.degrees(abs(np.arctan2(linear[1, 0], linear[0, 0]))))
 
 
-def _simple(
-    ring: Array, tiles: NearestTiles, candidates: NDArray[np.int64]
-) -> tuple[NDArray[np.int64], Array]:
-    """Those of the candidates that do not cross themselves, and their IoU with the ring."""
+def _simple_tiles(
+    kind: IsohedralClass, ring: Array, outline: Complex, placements: Placements
+) -> Iterator[tuple[NearestTiles, Placements, Array]]:
+    """The nearest tiles that do not cross themselves, their placements, their IoU with the ring.
+
+    Where the nearest tile to the outline crosses itself, that to the outline smoothed may not: the
+    limbs are shorter, their roots at the same places, and the descent lets them grow.
+    """
     goal = shapely.Polygon(ring)
     shapely.prepare(goal)
-    vertices = tiles.vertices[candidates]
-    polygons = np.asarray(shapely.polygons(np.stack([vertices.real, vertices.imag], axis=-1)))
-    upright = np.linalg.det(tiles.linear[candidates]) > 1e-6
-    good = np.flatnonzero(shapely.is_valid(polygons) & upright)
-    common = shapely.area(shapely.intersection(polygons[good], goal))
-    whole = shapely.area(polygons[good]) + goal.area - common
-    return candidates[good], common / whole
+    wanted = MEASURED
+    for spread in SMOOTHING:
+        if not len(placements.starts) or wanted < 1:
+            return
+        tiles = nearest_tiles(kind, _smoothed(outline, spread), placements)
+        polygons = np.asarray(
+            shapely.polygons(np.stack([tiles.vertices.real, tiles.vertices.imag], axis=-1))
+        )
+        simple = np.asarray(shapely.is_valid(polygons)) & (np.linalg.det(tiles.linear) > 1e-6)
+        nearest = np.argsort(tiles.distance, kind="stable")
+        chosen = nearest[simple[nearest]][:wanted]
+        common = shapely.area(shapely.intersection(polygons[chosen], goal))
+        whole = shapely.area(polygons[chosen]) + goal.area - common
+        yield tiles.take(chosen), placements.take(chosen), common / whole
+        wanted -= len(chosen)
+        placements = placements.take(np.flatnonzero(~simple))
+
+
+def _smoothed(outline: Complex, spread: float) -> Complex:
+    if spread == 0.0:
+        return outline
+    parts = np.stack([outline.real, outline.imag])
+    return np.asarray(gaussian_filter1d(parts, spread, axis=1, mode="wrap")).T @ np.array([1, 1j])
 
 
 def _apart(scores: Array, places: Array, mirrored: NDArray[np.bool_], count: int) -> list[int]:

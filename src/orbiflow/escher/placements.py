@@ -39,6 +39,12 @@ class Placements(NamedTuple):
     turns: NDArray[np.float64]
     gains: NDArray[np.float64]
 
+    def take(self, index: Integers) -> Placements:
+        """Those at `index`."""
+        return Placements(
+            self.lengths[index], self.starts[index], self.turns[index], self.gains[index]
+        )
+
 
 def best_placements(kind: IsohedralClass, outline: Complex, keep: int) -> Placements:
     """The `keep` placements of largest gain; of placements that differ by a relabelling, one.

@@ -65,7 +65,7 @@ class Prototiles:
         pieces = vertices // placed.shape[1]
         t = np.arange(pieces)[:, None] / pieces
         sides = np.roll(own, -1, axis=1) - own
-        outline = (own[:, :, None] + t * sides[:, :, None]).reshape(len(own), -1, 2)
+        outline = (own[:, :, None] + t * sides[:, :, None]).reshape(len(own), vertices, 2)
         angle, log_scale, stretch = _pose(kind, tiles.linear)
         return cls(
             outline,

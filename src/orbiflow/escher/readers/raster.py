@@ -2,12 +2,14 @@
 
 import re
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image, ImageOps
+from PIL import Image, ImageOps, UnidentifiedImageError
 from skimage.filters import threshold_otsu
 
 from orbiflow.errors import InputFileError, OrbiflowError
@@ -23,6 +25,8 @@ _FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "GIF", "TIFF")
 # What Pillow raises on a damaged file depends on the format.
 _DAMAGED = (OSError, SyntaxError, ValueError, EOFError, KeyError, IndexError, TypeError)
 _DAMAGED += (OverflowError, MemoryError, ArithmeticError, Image.DecompressionBombError)
+
+_Decoded = TypeVar("_Decoded")
 
 
 @dataclass(frozen=True)
@@ -52,13 +56,18 @@ def read_image(
     """
     if threshold is not None and not 0 < threshold < 1:
         raise OrbiflowError(f"threshold must lie between 0 and 1, got {threshold}")
-    picture = _open(path)
+    picture = open_image(path, _decode)
     level, notes = _choose_shape(path, picture, threshold, invert)
     outline, traced = trace(path, level, scale=picture.reduced, size=picture.size)
     return Reading(outline, True, "image", picture.size, (*picture.notes, *notes, *traced))
 
 
-def _open(path: Path) -> _Picture:
+def open_image(path: Path, decode: Callable[[Path, Image.Image], _Decoded]) -> _Decoded:
+    """What `decode` makes of the image at `path`, which is opened within bounds.
+
+    Raises `InputFileError` for a file over 64 MB, an image over 40 megapixels (before a pixel of it
+    is decoded), and one that is no image or that `decode` finds damaged.
+    """
     n_bytes = check_file(path)
     if n_bytes > MAX_BYTES:
         raise InputFileError(
@@ -71,7 +80,7 @@ def _open(path: Path) -> _Picture:
             warnings.simplefilter("ignore")
             with Image.open(path, formats=_FORMATS) as image:
                 _check_size(path, image.size)
-                return _decode(path, image)
+                return decode(path, image)
     except InputFileError:
         raise
     except Image.DecompressionBombError as exc:
@@ -79,6 +88,10 @@ def _open(path: Path) -> _Picture:
         raise InputFileError(_too_large(path, f"{n_pixels / 1e6:.0f} megapixels")) from exc
     except PermissionError as exc:
         raise InputFileError(f"{path}: cannot be read; check its permissions") from exc
+    except UnidentifiedImageError as exc:
+        raise InputFileError(
+            f"{path}: the image is damaged or cut short, or it is none; give a PNG, JPEG or WebP image"
+        ) from exc
     except _DAMAGED as exc:
         raise InputFileError(
             f"{path}: the image is damaged or cut short ({exc}); export or download it again"
@@ -99,27 +112,40 @@ def _too_large(path: Path, size: str) -> str:
     return f"{path}: {size}, at most {MAX_PIXELS // 10**6} megapixels are read; downscale the image"
 
 
-def _decode(path: Path, image: Image.Image) -> _Picture:
+def upright(image: Image.Image) -> tuple[Image.Image, list[str]]:
+    """The first frame of `image`, turned as its EXIF orientation asks, with notes."""
     notes = []
     if getattr(image, "n_frames", 1) > 1:
         notes.append("took the first frame of several")
     turned = ImageOps.exif_transpose(image)
     if image.getexif().get(0x0112, 1) not in (0, 1):
         notes.append("turned the image as its EXIF orientation asks")
-    band, name, band_notes = _channel(path, turned)
-    reduced = -(-max(turned.size) // MAX_SIDE)
-    if reduced > 1:
-        band = band.reduce(reduced)
-        notes.append(f"averaged {reduced} x {reduced} pixels into one before tracing")
+    return turned, notes
+
+
+def averaged(band: Image.Image) -> tuple[NDArray[np.float64], int]:
+    """Levels of `band` ("L" or "F"), 0 to 1, with at most 1500 pixels along a side.
+
+    Also how many pixels of `band`, along each axis, were averaged into one.
+    """
+    reduced = -(-max(band.size) // MAX_SIDE)
     full_scale = 255.0 if band.mode == "L" else 1.0
-    channel = np.asarray(band, dtype=np.float64) / full_scale
+    return np.asarray(band.reduce(reduced), dtype=np.float64) / full_scale, reduced
+
+
+def _decode(path: Path, image: Image.Image) -> _Picture:
+    turned, notes = upright(image)
+    band, name, band_notes = _channel(path, turned)
+    channel, reduced = averaged(band)
+    if reduced > 1:
+        notes.append(f"averaged {reduced} x {reduced} pixels into one before tracing")
     return _Picture(channel, name, turned.size, reduced, (*notes, *band_notes))
 
 
 def _channel(path: Path, image: Image.Image) -> tuple[Image.Image, str, list[str]]:
     """The channel that shows the shape: mode "L" (0 to 255) or "F" (0 to 1)."""
     if image.mode.startswith(("I", "F")):
-        return _deep_channel(path, image), "luminance", []
+        return deep_channel(path, image), "luminance", []
     if not image.has_transparency_data:
         return image.convert("L"), "luminance", []
     rgba = image.convert("RGBA")
@@ -137,7 +163,7 @@ def _channel(path: Path, image: Image.Image) -> tuple[Image.Image, str, list[str
     return Image.alpha_composite(white, rgba).convert("L"), "luminance", [note]
 
 
-def _deep_channel(path: Path, image: Image.Image) -> Image.Image:
+def deep_channel(path: Path, image: Image.Image) -> Image.Image:
     """A channel of more than 8 bits as mode "F", 0 to 1."""
     values = np.asarray(image, dtype=np.float32)
     if not np.isfinite(values).all():
