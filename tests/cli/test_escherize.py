@@ -18,7 +18,7 @@ from PIL import Image, ImageDraw
 
 from orbiflow import __version__
 from orbiflow.draw.folder import write_tile_folder
-from orbiflow.escher import Target, TileModel, load_model, search
+from orbiflow.escher import Target, TileModel, load_model, methods
 from orbiflow.escher.boundary import extract_tile
 from orbiflow.escher.fit import Fit
 from orbiflow.escher.result import best_tiles
@@ -26,7 +26,7 @@ from orbiflow.tilings import CLASSES
 
 DOCS = Path(__file__).parents[2] / "docs"
 FILES = {"tile.svg", "tiling.svg", "tiling.png", "overlay.png", "field.png", "model.safetensors"}
-FEW = ["--iterations", 8, "--turns", 1, "--max-frequency", 2]
+FEW = ["--method", "occupancy", "--iterations", 8, "--turns", 1, "--max-frequency", 2]
 
 # a shape in pixels with nothing symmetric about it
 BOOT = [(60, 20), (210, 20), (230, 80), (170, 95), (160, 190), (100, 145), (45, 80)]
@@ -160,7 +160,7 @@ def test_a_run_on_a_polygon_with_y_up(tmp_path: Path, orbiflow) -> None:
 def test_no_tile_is_status_one(tmp_path: Path, orbiflow, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "boot.json"
     path.write_text(json.dumps(BOOT))
-    monkeypatch.setattr(search, "fit_occupancy", lambda *_: crossed())
+    monkeypatch.setattr(methods, "fit_occupancy", lambda *_: crossed())
     options = ["--classes", "IH21", "--workers", 1, *FEW]
     outcome = orbiflow("escherize", path, "-o", tmp_path / "o", *options)
     assert outcome.status == 1

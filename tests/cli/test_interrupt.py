@@ -36,6 +36,7 @@ def test_what_was_finished_is_written(whole_group: bool, tmp_path: Path) -> None
     path.write_text(json.dumps(BOOT))
     command = [sys.executable, "-m", "orbiflow", "escherize", str(path), "--out", str(out)]
     command += ["--classes", ",".join(NAMES), "--workers", "2", "--turns", "1"]
+    command += ["--method", "occupancy"]
     command += ["--iterations", "20", "--max-frequency", "3"]
     with subprocess.Popen(
         command,

@@ -114,13 +114,24 @@ BAD_OPTIONS: dict[str, tuple[list[str], str]] = {
     "frequency 2.5": (["--max-frequency", "2.5"], "--max-frequency"),
     "workers 0": (["--workers", "0"], "--workers must be at least 1, got 0"),
     "workers -2": (["--workers", "-2"], "--workers must be at least 1, got -2"),
-    "iterations": (["--iterations", "0"], "iterations must be at least 1, got 0"),
-    "turns": (["--turns", "0"], "turns must be at least 1, got 0"),
+    "iterations": (
+        ["--method", "occupancy", "--iterations", "0"],
+        "iterations must be at least 1, got 0",
+    ),
+    "turns": (["--method", "occupancy", "--turns", "0"], "turns must be at least 1, got 0"),
     "threshold 7": (["--threshold", "7"], "threshold must lie between 0 and 1, got 7"),
     "threshold nan": (["--threshold", "nan"], "threshold must lie between 0 and 1, got nan"),
     "seed": (["--seed", "-1"], "seed must be from 0 to 2^32 - 1, got -1"),
     "seed 2^32": (["--seed", str(2**32)], f"got {2**32}"),
     "method": (["--method", "magic"], "magic"),
+    "effort": (["--effort", "heroic"], "heroic"),
+    "other method's option": (["--turns", "3"], "--turns belongs to --method occupancy"),
+    "per class": (["--per-class", "0"], "--per-class must be at least 1, got 0"),
+    "emphasis": (["--emphasis", "nowhere.png"], "nowhere.png"),
+    "emphasis for occupancy": (
+        ["--method", "occupancy", "--emphasis", "m.png"],
+        "--emphasis needs --method descent",
+    ),
     "no such option": (["--clases", "IH4"], "--clases"),
 }
 

@@ -86,8 +86,8 @@ def test_documents_are_valid(case: tuple[Target, dict[str, Any]]) -> None:
     assert document["seed"] == QUICK.seed
     assert document["timings"]["wall_seconds"] == 12.346
     assert [entry["class"] for entry in document["failed"]] == ["IH2"]
-    ious = [entry["metrics"]["iou"] for entry in document["tiles"]]
-    assert ious == sorted(ious, reverse=True)
+    scores = [entry["score"] for entry in document["tiles"]]
+    assert scores == sorted(scores, reverse=True)
     assert {entry["class"] for entry in document["tiles"]} == set(CLASSES)
 
 

@@ -87,7 +87,9 @@ def run(request: Request) -> None:
             watch=watch,
         )
     seconds = time.perf_counter() - begin
-    document = report(target, results, failures, settings, seconds=seconds, workers=count)
+    document = report(
+        target, results, failures, settings, seconds=seconds, workers=count, emphasis=emphasis
+    )
     write_atomic(out / "result.json", json.dumps(document, allow_nan=False))
     if results:
         with output.status("drawing"):
@@ -116,6 +118,8 @@ def _settings(request: Request) -> Settings:
     Raises:
         OrbiflowError: for values out of range, and for options of the other method.
     """
+    if request.per_class < 1:
+        raise OrbiflowError(f"--per-class must be at least 1, got {request.per_class}")
     asked = {
         name: value
         for name in ("max_frequency", "turns", "iterations")
@@ -150,16 +154,16 @@ def _workers(asked: int | None) -> int:
 
 def _table(results: list[TileResult]) -> Table:
     table = Table(title="Tiles, best first")
-    for column in ("class", "group", "IoU", "Dice", "Hausdorff", "certified", "edges", "seconds"):
-        table.add_column(column, justify="left" if column in ("class", "group") else "right")
+    for column in ("class", "score", "IoU", "Dice", "recognised", "certified", "edges", "core s"):
+        table.add_column(column, justify="left" if column == "class" else "right", no_wrap=True)
     for result in results:
         metrics, certificate = result.metrics, result.certificate
         table.add_row(
-            result.name,
-            result.group_name,
+            f"{result.name} ({result.group_name})",
+            f"{result.score:.3f}",
             f"{metrics.iou:.4f}",
             f"{metrics.dice:.4f}",
-            f"{metrics.hausdorff:.3f}",
+            f"{result.recognisability.score:.3f}",
             "yes" if certificate.valid else "[red]NO[/]",
             f"{certificate.edge_mismatch:.0e}",
             f"{result.seconds:.1f}",

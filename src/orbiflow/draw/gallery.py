@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import multiprocessing
+from collections import Counter
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
@@ -28,7 +29,7 @@ def write_gallery(
     Raises:
         OutputError: if a file cannot be written.
     """
-    folders = [out / result.name for result in results]
+    folders = [out / name for name in folder_names(results)]
     targets = [target] * len(results)
     if workers == 1:
         for result, folder in zip(results, folders, strict=True):
@@ -40,6 +41,17 @@ def write_gallery(
             for _ in pool.map(write_tile_folder, results, targets, folders):
                 pass
     write_atomic(out / "overview.png", overview_png(results, target))
+
+
+def folder_names(results: Sequence[TileResult]) -> list[str]:
+    """The class of each result; further tiles of a class are IH4-2, IH4-3 and so on."""
+    seen: Counter[str] = Counter()
+    names = []
+    for result in results:
+        seen[result.name] += 1
+        number = seen[result.name]
+        names.append(result.name if number == 1 else f"{result.name}-{number}")
+    return names
 
 
 def overview_png(results: Sequence[TileResult], target: Target) -> bytes:

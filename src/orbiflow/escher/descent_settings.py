@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 from orbiflow.errors import OrbiflowError
 from orbiflow.escher.occupancy import MAX_FREQUENCY
@@ -20,6 +20,8 @@ class DescentSettings:
       template turned and stretched; also what is left when no outline start is simple).
     - `candidates`: outline starts that the descent begins with.
     - `resolutions`: points of the outline from which starts are made.
+    - `projected`, `measured`: of each resolution, placements whose nearest tile is computed, and of
+      these the nearest whose overlap is measured.
     - `turns`, `stretch`: of template starts.
     - `stages`: (steps, survivors) of the successive halving; a step is a segment of the flow.
     - `boundary`: boundary points of each candidate; divided by each resolution and by 5 and 6.
@@ -35,11 +37,13 @@ class DescentSettings:
 
     max_frequency: int = 10
     starts: str = "outline"
-    candidates: int = 48
+    candidates: int = 64
     resolutions: tuple[int, ...] = (40, 60, 80)
+    projected: int = 1500
+    measured: int = 300
     turns: int = 12
     stretch: float = 0.25
-    stages: tuple[tuple[int, int], ...] = ((25, 12), (35, 4), (40, 2))
+    stages: tuple[tuple[int, int], ...] = ((25, 16), (35, 5), (40, 2))
     boundary: int = 240
     smoothness: tuple[float, float] = (2.0, 1.25)
     momentum: float = 0.8
@@ -51,7 +55,14 @@ class DescentSettings:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        for name in ("max_frequency", "candidates", "turns", "finalists"):
+        for name in (
+            "max_frequency",
+            "candidates",
+            "projected",
+            "measured",
+            "turns",
+            "finalists",
+        ):
             if getattr(self, name) < 1:
                 raise OrbiflowError(f"{name} must be at least 1, got {getattr(self, name)}")
         if self.max_frequency > MAX_FREQUENCY:
@@ -83,6 +94,11 @@ class DescentSettings:
         """Steps of all stages."""
         return sum(steps for steps, _ in self.stages)
 
+    def with_survivors(self, least: int) -> DescentSettings:
+        """The same, with at least that many candidates after each stage."""
+        stages = tuple((steps, max(kept, least)) for steps, kept in self.stages)
+        return replace(self, stages=stages)
+
     @classmethod
     def for_effort(cls, effort: str, **changes: object) -> DescentSettings:
         """The settings of a level of effort: "fast", "normal" or "best".
@@ -107,6 +123,8 @@ EFFORTS: dict[str, dict[str, object]] = {
     "fast": {
         "candidates": 8,
         "resolutions": (60,),
+        "projected": 800,
+        "measured": 150,
         "stages": ((12, 2), (16, 1)),
         "boundary": 120,
         "polish": 0,
@@ -115,9 +133,10 @@ EFFORTS: dict[str, dict[str, object]] = {
     "normal": {},
     "best": {
         "max_frequency": 15,
-        "candidates": 240,
-        "resolutions": (30, 40, 60, 80, 120),
-        "stages": ((30, 80), (40, 24), (60, 8), (70, 4)),
+        "candidates": 1000,
+        "projected": 8000,
+        "measured": 2000,
+        "stages": ((20, 120), (35, 24), (45, 6), (40, 4)),
         "polish": 100,
         "finalists": 4,
     },

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import shapely
+import torch
 
 from orbiflow.escher.descent import Descent
 from orbiflow.escher.descent_settings import DescentSettings
 from orbiflow.escher.fit import Fit, Progress
 from orbiflow.escher.outline_starts import outline_starts, template_starts
 from orbiflow.escher.prototiles import Prototiles
+from orbiflow.escher.ranking import rank_score
+from orbiflow.escher.recognition import Recogniser
 from orbiflow.escher.soft_target import SoftTarget
 from orbiflow.escher.target import Target
 from orbiflow.symmetry.isometry import Array
@@ -48,13 +51,37 @@ def fit_descent(
             descent.step(soft)
             if k % 8 == 7:
                 report(0.1 + 0.8 * descent.done / settings.iterations, 1 - best)
-        iou = boundary_iou(goal, descent.placed())
+        iou = _overlaps(goal, soft, descent)
         crossed += int((iou < 0).sum())
         ranking = np.argsort(-iou, kind="stable")
         simple = ranking[: max(1, int((iou >= 0).sum()))]
         descent.keep(simple[:survivors].tolist(), iou)
         best = float(iou.max())
+    _best_first(target, soft, descent)
     return Fit(descent.flow_model(), len(prototiles), crossed, 1)
+
+
+def _overlaps(goal: shapely.Polygon, soft: SoftTarget, descent: Descent) -> Array:
+    """IoU (S,) of the candidates, weighted if there is emphasis; -1 for those that cross themselves."""
+    boundaries = descent.placed()
+    plain = boundary_iou(goal, boundaries)
+    if soft.weights is None:
+        return plain
+    rings = torch.tensor(boundaries, dtype=soft.image.dtype)
+    rings = torch.where(descent.model.mirror[:, None, None], rings.flip(1), rings)
+    return np.where(plain < 0, plain, soft.weighted_iou(rings).numpy())
+
+
+def _best_first(target: Target, soft: SoftTarget, descent: Descent) -> None:
+    """Order the survivors by IoU and recognisability together."""
+    boundaries = descent.placed()
+    iou = _overlaps(shapely.Polygon(target.normal), soft, descent)
+    recognise = Recogniser(target.normal)
+    scores = [
+        rank_score(overlap, recognise(ring).score) if overlap >= 0 else -1.0
+        for overlap, ring in zip(iou, boundaries, strict=True)
+    ]
+    descent.keep(np.argsort(-np.array(scores), kind="stable").tolist(), iou)
 
 
 def boundary_iou(goal: shapely.Polygon, boundaries: Array) -> Array:
@@ -75,6 +102,8 @@ def _starts(target: Target, kind: IsohedralClass, settings: DescentSettings) -> 
             kind,
             count=settings.candidates,
             resolutions=settings.resolutions,
+            projected=settings.projected,
+            measured=settings.measured,
             vertices=settings.boundary,
             phase=phase,
         )

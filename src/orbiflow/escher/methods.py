@@ -44,8 +44,9 @@ def fit(
     """
     if isinstance(settings, DescentSettings):
         soft = _soft_target(target, emphasis)
+        settings = settings.with_survivors(2 * per_class)
         found = fit_descent(target, kind, settings, soft=soft, progress=progress)
-        return found._replace(enough=per_class)
+        return found._replace(enough=1 if per_class == 1 else 2 * per_class)
     number = list(CLASSES).index(kind.name)
     own = replace(settings, seed=(settings.seed * 1009 + number) % 2**32)
     model = fit_occupancy(target, kind, own, progress)

@@ -25,9 +25,6 @@ from orbiflow.tilings.class_table import EdgePair
 APART = 0.025
 """Starts differ by this share of the outline in where some corner sits, or they are twins."""
 
-PROJECTED, MEASURED = 1000, 200
-"""Of each resolution: placements projected, and of these the nearest whose overlap is measured."""
-
 SMOOTHING = (0.0, 1.0, 2.0)
 """Standard deviations, in points, of the smoothing of outlines whose nearest tile crosses itself."""
 
@@ -67,6 +64,8 @@ def outline_starts(
     *,
     count: int,
     resolutions: Sequence[int] = (40, 60, 80),
+    projected: int = 1000,
+    measured: int = 200,
     vertices: int = 240,
     phase: float = 0.0,
 ) -> Starts:
@@ -78,6 +77,8 @@ def outline_starts(
         count: how many at most; fewer if the rest cross themselves.
         resolutions: points of the outline, several for the sake of thin limbs: the fewer, the
             smoother the start. Each divides `vertices`.
+        projected: placements projected at each resolution.
+        measured: of these, the nearest tiles whose overlap is measured.
         vertices: of every start tile.
         phase: of the points along the outline, in spacings; what a seed changes.
     """
@@ -89,9 +90,9 @@ def outline_starts(
         ring = reverse(target.normal * (1.0, -1.0)) if mirrored else target.normal
         for points in resolutions:
             outline = resampled(ring, points, phase) @ [1, 1j]
-            found = best_placements(kind, outline, PROJECTED)
+            found = best_placements(kind, outline, projected)
             tried += len(found.starts)
-            for tiles, placements, score in _simple_tiles(kind, ring, outline, found):
+            for tiles, placements, score in _simple_tiles(kind, ring, outline, found, measured):
                 parts.append(Prototiles.of(kind, tiles, vertices, mirrored=mirrored))
                 scores.append(score)
                 places.append((placements.starts[:, None] + tiles.corners) / points)
@@ -167,16 +168,15 @@ def _turn_order(kind: IsohedralClass, pair: EdgePair) -> int:
 
 
 def _simple_tiles(
-    kind: IsohedralClass, ring: Array, outline: Complex, placements: Placements
+    kind: IsohedralClass, ring: Array, outline: Complex, placements: Placements, wanted: int
 ) -> Iterator[tuple[NearestTiles, Placements, Array]]:
-    """The nearest tiles that do not cross themselves, their placements, their IoU with the ring.
+    """The `wanted` nearest tiles that do not cross themselves, their placements and their IoU.
 
     Where the nearest tile to the outline crosses itself, that to the outline smoothed may not: the
     limbs are shorter, their roots at the same places, and the descent lets them grow.
     """
     goal = shapely.Polygon(ring)
     shapely.prepare(goal)
-    wanted = MEASURED
     for spread in SMOOTHING:
         if not len(placements.starts) or wanted < 1:
             return
@@ -197,8 +197,11 @@ def _simple_tiles(
 def _smoothed(outline: Complex, spread: float) -> Complex:
     if spread == 0.0:
         return outline
-    parts = np.stack([outline.real, outline.imag])
-    return np.asarray(gaussian_filter1d(parts, spread, axis=1, mode="wrap")).T @ np.array([1, 1j])
+    x, y = (
+        np.asarray(gaussian_filter1d(part, spread, mode="wrap"))
+        for part in (outline.real, outline.imag)
+    )
+    return (x + 1j * y).astype(np.complex128)
 
 
 def _apart(scores: Array, places: Array, mirrored: NDArray[np.bool_], count: int) -> list[int]:

@@ -26,7 +26,9 @@ def quick_tile(target: Target, names: Sequence[str]) -> TileResult | None:
     None if no nearest tile is simple.
     """
     kind = isohedral_class(next(name for name in PREFERRED if name in names))
-    found = outline_starts(target, kind, count=3, resolutions=(POINTS,), vertices=POINTS)
+    found = outline_starts(
+        target, kind, count=3, resolutions=(POINTS,), measured=40, vertices=POINTS
+    )
     if not len(found.prototiles):
         return None
     model = TileModel(

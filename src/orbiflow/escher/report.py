@@ -12,6 +12,7 @@ import shapely
 import torch
 
 from orbiflow import __version__
+from orbiflow.escher.emphasis import Emphasis
 from orbiflow.escher.methods import Settings, method_name
 from orbiflow.escher.result import ClassFailure, TileResult
 from orbiflow.escher.target import Target
@@ -37,7 +38,9 @@ def tile_json(result: TileResult) -> dict[str, Any]:
     ring = result.tile.polygon
     return {
         "class": result.name,
+        "score": result.score,
         "metrics": result.metrics.as_dict(),
+        "recognisability": result.recognisability.as_dict(),
         "certificate": result.certificate.as_dict(),
         "polygon": np.concatenate([ring, ring[:1]]).tolist(),
         "corners": list(result.tile.corners),
@@ -56,12 +59,14 @@ def report(
     *,
     seconds: float,
     workers: int,
+    emphasis: Emphasis | None = None,
 ) -> dict[str, Any]:
     """The whole document, ready for JSON, tiles best first.
 
     Args:
         seconds: wall-clock time of the search.
         workers: processes that were used.
+        emphasis: the mask, if there was one.
     """
     return {
         "schema_version": SCHEMA_VERSION,
@@ -77,10 +82,11 @@ def report(
         },
         "timings": {
             "wall_seconds": round(seconds, 3),
-            "core_seconds": round(sum(r.seconds for r in results), 3),
+            "core_seconds": round(sum({r.name: r.seconds for r in results}.values()), 3),
             "workers": workers,
         },
         "input": target.report(),
+        "emphasis": None if emphasis is None else emphasis.report(),
         "tiles": [tile_json(result) for result in results],
         "failed": [{"class": f.name, "reason": f.reason} for f in failures],
     }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import shapely
 
@@ -11,6 +12,8 @@ from orbiflow.escher.boundary import extract_tile
 from orbiflow.escher.fit import Fit
 from orbiflow.escher.metrics import ShapeMetrics, compare
 from orbiflow.escher.model import TileModel
+from orbiflow.escher.ranking import rank_score
+from orbiflow.escher.recognition import Recognisability, Recogniser
 from orbiflow.escher.storage import SavedModel
 from orbiflow.escher.target import Target
 from orbiflow.tilings import Certificate, Tile, certify
@@ -24,7 +27,7 @@ class TileResult:
     - `group_name`: such as "p2".
     - `tile`: in the input's own coordinates.
     - `normal_tile`: in the target's normal form (y up, area 1, centroid 0).
-    - `metrics`: of the certified polygon against the target.
+    - `metrics`, `recognisability`: of the certified polygon against the target.
     - `certificate`: of `tile`, in the input's coordinates.
     - `model`: the diffeomorphism, into the target's normal form.
     - `starts`, `dropped`: starts of the fit; those whose boundary crossed itself on the way, or that
@@ -38,6 +41,7 @@ class TileResult:
     tile: Tile
     normal_tile: Tile
     metrics: ShapeMetrics
+    recognisability: Recognisability
     certificate: Certificate
     model: SavedModel
     starts: int
@@ -47,8 +51,8 @@ class TileResult:
 
     @property
     def score(self) -> float:
-        """What tiles are ranked by."""
-        return self.metrics.iou
+        """What tiles are ranked by: `rank_score` of IoU and recognisability."""
+        return rank_score(self.metrics.iou, self.recognisability.score)
 
     def family(self) -> tuple[TileResult, ...]:
         """This tile and the others of its class."""
@@ -69,7 +73,7 @@ def best_tiles(
     """Turn finalists into polygons and certify them, best first, until there are enough.
 
     Returns:
-        Certified tiles, largest IoU first.
+        Certified tiles, best score first.
 
     Raises:
         CertificationError: if no finalist is certified and `force` is not set.
@@ -88,7 +92,7 @@ def best_tiles(
             break
     if not found:
         raise CertificationError("; ".join(dict.fromkeys(reasons)))
-    found.sort(key=lambda r: (not r.certificate.valid, -r.metrics.iou))
+    found.sort(key=lambda r: (not r.certificate.valid, -r.score))
     return [replace(result, dropped=fit.crossed + len(reasons)) for result in found]
 
 
@@ -106,9 +110,16 @@ def _result(
         tile=placed,
         normal_tile=tile,
         metrics=compare(region, target.outline),  # pyright: ignore[reportArgumentType]
+        recognisability=recogniser(target)(region),  # pyright: ignore[reportArgumentType]
         certificate=certify(placed),
         model=SavedModel.of(fine),
         starts=starts,
         dropped=0,
         seconds=seconds,
     )
+
+
+@lru_cache(maxsize=2)  # targets hash by identity; one serves all tiles
+def recogniser(target: Target) -> Recogniser:
+    """Of the target's outline in the input's own coordinates."""
+    return Recogniser(target.outline)

@@ -21,6 +21,7 @@ from orbiflow.escher.descent_settings import DescentSettings
 from orbiflow.escher.emphasis import Emphasis
 from orbiflow.escher.methods import Settings, fit
 from orbiflow.escher.preview import quick_tile
+from orbiflow.escher.ranking import diverse, tile_similarity
 from orbiflow.escher.result import ClassFailure, TileResult, best_tiles
 from orbiflow.escher.target import Target
 from orbiflow.tilings import CLASSES, isohedral_class
@@ -159,8 +160,18 @@ def _work_on(task: Task, name: str, watch: Watcher) -> Outcome:
             tiles = best_tiles(task.target, found, force=task.force)
         except CertificationError as error:
             return ClassFailure(kind.name, str(error))
-    best, *others = (replace(tile, seconds=time.perf_counter() - begin) for tile in tiles)
-    return replace(best, others=tuple(others[: task.per_class - 1]))
+    chosen = _without_twins(tiles, task.per_class)
+    seconds = time.perf_counter() - begin
+    best, *others = (replace(tiles[k], seconds=seconds) for k in chosen)
+    return replace(best, others=tuple(others))
+
+
+def _without_twins(tiles: Sequence[TileResult], count: int) -> list[int]:
+    if count == 1 or len(tiles) == 1:
+        return [0]
+    sound = [k for k, tile in enumerate(tiles) if tile.certificate.simple]
+    alike = tile_similarity([tiles[k].tile.polygon for k in sound], [tiles[k].name for k in sound])
+    return [sound[k] for k in diverse([tiles[k].score for k in sound], count, alike)] or [0]
 
 
 def _preview(task: Task, names: Sequence[str], watch: Watcher) -> None:
