@@ -127,7 +127,7 @@ def test_flow_lines_follow_the_field() -> None:
         return np.stack([-points[..., 1], points[..., 0]], axis=-1)
 
     lines = flow_lines(turning, np.array([[1.0, 0.0], [0.0, 0.0], [0.0, 2.0]]), 0.5)
-    assert lines.shape == (2, 25, 2)  # the fixed point has none
+    assert lines.shape == (2, 13, 2)  # the fixed point has none
     radii = np.linalg.norm(lines, axis=-1)
     assert np.ptp(radii, axis=1).max() < 1e-4
     assert lines[0, -1, 1] > 0 > lines[0, 0, 1]

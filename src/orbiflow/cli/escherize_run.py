@@ -92,8 +92,8 @@ def run(request: Request) -> None:
     )
     write_atomic(out / "result.json", json.dumps(document, allow_nan=False))
     if results:
-        with output.status("drawing"):
-            write_gallery(results, target, out, workers=count)
+        output.print("  drawing")
+        write_gallery(results, target, out, workers=count)
         output.print(_table(results))
     interrupted = any(failure.reason == INTERRUPTED for failure in failures)
     for failure in failures:
@@ -154,7 +154,7 @@ def _workers(asked: int | None) -> int:
 
 def _table(results: list[TileResult]) -> Table:
     table = Table(title="Tiles, best first")
-    for column in ("class", "score", "IoU", "Dice", "recognised", "certified", "edges", "core s"):
+    for column in ("class", "score", "IoU", "Dice", "recognised", "certified", "edges", "s"):
         table.add_column(column, justify="left" if column == "class" else "right", no_wrap=True)
     for result in results:
         metrics, certificate = result.metrics, result.certificate

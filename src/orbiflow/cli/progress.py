@@ -25,7 +25,8 @@ def watched(names: Sequence[str]) -> Iterator[Watcher]:
         TimeElapsedColumn(),
         TextColumn("{task.fields[best]}"),
     )
-    with Progress(*columns, console=output, transient=True) as progress:
+    # no thread that refreshes: workers are forked from a process with one thread
+    with Progress(*columns, console=output, transient=True, auto_refresh=False) as progress:
         task = progress.add_task("fitting", total=float(len(names)), best="")
         begin = time.perf_counter()
 
@@ -45,6 +46,6 @@ def watched(names: Sequence[str]) -> Iterator[Watcher]:
                     f"  {event.name}: IoU {event.outcome.metrics.iou:.4f}", highlight=False
                 )
             text = f"best {best[0].metrics.iou:.4f} ({best[0].name})" if best else ""
-            progress.update(task, completed=sum(shares.values()), best=text)
+            progress.update(task, completed=sum(shares.values()), best=text, refresh=True)
 
         yield watch

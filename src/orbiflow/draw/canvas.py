@@ -80,5 +80,11 @@ def fill_geometry(axes: Axes, geometry: Any, fill: str) -> None:
 def png_bytes(figure: Figure) -> bytes:
     """The figure as PNG, at exactly its size."""
     buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=DPI, facecolor=figure.get_facecolor())
+    figure.savefig(
+        buffer,
+        format="png",
+        pil_kwargs={"compress_level": 3},
+        dpi=DPI,
+        facecolor=figure.get_facecolor(),
+    )
     return buffer.getvalue()

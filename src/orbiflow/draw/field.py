@@ -30,7 +30,7 @@ def field_png(
     tile: Tile | None = None,
     *,
     window: Window | None = None,
-    width_px: int = 1600,
+    width_px: int = 1200,
     y_down: bool = False,
     signs: bool = True,
 ) -> bytes:

@@ -9,7 +9,7 @@ import numpy as np
 from orbiflow.symmetry import CrystallographicGroup
 from orbiflow.symmetry.isometry import Array
 
-_STEPS = 24
+_STEPS = 12
 
 
 def symmetric_seeds(group: CrystallographicGroup, spacing: float, *, tries: int = 600) -> Array:
@@ -30,7 +30,7 @@ def symmetric_seeds(group: CrystallographicGroup, spacing: float, *, tries: int 
 
 
 def flow_lines(velocity: Callable[[Array], Array], seeds: Array, length: float) -> Array:
-    """(M, 25, 2) flow lines of at most that length, with the seed in the middle.
+    """(M, 13, 2) flow lines of at most that length, with the seed in the middle.
 
     Integrated (midpoint rule) at a speed that is near one where the field is strong and goes to
     zero with the field, so that lines end in a sink and do not jitter about it. Seeds where the

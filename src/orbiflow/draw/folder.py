@@ -69,12 +69,13 @@ def placed_field(model: TileModel) -> Callable[[Tensor], Tensor]:
     The mean over time, where the flow has several segments.
     """
     linear = model.linear().detach()[0]
+    # fields are linear in their parameters: one evaluation for any number of segments
+    parameters = torch.stack([segment.parameters_.detach() for segment in model.fourier_fields()])
+    mean = model.with_fields([parameters.mean(dim=0)])
 
     @torch.no_grad()
     def field(points: Tensor) -> Tensor:
         flat = points.to(linear).reshape(1, -1, 2)
-        pulled = model.unplace(flat)
-        mean = torch.stack([segment(pulled) for segment in model.flow.segments]).mean(dim=0)
-        return (mean @ linear.mT).reshape(points.shape)
+        return (mean.flow.segments[0](model.unplace(flat)) @ linear.mT).reshape(points.shape)
 
     return field

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import multiprocessing
 from collections import Counter
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -15,6 +14,7 @@ from PIL import Image, ImageDraw, ImageFont
 from orbiflow.draw.files import write_atomic
 from orbiflow.draw.folder import write_tile_folder
 from orbiflow.draw.raster import overlay_png, tiling_png
+from orbiflow.escher.processes import process_context, quiet_fork
 from orbiflow.escher.result import TileResult
 from orbiflow.escher.target import Target
 
@@ -35,12 +35,17 @@ def write_gallery(
         for result, folder in zip(results, folders, strict=True):
             write_tile_folder(result, target, folder)
     else:
-        methods = multiprocessing.get_all_start_methods()
-        context = multiprocessing.get_context("forkserver" if "forkserver" in methods else "spawn")
+        context = process_context()
         with ProcessPoolExecutor(workers, context, torch.set_num_threads, (1,)) as pool:
-            for _ in pool.map(write_tile_folder, results, targets, folders):
+            with quiet_fork():
+                done = pool.map(write_tile_folder, results, targets, folders)
+            for _ in done:
                 pass
-    write_atomic(out / "overview.png", overview_png(results, target))
+    pictures = [
+        tuple((folder / name).read_bytes() for name in ("overlay.png", "tiling.png"))
+        for folder in folders
+    ]
+    write_atomic(out / "overview.png", overview_png(results, target, pictures))
 
 
 def folder_names(results: Sequence[TileResult]) -> list[str]:
@@ -54,8 +59,18 @@ def folder_names(results: Sequence[TileResult]) -> list[str]:
     return names
 
 
-def overview_png(results: Sequence[TileResult], target: Target) -> bytes:
-    """PNG of all tiles, best first: each over its target, and its tiling."""
+def overview_png(
+    results: Sequence[TileResult],
+    target: Target,
+    pictures: Sequence[Sequence[bytes]] | None = None,
+) -> bytes:
+    """PNG of all tiles, best first: each over its target, and its tiling.
+
+    Args:
+        results: of one search.
+        target: of the search.
+        pictures: overlay and tiling of each result as PNGs, if they are at hand.
+    """
     columns = min(3, len(results))
     rows = -(-len(results) // columns)
     sheet = Image.new("RGB", (columns * 2 * _PANEL, rows * (_PANEL + _HEADER)), "white")
@@ -64,17 +79,24 @@ def overview_png(results: Sequence[TileResult], target: Target) -> bytes:
     for i, result in enumerate(results):
         left, top = (i % columns) * 2 * _PANEL, (i // columns) * (_PANEL + _HEADER)
         proof = "certified" if result.certificate.valid else "NOT CERTIFIED"
-        title = f"{result.name}  {result.group_name}    IoU {result.metrics.iou:.3f}    {proof}"
-        pen.text((left + 24, top + 14), title, fill="#1a1a1a", font=font)
-        pictures = (
-            overlay_png(result.tile, target.outline, y_down=target.y_down, width_px=900),
-            tiling_png(result.tile, y_down=target.y_down, width_px=900),
+        title = (
+            f"{result.name}  {result.group_name}    IoU {result.metrics.iou:.3f}    "
+            f"recognised {result.recognisability.score:.2f}    {proof}"
         )
-        for j, picture in enumerate(pictures):
+        pen.text((left + 24, top + 14), title, fill="#1a1a1a", font=font)
+        both = (
+            pictures[i]
+            if pictures is not None
+            else (
+                overlay_png(result.tile, target.outline, y_down=target.y_down, width_px=900),
+                tiling_png(result.tile, y_down=target.y_down, width_px=900),
+            )
+        )
+        for j, picture in enumerate(both):
             panel = Image.open(io.BytesIO(picture)).convert("RGB")
             panel.thumbnail((_PANEL - 24, _PANEL - 24), Image.Resampling.LANCZOS)
             x = left + j * _PANEL + (_PANEL - panel.width) // 2
             sheet.paste(panel, (x, top + _HEADER + (_PANEL - panel.height) // 2))
     buffer = io.BytesIO()
-    sheet.save(buffer, "PNG", optimize=True)
+    sheet.save(buffer, "PNG", compress_level=4)
     return buffer.getvalue()

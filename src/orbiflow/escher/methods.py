@@ -53,6 +53,12 @@ def fit(
     return Fit(model, len(initial_poses(kind, settings.turns)[0]), 0, model.size)
 
 
+def prepare(target: Target, settings: Settings, emphasis: Emphasis | None) -> None:
+    """Compute what the fits of all classes share, so that forked processes find it done."""
+    if isinstance(settings, DescentSettings):
+        _soft_target(target, emphasis)
+
+
 @lru_cache(maxsize=2)  # targets hash by identity; one serves all classes
 def _soft_target(target: Target, emphasis: Emphasis | None) -> SoftTarget:
     return SoftTarget(target, emphasis=emphasis)

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import contextlib
-import multiprocessing
 import queue
 import threading
 import time
-import warnings
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
@@ -19,8 +17,9 @@ import torch
 from orbiflow.errors import CertificationError, OrbiflowError
 from orbiflow.escher.descent_settings import DescentSettings
 from orbiflow.escher.emphasis import Emphasis
-from orbiflow.escher.methods import Settings, fit
+from orbiflow.escher.methods import Settings, fit, prepare
 from orbiflow.escher.preview import quick_tile
+from orbiflow.escher.processes import process_context, quiet_fork
 from orbiflow.escher.ranking import diverse, tile_similarity
 from orbiflow.escher.result import ClassFailure, TileResult, best_tiles
 from orbiflow.escher.target import Target
@@ -221,20 +220,19 @@ def _work(task: Task, name: str) -> Outcome:
 def _run_pool(
     task: Task, names: Sequence[str], count: int, watch: Watcher
 ) -> Generator[Outcome, None, None]:
-    context = _process_context()
+    context = process_context()
     events = context.Queue()
     _preview(task, names, watch)
-    with (
-        ProcessPoolExecutor(count, context, _set_up_worker, (events,)) as pool,
-        _relayed(events, watch),
-    ):
+    if context.get_start_method() == "fork":
+        prepare(task.target, task.settings, task.emphasis)  # once, for all workers
+    with ProcessPoolExecutor(count, context, _set_up_worker, (events,)) as pool:
         try:
-            with warnings.catch_warnings():  # of a fork: see _process_context
-                warnings.simplefilter("ignore", DeprecationWarning)
+            with quiet_fork():
                 pending = {pool.submit(_work, task, name) for name in _longest_first(names)}
-            while pending:
-                done, pending = wait(pending, return_when=FIRST_COMPLETED)
-                yield from _in_order(done)
+            with _relayed(events, watch):  # a thread: not before the fork
+                while pending:
+                    done, pending = wait(pending, return_when=FIRST_COMPLETED)
+                    yield from _in_order(done)
         except BrokenProcessPool as error:
             raise OrbiflowError(
                 "a worker process died: was memory short, or is the script that called this "
@@ -245,20 +243,6 @@ def _run_pool(
                 process.terminate()
             pool.shutdown(wait=False, cancel_futures=True)
             raise
-
-
-def _process_context() -> Any:
-    """How workers start: forked where that is safe, which saves them two seconds of imports.
-
-    A fork is safe as long as this process has no other thread and torch has not been allowed any.
-    """
-    methods = multiprocessing.get_all_start_methods()
-    if "fork" in methods and torch.get_num_threads() == 1 and threading.active_count() == 1:
-        return multiprocessing.get_context("fork")
-    context = multiprocessing.get_context("forkserver" if "forkserver" in methods else "spawn")
-    if context.get_start_method() == "forkserver":
-        context.set_forkserver_preload(["orbiflow.escher.search"])
-    return context
 
 
 def _longest_first(names: Sequence[str]) -> list[str]:
