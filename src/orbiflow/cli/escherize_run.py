@@ -172,4 +172,5 @@ def _table(results: list[TileResult]) -> Table:
 
 
 def _explain(failure: ClassFailure) -> None:
-    errors.print(f"{failure.name}: no tile: {failure.reason}", highlight=False, soft_wrap=True)
+    what = "interrupted" if failure.reason == INTERRUPTED else f"no tile: {failure.reason}"
+    errors.print(f"{failure.name}: {what}", highlight=False, soft_wrap=True)
