@@ -30,8 +30,8 @@ class DescentSettings:
     - `reach`: how far a boundary point may move in a step, first and last; the target has area 1.
     - `blur`: of the target's edge, first and last.
     - `lattice`: whether the lattice freedom takes part.
-    - `polish`: L-BFGS iterations on the exact IoU for each survivor of the last stage; 0 for none.
-    - `finalists`: candidates turned into certified tiles, so that one that fails has a substitute.
+    - `polish`: L-BFGS iterations on the exact IoU; 0 for none.
+    - `finalists`: survivors of the last stage that are polished, best first.
     - `seed`: moves the starts.
     """
 
@@ -43,15 +43,15 @@ class DescentSettings:
     measured: int = 300
     turns: int = 12
     stretch: float = 0.25
-    stages: tuple[tuple[int, int], ...] = ((25, 16), (35, 5), (40, 2))
+    stages: tuple[tuple[int, int], ...] = ((25, 16), (30, 5), (25, 2))
     boundary: int = 240
     smoothness: tuple[float, float] = (2.0, 1.25)
     momentum: float = 0.8
     reach: tuple[float, float] = (0.02, 0.0005)
     blur: tuple[float, float] = (0.05, 0.006)
     lattice: bool = True
-    polish: int = 30
-    finalists: int = 2
+    polish: int = 20
+    finalists: int = 1
     seed: int = 0
 
     def __post_init__(self) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 import torch
@@ -160,6 +161,21 @@ class TileModel(nn.Module):
         """A new model with the candidates at `indices` only, at the same parameters."""
         fields = [field.parameters_.detach()[indices] for field in self.fourier_fields()]
         return self.with_fields(fields, indices)
+
+    @staticmethod
+    @torch.no_grad()
+    def joined(models: Sequence[TileModel]) -> TileModel:
+        """The candidates of models that differ in their parameters alone, as one stack."""
+        first = models[0]
+        stack = first.take([0] * len(models))
+        parts = [dict(model.named_parameters()) for model in models]
+        for name, parameter in stack.named_parameters():
+            parameter.copy_(torch.cat([part[name] for part in parts]))
+        stack.mirror = torch.cat([model.mirror for model in models])
+        if first.outline is not None and first.corners is not None:
+            stack.outline = torch.cat([m.outline for m in models if m.outline is not None])
+            stack.corners = torch.cat([m.corners for m in models if m.corners is not None])
+        return stack
 
     def fourier_fields(self) -> list[FourierField]:
         """The segments of the flow."""
