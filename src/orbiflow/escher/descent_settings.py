@@ -10,6 +10,9 @@ from orbiflow.escher.occupancy import MAX_FREQUENCY
 MAX_SEGMENTS = 2000
 """Of a flow; the descent adds one a step."""
 
+PLAIN = 7.0
+"""Length of an outline, in square roots of its area, up to which the settings are as they are."""
+
 
 @dataclass(frozen=True)
 class DescentSettings:
@@ -43,7 +46,7 @@ class DescentSettings:
     measured: int = 300
     turns: int = 12
     stretch: float = 0.25
-    stages: tuple[tuple[int, int], ...] = ((25, 16), (30, 5), (25, 2))
+    stages: tuple[tuple[int, int], ...] = ((25, 16), (35, 5), (25, 2))
     boundary: int = 240
     smoothness: tuple[float, float] = (2.0, 1.25)
     momentum: float = 0.8
@@ -93,6 +96,22 @@ class DescentSettings:
     def iterations(self) -> int:
         """Steps of all stages."""
         return sum(steps for steps, _ in self.stages)
+
+    def for_outline(self, length: float) -> DescentSettings:
+        """More starts for a ragged silhouette: there are more ways to lay it out, and more fail.
+
+        Args:
+            length: of the outline, in square roots of the silhouette's area; a disc has 3.5.
+        """
+        share = min(max((length / PLAIN) ** 2, 1.0), 4.0)
+        (steps, kept), *later = self.stages
+        return replace(
+            self,
+            candidates=round(share * self.candidates),
+            projected=round(share * self.projected),
+            measured=round(share * self.measured),
+            stages=((steps, round(share * kept)), *later),
+        )
 
     def with_survivors(self, least: int) -> DescentSettings:
         """The same, with at least that many candidates after each stage."""

@@ -20,6 +20,9 @@ from orbiflow.escher.target import Target
 from orbiflow.symmetry.isometry import Array
 from orbiflow.tilings import IsohedralClass
 
+NEAR = 0.01
+"""IoU that a more recognisable candidate of a class may be behind the best."""
+
 
 def fit_descent(
     target: Target,
@@ -38,7 +41,8 @@ def fit_descent(
         soft: of the target, if it is at hand already.
         progress: told 1 - IoU of the best so far as the loss.
     """
-    settings = settings or DescentSettings()
+    outline = shapely.Polygon(target.normal).exterior
+    settings = (settings or DescentSettings()).for_outline(outline.length)
     soft = soft or SoftTarget(target)
     report = progress or (lambda _share, _loss: None)
     prototiles = _starts(target, kind, settings)
@@ -93,12 +97,14 @@ def _overlaps(goal: shapely.Polygon, soft: SoftTarget, descent: Descent) -> Arra
 
 
 def _best_first(target: Target, soft: SoftTarget, descent: Descent) -> None:
-    """Order the survivors by IoU and recognisability together."""
+    """Order the survivors by IoU and recognisability together, those that gave up IoU last."""
     boundaries = descent.placed()
     iou = _overlaps(shapely.Polygon(target.normal), soft, descent)
     recognise = Recogniser(target.normal)
     scores = [
-        rank_score(overlap, recognise(ring).score) if overlap >= 0 else -1.0
+        rank_score(overlap, recognise(ring).score) - float(overlap < iou.max() - NEAR)
+        if overlap >= 0
+        else -2.0
         for overlap, ring in zip(iou, boundaries, strict=True)
     ]
     descent.keep(np.argsort(-np.array(scores), kind="stable").tolist(), iou)
