@@ -21,6 +21,8 @@ Ring = NDArray[np.float64]
 
 def reference() -> dict[str, Any]:
     """Published and measured figures of the nine goals, by name."""
+    if not SHARED.exists():
+        raise SystemExit(f"the paper's goals and their figures are expected in {SHARED}")
     document = json.loads((SHARED / "reference.json").read_text())
     return document["escherization"]["goals"]
 
