@@ -60,8 +60,10 @@ def test_converge_refuses_a_field_that_is_not_finite() -> None:
     model = bent("IH1")
     with torch.no_grad():
         next(model.flow.parameters()).fill_(float("nan"))
+    steps = model.flow.steps
     with pytest.raises(CertificationError, match="no finite values"):
         converge(model, model.boundary(1).detach())
+    assert model.flow.steps == steps
     for force in (False, True):
         with pytest.raises(CertificationError, match="finite"):
             extract_tile(model, force=force)

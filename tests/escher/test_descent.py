@@ -11,11 +11,12 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.escher.boundary import extract_tile
 from orbiflow.escher.descent import CALM, Descent
 from orbiflow.escher.descent_settings import EFFORTS, DescentSettings
-from orbiflow.escher.fit_descent import boundary_iou, fit_descent
+from orbiflow.escher.fit_descent import fit_descent
 from orbiflow.escher.methods import fit, method_name
 from orbiflow.escher.metrics import iou
 from orbiflow.escher.occupancy import OccupancySettings
 from orbiflow.escher.outline_starts import template_starts
+from orbiflow.escher.overlap import boundary_iou
 from orbiflow.escher.preview import quick_tile
 from orbiflow.escher.search import Event, escherize, escherize_class
 from orbiflow.escher.soft_target import SoftTarget

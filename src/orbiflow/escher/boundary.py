@@ -48,11 +48,12 @@ def converge(
     """
     coarse = model.flow(points)
     while True:
-        model.flow.steps *= 2
-        fine = model.flow(points)
+        with model.flow.with_steps(2 * model.flow.steps):
+            fine = model.flow(points)
         error = float((fine - coarse).abs().max())
         if not math.isfinite(error):
             raise CertificationError("the flow has no finite values: lower the learning rate")
+        model.flow.steps *= 2
         if error <= tolerance or (force and model.flow.steps >= MAX_STEPS):
             return fine, error
         if model.flow.steps >= MAX_STEPS:

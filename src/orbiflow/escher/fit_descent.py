@@ -11,6 +11,7 @@ from orbiflow.escher.descent_settings import DescentSettings
 from orbiflow.escher.fit import Fit, Progress
 from orbiflow.escher.model import TileModel
 from orbiflow.escher.outline_starts import outline_starts, template_starts
+from orbiflow.escher.overlap import boundary_iou
 from orbiflow.escher.polish import polish
 from orbiflow.escher.prototiles import Prototiles
 from orbiflow.escher.ranking import rank_score
@@ -108,16 +109,6 @@ def _best_first(target: Target, soft: SoftTarget, descent: Descent) -> None:
         for overlap, ring in zip(iou, boundaries, strict=True)
     ]
     descent.keep(np.argsort(-np.array(scores), kind="stable").tolist(), iou)
-
-
-def boundary_iou(goal: shapely.Polygon, boundaries: Array) -> Array:
-    """IoU (S,) of rings (S, N, 2) with a polygon; -1 for those that cross themselves."""
-    polygons = np.asarray(shapely.polygons(boundaries))
-    good = np.asarray(shapely.is_valid(polygons))
-    scores = np.full(len(polygons), -1.0)
-    common = shapely.area(shapely.intersection(polygons[good], goal))
-    scores[good] = common / (shapely.area(polygons[good]) + goal.area - common)
-    return scores
 
 
 def _starts(target: Target, kind: IsohedralClass, settings: DescentSettings) -> Prototiles:

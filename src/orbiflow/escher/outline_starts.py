@@ -13,8 +13,9 @@ from scipy.ndimage import gaussian_filter1d
 
 from orbiflow.escher.nearest_tile import NearestTiles, nearest_tiles
 from orbiflow.escher.outline import reverse
+from orbiflow.escher.overlap import boundary_iou
 from orbiflow.escher.placements import Complex, Placements, best_placements
-from orbiflow.escher.prototiles import Prototiles
+from orbiflow.escher.prototiles import Prototiles, subdivided
 from orbiflow.escher.starts import template_symmetries
 from orbiflow.escher.target import Target
 from orbiflow.symmetry import rotation_matrix
@@ -31,16 +32,14 @@ SMOOTHING = (0.0, 1.0, 2.0)
 
 @dataclass(frozen=True)
 class Starts:
-    """The best starts of a search, and how many were looked at.
+    """The best starts of a search.
 
     - `prototiles`: best overlap first.
     - `iou`: (S,) of each before the descent.
-    - `tried`: placements that were projected.
     """
 
     prototiles: Prototiles
     iou: Array
-    tried: int
 
 
 def resampled(ring: Array, count: int, phase: float = 0.0) -> Array:
@@ -85,20 +84,18 @@ def outline_starts(
     parts: list[Prototiles] = []
     scores: list[Array] = []
     places: list[Array] = []
-    tried = 0
     for mirrored in (False,) if mirror_closed(kind) else (False, True):
         ring = reverse(target.normal * (1.0, -1.0)) if mirrored else target.normal
         for points in resolutions:
             outline = resampled(ring, points, phase) @ [1, 1j]
             found = best_placements(kind, outline, projected)
-            tried += len(found.starts)
             for tiles, placements, score in _simple_tiles(kind, ring, outline, found, measured):
                 parts.append(Prototiles.of(kind, tiles, vertices, mirrored=mirrored))
                 scores.append(score)
                 places.append((placements.starts[:, None] + tiles.corners) / points)
     iou, all_tiles = np.concatenate(scores), Prototiles.joined(parts)
     chosen = _apart(iou, np.concatenate(places), all_tiles.mirrored, count)
-    return Starts(all_tiles.take(chosen), iou[chosen], tried)
+    return Starts(all_tiles.take(chosen), iou[chosen])
 
 
 def template_starts(
@@ -124,8 +121,6 @@ def template_starts(
     poses = list(itertools.product(sides, (np.arange(turns) + phase) * step, stretches))
     corners = kind.template()
     pieces = vertices // len(corners)
-    t = np.arange(pieces)[:, None] / pieces
-    outline = corners[:, None] + t * (np.roll(corners, -1, axis=0) - corners)[:, None]
     count = len(poses)
     area = kind.group().cell_volume / kind.group().order
     mirrored = np.array([side for side, _, _ in poses])
@@ -136,7 +131,7 @@ def template_starts(
     turned[mirrored, :, 1] *= -1
     center = scale * turned @ kind.stretch(pull) @ corners.mean(axis=0)
     return Prototiles(
-        np.tile(outline.reshape(1, -1, 2), (count, 1, 1)),
+        np.tile(subdivided(corners[None], pieces), (count, 1, 1)),
         np.tile(np.arange(len(corners)) * pieces, (count, 1)),
         angle,
         np.full(count, np.log(scale)),
@@ -181,15 +176,12 @@ def _simple_tiles(
         if not len(placements.starts) or wanted < 1:
             return
         tiles = nearest_tiles(kind, _smoothed(outline, spread), placements)
-        polygons = np.asarray(
-            shapely.polygons(np.stack([tiles.vertices.real, tiles.vertices.imag], axis=-1))
-        )
-        simple = np.asarray(shapely.is_valid(polygons)) & (np.linalg.det(tiles.linear) > 1e-6)
+        rings = np.stack([tiles.vertices.real, tiles.vertices.imag], axis=-1)
+        valid = np.asarray(shapely.is_valid(shapely.polygons(rings)))
+        simple = valid & (np.linalg.det(tiles.linear) > 1e-6)
         nearest = np.argsort(tiles.distance, kind="stable")
         chosen = nearest[simple[nearest]][:wanted]
-        common = shapely.area(shapely.intersection(polygons[chosen], goal))
-        whole = shapely.area(polygons[chosen]) + goal.area - common
-        yield tiles.take(chosen), placements.take(chosen), common / whole
+        yield tiles.take(chosen), placements.take(chosen), boundary_iou(goal, rings[chosen])
         wanted -= len(chosen)
         placements = placements.take(np.flatnonzero(~simple))
 

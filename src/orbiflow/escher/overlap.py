@@ -1,4 +1,4 @@
-"""The exact overlap of a polygon with a region, and its exact gradient in the vertices."""
+"""The exact overlap of polygons with a region, and its exact gradient in the vertices."""
 
 from __future__ import annotations
 
@@ -7,6 +7,16 @@ import shapely
 
 from orbiflow.escher.outline import signed_area
 from orbiflow.symmetry.isometry import Array
+
+
+def boundary_iou(goal: shapely.Polygon, boundaries: Array) -> Array:
+    """IoU (S,) of rings (S, N, 2) with a polygon; -1 for those that cross themselves."""
+    polygons = np.asarray(shapely.polygons(boundaries))
+    good = np.asarray(shapely.is_valid(polygons))
+    scores = np.full(len(polygons), -1.0)
+    common = shapely.area(shapely.intersection(polygons[good], goal))
+    scores[good] = common / (shapely.area(polygons[good]) + goal.area - common)
+    return scores
 
 
 class Overlap:

@@ -63,12 +63,9 @@ class Prototiles:
         inverse = np.linalg.inv(tiles.linear)
         own = (placed - tiles.offset[:, None]) @ np.swapaxes(inverse, 1, 2)
         pieces = vertices // placed.shape[1]
-        t = np.arange(pieces)[:, None] / pieces
-        sides = np.roll(own, -1, axis=1) - own
-        outline = (own[:, :, None] + t * sides[:, :, None]).reshape(len(own), vertices, 2)
         angle, log_scale, stretch = _pose(kind, tiles.linear)
         return cls(
-            outline,
+            subdivided(own, pieces),
             tiles.corners * pieces,
             -angle if mirrored else angle,
             log_scale,
@@ -76,6 +73,14 @@ class Prototiles:
             stretch,
             np.full(len(own), mirrored),
         )
+
+
+def subdivided(rings: Array, pieces: int) -> Array:
+    """Rings (S, N, 2) with every side divided evenly: (S, N pieces, 2)."""
+    count, size, _ = rings.shape
+    t = np.arange(pieces)[:, None] / pieces
+    sides = np.roll(rings, -1, axis=1) - rings
+    return (rings[:, :, None] + t * sides[:, :, None]).reshape(count, size * pieces, 2)
 
 
 def _pose(kind: IsohedralClass, linear: Array) -> tuple[Array, Array, Array]:
