@@ -130,8 +130,13 @@ BAD_OPTIONS: dict[str, tuple[list[str], str]] = {
     "emphasis": (["--emphasis", "nowhere.png"], "nowhere.png"),
     "emphasis for occupancy": (
         ["--method", "occupancy", "--emphasis", "m.png"],
-        "--emphasis needs --method descent",
+        "--emphasis belongs to --method descent",
     ),
+    "effort of occupancy": (
+        ["--method", "occupancy", "--effort", "fast"],
+        "--effort belongs to --method descent",
+    ),
+    "strength of nothing": (["--strength", "3"], "--strength needs --emphasis"),
     "no such option": (["--clases", "IH4"], "--clases"),
 }
 

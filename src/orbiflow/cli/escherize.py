@@ -39,8 +39,11 @@ def escherize(
         str, typer.Option(help="Isohedral classes, such as IH4,IH6, or all.")
     ] = "all",
     effort: Annotated[
-        Effort, typer.Option(help="Seconds, a quarter of a minute, or minutes.")
-    ] = Effort.NORMAL,
+        Effort | None,
+        typer.Option(
+            help="Seconds, a quarter of a minute, or minutes; default normal.", show_default=False
+        ),
+    ] = None,
     emphasis: Annotated[
         Path | None,
         typer.Option(
@@ -49,8 +52,12 @@ def escherize(
         ),
     ] = None,
     strength: Annotated[
-        float, typer.Option(help="How many times more the mask's white part counts.")
-    ] = 4.0,
+        float | None,
+        typer.Option(
+            help="How many times more the mask's white part counts; default 4.",
+            show_default=False,
+        ),
+    ] = None,
     per_class: Annotated[
         int, typer.Option(help="Tiles of each class, the best and others that differ from it.")
     ] = 1,
@@ -104,7 +111,7 @@ def escherize(
             out=out,
             classes=classes,
             method=method.value,
-            effort=effort.value,
+            effort=effort.value if effort else None,
             emphasis=emphasis,
             strength=strength,
             per_class=per_class,

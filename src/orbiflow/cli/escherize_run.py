@@ -42,9 +42,9 @@ class Request:
     out: Path
     classes: str
     method: str
-    effort: str
+    effort: str | None
     emphasis: Path | None
-    strength: float
+    strength: float | None
     per_class: int
     max_frequency: int | None
     seed: int
@@ -71,7 +71,8 @@ def run(request: Request) -> None:
     target = Target.read(request.image, threshold=request.threshold, invert=request.invert)
     emphasis = None
     if request.emphasis is not None:
-        emphasis = Emphasis.read(request.emphasis, target, strength=request.strength)
+        strength = {} if request.strength is None else {"strength": request.strength}
+        emphasis = Emphasis.read(request.emphasis, target, **strength)
     out = make_folder(request.out)
     for note in (*target.notes, *(emphasis.notes if emphasis else ())):
         output.print(f"  {note}", highlight=False, soft_wrap=True)
@@ -125,16 +126,19 @@ def _settings(request: Request) -> Settings:
         for name in ("max_frequency", "turns", "iterations")
         if (value := getattr(request, name)) is not None
     }
+    if request.strength is not None and request.emphasis is None:
+        raise OrbiflowError("--strength needs --emphasis: the mask that it belongs to")
     if request.method == "occupancy":
-        if request.emphasis is not None:
-            raise OrbiflowError("--emphasis needs --method descent")
+        for name in ("emphasis", "effort"):
+            if getattr(request, name) is not None:
+                raise OrbiflowError(f"--{name} belongs to --method descent")
         return OccupancySettings(seed=request.seed, **asked)
     for name in ("turns", "iterations"):
         if name in asked:
             raise OrbiflowError(
                 f"--{name} belongs to --method occupancy; the descent has --effort instead"
             )
-    return DescentSettings.for_effort(request.effort, seed=request.seed, **asked)
+    return DescentSettings.for_effort(request.effort or "normal", seed=request.seed, **asked)
 
 
 def _class_names(text: str) -> list[str]:

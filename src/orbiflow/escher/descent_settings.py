@@ -10,8 +10,15 @@ from orbiflow.escher.occupancy import MAX_FREQUENCY
 MAX_SEGMENTS = 2000
 """Of a flow; the descent adds one a step."""
 
-PLAIN = 7.0
+PLAIN = 8.0
 """Length of an outline, in square roots of its area, up to which the settings are as they are."""
+
+
+RAGGED = 3.5
+"""Power of the length beyond, by which the number of starts grows."""
+
+MOST_TIMES = 6.0
+"""What a ragged outline may multiply the starts by."""
 
 
 @dataclass(frozen=True)
@@ -40,13 +47,13 @@ class DescentSettings:
 
     max_frequency: int = 10
     starts: str = "outline"
-    candidates: int = 64
+    candidates: int = 48
     resolutions: tuple[int, ...] = (40, 60, 80)
-    projected: int = 1500
-    measured: int = 300
+    projected: int = 1000
+    measured: int = 200
     turns: int = 12
     stretch: float = 0.25
-    stages: tuple[tuple[int, int], ...] = ((25, 16), (35, 5), (25, 2))
+    stages: tuple[tuple[int, int], ...] = ((20, 12), (30, 4), (25, 2))
     boundary: int = 240
     smoothness: tuple[float, float] = (2.0, 1.25)
     momentum: float = 0.8
@@ -103,7 +110,7 @@ class DescentSettings:
         Args:
             length: of the outline, in square roots of the silhouette's area; a disc has 3.5.
         """
-        share = min(max((length / PLAIN) ** 2, 1.0), 4.0)
+        share = min(max((length / PLAIN) ** RAGGED, 1.0), MOST_TIMES)
         (steps, kept), *later = self.stages
         return replace(
             self,
@@ -152,10 +159,10 @@ EFFORTS: dict[str, dict[str, object]] = {
     "normal": {},
     "best": {
         "max_frequency": 15,
-        "candidates": 1000,
-        "projected": 8000,
-        "measured": 2000,
-        "stages": ((20, 120), (35, 24), (45, 6), (40, 4)),
+        "candidates": 400,
+        "projected": 4000,
+        "measured": 1000,
+        "stages": ((20, 60), (35, 16), (45, 5), (40, 4)),
         "polish": 100,
         "finalists": 4,
     },

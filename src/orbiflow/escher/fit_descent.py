@@ -64,7 +64,7 @@ def fit_descent(
         simple = ranking[: max(1, int((iou >= 0).sum()))]
         descent.keep(simple[:survivors].tolist(), iou)
         best = float(iou.max())
-    _best_first(target, soft, descent)
+    _best_first(target, goal, soft, descent)
     model = descent.flow_model()
     if settings.polish and soft.weights is None:  # the exact overlap knows no emphasis
         report(0.92, 1 - best)
@@ -97,10 +97,10 @@ def _overlaps(goal: shapely.Polygon, soft: SoftTarget, descent: Descent) -> Arra
     return np.where(plain < 0, plain, soft.weighted_iou(rings).numpy())
 
 
-def _best_first(target: Target, soft: SoftTarget, descent: Descent) -> None:
+def _best_first(target: Target, goal: shapely.Polygon, soft: SoftTarget, descent: Descent) -> None:
     """Order the survivors by IoU and recognisability together, those that gave up IoU last."""
     boundaries = descent.placed()
-    iou = _overlaps(shapely.Polygon(target.normal), soft, descent)
+    iou = _overlaps(goal, soft, descent)
     recognise = Recogniser(target.normal)
     scores = [
         rank_score(overlap, recognise(ring).score) - float(overlap < iou.max() - NEAR)

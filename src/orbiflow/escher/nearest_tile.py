@@ -135,6 +135,10 @@ class _Orbits:
         self.shift[rows, vertex] = where
 
 
+CHUNK = 4000
+"""Placements worked on at a time: bounds the memory at some hundred MB."""
+
+
 def nearest_tiles(
     kind: IsohedralClass,
     outline: Complex,
@@ -149,6 +153,18 @@ def nearest_tiles(
         placements: C of them, of this class and n.
         weights: (n,) positive weights of the points; default 1.
     """
+    chunks = [
+        _nearest_tiles(kind, outline, placements.take(index), weights)
+        for index in np.array_split(
+            np.arange(len(placements.starts)), max(1, -(-len(placements.starts) // CHUNK))
+        )
+    ]
+    return NearestTiles(*(np.concatenate(parts) for parts in zip(*chunks, strict=True)))
+
+
+def _nearest_tiles(
+    kind: IsohedralClass, outline: Complex, placements: Placements, weights: Array | None
+) -> NearestTiles:
     count, n = len(placements.starts), len(outline)
     orbits = _Orbits(kind, placements.lengths)
     order = (np.arange(n) + placements.starts[:, None]) % n

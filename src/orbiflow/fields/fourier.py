@@ -67,21 +67,14 @@ class FourierField(nn.Module):
         self.size = self.basis.size
         shape = (self.size,) if batch is None else (batch, self.size)
         self.parameters_ = nn.Parameter(torch.zeros(shape, dtype=dtype, device=device))
-        self._orders: tuple[int, ...] = tuple(np.abs(self.basis.frequencies).max(axis=0).tolist())
+        self._orders = _orders(self.basis)
         self._fill_buffers()
 
     def _fill_buffers(self) -> None:
-        dtype, device = self.parameters_.dtype, self.parameters_.device
-        rows, columns, values = tensor_layout(self.basis, self._orders)
-        scale = self.sobolev_weights(self.smoothness)
-        for name, index in (("rows", rows), ("columns", columns)):
-            self.register_buffer(name, torch.tensor(index, device=device), persistent=False)
-        for name, real in (
-            ("values", values),
-            ("frame", self.group.inverse_lattice),
-            ("scale", scale),
-        ):
-            tensor = torch.tensor(real, dtype=dtype, device=device)
+        like = self.parameters_
+        for name, tensor in _constants(
+            self.group, self.max_frequency, self.smoothness, like.dtype, like.device
+        ).items():
             self.register_buffer(name, tensor, persistent=False)
 
     def _apply(self, fn: Callable[[Tensor], Tensor], recurse: bool = True) -> FourierField:
@@ -97,8 +90,7 @@ class FourierField(nn.Module):
 
     def sobolev_weights(self, smoothness: float) -> np.ndarray:
         """(P,) factors (1 + |kappa|^2 vol^(2/d))^(-smoothness / 2), free of the unit of length."""
-        size = self.group.cell_volume ** (1 / self.group.dim)
-        return (1.0 + (self.basis.magnitude * size) ** 2) ** (-smoothness / 2)
+        return _sobolev_weights(self.group, self.basis, smoothness)
 
     def weights(self) -> Tensor:
         """Fourier weights in the tensor basis of `series`: (S, d, A_1, ..., A_d), S = 1 if single."""
@@ -206,6 +198,39 @@ class FourierField(nn.Module):
 
     def extra_repr(self) -> str:
         return f"{self.group!r}, max_frequency={self.max_frequency}, parameters={self.size}"
+
+
+def _orders(basis: InvariantBasis) -> tuple[int, ...]:
+    return tuple(np.abs(basis.frequencies).max(axis=0).tolist())
+
+
+def _sobolev_weights(
+    group: CrystallographicGroup, basis: InvariantBasis, smoothness: float
+) -> np.ndarray:
+    size = group.cell_volume ** (1 / group.dim)
+    return (1.0 + (basis.magnitude * size) ** 2) ** (-smoothness / 2)
+
+
+@lru_cache(maxsize=64)  # the segments of a flow share them
+def _constants(
+    group: CrystallographicGroup,
+    max_frequency: int,
+    smoothness: float,
+    dtype: torch.dtype,
+    device: torch.device,
+) -> dict[str, Tensor]:
+    basis = invariant_basis(group, max_frequency)
+    rows, columns, values = tensor_layout(basis, _orders(basis))
+    real = {
+        "values": values,
+        "frame": group.inverse_lattice,
+        "scale": _sobolev_weights(group, basis, smoothness),
+    }
+    return {
+        "rows": torch.tensor(rows, device=device),
+        "columns": torch.tensor(columns, device=device),
+        **{name: torch.tensor(x, dtype=dtype, device=device) for name, x in real.items()},
+    }
 
 
 @lru_cache(maxsize=64)  # bases hash by identity
