@@ -1,0 +1,42 @@
+"""Densities on the torus, the sphere, the Klein bottle and the projective plane."""
+
+from orbiflow.density.bases import Base, UniformBase, VonMisesBase
+from orbiflow.density.density import SymmetricDensity, kl_by_quadrature, midpoints
+from orbiflow.density.estimator import SPACES, DensityEstimator, make_space
+from orbiflow.density.fit import FitReport, FitSettings, fit_density
+from orbiflow.density.flat_spaces import KleinBottle, Torus
+from orbiflow.density.round_spaces import (
+    ProjectivePlane,
+    Sphere,
+    clear_rotation,
+    to_latlon,
+    to_vectors,
+)
+from orbiflow.density.space import MEASURES, Space
+from orbiflow.density.storage import density_to_bytes, read_density
+
+__all__ = [
+    "MEASURES",
+    "SPACES",
+    "Base",
+    "DensityEstimator",
+    "FitReport",
+    "FitSettings",
+    "KleinBottle",
+    "ProjectivePlane",
+    "Space",
+    "Sphere",
+    "SymmetricDensity",
+    "Torus",
+    "UniformBase",
+    "VonMisesBase",
+    "clear_rotation",
+    "density_to_bytes",
+    "fit_density",
+    "kl_by_quadrature",
+    "make_space",
+    "midpoints",
+    "read_density",
+    "to_latlon",
+    "to_vectors",
+]

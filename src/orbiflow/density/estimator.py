@@ -1,0 +1,206 @@
+"""A density estimator with scikit-learn's interface, for data in the units that people have."""
+
+from __future__ import annotations
+
+import inspect
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import ArrayLike
+
+from orbiflow.density.density import SymmetricDensity
+from orbiflow.density.fit import FitReport, FitSettings, Progress, fit_density
+from orbiflow.density.flat_spaces import KleinBottle, Torus
+from orbiflow.density.round_spaces import ProjectivePlane, Sphere, clear_rotation
+from orbiflow.density.space import Space
+from orbiflow.errors import OrbiflowError
+from orbiflow.symmetry.isometry import Array
+
+SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")
+
+
+def make_space(name: str, **options: Any) -> Space:
+    """A space by its name; `options` are those of its class.
+
+    Raises:
+        OrbiflowError: for an unknown name or an option that the space does not have.
+
+    >>> make_space("torus", dim=2, unit="degrees")
+    Torus(dim=2, unit='degrees')
+    """
+    classes = {kind.name: kind for kind in (Torus, Sphere, KleinBottle, ProjectivePlane)}
+    if name not in classes:
+        raise OrbiflowError(f"unknown space {name!r}; the four are {', '.join(SPACES)}")
+    kind = classes[name]
+    wrong = [key for key in options if key not in inspect.signature(kind).parameters]
+    if wrong:
+        raise OrbiflowError(f"the {name} has no option {', '.join(wrong)}")
+    return kind(**options)
+
+
+class DensityEstimator:
+    """Exact, normalised density of angles, directions, axes or Klein-bottle coordinates.
+
+    Follows scikit-learn's conventions: works in a `GridSearchCV` and a `Pipeline`.
+
+    Args:
+        space: "torus", "sphere", "klein-bottle", "projective-plane", or a `Space`.
+        unit: of angles on torus and Klein bottle: "radians", "degrees" or "turns".
+        detail: largest wave number of the flow, in waves along a side of the square.
+        segments: stationary pieces of the flow.
+        smoothness, ridge, roughness, kinetic, iterations, validation, base, seconds, seed: see
+            `FitSettings`.
+
+    After `fit`: `space_`, `density_` (a `SymmetricDensity`), `report_` (a `FitReport`),
+    `n_features_in_`.
+
+    >>> rng = np.random.default_rng(0)
+    >>> angles = rng.vonmises([0.0, 1.0], 4.0, (200, 2))
+    >>> estimator = DensityEstimator("torus", detail=2, segments=2, iterations=5).fit(angles)
+    >>> estimator.score_samples([[0.0, 1.0]]).shape
+    (1,)
+    """
+
+    def __init__(
+        self,
+        space: str | Space = "torus",
+        *,
+        unit: str = "radians",
+        detail: int = 8,
+        segments: int = 6,
+        smoothness: float = 2.0,
+        ridge: float = 1e-4,
+        roughness: tuple[float, ...] = (1e-3, 1e-3, 1e-4),
+        kinetic: float = 0.0,
+        iterations: int = 100,
+        validation: float = 0.1,
+        base: str = "uniform",
+        seconds: float = float("inf"),
+        seed: int = 0,
+    ) -> None:
+        self.space = space
+        self.unit = unit
+        self.detail = detail
+        self.segments = segments
+        self.smoothness = smoothness
+        self.ridge = ridge
+        self.roughness = roughness
+        self.kinetic = kinetic
+        self.iterations = iterations
+        self.validation = validation
+        self.base = base
+        self.seconds = seconds
+        self.seed = seed
+
+    def fit(
+        self, X: ArrayLike, y: object = None, *, progress: Progress | None = None
+    ) -> DensityEstimator:
+        """Fit to data (N, k) in the space's own units; `y` is ignored.
+
+        Raises:
+            OrbiflowError: for data that are not of the space, too few points, or a setting out of
+                range.
+        """
+        del y
+        settings = FitSettings(
+            **{
+                name: value
+                for name, value in self.get_params().items()
+                if name not in ("space", "unit")
+            }
+        )
+        data = np.asarray(X)
+        self.space_ = self._space_for(data)
+        points = self.space_.to_chart(data)
+        self.density_: SymmetricDensity
+        self.report_: FitReport
+        self.density_, self.report_ = fit_density(self.space_, points, settings, progress=progress)
+        self.n_features_in_ = int(data.shape[1])
+        return self
+
+    def score_samples(self, X: ArrayLike, *, measure: str = "natural") -> Array:
+        """Log densities (N,) in nats at data (N, k), with respect to `measure` (see `MEASURES`)."""
+        density = self._fitted()
+        with torch.no_grad():
+            points = self.space_.to_chart(np.asarray(X))
+            return density.log_prob(points, measure=measure).numpy()
+
+    def score(self, X: ArrayLike, y: object = None) -> float:
+        """Mean log density of data (N, k), in natural measure."""
+        del y
+        return float(self.score_samples(X).mean())
+
+    def sample(self, n_samples: int = 1, random_state: int = 0) -> Array:
+        """New data (n_samples, k), the same for the same `random_state`."""
+        density = self._fitted()
+        if n_samples < 1:
+            raise OrbiflowError(f"n_samples must be at least 1, got {n_samples}")
+        generator = torch.Generator().manual_seed(random_state)
+        return self.space_.from_chart(density.sample((n_samples,), generator))
+
+    def get_params(self, deep: bool = True) -> dict[str, Any]:
+        """The constructor's arguments, by name."""
+        del deep
+        return {name: getattr(self, name) for name in self._names()}
+
+    def set_params(self, **params: Any) -> DensityEstimator:
+        """Change constructor arguments.
+
+        Raises:
+            OrbiflowError: for a name that is none.
+        """
+        for name, value in params.items():
+            if name not in self._names():
+                raise OrbiflowError(f"no parameter {name!r}; there are {', '.join(self._names())}")
+            setattr(self, name, value)
+        return self
+
+    def __sklearn_tags__(self) -> Any:
+        # asked for by scikit-learn alone, which is therefore there
+        from sklearn.utils import Tags, TargetTags  # pyright: ignore[reportMissingImports]
+
+        return Tags(
+            estimator_type="density_estimator",
+            target_tags=TargetTags(required=False),
+            transformer_tags=None,
+            regressor_tags=None,
+            classifier_tags=None,
+        )
+
+    def __repr__(self) -> str:
+        defaults = inspect.signature(type(self)).parameters
+        shown = [
+            f"{name}={value!r}"
+            for name, value in self.get_params().items()
+            if value != defaults[name].default
+        ]
+        return f"DensityEstimator({', '.join(shown)})"
+
+    @classmethod
+    def _names(cls) -> list[str]:
+        return list(inspect.signature(cls).parameters)
+
+    def _space_for(self, data: np.ndarray) -> Space:
+        if isinstance(self.space, Space):
+            return self.space
+        if data.ndim != 2:
+            raise OrbiflowError(f"expected data of shape (N, k), got {data.shape}")
+        match self.space:
+            case "torus":
+                return make_space("torus", dim=data.shape[1], unit=self.unit)
+            case "sphere" | "projective-plane":
+                form = "vector" if data.shape[1] == 3 else "latlon"
+                space = make_space(self.space, form=form)
+                assert isinstance(space, Sphere | ProjectivePlane)
+                turn = clear_rotation(space, data, seed=self.seed)
+                return make_space(self.space, form=form, rotation=turn)
+            case "klein-bottle":
+                return make_space("klein-bottle", unit=self.unit)
+            case _:
+                return make_space(str(self.space))
+
+    def _fitted(self) -> SymmetricDensity:
+        if not hasattr(self, "density_"):
+            raise OrbiflowError("this estimator is not fitted yet: call fit first")
+        return self.density_

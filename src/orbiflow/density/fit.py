@@ -1,0 +1,307 @@
+"""Fitting a density to points of the chart: split, match, refine, check."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field, fields
+
+import torch
+from torch import Tensor
+
+from orbiflow.density.bases import Base, UniformBase, VonMisesBase
+from orbiflow.density.density import SymmetricDensity
+from orbiflow.density.likelihood import Refinement, refine
+from orbiflow.density.matching import coupled, match_flow
+from orbiflow.density.space import Space
+from orbiflow.errors import OrbiflowError
+from orbiflow.fields import FourierField
+from orbiflow.flows import Flow
+
+MASS_TOLERANCE = 1e-3
+"""Of the integral over the square, and of the log-likelihood at doubled steps."""
+
+MOST_STEPS = 16
+"""Runge-Kutta steps a segment, to which they are doubled where the integrator has not converged."""
+
+MOST_MATCHED = 20_000
+"""Points that the closed-form start looks at."""
+
+FEW, FEW_HELD = 8192, 4096
+"""Points of the first stage of refinement, and validation points of all stages."""
+
+Progress = Callable[[float, str], None]
+"""Told the share of the work done and what is being done."""
+
+
+@dataclass(frozen=True)
+class FitSettings:
+    """Knobs of a fit; the defaults are measured on the benchmarks.
+
+    - `detail`: largest wave number of the fields, in waves along a side of the square.
+    - `segments`: stationary pieces of the flow.
+    - `steps`: RK4 steps in each, at first; doubled where the integrator has not converged.
+    - `smoothness`: exponent s of the parameters' scaling (1 + |kappa|^2)^(-s/2).
+    - `ridge`: of the closed-form start.
+    - `roughness`: weights of the roughness penalty, each a stage of refinement from where the one
+      before was best on the validation points; largest first. The first stage looks at 8,192 points.
+    - `kinetic`: weight of the kinetic energy.
+    - `iterations`: of L-BFGS in each stage, at most; 0 keeps the closed-form start.
+    - `validation`: share of the points held out for early stopping.
+    - `base`: "uniform" or "von-mises", the paper's.
+    - `single`: train in float32, about twice as fast; the result is float64 in any case.
+    - `seconds`: of refinement at most.
+    - `seed`: of the split, the base points and the times.
+    """
+
+    detail: int = 8
+    segments: int = 6
+    steps: int = 1
+    smoothness: float = 2.0
+    ridge: float = 1e-4
+    roughness: tuple[float, ...] = (1e-3, 1e-3, 1e-4)
+    kinetic: float = 0.0
+    iterations: int = 100
+    validation: float = 0.1
+    base: str = "uniform"
+    single: bool = True
+    seconds: float = math.inf
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        for name, low, high in (
+            ("detail", 1, 64),
+            ("segments", 1, 256),
+            ("steps", 1, 256),
+            ("smoothness", 0, 8),
+            ("ridge", 0, math.inf),
+            ("kinetic", 0, math.inf),
+            ("iterations", 0, 100_000),
+            ("seconds", 0, math.inf),
+        ):
+            value = getattr(self, name)
+            if not low <= value <= high:
+                raise OrbiflowError(f"{name} must be from {low:g} to {high:g}, got {value!r}")
+        if not 0 < self.validation < 1:
+            raise OrbiflowError(f"validation must be between 0 and 1, got {self.validation!r}")
+        if not self.roughness or min(self.roughness) < 0:
+            raise OrbiflowError(f"roughness needs weights of at least 0, got {self.roughness!r}")
+        if self.base not in ("uniform", "von-mises"):
+            raise OrbiflowError(f'base must be "uniform" or "von-mises", got {self.base!r}')
+
+
+@dataclass(frozen=True)
+class FitReport:
+    """What a fit did; log-likelihoods in nats with respect to the square.
+
+    - `points`, `duplicates`: data points, and those that equal an earlier one.
+    - `train`, `validation`: points of each.
+    - `train_nll`, `validation_nll`: mean negative log density at the end.
+    - `start_nll`: on the validation points, of the closed-form start.
+    - `stages`: one for each roughness.
+    - `steps`: RK4 steps a segment, in the end.
+    - `mass`: integral over the square on a grid, None above two dimensions.
+    - `integration_error`: change of the mean validation log density at doubled steps.
+    - `notes`: what the user should know, in words.
+    """
+
+    points: int
+    duplicates: int
+    train: int
+    validation: int
+    start_nll: float
+    train_nll: float
+    validation_nll: float
+    stages: tuple[Refinement, ...]
+    steps: int
+    mass: float | None
+    integration_error: float
+    notes: tuple[str, ...] = field(default=())
+
+
+def fit_density(
+    space: Space,
+    points: Tensor,
+    settings: FitSettings | None = None,
+    *,
+    progress: Progress | None = None,
+) -> tuple[SymmetricDensity, FitReport]:
+    """Fit a Fourier flow to canonical points by flow matching, then by likelihood.
+
+    Args:
+        space: of two dimensions; see `fit_neural` for tori of more.
+        points: (N, d) in the chart, N >= 10 different ones.
+        settings: default `FitSettings()`.
+        progress: told how far it is.
+
+    Returns:
+        The density, float64, and the report.
+
+    Raises:
+        OrbiflowError: for too few points.
+    """
+    settings = settings or FitSettings()
+    say = progress or (lambda _share, _what: None)
+    generator = torch.Generator().manual_seed(settings.seed)
+    points = space.project(points.double())
+    train, validation, duplicates = split(points, settings.validation, generator)
+    base: Base = UniformBase(space) if settings.base == "uniform" else VonMisesBase(space)
+    dtype = torch.float32 if settings.single else torch.float64
+    segments = [
+        FourierField(
+            space.group,
+            max_frequency(space, settings.detail),
+            smoothness=settings.smoothness,
+            dtype=dtype,
+        )
+        for _ in range(settings.segments)
+    ]
+    say(0.0, "matching")
+    chosen = train[:MOST_MATCHED]
+    start, move = coupled(space, base.sample(len(chosen), generator), chosen)
+    match_flow(
+        segments,
+        space,
+        start.to(dtype),
+        move.to(dtype),
+        ridge=settings.ridge,
+        generator=generator,
+    )
+    density = SymmetricDensity(space, Flow(segments, steps=settings.steps), base)
+    with torch.no_grad():
+        start_nll = -float(density.log_prob(validation.to(dtype)).mean())
+    stages = _refined(density, train.to(dtype), validation.to(dtype), settings, say)
+    density.flow.double()
+    error, mass = _converged(density, validation)
+    notes = _notes(space, len(points), duplicates, density, error, mass)
+    with torch.no_grad():
+        nll = [-float(density.log_prob(part).mean()) for part in (train, validation)]
+    report = FitReport(
+        points=len(points),
+        duplicates=duplicates,
+        train=len(train),
+        validation=len(validation),
+        start_nll=start_nll,
+        train_nll=nll[0],
+        validation_nll=nll[1],
+        stages=tuple(stages),
+        steps=density.flow.steps,
+        mass=mass,
+        integration_error=error,
+        notes=tuple(notes),
+    )
+    return density, report
+
+
+def max_frequency(space: Space, detail: int) -> int:
+    """Frequency index that reaches `detail` waves along a side of the square."""
+    return round(detail * float(space.group.lattice.diagonal().max()))
+
+
+def split(points: Tensor, share: float, generator: torch.Generator) -> tuple[Tensor, Tensor, int]:
+    """Shuffle and hold out a share, equal points on the same side; and how many repeat another.
+
+    Raises:
+        OrbiflowError: if there are fewer than ten different points.
+    """
+    # rounding keeps together what differs by the projection's last digit
+    unique, where = torch.unique((points * 1e9).round(), dim=0, return_inverse=True)
+    if len(unique) < 10:
+        raise OrbiflowError(
+            f"a density needs at least 10 different points, got {len(unique)} among {len(points)}"
+        )
+    held = torch.zeros(len(unique), dtype=torch.bool)
+    held[torch.randperm(len(unique), generator=generator)[: max(1, round(share * len(unique)))]] = (
+        True
+    )
+    order = torch.randperm(len(points), generator=generator)
+    points, held = points[order], held[where][order]
+    return points[~held], points[held], len(points) - len(unique)
+
+
+def _refined(
+    density: SymmetricDensity,
+    train: Tensor,
+    validation: Tensor,
+    settings: FitSettings,
+    say: Progress,
+) -> list[Refinement]:
+    stages: list[Refinement] = []
+    if not settings.iterations:
+        return stages
+    count = len(settings.roughness)
+    left = settings.seconds
+    for number, roughness in enumerate(settings.roughness):
+
+        def watch(iteration: int, nll: float, held: float, number: int = number) -> None:
+            share = (number + iteration / settings.iterations) / count
+            say(share, f"likelihood: train {nll:.4f}, validation {held:.4f}")
+
+        stage = refine(
+            density,
+            train if number else train[:FEW],
+            validation[:FEW_HELD],
+            iterations=settings.iterations,
+            kinetic=settings.kinetic,
+            roughness=roughness,
+            seconds=left,
+            watch=watch,
+        )
+        left -= stage.seconds
+        stages.append(stage)
+        unconverged = _step_error(density, validation[:FEW_HELD]) > MASS_TOLERANCE
+        if unconverged and density.flow.steps < MOST_STEPS:
+            density.flow.steps *= 2
+        elif left <= 0 or (number > 1 and stage.best == 0):
+            break
+    return stages
+
+
+@torch.no_grad()
+def _step_error(density: SymmetricDensity, points: Tensor) -> float:
+    """Change of the mean log density at `points` when the steps are doubled."""
+    coarse = float(density.log_prob(points).mean())
+    with density.flow.with_steps(2 * density.flow.steps):
+        return abs(float(density.log_prob(points).mean()) - coarse)
+
+
+def _converged(density: SymmetricDensity, validation: Tensor) -> tuple[float, float | None]:
+    """Double the steps until log-likelihood and mass are right; what is left of error, and the mass."""
+    flow = density.flow
+    while True:
+        error = _step_error(density, validation)
+        mass = density.mass() if density.space.dim == 2 else None
+        off = 0.0 if mass is None else abs(mass - 1)
+        if max(error, off) <= MASS_TOLERANCE / 2 or flow.steps >= MOST_STEPS:
+            return error, mass
+        flow.steps *= 2
+
+
+def _notes(
+    space: Space,
+    count: int,
+    duplicates: int,
+    density: SymmetricDensity,
+    error: float,
+    mass: float | None,
+) -> list[str]:
+    notes = []
+    if duplicates:
+        notes.append(
+            f"{duplicates} of {count} points repeat another: they count as often as they come, and "
+            "equal points were kept on the same side of the validation split"
+        )
+    if error > MASS_TOLERANCE:
+        notes.append(
+            f"the integrator has not converged at {density.flow.steps} steps a segment: the mean log "
+            f"density changes by {error:.1e} when they are doubled"
+        )
+    if mass is not None and abs(mass - 1) > MASS_TOLERANCE:
+        notes.append(
+            f"the density integrates to {mass:.4f} on a grid of this {space.name}, not to 1"
+        )
+    return notes
+
+
+KNOWN = tuple(f.name for f in fields(FitSettings))
+"""Names of the settings."""

@@ -1,0 +1,156 @@
+"""What the four identification spaces have in common: a chart, a group, measures, distances."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import ArrayLike
+from torch import Tensor
+
+from orbiflow.errors import OrbiflowError
+from orbiflow.symmetry import CrystallographicGroup, DirichletDomain
+from orbiflow.symmetry.isometry import Array
+
+MEASURES = ("natural", "square", "uniform")
+"""Natural: the user's units, or round area in steradians. Square: area of the canonical square.
+Uniform: the uniform distribution, so that a density of 1 is that of no structure at all."""
+
+
+class Space(ABC):
+    """An identification space: the unit cube modulo a crystallographic group (design point 12).
+
+    Points in the chart are float tensors (..., d); `project` brings them to the canonical cube
+    [0, 1)^d. Data are arrays (N, k) in the units that people have.
+
+    - `name`: such as "klein-bottle".
+    - `group`: acts on R^d; densities are invariant under it.
+    - `columns`: names of the data's columns.
+    """
+
+    name: str
+    group: CrystallographicGroup
+    columns: tuple[str, ...]
+
+    @property
+    def dim(self) -> int:
+        """Dimension d of the space."""
+        return self.group.dim
+
+    @cached_property
+    def domain(self) -> DirichletDomain:
+        """The canonical cube, as the Dirichlet domain of its centre."""
+        return DirichletDomain(self.group, np.full(self.dim, 0.5))
+
+    def project(self, points: Tensor) -> Tensor:
+        """Canonical representatives in [0, 1]^d of points (..., d); differentiable almost anywhere."""
+        return self.domain.project(points)
+
+    def log_area(self, points: Tensor) -> Tensor:
+        """log of natural area over chart area (...,) at points (..., d)."""
+        return torch.full_like(points[..., 0], math.log(self.volume))
+
+    @property
+    @abstractmethod
+    def volume(self) -> float:
+        """Of the whole space, in natural measure."""
+
+    @abstractmethod
+    def to_chart(self, data: ArrayLike) -> Tensor:
+        """Data (N, k) to canonical points (N, d), float64.
+
+        Raises:
+            OrbiflowError: for a wrong shape, values that are not finite or out of range.
+        """
+
+    @abstractmethod
+    def from_chart(self, points: Tensor) -> Array:
+        """Chart points (N, d) to data (N, k)."""
+
+    @abstractmethod
+    def settings(self) -> dict[str, Any]:
+        """What, with `name`, makes the same space again; ready for JSON."""
+
+    def log_density_factor(self, points: Tensor, measure: str) -> Tensor:
+        """What to add to a log density of the square at points (..., d) for another `measure`.
+
+        Raises:
+            OrbiflowError: for a measure that is not one of `MEASURES`.
+        """
+        if measure not in MEASURES:
+            raise OrbiflowError(f"measure must be one of {', '.join(MEASURES)}, got {measure!r}")
+        if measure == "square":
+            return torch.zeros_like(points[..., 0])
+        shift = math.log(self.volume) if measure == "uniform" else 0.0
+        return shift - self.log_area(points)
+
+    def displacement(self, start: Tensor, end: Tensor) -> Tensor:
+        """Shortest flat displacement (..., d) from `start` to an image of `end` under the group."""
+        images = self._images_of(end) - start
+        nearest = (images**2).sum(dim=-1).argmin(dim=0)
+        return torch.take_along_dim(images, nearest[None, ..., None], dim=0)[0]
+
+    def distance(self, start: Tensor, end: Tensor) -> Tensor:
+        """Geodesic distance (...,) in the flat metric of the chart, over group images."""
+        return self.displacement(start, end).norm(dim=-1)
+
+    def squared_distances(self, start: Tensor, end: Tensor) -> Tensor:
+        """Squares (N, M) of `distance` between all of `start` (N, d) and `end` (M, d)."""
+        images = self._images_of(end)
+        dot = images @ start.mT
+        square = (images**2).sum(dim=-1, keepdim=True) - 2 * dot
+        return (square.amin(dim=0).mT + (start**2).sum(dim=-1, keepdim=True)).clamp_min(0.0)
+
+    def uniform(self, count: int, generator: torch.Generator) -> Tensor:
+        """`count` chart points, uniform in natural measure."""
+        return torch.rand(count, self.dim, dtype=torch.float64, generator=generator)
+
+    @cached_property
+    def _near(self) -> tuple[Array, Array]:
+        # an image of one point is within a diagonal of any other, and both of their cube.s centre
+        diagonal = math.sqrt(self.dim)
+        center = np.full(self.dim, 0.5)
+        elements = self.group.elements_near(center, 2 * diagonal, source=center)
+        return (
+            np.stack([g.linear for g in elements]),
+            np.stack([g.translation for g in elements]),
+        )
+
+    def _images_of(self, points: Tensor) -> Tensor:
+        """(E, ..., d): all images of canonical points that can be nearest to one of the cube."""
+        linear, shift = (
+            torch.as_tensor(a, dtype=points.dtype, device=points.device) for a in self._near
+        )
+        flat = self.project(points).reshape(1, -1, self.dim)
+        moved = flat @ linear.mT + shift[:, None, :]
+        return moved.reshape(len(linear), *points.shape)
+
+    def __repr__(self) -> str:
+        options = ", ".join(f"{k}={v!r}" for k, v in self.settings().items())
+        return f"{type(self).__name__}({options})"
+
+
+def checked_table(data: ArrayLike, widths: tuple[int, ...], what: str) -> Array:
+    """Data as a finite float64 array (N, k), k one of `widths`.
+
+    Raises:
+        OrbiflowError: naming the first row that is wrong.
+    """
+    try:
+        table = np.asarray(data, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise OrbiflowError(f"{what}: expected numbers, got {error}") from error
+    if table.ndim != 2 or table.shape[1] not in widths:
+        expected = " or ".join(f"(N, {k})" for k in widths)
+        raise OrbiflowError(f"{what}: expected an array {expected}, got shape {table.shape}")
+    bad = np.flatnonzero(~np.isfinite(table).all(axis=1))
+    if len(bad):
+        raise OrbiflowError(
+            f"{what}: row {bad[0] + 1} has a missing or infinite value "
+            f"({len(bad)} such rows): remove them first"
+        )
+    return table

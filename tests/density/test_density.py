@@ -1,0 +1,183 @@
+"""SymmetricDensity: normalised, invariant, continuous over the seams, sampled as it says."""
+
+import math
+
+import numpy as np
+import pytest
+import scipy.stats
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from orbiflow.density import (
+    KleinBottle,
+    ProjectivePlane,
+    Sphere,
+    SymmetricDensity,
+    Torus,
+    UniformBase,
+    VonMisesBase,
+    kl_by_quadrature,
+    midpoints,
+)
+from orbiflow.errors import OrbiflowError
+from orbiflow.fields import FourierField, neural_field
+from orbiflow.flows import Flow
+
+SPACES = (Torus(2), Sphere(), KleinBottle(), ProjectivePlane())
+every = pytest.mark.parametrize("space", SPACES, ids=lambda s: s.name)
+seeds = st.integers(0, 2**32 - 1)
+
+
+def make(space, seed: int = 0, *, base=UniformBase, segments: int = 2, strength: float = 0.1):
+    fields = []
+    for k in range(segments):
+        field = FourierField(space.group, 3, smoothness=1.0)
+        generator = torch.Generator().manual_seed(seed + k)
+        noise = torch.randn(field.size, generator=generator, dtype=torch.float64)
+        field.parameters_.data.copy_(strength * noise / noise.norm())  # of rms `strength` at most
+        fields.append(field)
+    return SymmetricDensity(space, Flow(fields, steps=6), base(space))
+
+
+def square(seed: int, count: int = 40, dim: int = 2) -> torch.Tensor:
+    return torch.tensor(np.random.default_rng(seed).random((count, dim)))
+
+
+@every
+@pytest.mark.parametrize("base", [UniformBase, VonMisesBase])
+@settings(max_examples=5)
+@given(seed=seeds)
+def test_it_integrates_to_one(space, base, seed: int) -> None:
+    assert make(space, seed, base=base).mass(200) == pytest.approx(1.0, abs=1e-3)
+
+
+@every
+@settings(max_examples=10)
+@given(seed=seeds)
+def test_log_prob_is_invariant_under_the_group(space, seed: int) -> None:
+    density, points = make(space, seed), square(seed)
+    shift = np.random.default_rng(seed).integers(-2, 3, (space.group.order, 1, 2))
+    images = space.group.images(points) + torch.tensor(shift @ space.group.lattice.T)
+    for measure in ("square", "natural"):
+        spread = density.log_prob(images, measure=measure) - density.log_prob(
+            points, measure=measure
+        )
+        assert float(spread.detach().abs().max()) < 1e-8
+
+
+@every
+@settings(max_examples=10)
+@given(seed=seeds, side=st.integers(0, 3), t=st.floats(0.02, 0.98))
+def test_it_is_continuous_over_every_edge(space, seed: int, side: int, t: float) -> None:
+    edge = [(t, 0.0), (t, 1.0), (0.0, t), (1.0, t)][side]
+    outward = [(0.0, -1.0), (0.0, 1.0), (-1.0, 0.0), (1.0, 0.0)][side]
+    steps = torch.tensor([-1e-6, 1e-6], dtype=torch.float64)[:, None]
+    across = torch.tensor([edge]).double() + steps * torch.tensor([outward]).double()
+    canonical = space.project(across)  # one of them lies at another edge now
+    assert float(space.distance(canonical[0], canonical[1])) < 1e-5
+    values = make(space, seed).log_prob(canonical, measure="natural").detach()
+    assert float(values[0] - values[1]) == pytest.approx(0.0, abs=1e-3)
+
+
+@every
+@settings(max_examples=10)
+@given(seed=seeds)
+def test_to_base_and_back(space, seed: int) -> None:
+    density = make(space, seed)
+    points = density.sample((50,), torch.Generator().manual_seed(seed % 2**31))
+    again = density.from_base(density.to_base(points)).detach()
+    # an integrator's inverse is that of its order
+    assert float(space.distance(points, again).max()) < 1e-4
+
+
+@every
+@pytest.mark.parametrize("base", [UniformBase, VonMisesBase])
+def test_samples_follow_the_density(space, base) -> None:
+    density = make(space, 7, base=base, strength=0.12)
+    count, cells = 40_000, 8
+    points = density.sample((count,), torch.Generator().manual_seed(1))
+    assert bool(((points >= 0) & (points <= 1)).all())
+    edges = torch.linspace(0, 1, cells + 1).double()
+    observed = torch.histogramdd(points, [edges, edges]).hist.flatten().numpy()
+    with torch.no_grad():
+        values = density.log_prob(midpoints(space, 20 * cells)).exp()
+    expected = values.reshape(cells, 20, cells, 20).mean(dim=(1, 3)).flatten().numpy()
+    expected *= count / expected.sum()
+    assert scipy.stats.chisquare(observed, expected).pvalue > 1e-4
+    assert expected.max() > 1.5 * expected.min()  # a test that an even density would fail
+
+
+@every
+@settings(max_examples=5)
+@given(seed=seeds, concentration=st.floats(0.1, 8.0))
+def test_the_von_mises_base_is_symmetric_and_normalised(space, seed, concentration) -> None:
+    base, points = VonMisesBase(space, concentration), square(seed)
+    images = space.group.images(points)
+    assert torch.allclose(base.log_prob(images), base.log_prob(points).expand(len(images), -1))
+    mass = base.log_prob(midpoints(space, 200)).exp().mean()
+    assert float(mass) == pytest.approx(1.0, abs=1e-6)
+
+
+def test_of_the_torus_the_von_mises_base_is_the_papers() -> None:
+    points = square(0)
+    expected = scipy.stats.vonmises(1.0).logpdf(2 * math.pi * (points.numpy() - 0.5)).sum(axis=1)
+    found = VonMisesBase(Torus(2)).log_prob(points).numpy()
+    assert np.allclose(found, expected + 2 * math.log(2 * math.pi))
+
+
+def test_gradients_reach_the_parameters() -> None:
+    density = make(Sphere(), 3)
+    parameters = list(density.flow.parameters())
+    loss = -density.log_prob(square(0)).mean() + density.rsample((20,)).square().mean()
+    assert all(float(g.norm()) > 0 for g in torch.autograd.grad(loss, parameters))
+
+
+def test_any_network_serves_as_a_field() -> None:
+    space = Torus(3)
+    field = neural_field(space.group, hidden=(8,), seed=1)
+    torch.nn.init.normal_(list(field.parameters())[-2], std=0.05)
+    density = SymmetricDensity(space, Flow(field, steps=4))
+    points = square(0, 20, 3)
+    start, log_det = (t.detach() for t in density.flow.inverse_and_log_det(points))
+    assert torch.allclose(density.log_prob(points).detach(), log_det)
+    jacobian = torch.autograd.functional.jacobian(lambda x: density.flow.inverse(x), points[0])
+    assert float(torch.linalg.slogdet(jacobian.detach())[1]) == pytest.approx(
+        float(log_det[0]), abs=1e-4
+    )
+    assert density.sample((5,)).shape == (5, 3)
+    assert torch.allclose(space.project(density.flow(start)).detach(), points, atol=1e-4)
+
+
+def test_entropy_and_divergence() -> None:
+    flat = SymmetricDensity(Sphere(), make(Sphere(), 0, strength=0.0).flow)
+    generator = torch.Generator().manual_seed(0)
+    assert float(flat.entropy(100, generator=generator)) == pytest.approx(math.log(4 * math.pi))
+    one, other = make(Torus(2), 1), make(Torus(2), 2)
+    grid = midpoints(Torus(2), 150)
+    with torch.no_grad():
+        exact = kl_by_quadrature(one.log_prob(grid).exp(), other.log_prob(grid))
+    assert exact > 0.01
+    assert float(one.kl_to(other, 40_000, generator=generator)) == pytest.approx(exact, rel=0.1)
+    assert float(one.kl_to(one, 100, generator=generator)) == 0.0
+
+
+def test_large_batches_are_the_same_in_blocks(monkeypatch) -> None:
+    density, points = make(KleinBottle()), square(0, 60).reshape(3, 20, 2)
+    with torch.no_grad():
+        whole = density.log_prob(points)
+        monkeypatch.setattr("orbiflow.density.density.BLOCK", 7)
+        assert torch.allclose(density.log_prob(points), whole)
+        draws = [density.sample((4, 5), torch.Generator().manual_seed(3)) for _ in range(2)]
+    assert torch.equal(*draws)
+    assert draws[0].shape == (4, 5, 2)
+
+
+def test_what_is_refused() -> None:
+    with pytest.raises(OrbiflowError, match=r"expected points \(..., 2\), got \(5, 3\)"):
+        make(Torus(2)).log_prob(torch.zeros(5, 3))
+    with pytest.raises(OrbiflowError, match="a grid needs two dimensions"):
+        SymmetricDensity(Torus(3), Flow(lambda x: 0 * x)).mass()
+    for wrong in (0.0, -1.0, math.nan, math.inf):
+        with pytest.raises(OrbiflowError, match="concentration must be positive"):
+            VonMisesBase(Torus(2), wrong)

@@ -1,0 +1,265 @@
+"""Fitting: coupling, the closed-form start, likelihood, the estimator, storage."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from orbiflow.density import (
+    DensityEstimator,
+    FitSettings,
+    KleinBottle,
+    ProjectivePlane,
+    Sphere,
+    SymmetricDensity,
+    Torus,
+    UniformBase,
+    density_to_bytes,
+    fit_density,
+    read_density,
+)
+from orbiflow.density.fit import split
+from orbiflow.density.likelihood import Objective
+from orbiflow.density.matching import conjugate_gradients, coupled, match_flow
+from orbiflow.errors import InputFileError, OrbiflowError
+from orbiflow.fields import FourierField
+from orbiflow.flows import Flow
+
+SPACES = (Torus(2), Sphere(), KleinBottle(), ProjectivePlane())
+every = pytest.mark.parametrize("space", SPACES, ids=lambda s: s.name)
+seeds = st.integers(0, 2**31 - 1)
+QUICK = FitSettings(detail=3, segments=2, iterations=15)
+
+
+def blob(space, count: int = 600, seed: int = 0) -> torch.Tensor:
+    """Points about (0.3, 0.6) and their opposite corner, projected."""
+    rng = np.random.default_rng(seed)
+    center = np.where(rng.random((count, 1)) < 0.7, [[0.3, 0.6]], [[0.8, 0.15]])
+    return space.project(torch.tensor(center + 0.1 * rng.normal(size=(count, 2))))
+
+
+@every
+@settings(max_examples=10)
+@given(seed=seeds)
+def test_coupling_is_a_pairing_with_short_geodesics(space, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    start, end = (torch.tensor(rng.random((60, 2))) for _ in range(2))
+    paired, move = coupled(space, start, end, group=25)
+    assert torch.equal(*(torch.sort(p.flatten()).values for p in (paired, start)))
+    assert float(space.distance(space.project(paired + move), end).max()) < 1e-9
+    assert float((move**2).sum()) <= float((space.displacement(start, end) ** 2).sum()) + 1e-9
+
+
+@given(st.integers(1, 12), seeds)
+def test_conjugate_gradients_solve(size: int, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    root = torch.tensor(rng.normal(size=(size, size)))
+    matrix = root @ root.mT + torch.eye(size)
+    right = torch.tensor(rng.normal(size=size))
+    found = conjugate_gradients(lambda x: matrix @ x, right, matrix.diagonal(), 200, 1e-10)
+    assert torch.allclose(matrix @ found, right, atol=1e-6)
+
+
+@every
+def test_matching_recovers_a_field(space) -> None:
+    truth = FourierField(space.group, 4)
+    truth.parameters_.data.copy_(0.02 * torch.randn(truth.size).double())
+    points = torch.rand(3000, 2, dtype=torch.float64)
+    found = FourierField(space.group, 4, smoothness=2.0)
+    with torch.no_grad():  # a single segment with tiny moves regresses the field itself
+        move = 1e-6 * truth(points)
+    match_flow([found], space, points, move, ridge=0.0, iterations=200)
+    error = 1e6 * found.parameters_.detach() * found.scale - truth.parameters_.detach()
+    assert float(error.abs().max()) < 1e-4
+
+
+@settings(max_examples=5, deadline=None)
+@given(seeds)
+def test_the_gradient_of_the_objective(seed: int) -> None:
+    space = Sphere()
+    fields = [FourierField(space.group, 3, smoothness=1.0) for _ in range(2)]
+    density = SymmetricDensity(space, Flow(fields, steps=2), UniformBase(space))
+    objective = Objective(density, blob(space, 30), kinetic=0.1, roughness=1e-3)
+    rng = np.random.default_rng(seed)
+    at, along = 0.05 * rng.normal(size=(2, len(objective.get())))
+    loss, gradient = objective(at)
+    ahead, behind = (objective(at + s * 1e-4 * along)[0] for s in (1, -1))
+    assert (ahead - behind) / 2e-4 == pytest.approx(gradient @ along, rel=1e-4, abs=1e-7)
+    assert math.isfinite(loss)
+
+
+@every
+def test_a_fit_is_no_worse_than_its_start_and_normalised(space) -> None:
+    density, report = fit_density(space, blob(space), QUICK)
+    assert report.validation_nll < report.start_nll + 0.01
+    assert report.validation_nll < -0.5  # 0 is the even density of the square
+    assert report.mass == pytest.approx(1.0, abs=1e-3)
+    assert report.integration_error < 1e-3
+    assert report.notes == ()
+    assert (report.train, report.validation, report.duplicates) == (540, 60, 0)
+    held_out = blob(space, 2000, seed=1)
+    with torch.no_grad():
+        nll = -float(density.log_prob(held_out).mean())
+    assert nll == pytest.approx(report.validation_nll, abs=0.3)
+
+
+def test_the_same_seed_gives_the_same_density() -> None:
+    points = blob(Torus(2), 200)
+    one, other, another = (
+        fit_density(Torus(2), points, FitSettings(detail=2, segments=2, iterations=5, seed=seed))[0]
+        for seed in (1, 1, 2)
+    )
+    with torch.no_grad():
+        values = [d.log_prob(points) for d in (one, other, another)]
+    assert torch.equal(values[0], values[1])
+    assert not torch.equal(values[0], values[2])
+
+
+def test_equal_points_stay_on_one_side_and_are_said() -> None:
+    points = blob(Torus(2), 300)[torch.randint(0, 60, (300,), generator=torch.manual_seed(0))]
+    train, held, repeats = split(points, 0.2, torch.Generator().manual_seed(0))
+    assert len(train) + len(held) == 300
+    assert repeats == 300 - len(torch.unique(points, dim=0))
+    both = torch.cat([torch.unique(train, dim=0), torch.unique(held, dim=0)])
+    assert len(torch.unique(both, dim=0)) == len(both)
+    _, report = fit_density(Torus(2), points, QUICK)
+    assert f"{repeats} of 300 points repeat another" in report.notes[0]
+
+
+def test_few_or_equal_points_are_refused() -> None:
+    for points in (torch.rand(9, 2), torch.full((500, 2), 0.3)):
+        with pytest.raises(OrbiflowError, match="at least 10 different points, got"):
+            fit_density(Torus(2), points, QUICK)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"detail": 0},
+        {"detail": 65},
+        {"segments": 0},
+        {"steps": 0},
+        {"ridge": -1.0},
+        {"kinetic": math.nan},
+        {"iterations": -1},
+        {"validation": 0.0},
+        {"validation": 1.0},
+        {"roughness": ()},
+        {"roughness": (-1.0,)},
+        {"base": "normal"},
+    ],
+)
+def test_settings_out_of_range(changes) -> None:
+    with pytest.raises(OrbiflowError, match=next(iter(changes))):
+        FitSettings(**changes)
+
+
+DATA = {
+    "torus": np.random.default_rng(0).vonmises([0.0, 1.0], 3.0, (300, 2)),
+    "sphere": np.random.default_rng(1).normal(20, 10, (300, 2)),
+    "klein-bottle": np.random.default_rng(2).vonmises([0.5, 0.0], 3.0, (300, 2)),
+    "projective-plane": np.random.default_rng(3).normal([60, 30], 10, (300, 2)).clip(-90, 90),
+}
+
+
+@pytest.mark.parametrize("space", DATA)
+def test_the_estimator(space: str) -> None:
+    estimator = DensityEstimator(space, detail=2, segments=2, iterations=8)
+    with pytest.raises(OrbiflowError, match="not fitted yet"):
+        estimator.sample()
+    assert estimator.fit(DATA[space]) is estimator
+    scores = estimator.score_samples(DATA[space])
+    assert scores.shape == (300,)
+    assert estimator.score(DATA[space]) == pytest.approx(scores.mean())
+    even = -math.log(estimator.space_.volume)
+    assert estimator.score(DATA[space]) > even + 0.3
+    relative = estimator.score_samples(DATA[space], measure="uniform")
+    assert np.allclose(relative, scores - even)
+    draws = estimator.sample(500, random_state=4)
+    assert draws.shape == (500, 2)
+    assert np.array_equal(draws, estimator.sample(500, random_state=4))
+    assert estimator.score(draws) == pytest.approx(estimator.score(DATA[space]), abs=0.5)
+
+
+def test_units_change_the_density_by_their_ratio() -> None:
+    small = {"detail": 2, "segments": 2, "iterations": 5}
+    radians = DensityEstimator("torus", **small).fit(DATA["torus"])
+    degrees = DensityEstimator("torus", unit="degrees", **small).fit(np.degrees(DATA["torus"]))
+    shift = radians.score_samples(DATA["torus"]) - degrees.score_samples(np.degrees(DATA["torus"]))
+    assert np.allclose(shift, 2 * math.log(180 / math.pi), atol=1e-3)
+
+
+def test_parameters_of_the_estimator() -> None:
+    estimator = DensityEstimator("sphere", detail=3)
+    assert estimator.get_params()["detail"] == 3
+    assert estimator.set_params(detail=5).detail == 5
+    assert repr(estimator) == "DensityEstimator(space='sphere', detail=5)"
+    with pytest.raises(OrbiflowError, match="no parameter 'depth'"):
+        estimator.set_params(depth=1)
+    with pytest.raises(OrbiflowError, match="unknown space 'moebius'"):
+        DensityEstimator("moebius").fit(DATA["torus"])
+
+
+def test_a_grid_search() -> None:
+    selection = pytest.importorskip("sklearn.model_selection", reason="scikit-learn is not there")
+    search = selection.GridSearchCV(
+        DensityEstimator("torus", segments=2, iterations=3), {"detail": [1, 2]}, cv=2
+    ).fit(DATA["torus"])
+    assert search.best_params_["detail"] in (1, 2)
+    assert math.isfinite(search.best_score_)
+
+
+@pytest.mark.parametrize("space", DATA)
+def test_saved_and_read(space: str, tmp_path) -> None:
+    estimator = DensityEstimator(space, detail=2, segments=2, iterations=3).fit(DATA[space])
+    path = tmp_path / "density.safetensors"
+    path.write_bytes(density_to_bytes(estimator.density_, columns=["a", "b"]))
+    density, extra = read_density(path)
+    assert extra == {"columns": ["a", "b"]}
+    points = estimator.space_.to_chart(DATA[space])
+    with torch.no_grad():
+        assert torch.equal(density.log_prob(points), estimator.density_.log_prob(points))
+
+
+def test_files_that_are_no_density(tmp_path) -> None:
+    path = tmp_path / "density.safetensors"
+    with pytest.raises(InputFileError, match="cannot read"):
+        read_density(path)
+    estimator = DensityEstimator("torus", detail=1, segments=1, iterations=0).fit(DATA["torus"])
+    good = density_to_bytes(estimator.density_)
+    length = int.from_bytes(good[:8], "little")
+    outer = json.loads(good[8 : 8 + length])
+
+    def changed(edit) -> bytes:
+        header = json.loads(outer["__metadata__"]["orbiflow"])
+        edit(header)
+        text = json.dumps(outer | {"__metadata__": {"orbiflow": json.dumps(header)}}).encode()
+        return len(text).to_bytes(8, "little") + text + good[8 + length :]
+
+    bad = [
+        b"",
+        b"hello world, this is no density",
+        good[:-9],
+        b"\xff" * 100,
+        changed(lambda h: h.update(format="orbiflow-tile/1")),
+        changed(lambda h: h["space"].update(name="moebius")),
+        changed(lambda h: h["space"].update(dim=40)),
+        changed(lambda h: h["flow"].update(max_frequency=10**6)),
+        changed(lambda h: h["flow"].update(max_frequency=2)),
+        changed(lambda h: h["flow"].update(steps=10**9)),
+        changed(lambda h: h["flow"].update(method="magic")),
+        changed(lambda h: h.pop("base")),
+    ]
+    for content in bad:
+        path.write_bytes(content)
+        with pytest.raises(InputFileError, match="not a density saved by orbiflow"):
+            read_density(path)
+
+
+def test_other_flows_are_not_saved() -> None:
+    with pytest.raises(OrbiflowError, match="only flows of single Fourier fields"):
+        density_to_bytes(SymmetricDensity(Torus(2), Flow(lambda x: 0 * x)))

@@ -1,0 +1,182 @@
+"""The four spaces: units, measures, distances, and what they refuse."""
+
+import math
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import given
+from hypothesis import strategies as st
+
+from orbiflow.density import (
+    KleinBottle,
+    ProjectivePlane,
+    Sphere,
+    Torus,
+    clear_rotation,
+    make_space,
+    to_latlon,
+    to_vectors,
+)
+from orbiflow.density.space import MEASURES
+from orbiflow.errors import OrbiflowError
+
+TURN = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))[0]
+SPACES = (
+    Torus(2),
+    Torus(2, unit="degrees"),
+    KleinBottle(),
+    KleinBottle(unit="turns"),
+    Sphere(),
+    Sphere(form="vector", rotation=TURN),
+    ProjectivePlane(rotation=TURN),
+    ProjectivePlane(form="vector"),
+)
+seeds = st.integers(0, 2**32 - 1)
+every = pytest.mark.parametrize("space", SPACES, ids=repr)
+
+
+def square(seed: int, count: int = 50, dim: int = 2) -> torch.Tensor:
+    return torch.tensor(np.random.default_rng(seed).random((count, dim)))
+
+
+@every
+@given(seed=seeds)
+def test_data_and_chart_there_and_back(space, seed: int) -> None:
+    points = square(seed)
+    again = space.to_chart(space.from_chart(points))
+    assert float(space.distance(points, again).max()) < 1e-9
+    assert bool(((again > -1e-9) & (again < 1 + 1e-9)).all())
+
+
+@every
+@given(seed=seeds)
+def test_images_are_one_point(space, seed: int) -> None:
+    points = square(seed)
+    shift = np.random.default_rng(seed).integers(-3, 4, (space.group.order, 1, 2))
+    images = space.group.images(points) + torch.tensor(shift @ space.group.lattice.T)
+    for image in images:
+        assert float(space.distance(points, space.project(image)).max()) < 1e-9
+
+
+@every
+@given(seed=seeds)
+def test_distance_is_a_metric_and_the_least_over_many_images(space, seed: int) -> None:
+    a, b, c = square(seed, 30), square(seed + 1, 30), square(seed + 2, 30)
+    ab = space.distance(a, b)
+    assert torch.allclose(ab, space.distance(b, a), atol=1e-9)
+    assert bool((space.distance(a, c) <= ab + space.distance(b, c) + 1e-9).all())
+    elements = space.group.elements_near((0.5, 0.5), 5.0)
+    brute = torch.stack([(g(b) - a).norm(dim=-1) for g in elements]).amin(dim=0)
+    assert torch.allclose(ab, brute, atol=1e-9)
+    table = space.squared_distances(a, b)
+    assert torch.allclose(table.diagonal(), ab**2, atol=1e-9)
+
+
+@pytest.mark.parametrize("space", [Sphere(rotation=TURN), ProjectivePlane(rotation=TURN)])
+@given(seed=seeds)
+def test_round_distance_is_the_angle(space, seed: int) -> None:
+    a, b = square(seed), square(seed + 1)
+    cosine = (space.vectors(a) * space.vectors(b)).sum(axis=1)
+    if space.name == "projective-plane":
+        cosine = abs(cosine)
+    angle = np.arccos(np.clip(cosine, -1, 1))
+    assert np.allclose(space.round_distance(a, b).numpy(), angle, atol=1e-6)
+
+
+@every
+def test_densities_of_the_uniform_distribution(space) -> None:
+    points = square(0)
+    natural = space.log_area(points) - math.log(space.volume)  # of the square, uniform in nature
+    factor = {m: space.log_density_factor(points, m) for m in MEASURES}
+    assert torch.allclose(
+        natural + factor["natural"], torch.tensor(-math.log(space.volume)).double()
+    )
+    assert torch.allclose(natural + factor["uniform"], torch.zeros(50).double(), atol=1e-12)
+    assert torch.equal(factor["square"], torch.zeros(50).double())
+    with pytest.raises(OrbiflowError, match="measure must be one of"):
+        space.log_density_factor(points, "round")
+
+
+@every
+def test_uniform_points_are_even(space) -> None:
+    points = space.uniform(20_000, torch.Generator().manual_seed(0))
+    counts = torch.histogramdd(points, [5, 5], range=[0.0, 1.0, 0.0, 1.0]).hist
+    t = (torch.arange(200, dtype=torch.float64) + 0.5) / 200
+    grid = torch.stack(torch.meshgrid(t, t, indexing="ij"), dim=-1)
+    area = space.log_area(grid).exp().reshape(5, 40, 5, 40).mean(dim=(1, 3))
+    expected = 20_000 * area / area.sum()
+    assert float(((counts - expected) ** 2 / expected).sum()) < 60  # chi-square, 24 degrees
+
+
+@given(st.floats(-400, 400), st.floats(-400, 400))
+def test_the_klein_identification(theta: float, phi: float) -> None:
+    space = KleinBottle(unit="degrees")
+    images = [[theta, phi], [theta + 180, 180 - phi], [theta + 360, phi], [theta, phi - 360]]
+    points = space.to_chart(images)
+    assert float(space.distance(points[:1].expand(4, -1), points).max()) < 1e-9
+
+
+@given(st.floats(-90, 90), st.floats(-180, 179.99))
+def test_latitude_and_longitude(lat: float, lon: float) -> None:
+    again = to_latlon(to_vectors([[lat, lon]]))
+    assert np.allclose(to_vectors(again), to_vectors([[lat, lon]]), atol=1e-12)
+    assert again[0, 0] == pytest.approx(lat, abs=1e-9)
+    assert -180 <= again[0, 1] < 180
+
+
+def test_a_torus_of_any_dimension() -> None:
+    space = Torus(7, unit="degrees")
+    data = np.random.default_rng(0).uniform(-180, 180, (20, 7))
+    assert np.allclose(space.from_chart(space.to_chart(data)), data)
+    assert space.volume == 360.0**7
+    a, b = square(1, 20, 7), square(2, 20, 7)
+    assert float(space.distance(a, b).max()) <= math.sqrt(7) / 2
+
+
+@pytest.mark.parametrize("kind", [Sphere, ProjectivePlane])
+def test_clear_rotation_moves_the_cone_points_away(kind) -> None:
+    rng = np.random.default_rng(0)
+    vectors = rng.normal(size=(500, 3)) * 0.2 + kind().cone_vectors()[0]
+    vectors /= np.linalg.norm(vectors, axis=1, keepdims=True)
+    turned = kind(rotation=clear_rotation(kind(), vectors))
+    cosines = vectors @ turned.cone_vectors().T
+    assert (abs(cosines) if turned.power == 2 else cosines).max() < 0.95
+    assert np.allclose(clear_rotation(kind(), vectors), turned.rotation)
+
+
+BAD = {
+    "latitude": (Sphere(), [[10, 0], [95, 0], [-91, 3]], r"row 2: latitude 95 .* \(2 such rows\)"),
+    "longitude": (Sphere(), [[0, 1000.0]], "row 1: longitude 1000 is beyond 360"),
+    "length": (ProjectivePlane(), [[1, 0, 0], [1, 1, 0]], "row 2: the vector .* has length 1.414"),
+    "columns": (
+        Torus(3),
+        [[1.0, 2.0]],
+        r"3 angles: expected an array \(N, 3\), got shape \(1, 2\)",
+    ),
+    "one row, flat": (Sphere(), [1.0, 2.0], r"got shape \(2,\)"),
+    "nan": (KleinBottle(), [[0, 0], [0, math.nan]], "row 2 has a missing or infinite value"),
+    "inf": (Torus(1), [[math.inf]], "row 1 has a missing or infinite value"),
+    "text": (Torus(2), [["a", "b"]], "expected numbers"),
+    "ragged": (Torus(2), [[1, 2], [3]], "expected numbers"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_data_that_are_not_of_the_space(case: str) -> None:
+    space, data, message = BAD[case]
+    with pytest.raises(OrbiflowError, match=message):
+        space.to_chart(data)
+
+
+def test_options_that_are_none() -> None:
+    for make, message in (
+        (lambda: Torus(0), "dim must be an integer from 1 to 64"),
+        (lambda: Torus(2, unit="grad"), "unit must be one of radians, degrees, turns"),
+        (lambda: Sphere(form="utm"), "form must be one of"),
+        (lambda: Sphere(rotation=2 * np.eye(3)), "orthogonal"),
+        (lambda: make_space("moebius"), "unknown space 'moebius'; the four are"),
+        (lambda: make_space("sphere", unit="degrees"), "the sphere has no option unit"),
+    ):
+        with pytest.raises(OrbiflowError, match=message):
+            make()
