@@ -2,6 +2,7 @@
 
 import json
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -186,7 +187,7 @@ def test_the_estimator(space: str) -> None:
 
 
 def test_units_change_the_density_by_their_ratio() -> None:
-    small = {"detail": 2, "segments": 2, "iterations": 5}
+    small: dict[str, Any] = {"detail": 2, "segments": 2, "iterations": 5}
     radians = DensityEstimator("torus", **small).fit(DATA["torus"])
     degrees = DensityEstimator("torus", unit="degrees", **small).fit(np.degrees(DATA["torus"]))
     shift = radians.score_samples(DATA["torus"]) - degrees.score_samples(np.degrees(DATA["torus"]))

@@ -11,6 +11,7 @@ from rich.markup import escape
 from orbiflow import __version__
 from orbiflow.cli.classes import classes
 from orbiflow.cli.console import errors
+from orbiflow.cli.density import density
 from orbiflow.cli.escherize import escherize
 from orbiflow.errors import OrbiflowError
 
@@ -27,6 +28,7 @@ app = typer.Typer(
 )
 app.command()(escherize)
 app.command()(classes)
+app.add_typer(density)
 
 
 @app.callback(invoke_without_command=True)

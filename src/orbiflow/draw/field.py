@@ -57,8 +57,8 @@ def field_png(
     aspect = (window[3] - window[1]) / (window[2] - window[0])
     figure = blank_figure(width_px, round(width_px * aspect))
     axes = plane_axes(figure, window, y_down=y_down)
-    _draw_magnitude(axes, velocity, window)
-    _draw_flow(axes, velocity, group, window)
+    draw_magnitude(axes, velocity, window)
+    draw_flow(axes, velocity, group, window)
     outline_cell(axes, group, middle)
     if tile is not None:
         ring = np.concatenate([tile.polygon, tile.polygon[:1]])
@@ -69,7 +69,7 @@ def field_png(
     return png_bytes(figure)
 
 
-def _draw_magnitude(axes: Axes, velocity: Callable[[Any], Any], window: Window) -> None:
+def draw_magnitude(axes: Axes, velocity: Callable[[Any], Any], window: Window) -> None:
     longer = max(window[2] - window[0], window[3] - window[1])
     counts = [max(2, round(_SAMPLES * (window[i + 2] - window[i]) / longer)) for i in (0, 1)]
     x, y = (np.linspace(window[i], window[i + 2], counts[i]) for i in (0, 1))
@@ -86,7 +86,7 @@ def _draw_magnitude(axes: Axes, velocity: Callable[[Any], Any], window: Window) 
     axes.set_aspect("equal")
 
 
-def _draw_flow(
+def draw_flow(
     axes: Axes, velocity: Callable[[Any], Any], group: CrystallographicGroup, window: Window
 ) -> None:
     from matplotlib.collections import LineCollection, PolyCollection

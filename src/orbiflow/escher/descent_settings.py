@@ -160,6 +160,8 @@ EFFORTS: dict[str, dict[str, object]] = {
     "best": {
         "max_frequency": 15,
         "candidates": 400,
+        "resolutions": (30, 48, 96, 120),
+        "boundary": 480,
         "projected": 4000,
         "measured": 1000,
         "stages": ((20, 60), (35, 16), (45, 5), (40, 4)),

@@ -1,0 +1,162 @@
+"""`orbiflow density`: options of its commands. The work is imported when it runs: --help is quick."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+density = typer.Typer(
+    name="density",
+    help="Fit, evaluate, sample and draw exact densities of angles, directions and axes.",
+    no_args_is_help=True,
+    rich_markup_mode="rich",
+)
+
+
+class Space(StrEnum):
+    """Where the data live."""
+
+    TORUS = "torus"
+    SPHERE = "sphere"
+    KLEIN_BOTTLE = "klein-bottle"
+    PROJECTIVE_PLANE = "projective-plane"
+
+
+class Unit(StrEnum):
+    """Of angles."""
+
+    RADIANS = "radians"
+    DEGREES = "degrees"
+    TURNS = "turns"
+
+
+class Measure(StrEnum):
+    """What a density is per."""
+
+    NATURAL = "natural"
+    SQUARE = "square"
+    UNIFORM = "uniform"
+
+
+Data = Annotated[Path, typer.Argument(help="CSV, TSV, NPY or Parquet.", show_default=False)]
+Columns = Annotated[
+    str | None,
+    typer.Option(help="Names or numbers of the columns, such as lat,lon.", show_default=False),
+]
+Model = Annotated[
+    Path, typer.Option("--model", "-m", help="Folder that `fit` wrote.", show_default=False)
+]
+
+
+@density.command()
+def fit(
+    data: Data,
+    space: Annotated[Space, typer.Option(help="Where the data live.", show_default=False)],
+    out: Annotated[
+        Path, typer.Option("--out", "-o", help="Folder for the results, made if need be.")
+    ] = Path("density"),
+    columns: Columns = None,
+    unit: Annotated[
+        Unit, typer.Option(help="Of angles on the torus and the Klein bottle.")
+    ] = Unit.RADIANS,
+    detail: Annotated[
+        int, typer.Option(help="Waves of the flow along a side of the square, 1 to 64.")
+    ] = 8,
+    segments: Annotated[int, typer.Option(help="Stationary pieces of the flow.")] = 6,
+    seconds: Annotated[
+        float | None,
+        typer.Option(help="Of refinement at most; default no limit.", show_default=False),
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Same seed, same machine: same density.")] = 0,
+) -> None:
+    """Fit a density: angles (torus), lat,lon or x,y,z (sphere), axes (projective plane) or theta,phi.
+
+    Writes density.safetensors and report.json into the folder.
+    """
+    from orbiflow.cli.density_run import run_fit
+
+    run_fit(
+        data,
+        out,
+        space=space.value,
+        columns=columns,
+        unit=unit.value,
+        detail=detail,
+        segments=segments,
+        seconds=seconds,
+        seed=seed,
+    )
+
+
+@density.command()
+def score(
+    data: Data,
+    model: Model,
+    out: Annotated[
+        Path, typer.Option("--out", "-o", help="The data with a column log_prob.")
+    ] = Path("scores.csv"),
+    columns: Columns = None,
+    measure: Annotated[
+        Measure,
+        typer.Option(help="Natural: the data's own units, or steradians. Uniform: against chance."),
+    ] = Measure.NATURAL,
+) -> None:
+    """Add a column log_prob, in nats, to a table."""
+    from orbiflow.cli.density_run import run_score
+
+    run_score(data, model, out, columns=columns, measure=measure.value)
+
+
+@density.command()
+def sample(
+    model: Model,
+    out: Annotated[Path, typer.Option("--out", "-o", help="CSV of the samples.")] = Path(
+        "samples.csv"
+    ),
+    n: Annotated[int, typer.Option("-n", help="How many.")] = 1000,
+    seed: Annotated[int, typer.Option(help="Same seed, same machine: same samples.")] = 0,
+) -> None:
+    """Draw samples in the units of the data."""
+    from orbiflow.cli.density_run import run_sample
+
+    run_sample(model, out, count=n, seed=seed)
+
+
+@density.command()
+def plot(
+    model: Model,
+    out: Annotated[
+        Path, typer.Option("--out", "-o", help="Folder for the pictures, made if need be.")
+    ] = Path("plots"),
+    data: Annotated[
+        Path | None,
+        typer.Option(
+            help="Table whose points are drawn, too; default samples.", show_default=False
+        ),
+    ] = None,
+    columns: Columns = None,
+    coastlines: Annotated[
+        Path | None,
+        typer.Option(
+            help="Table of lat,lon drawn as lines on the sphere; lat beyond 90 ends a line.",
+            show_default=False,
+        ),
+    ] = None,
+    measure: Annotated[Measure, typer.Option(help="What the density is per.")] = Measure.NATURAL,
+    seed: Annotated[int, typer.Option(help="Of the samples.")] = 0,
+) -> None:
+    """Draw a density: density.png, flow.png, samples.png and surface.html, which turns in 3-D."""
+    from orbiflow.cli.density_plot import run_plot
+
+    run_plot(
+        model,
+        out,
+        data=data,
+        columns=columns,
+        coastlines=coastlines,
+        measure=measure.value,
+        seed=seed,
+    )

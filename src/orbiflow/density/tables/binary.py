@@ -1,0 +1,134 @@
+"""Tables in `.npy` and Parquet files, bounded before they are decoded; nothing is unpickled."""
+
+from __future__ import annotations
+
+import importlib
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orbiflow.density.tables.table import (
+    BLOCK,
+    MAX_COLUMNS,
+    Table,
+    check_count,
+    check_finite,
+    choose,
+    find,
+    quote,
+)
+from orbiflow.errors import InputFileError, OrbiflowError
+
+MAX_NPY_HEADER = 10_000  # characters; numpy parses the header with `ast.literal_eval`
+
+
+def read_npy(path: Path, columns: Sequence[str] | None, width: int | None, max_rows: int) -> Table:
+    shape, dtype = _npy_header(path)
+    check_count(path, shape[0], max_rows, "rows")
+    fields = dtype.names
+    n_columns = len(fields) if fields is not None else shape[1]
+    check_count(path, n_columns, MAX_COLUMNS, "columns")
+    names = fields or tuple(f"column{i}" for i in range(1, n_columns + 1))
+    types = [dtype[name] for name in fields] if fields is not None else [dtype] * n_columns
+    numeric = [kind.kind in "fiu" for kind in types]
+    picked, notes = choose(path, names, numeric, columns, width)
+    _check_numeric(path, names, types, numeric, picked)
+    try:
+        data = np.load(path, mmap_mode="r", allow_pickle=False, max_header_size=MAX_NPY_HEADER)
+        with np.errstate(over="ignore"):
+            parts = [data[names[i]] if fields is not None else data[:, i] for i in picked]
+            values = np.stack([part.astype(np.float64) for part in parts], axis=1)
+    except (OSError, ValueError, TypeError, IndexError, OverflowError) as exc:
+        raise _damaged(path, exc) from exc
+    return _numbered(path, values, tuple(names[i] for i in picked), notes)
+
+
+def _npy_header(path: Path) -> tuple[tuple[int, ...], np.dtype]:
+    """Shape and dtype, once they are known to be a table's and to fit into the file."""
+    form = np.lib.format
+    try:
+        with path.open("rb") as file:
+            version = form.read_magic(file)
+            read = {(1, 0): form.read_array_header_1_0, (2, 0): form.read_array_header_2_0}[version]
+            shape, _, dtype = read(file, max_header_size=MAX_NPY_HEADER)
+            left = path.stat().st_size - file.tell()
+    except Exception as exc:  # numpy's parser of headers raises many types
+        raise _damaged(path, exc) from exc
+    if dtype.hasobject:
+        raise InputFileError(
+            f"{path}: holds Python objects, which are never read; save the array as float64"
+        )
+    if len(shape) != (1 if dtype.names is not None else 2) or min(shape) < 0:
+        raise InputFileError(
+            f"{path}: an array of shape {quote(str(shape))} and type {quote(str(dtype))}; save "
+            "one of shape (N, k), or (N,) with named fields"
+        )
+    if math.prod(shape) * dtype.itemsize > left:
+        raise InputFileError(
+            f"{path}: its header promises {math.prod(shape) * dtype.itemsize} bytes of numbers and "
+            f"{left} follow; the file is cut short or damaged: save it again"
+        )
+    return shape, dtype
+
+
+def read_parquet(
+    path: Path, columns: Sequence[str] | None, width: int | None, max_rows: int
+) -> Table:
+    try:
+        arrow = importlib.import_module("pyarrow")
+        parquet = importlib.import_module("pyarrow.parquet")
+    except ImportError as exc:
+        raise OrbiflowError(
+            f"{path}: reading Parquet needs pyarrow: pip install 'orbiflow[parquet]'"
+        ) from exc
+    try:
+        with parquet.ParquetFile(path) as file:
+            check_count(path, file.metadata.num_rows, max_rows, "rows")
+            schema = file.schema_arrow
+            check_count(path, len(schema.names), MAX_COLUMNS, "columns")
+            tests = arrow.types.is_integer, arrow.types.is_floating, arrow.types.is_decimal
+            numeric = [any(test(kind) for test in tests) for kind in schema.types]
+            picked, notes = choose(path, schema.names, numeric, columns, width)
+            names = tuple(schema.names[i] for i in picked)
+            _check_numeric(path, schema.names, schema.types, numeric, picked)
+            for name in names:  # Parquet is read by name alone
+                find(path, schema.names, name)
+            blocks = [np.empty((0, len(names)))]
+            for batch in file.iter_batches(BLOCK, columns=list(names)):
+                cast = [batch.column(name).cast("float64", safe=False) for name in names]
+                blocks.append(np.stack([c.to_numpy(zero_copy_only=False) for c in cast], axis=1))
+    except InputFileError:
+        raise
+    except (arrow.ArrowException, OSError, ValueError, KeyError, MemoryError) as exc:
+        raise _damaged(path, exc) from exc
+    return _numbered(path, np.concatenate(blocks), names, notes)
+
+
+def _numbered(
+    path: Path, values: NDArray[np.float64], names: tuple[str, ...], notes: list[str]
+) -> Table:
+    rows = np.arange(1, len(values) + 1, dtype=np.int64)
+    check_finite(path, values, rows, names, "row")
+    return Table(values, names, rows, tuple(notes), None, None)
+
+
+def _check_numeric(
+    path: Path,
+    names: Sequence[str],
+    types: Sequence[object],
+    numeric: Sequence[bool],
+    picked: list[int],
+) -> None:
+    for i in picked:
+        if not numeric[i]:
+            raise InputFileError(
+                f"{path}: column {quote(names[i])} holds {quote(str(types[i]))}, not numbers; "
+                "choose another with --columns"
+            )
+
+
+def _damaged(path: Path, exc: Exception) -> InputFileError:
+    return InputFileError(f"{path}: damaged or of an unknown kind ({quote(str(exc))}); save again")

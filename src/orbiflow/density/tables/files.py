@@ -1,0 +1,147 @@
+"""Reading a table by the kind of its file, and writing one."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from orbiflow.density.tables.binary import read_npy, read_parquet
+from orbiflow.density.tables.table import (
+    Table,
+)
+from orbiflow.density.tables.text import read_text, text_lines
+from orbiflow.errors import InputFileError
+
+MAX_BYTES = 2 * 2**30
+_MAGIC = {"npy": b"\x93NUMPY", "parquet": b"PAR1"}
+_TEXT = frozenset({".csv", ".tsv", ".txt"})
+
+
+def read_table(
+    path: str | Path,
+    *,
+    columns: Sequence[str] | None,
+    width: int | None,
+    max_rows: int = 20_000_000,
+) -> Table:
+    """Read columns of finite numbers from a text, `.npy` or Parquet file.
+
+    In text, cells are parted by tabs, semicolons, commas or whitespace, and a quoted cell may not
+    run over a line's end. Blank lines and lines that begin with # are passed over; the first line
+    left is a header when a cell in it is neither a number nor a missing value. `.npy` files hold a
+    2-dimensional array of numbers or a 1-dimensional structured one.
+
+    `columns` names the columns wanted, in the order of `values`: each by its name (the very name
+    first, then without regard to case), else by its 1-based number as text ("3"). None takes all
+    columns of numbers. `width` is how many columns there must be, None for any number.
+
+    Raises `InputFileError` naming the file, the line and the column at fault; `OrbiflowError` for
+    a Parquet file without pyarrow.
+    """
+    path = Path(path)
+    read = {"text": read_text, "npy": read_npy, "parquet": read_parquet}[_kind(path)]
+    return read(path, columns, width, max_rows)
+
+
+def append_column(table: Table, path_of_source: str | Path, name: str, values: ArrayLike) -> bytes:
+    """The source file with one more column, as UTF-8 text that ends its lines with a newline.
+
+    `values` is (N,), one for each row of `table`, written with 10 significant digits. A text file
+    keeps its delimiter, its other columns and its comments, and loses its blank lines; it gets the
+    new name only where it has a header. From npy and Parquet come `table`'s columns, as CSV. A name
+    that is taken gets a number: "density_2".
+
+    Raises `InputFileError` where the source has changed since it was read, `ValueError` where
+    `values` has another shape.
+    """
+    values = np.asarray(values, dtype=np.float64)
+    if values.shape != table.lines.shape:
+        raise ValueError(f"values must have shape {table.lines.shape}, not {values.shape}")
+    if table.delimiter is None:
+        names = (*table.columns, _free_name(name, table.columns))
+        return to_csv(names, np.column_stack([table.values, values]))
+    path, end, done, out = Path(path_of_source), table.delimiter, 0, bytearray()
+    header, lines = table.header, [*table.lines.tolist(), -1]
+    changed = InputFileError(f"{path}: the file changed after it was read; run this again")
+    for number, line, is_comment in text_lines(path):
+        if is_comment:
+            out += f"{line}\n".encode()
+        elif header is not None:
+            out += f"{line}{end}{_name_cell(_free_name(name, header), end)}\n".encode()
+            header = None
+        elif lines[done] == number:
+            out += f"{line}{end}{values[done]:.10g}\n".encode()
+            done += 1
+        else:
+            raise changed
+    if done < len(values):
+        raise changed
+    return bytes(out)
+
+
+def to_csv(columns: Sequence[str], values: ArrayLike) -> bytes:
+    """`values`, (N, k), as UTF-8 CSV under a header of k names, with 10 significant digits.
+
+    >>> to_csv(["lat", "lon"], [[0.1, 2], [1e-20, 1 / 3]]).decode().splitlines()
+    ['lat,lon', '0.1,2', '1e-20,0.3333333333']
+    """
+    values = np.asarray(values, dtype=np.float64)
+    if values.ndim != 2 or values.shape[1] != len(columns):
+        raise ValueError(f"values must have shape (N, {len(columns)}), not {values.shape}")
+    out = io.BytesIO()
+    out.write((",".join(_name_cell(name, ",") for name in columns) + "\n").encode())
+    np.savetxt(out, values, fmt="%.10g", delimiter=",")
+    return out.getvalue()
+
+
+def _free_name(name: str, taken: Sequence[str]) -> str:
+    used = {other.casefold() for other in taken}
+    free, i = name, 1
+    while free.casefold() in used:
+        i += 1
+        free = f"{name}_{i}"
+    return free
+
+
+def _name_cell(name: str, delimiter: str) -> str:
+    words = name.split()
+    if delimiter == " ":
+        return "_".join(words)
+    name = " ".join(words)
+    if name.startswith("#") or delimiter in name or '"' in name:
+        return '"' + name.replace('"', '""') + '"'
+    return name
+
+
+def _kind(path: Path) -> str:
+    """ "text", "npy" or "parquet", by the first bytes, which an extension must not belie."""
+    try:
+        size, is_file, head = path.stat().st_size, path.is_file(), b""
+        if is_file:
+            with path.open("rb") as file:
+                head = file.read(4096)
+    except FileNotFoundError as exc:
+        raise InputFileError(f"{path}: no such file; check the path") from exc
+    except (OSError, ValueError) as exc:  # ValueError: a null byte in the name
+        raise InputFileError(f"{path}: cannot be read ({exc}); check it") from exc
+    if not is_file:
+        raise InputFileError(f"{path}: is a folder or a device; give a file")
+    if size > MAX_BYTES:
+        raise InputFileError(
+            f"{path}: {size / 2**30:.1f} GiB, at most {MAX_BYTES / 2**30:g} are read; split the "
+            "file or draw a sample of its rows"
+        )
+    if not head:
+        raise InputFileError(f"{path}: the file is empty; export or download it again")
+    for kind, magic in _MAGIC.items():
+        if head.startswith(magic) and path.suffix.lower() not in _TEXT:
+            return kind
+        if path.suffix.lower() == f".{kind}":
+            raise InputFileError(f"{path}: does not begin as a .{kind} file does; save it again")
+    if b"\0" in head:
+        raise InputFileError(f"{path}: binary data, not a table; save it as CSV in UTF-8")
+    return "text"

@@ -1,0 +1,129 @@
+"""A table of numbers, the choice of its columns, and what is said of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orbiflow.errors import InputFileError
+
+MAX_COLUMNS = 10_000
+BLOCK = 65_536  # rows
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """The chosen columns of a file.
+
+    - `values`: (N, k) float64, all finite.
+    - `columns`: k names; a column without one is called "column3", after its 1-based number.
+    - `lines`: (N,) int64, 1-based number of each row's line (of the row, in npy and Parquet).
+    - `notes`: what was decided for the user, in plain words.
+    - `header`: names of all columns in a text file's header line, None where there is none.
+    - `delimiter`: of a text file, " " for runs of whitespace; None for npy and Parquet.
+    """
+
+    values: NDArray[np.float64]
+    columns: tuple[str, ...]
+    lines: NDArray[np.int64]
+    notes: tuple[str, ...]
+    header: tuple[str, ...] | None
+    delimiter: str | None
+
+
+def choose(
+    path: Path,
+    names: Sequence[str],
+    numeric: Sequence[bool],
+    columns: Sequence[str] | None,
+    width: int | None,
+) -> tuple[list[int], list[str]]:
+    """0-based numbers of the columns wanted, and notes."""
+    if columns is not None:
+        picked = [find(path, names, wanted) for wanted in columns]
+        if len(set(picked)) < len(picked):
+            raise InputFileError(f"{path}: --columns names a column twice; name each once")
+    else:
+        # Of just `width` columns all are meant, so that a bad cell is named rather than passed by.
+        picked = [i for i, ok in enumerate(numeric) if ok or len(names) == width]
+    if not picked or (width is not None and len(picked) != width):
+        got = f"--columns names {len(picked)}" if columns is not None else f"it has {len(picked)}"
+        raise InputFileError(
+            f"{path}: {'some' if width is None else width} column{'s' * (width != 1)} of numbers "
+            f"must be taken and {got} (its columns: {listing(names)}); choose with --columns"
+        )
+    if columns is not None:
+        return picked, []
+    taken = [names[i] for i in picked]
+    for name in taken:
+        find(path, names, name)
+    all_of_them = len(taken) == len(names)
+    return picked, [] if all_of_them else [f"took the columns of numbers: {listing(taken)}"]
+
+
+def find(path: Path, names: Sequence[str], wanted: str) -> int:
+    key = wanted.strip()
+    hits = [i for i, name in enumerate(names) if name == key]
+    hits = hits or [i for i, name in enumerate(names) if name.casefold() == key.casefold()]
+    if len(hits) == 1:
+        return hits[0]
+    if hits:
+        numbers = " and ".join(str(i + 1) for i in hits[:8])
+        raise InputFileError(
+            f"{path}: columns {numbers} are all called {quote(key)}; rename them, or choose by "
+            f"number with --columns {hits[0] + 1}"
+        )
+    number = column_number(key, len(names))
+    if number is None:
+        raise InputFileError(
+            f"{path}: no column {quote(wanted)}; it has {listing(names)}: choose by name, or by "
+            f"number from 1 to {len(names)}"
+        )
+    return number
+
+
+def column_number(text: str, n: int) -> int | None:
+    """0-based number of the column that `text` counts from 1, None where there is none such."""
+    if not (text.isascii() and text.isdigit() and len(text) < 9 and 1 <= int(text) <= n):
+        return None
+    return int(text) - 1
+
+
+def check_count(path: Path, n: int, most: int, what: str) -> None:
+    if n > most:
+        raise InputFileError(
+            f"{path}: more than {most} {what}, the most that is read; save a part of the table"
+        )
+
+
+def check_finite(
+    path: Path,
+    values: NDArray[np.float64],
+    lines: NDArray[np.int64],
+    columns: Sequence[str],
+    unit: str,
+) -> None:
+    if not len(values):
+        raise InputFileError(f"{path}: holds no rows of numbers; export it again")
+    rows, at = np.nonzero(~np.isfinite(values))
+    if len(rows):
+        raise InputFileError(
+            f"{path}: {len(rows)} cell{'s' * (len(rows) > 1)} empty, NaN or infinite, the first in "
+            f"{unit} {lines[rows[0]]}, column {quote(columns[int(at[0])])}; fill them in "
+            "or drop their rows"
+        )
+
+
+def listing(names: Sequence[str]) -> str:
+    shown = ", ".join(quote(name)[1:-1] for name in names[:20])
+    return shown if len(names) <= 20 else f"{shown} and {len(names) - 20} more"
+
+
+def quote(text: str) -> str:
+    """`text` for a message: at most 40 characters, and on one line."""
+    text = text.strip()
+    return ascii(text if len(text) <= 40 else text[:37] + "...")

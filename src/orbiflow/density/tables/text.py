@@ -1,0 +1,235 @@
+"""Tables in text: two streamed passes.
+
+A first look at 100 rows finds the delimiter, the header and the columns of numbers; the second pass
+turns blocks of cells into numbers, and only a block that fails is gone through cell by cell to name
+the culprit. Memory holds the numbers and one block of text.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from array import array
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+
+from orbiflow.density.tables.table import (
+    BLOCK,
+    MAX_COLUMNS,
+    Table,
+    check_count,
+    check_finite,
+    choose,
+    column_number,
+    listing,
+    quote,
+)
+from orbiflow.errors import InputFileError
+
+MAX_LINE = 2**20  # characters
+SAMPLE = 100  # rows looked at to find the layout
+
+_MISSING = frozenset({"", "na", "n/a", "nan", "null", "none"})
+
+
+@dataclass(frozen=True)
+class Layout:
+    """How a text file is laid out; `first` is the number of its first line that is no comment."""
+
+    delimiter: str
+    header: tuple[str, ...] | None
+    names: tuple[str, ...]
+    numeric: tuple[bool, ...]
+    first: int
+
+
+def read_text(path: Path, columns: Sequence[str] | None, width: int | None, max_rows: int) -> Table:
+    layout = layout_of(path, columns)
+    picked, notes = choose(path, layout.names, layout.numeric, columns, width)
+    names = tuple(layout.names[i] for i in picked)
+    values, lines, cells, comments = array("d"), array("q"), [], 0
+    for number, line, is_comment in text_lines(path):
+        if is_comment or (number == layout.first and layout.header is not None):
+            comments += is_comment
+            continue
+        row = split_line(path, number, line, layout.delimiter)
+        if len(row) != len(layout.names):
+            raise _ragged(path, number, len(row), layout.first, len(layout.names))
+        lines.append(number)
+        cells.extend([row[i] for i in picked])
+        if len(cells) >= BLOCK * len(picked):
+            values.extend(_numbers(path, cells, lines, names))
+            cells.clear()
+            check_count(path, len(lines), max_rows, "rows")
+    values.extend(_numbers(path, cells, lines, names))
+    check_count(path, len(lines), max_rows, "rows")
+    table = np.frombuffer(values).reshape(-1, len(picked)), np.frombuffer(lines, dtype=np.int64)
+    check_finite(path, *table, names, "line")
+    if layout.header is not None:
+        notes.append(f"took line {layout.first} as the header: {listing(layout.header)}")
+    if comments:
+        notes.append(f"passed over {comments} comment line{'s' * (comments > 1)}")
+    return Table(table[0], names, table[1], tuple(notes), layout.header, layout.delimiter)
+
+
+def text_lines(path: Path) -> Iterator[tuple[int, str, bool]]:
+    """Number, text and whether it is a comment, of every line that is not blank."""
+    try:
+        with path.open(encoding="utf-8-sig") as file:
+            for number, line in enumerate(iter(partial(file.readline, MAX_LINE), ""), start=1):
+                if len(line) == MAX_LINE and line[-1] != "\n":
+                    raise InputFileError(
+                        f"{path}: line {number} is longer than {MAX_LINE} characters; this is not "
+                        "a table of numbers, or its line ends are lost"
+                    )
+                text = line.strip()
+                if text:
+                    yield number, line.rstrip("\n"), text[0] == "#"
+    except UnicodeDecodeError as exc:
+        raise InputFileError(
+            f"{path}: line {_undecodable(path)}: not UTF-8 text; save the file as UTF-8"
+        ) from exc
+    except OSError as exc:
+        raise InputFileError(f"{path}: cannot be read ({exc.strerror}); check it") from exc
+
+
+def _undecodable(path: Path) -> int:
+    with path.open(encoding="utf-8-sig", errors="surrogateescape") as file:
+        pieces, number = iter(partial(file.readline, MAX_LINE), ""), 1
+        for piece in pieces:
+            if any("\ud800" <= char <= "\udfff" for char in piece):
+                break
+            number += piece[-1] == "\n"
+    return number
+
+
+def layout_of(path: Path, columns: Sequence[str] | None) -> Layout:
+    lines = (line[:2] for line in text_lines(path) if not line[2])
+    sample = list(islice(lines, SAMPLE))
+    if not sample:
+        raise InputFileError(f"{path}: only comments and blank lines; export it again")
+    first = sample[0][0]
+    delimiter = _delimiter([line for _, line in sample])
+    rows = [split_line(path, number, line, delimiter) for number, line in sample]
+    check_count(path, len(rows[0]), MAX_COLUMNS, "columns")
+    for (number, _), row in zip(sample, rows, strict=True):
+        if len(row) != len(rows[0]):
+            raise _ragged(path, number, len(row), first, len(rows[0]))
+    classes = list(zip(*([_class(cell) for cell in row] for row in rows), strict=True))
+    header = None
+    if _has_header(path, first, rows[0], classes, columns):
+        header = tuple(cell.strip().strip('"').strip() for cell in rows[0])
+        if len(rows) == 1:
+            raise InputFileError(f"{path}: line {first} is a header and no row follows; add rows")
+        classes = [column[1:] for column in classes]
+    names = tuple(name or f"column{i}" for i, name in enumerate(header or [""] * len(classes), 1))
+    numeric = tuple(c.count("number") >= max(1, c.count("word")) for c in classes)
+    return Layout(delimiter, header, names, numeric, first)
+
+
+def _delimiter(lines: list[str]) -> str:
+    r"""The mark that parts every one of `lines` into as many cells, else that parts most of them.
+
+    The semicolon goes before the comma, which may be a decimal one.
+
+    >>> _delimiter(["lat;lon", "1,5;2"]), _delimiter(["1, 2", "3, 4"]), _delimiter(["1 2", "3\t4"])
+    (';', ',', ' ')
+    """
+    counts = {mark: [line.count(mark) for line in lines] for mark in "\t;,"}
+    for mark, count in counts.items():
+        if count[0] and len(set(count)) == 1:
+            return mark
+    for mark, count in counts.items():
+        if 2 * sum(map(bool, count)) > len(lines):
+            return mark
+    return " " if any(len(line.split()) > 1 for line in lines) else ","
+
+
+def split_line(path: Path, number: int, line: str, delimiter: str) -> list[str]:
+    if delimiter == " ":
+        return line.split()
+    if '"' not in line:
+        return line.split(delimiter)
+    try:
+        return next(csv.reader([line], delimiter=delimiter, skipinitialspace=True, strict=True))
+    except csv.Error as exc:
+        raise InputFileError(
+            f"{path}: line {number}: {quote(line)} has a quotation mark without its pair ({exc}); "
+            "a quoted cell must end on its line"
+        ) from exc
+
+
+def _class(cell: str) -> str:
+    cell = cell.strip()
+    if cell.casefold() in _MISSING:
+        return "missing"
+    try:
+        float(cell)
+    except ValueError:
+        return "word"
+    return "word" if "_" in cell else "number"
+
+
+def _has_header(
+    path: Path,
+    first: int,
+    row: list[str],
+    classes: list[tuple[str, ...]],
+    columns: Sequence[str] | None,
+) -> bool:
+    tops = [column[0] for column in classes]
+    if "word" not in tops:
+        return False
+    if "number" not in tops or len(classes[0]) == 1:
+        return True
+    if any(column[0] == "word" and "number" in column[1:] for column in classes):
+        return True
+    # `Paris,48.9,2.4` above `Rome,41.9,12.5` is a row; `city,2019,2020` above it is a header.
+    names = {cell.strip().casefold() for cell in row}
+    wanted = [name.strip() for name in columns or ()]
+    by_number = all(column_number(name, len(row)) is not None for name in wanted)
+    if not by_number and all(name.casefold() in names for name in wanted):
+        return True
+    raise InputFileError(
+        f"{path}: line {first} may be a header or a row, as its numbers stand above numbers and "
+        "its words above words; put a header line of names above it, or choose columns by the "
+        "names in it with --columns"
+    )
+
+
+def _numbers(path: Path, cells: list[str], lines: array, names: tuple[str, ...]) -> list[float]:
+    """`cells` of the last of `lines`, row after row, as floats; NaN where one is missing."""
+    try:
+        if "_" not in "".join(cells):  # float takes 1_000
+            return list(map(float, cells))
+    except ValueError:
+        pass
+    k, start = len(names), len(lines) - len(cells) // len(names)
+    return [
+        _number(path, lines[start + i // k], names[i % k], cell) for i, cell in enumerate(cells)
+    ]
+
+
+def _number(path: Path, line: int, name: str, cell: str) -> float:
+    kind = _class(cell)
+    if kind == "missing":
+        return math.nan
+    if kind == "number":
+        return float(cell)
+    comma = _class(cell.replace(",", ".")) == "number"
+    raise InputFileError(
+        f"{path}: line {line}: column {quote(name)}: {quote(cell)} is not a number; "
+        + ("write decimal points, not commas" if comma else "correct it or drop the line")
+    )
+
+
+def _ragged(path: Path, number: int, n: int, first: int, expected: int) -> InputFileError:
+    return InputFileError(
+        f"{path}: line {number} has {n} cell{'s' * (n != 1)} and line {first} has {expected}; give "
+        "every line as many"
+    )
