@@ -1,0 +1,131 @@
+"""`orbiflow density`: a fit, scores, samples and pictures by the public command, and mistakes."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from orbiflow.density import read_density
+
+FIT = ["--detail", 2, "--segments", 2, "--seconds", 2]
+SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")
+
+
+def table(folder: Path, rows: int = 200, name: str = "data.csv") -> Path:
+    rng = np.random.default_rng(0)
+    values = rng.normal([20.0, 60.0], 15.0, (rows, 2)).clip(-89, 89)
+    path = folder / name
+    path.write_text("lat,lon\n" + "\n".join(f"{a:.4f},{b:.4f}" for a, b in values) + "\n")
+    return path
+
+
+@pytest.mark.parametrize("space", SPACES)
+def test_fit_score_sample_plot(space: str, tmp_path: Path, orbiflow) -> None:
+    data, model = table(tmp_path), tmp_path / "model"
+    fitted = orbiflow(
+        "density", "fit", data, "--space", space, "--unit", "degrees", "--out", model, *FIT
+    )
+    assert fitted.status == 0, fitted.err
+    assert "200 rows: mean log density" in fitted.out
+    report = json.loads((model / "report.json").read_text())
+    assert report["columns"] == ["lat", "lon"]
+    assert report["report"]["mass"] == pytest.approx(1.0, abs=2e-3)
+    gain = report["log_likelihood"]["natural"] - report["log_likelihood"]["uniform"]
+    assert gain > 0.5
+
+    scores = tmp_path / "scores.csv"
+    assert orbiflow("density", "score", data, "--model", model, "--out", scores).status == 0
+    header, *rows = scores.read_text().splitlines()
+    assert header == "lat,lon,log_prob"
+    values = np.array([row.split(",") for row in rows], dtype=float)
+    assert values[:, 2].mean() == pytest.approx(report["log_likelihood"]["natural"], abs=1e-6)
+
+    drawn = tmp_path / "drawn.csv"
+    arguments = ("density", "sample", "--model", model, "-n", 50, "--out", drawn)
+    assert orbiflow(*arguments).status == 0
+    first = drawn.read_text()
+    assert first.startswith("lat,lon\n")
+    assert len(first.splitlines()) == 51
+    orbiflow(*arguments)
+    assert drawn.read_text() == first
+
+
+def test_plots(tmp_path: Path, orbiflow) -> None:
+    data, model, out = table(tmp_path), tmp_path / "model", tmp_path / "plots"
+    orbiflow("density", "fit", data, "--space", "sphere", "--out", model, *FIT)
+    drawn = orbiflow("density", "plot", "--model", model, "--data", data, "--out", out)
+    assert drawn.status == 0, drawn.err
+    names = {path.name for path in out.iterdir()}
+    assert names == {"density.png", "flow.png", "samples.png", "surface.html"}
+    assert (out / "surface.html").read_text().lstrip().lower().startswith("<!doctype html>")
+
+
+def test_measures_differ_by_their_areas(tmp_path: Path, orbiflow) -> None:
+    data, model = table(tmp_path), tmp_path / "model"
+    orbiflow("density", "fit", data, "--space", "torus", "--unit", "degrees", "--out", model, *FIT)
+    means = {}
+    for measure in ("natural", "square", "uniform"):
+        out = tmp_path / f"{measure}.csv"
+        orbiflow("density", "score", data, "--model", model, "--measure", measure, "--out", out)
+        means[measure] = np.loadtxt(out, delimiter=",", skiprows=1)[:, 2].mean()
+    assert means["square"] == pytest.approx(means["uniform"])
+    assert means["natural"] == pytest.approx(means["square"] - 2 * np.log(360), abs=1e-6)
+
+
+MISTAKES = {
+    "no file": ("", "sphere", "nowhere.csv"),
+    "empty": ("", "sphere", "empty"),
+    "header only": ("lat,lon\n", "sphere", "no row follows"),
+    "one row": ("lat,lon\n1,2\n", "sphere", "at least 10 different points, got 1"),
+    "all equal": ("lat,lon\n" + "1,2\n" * 500, "sphere", "at least 10 different points, got 1"),
+    "latitude": ("lat,lon\n" + "95,2\n" * 20, "sphere", "latitude 95 is beyond 90"),
+    "not unit": ("1,2,3\n" * 20, "projective-plane", "has length 3.742, not 1"),
+    "strings": ("lat,lon\n" + "1,2\n" * 20 + "north,3\n", "sphere", "north"),
+    "nan": ("lat,lon\n" + "1,2\n" * 20 + "nan,3\n", "torus", "NaN or infinite"),
+    "infinite": ("lat,lon\n" + "1,2\n" * 20 + "inf,3\n", "torus", "inf"),
+    "columns": ("a,b,c,d\n" + "1,2,3,4\n" * 20, "klein-bottle", "--columns"),
+    "ragged": ("lat,lon\n1,2\n1\n", "sphere", "line 3"),
+}
+
+
+@pytest.mark.parametrize("case", MISTAKES)
+def test_mistakes_in_the_data(case: str, tmp_path: Path, orbiflow) -> None:
+    content, space, message = MISTAKES[case]
+    data = tmp_path / ("nowhere.csv" if case == "no file" else "data.csv")
+    if case != "no file":
+        data.write_text(content)
+    outcome = orbiflow("density", "fit", data, "--space", space, "--out", tmp_path / "out")
+    assert outcome.status == 2
+    assert message in outcome.err
+    assert "Traceback" not in outcome.err
+    assert not (tmp_path / "out" / "density.safetensors").exists()
+
+
+def test_mistakes_in_the_options(tmp_path: Path, orbiflow) -> None:
+    data, model = table(tmp_path), tmp_path / "model"
+    orbiflow("density", "fit", data, "--space", "torus", "--out", model, *FIT)
+    fit, score = ("density", "fit", data, "--space", "torus"), ("density", "score", data)
+    for arguments, message in (
+        ((*fit, "--columns", "lat,height"), "height"),
+        ((*fit, "--columns", " , "), "--columns names no column"),
+        ((*fit, "--detail", 0), "detail must be from 1 to 64"),
+        (("density", "fit", data, "--space", "moebius"), "moebius"),
+        ((*score, "--model", tmp_path), "cannot read"),
+        ((*score, "--model", data), "not a density saved by orbiflow"),
+        ((*score, "--model", model, "--measure", "round"), "round"),
+        (("density", "sample", "--model", model, "-n", 0), "-n must be from 1"),
+        (("density", "plot", "--model", model, "--coastlines", data), "belongs to the sphere"),
+    ):
+        outcome = orbiflow(*arguments)
+        assert outcome.status == 2, arguments
+        assert message in outcome.err
+        assert "Traceback" not in outcome.err
+
+
+def test_the_model_is_whole_and_readable(tmp_path: Path, orbiflow) -> None:
+    data, model = table(tmp_path), tmp_path / "model"
+    orbiflow("density", "fit", data, "--space", "sphere", "--out", model, *FIT)
+    density, extra = read_density(model / "density.safetensors")
+    assert extra == {"columns": ["lat", "lon"]}
+    assert density.mass(128) == pytest.approx(1.0, abs=2e-3)
