@@ -20,6 +20,10 @@ lint: $(VENV)/.installed-dev
 bench: $(VENV)/.installed-dev
 	$(BIN)/python benchmarks/field.py --quick
 	$(BIN)/python benchmarks/nine_classes.py --quick
+	$(BIN)/python benchmarks/escherization.py --quick
+	$(BIN)/python benchmarks/ablations.py --quick
+	$(BIN)/python benchmarks/density_kl.py --quick
+	$(BIN)/python benchmarks/density_nll.py --quick
 
 clean:
 	rm -rf $(VENV) out
