@@ -40,6 +40,7 @@ def run_fit(
     unit: str,
     detail: int,
     segments: int,
+    kernels: bool,
     seconds: float | None,
     seed: int,
 ) -> None:
@@ -56,6 +57,7 @@ def run_fit(
         unit=unit,
         detail=detail,
         segments=segments,
+        kernels=kernels,
         seconds=math.inf if seconds is None else seconds,
         seed=seed,
     )
@@ -66,7 +68,12 @@ def run_fit(
     document = {
         "space": {"name": estimator.space_.name, **estimator.space_.settings()},
         "columns": table.columns,
-        "settings": {"detail": detail, "segments": segments, "seed": seed},
+        "settings": {
+            "detail": detail,
+            "segments": segments,
+            "kernels": kernels,
+            "seed": seed,
+        },
         "log_likelihood": {
             "natural": estimator.score(table.values),
             "uniform": -math.log(estimator.space_.volume),

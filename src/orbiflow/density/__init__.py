@@ -5,6 +5,9 @@ from orbiflow.density.density import SymmetricDensity, kl_by_quadrature, midpoin
 from orbiflow.density.estimator import SPACES, DensityEstimator, make_space
 from orbiflow.density.fit import FitReport, FitSettings, fit_density
 from orbiflow.density.flat_spaces import KleinBottle, Torus
+from orbiflow.density.kernel_fit import mix_kernels
+from orbiflow.density.kernels import AdaptiveKernels
+from orbiflow.density.mixed import MixedDensity
 from orbiflow.density.round_spaces import (
     ProjectivePlane,
     Sphere,
@@ -14,19 +17,23 @@ from orbiflow.density.round_spaces import (
 )
 from orbiflow.density.space import MEASURES, Space
 from orbiflow.density.storage import density_to_bytes, read_density
+from orbiflow.density.tabulated import TabulatedDensity
 
 __all__ = [
     "MEASURES",
     "SPACES",
+    "AdaptiveKernels",
     "Base",
     "DensityEstimator",
     "FitReport",
     "FitSettings",
     "KleinBottle",
+    "MixedDensity",
     "ProjectivePlane",
     "Space",
     "Sphere",
     "SymmetricDensity",
+    "TabulatedDensity",
     "Torus",
     "UniformBase",
     "VonMisesBase",
@@ -36,6 +43,7 @@ __all__ = [
     "kl_by_quadrature",
     "make_space",
     "midpoints",
+    "mix_kernels",
     "read_density",
     "to_latlon",
     "to_vectors",

@@ -49,8 +49,8 @@ class DensityEstimator:
         unit: of angles on torus and Klein bottle: "radians", "degrees" or "turns".
         detail: largest wave number of the flow, in waves along a side of the square.
         segments: stationary pieces of the flow.
-        smoothness, ridge, roughness, kinetic, iterations, validation, base, seconds, seed: see
-            `FitSettings`.
+        smoothness, ridge, roughness, kinetic, iterations, validation, base, kernels, seconds, seed:
+            see `FitSettings`.
 
     After `fit`: `space_`, `density_` (a `SymmetricDensity`), `report_` (a `FitReport`),
     `n_features_in_`.
@@ -76,6 +76,7 @@ class DensityEstimator:
         iterations: int = 100,
         validation: float = 0.1,
         base: str = "uniform",
+        kernels: bool = False,
         seconds: float = float("inf"),
         seed: int = 0,
     ) -> None:
@@ -90,6 +91,7 @@ class DensityEstimator:
         self.iterations = iterations
         self.validation = validation
         self.base = base
+        self.kernels = kernels
         self.seconds = seconds
         self.seed = seed
 

@@ -13,11 +13,14 @@ import torch
 from torch import Tensor
 
 from orbiflow.density.density import SymmetricDensity
-from orbiflow.fields import FourierField
+from orbiflow.fields import FourierField, SplineField
 from orbiflow.symmetry.isometry import Array
 
 ORDER = 3
 """Of the derivatives whose energy is the roughness: smooth displacements are to be cheap."""
+
+EVERY = 3
+"""Iterations between scores of the validation points."""
 
 PATIENCE = 12
 """Iterations without a better validation score after which refinement ends."""
@@ -30,8 +33,9 @@ Watch = Callable[[int, float, float], None]
 class Refinement:
     """What became of it.
 
-    - `train`, `validation`: mean negative log density with respect to the square, per iteration.
-    - `best`: the iteration whose parameters were kept.
+    - `train`, `validation`: mean negative log density with respect to the square, at the start and
+      every `EVERY` iterations.
+    - `best`: the entry whose parameters were kept.
     - `stopped`: "iterations", "validation", "converged" or "time".
     - `seconds`: that it took.
     """
@@ -52,18 +56,28 @@ class Objective:
     """Mean NLL of the training points plus penalties, as SciPy wants it.
 
     Args:
-        density: whose flow has Fourier fields.
+        density: whose flow has Fourier or spline fields.
         points: (N, d) canonical, training.
+        weights: (N,) of sum 1; default equal.
         kinetic: weight of the flow's kinetic energy, E|V|^2 summed over segments.
         roughness: weight of E|grad^3 V|^2 summed over segments, with lengths in wavelengths.
     """
 
     def __init__(
-        self, density: SymmetricDensity, points: Tensor, *, kinetic: float, roughness: float
+        self,
+        density: SymmetricDensity,
+        points: Tensor,
+        weights: Tensor | None = None,
+        *,
+        kinetic: float,
+        roughness: float,
     ) -> None:
         self.density, self.points = density, points
+        self.weights = _even(points) if weights is None else weights
         self.parameters = [p for p in density.flow.parameters() if p.requires_grad]
-        self.fields = [f for f in density.flow.segments if isinstance(f, FourierField)]
+        self.fields = [
+            f for f in density.flow.segments if isinstance(f, FourierField | SplineField)
+        ]
         self.kinetic, self.roughness = kinetic, roughness
         self.last = math.inf
 
@@ -95,7 +109,7 @@ class Objective:
         self.set(values)
         for parameter in self.parameters:
             parameter.grad = None
-        nll = -self.density.log_prob(self.points).mean()
+        nll = -(self.weights * self.density.log_prob(self.points)).sum()
         loss = nll + self.penalty()
         if not bool(torch.isfinite(loss)):
             return 1e10, np.zeros(len(values))
@@ -115,6 +129,8 @@ def refine(
     train: Tensor,
     validation: Tensor,
     *,
+    weights: Tensor | None = None,
+    held_weights: Tensor | None = None,
     iterations: int = 100,
     kinetic: float = 0.0,
     roughness: float = 0.0,
@@ -126,35 +142,40 @@ def refine(
     Args:
         density: its flow's parameters are changed.
         train, validation: canonical points (N, d) in the parameters' dtype.
+        weights, held_weights: of the two, (N,) of sum 1; default equal.
         iterations: at most; it stops where validation has not improved for `PATIENCE` of them.
         kinetic, roughness: see `Objective`.
         seconds: after which it stops, at the best so far.
-        watch: called after every iteration.
+        watch: called with every score.
     """
-    objective = Objective(density, train, kinetic=kinetic, roughness=roughness)
+    weights = _even(train) if weights is None else weights
+    held_weights = _even(validation) if held_weights is None else held_weights
+    objective = Objective(density, train, weights, kinetic=kinetic, roughness=roughness)
     began = time.monotonic()
 
     def score() -> float:
         # at doubled steps: what only exploits the integrator gains nothing here
         with torch.no_grad(), density.flow.with_steps(2 * density.flow.steps):
-            return -float(density.log_prob(validation).mean())
+            return -float((held_weights * density.log_prob(validation)).sum())
 
     with torch.no_grad():
-        trains = [-float(density.log_prob(train).mean())]
+        trains = [-float((weights * density.log_prob(train)).sum())]
     scores = [score()]
-    best, kept = 0, objective.get()
+    best, kept, done = 0, objective.get(), 0
 
     def after(values: Array) -> None:
-        nonlocal best, kept
-        objective.set(values)
-        trains.append(objective.last)
-        scores.append(score())
-        if watch is not None:
-            watch(len(scores) - 1, trains[-1], scores[-1])
-        if scores[-1] < scores[best] or not math.isfinite(scores[best]):
-            best, kept = len(scores) - 1, np.array(values)
-        if len(scores) - 1 - best >= PATIENCE:
-            raise _Stop("validation")
+        nonlocal best, kept, done
+        done += 1
+        if done % EVERY == 0:
+            objective.set(values)
+            trains.append(objective.last)
+            scores.append(score())
+            if watch is not None:
+                watch(done, trains[-1], scores[-1])
+            if scores[-1] < scores[best] or not math.isfinite(scores[best]):
+                best, kept = len(scores) - 1, np.array(values)
+            if EVERY * (len(scores) - 1 - best) >= PATIENCE:
+                raise _Stop("validation")
         if time.monotonic() - began > seconds:
             raise _Stop("time")
 
@@ -174,3 +195,7 @@ def refine(
         stopped = stop.reason
     objective.set(kept)
     return Refinement(tuple(trains), tuple(scores), best, stopped, time.monotonic() - began)
+
+
+def _even(points: Tensor) -> Tensor:
+    return torch.full_like(points[:, 0], 1 / len(points))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import torch
@@ -10,7 +10,7 @@ from scipy.optimize import linear_sum_assignment
 from torch import Tensor
 
 from orbiflow.density.space import Space
-from orbiflow.fields import FourierField
+from orbiflow.fields import FourierField, SplineField
 
 ORDER = 3
 """Of the derivatives that the ridge holds small: the displacements are smooth, their noise is not."""
@@ -44,14 +44,14 @@ def coupled(
 
 @torch.no_grad()
 def match_flow(
-    fields: list[FourierField],
+    fields: Sequence[FourierField | SplineField],
     space: Space,
     start: Tensor,
     move: Tensor,
     *,
     repeats: int = 2,
     ridge: float = 1e-3,
-    iterations: int = 40,
+    iterations: int = 15,
     generator: torch.Generator | None = None,
 ) -> None:
     """Set the parameters of `fields`, the equal segments of a flow, by ridge regression.
@@ -78,7 +78,7 @@ def match_flow(
 
 
 def _least_squares(
-    field: FourierField, points: Tensor, values: Tensor, ridge: float, iterations: int
+    field: FourierField | SplineField, points: Tensor, values: Tensor, ridge: float, iterations: int
 ) -> Tensor:
     size = len(points)
     magnitude = torch.as_tensor(field.basis.magnitude).to(points)

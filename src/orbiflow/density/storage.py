@@ -13,26 +13,33 @@ from safetensors.torch import load, save
 from orbiflow.density.bases import Base, UniformBase, VonMisesBase
 from orbiflow.density.density import SymmetricDensity
 from orbiflow.density.estimator import make_space
+from orbiflow.density.kernels import AdaptiveKernels
+from orbiflow.density.mixed import MixedDensity
 from orbiflow.errors import InputFileError, OrbiflowError
-from orbiflow.fields import FourierField
+from orbiflow.fields import FourierField, SplineField
 from orbiflow.flows import Flow
 
 FORMAT = "orbiflow-density/1"
 MAX_BYTES = 256 * 2**20
-MAX_SEGMENTS, MAX_FREQUENCY, MAX_STEPS = 256, 128, 4096
+MAX_SEGMENTS, MAX_FREQUENCY, MAX_STEPS, MAX_KERNELS = 256, 128, 4096, 1_000_000
+FIELDS: dict[str, type[FourierField | SplineField]] = {
+    "fourier": FourierField,
+    "spline": SplineField,
+}
 
 
 def density_to_bytes(density: SymmetricDensity, **extra: Any) -> bytes:
-    """A density whose flow is made of single Fourier fields, with `extra` JSON for the reader.
+    """A density whose flow is made of Fourier or spline fields, with `extra` JSON for the reader.
 
     Raises:
         OrbiflowError: for other fields.
     """
     fields = list(density.flow.segments)
-    if not all(isinstance(f, FourierField) and f.parameters_.dim() == 1 for f in fields):
-        raise OrbiflowError("only flows of single Fourier fields are saved")
+    names = [name for name, kind in FIELDS.items() if all(type(f) is kind for f in fields)]
+    if not names or any(f.parameters_.dim() != 1 for f in fields):  # type: ignore[union-attr]
+        raise OrbiflowError("only flows of single Fourier fields or spline fields are saved")
     first = fields[0]
-    assert isinstance(first, FourierField)
+    assert isinstance(first, FourierField | SplineField)
     base: dict[str, Any] = {"kind": "uniform"}
     if isinstance(density.base, VonMisesBase):
         base = {"kind": "von-mises", "concentration": density.base.concentration}
@@ -41,6 +48,7 @@ def density_to_bytes(density: SymmetricDensity, **extra: Any) -> bytes:
         "space": {"name": density.space.name, **density.space.settings()},
         "base": base,
         "flow": {
+            "field": names[0],
             "max_frequency": first.max_frequency,
             "smoothness": first.smoothness,
             "steps": density.flow.steps,
@@ -50,7 +58,17 @@ def density_to_bytes(density: SymmetricDensity, **extra: Any) -> bytes:
         "extra": extra,
     }
     stack = torch.stack([f.parameters_.detach().double().cpu() for f in fields])  # type: ignore[union-attr]
-    return save({"parameters": stack}, metadata={"orbiflow": json.dumps(header, allow_nan=False)})
+    tensors = {"parameters": stack}
+    if isinstance(density, MixedDensity):
+        kernels = density.kernels
+        tensors |= {
+            "kernel_centers": kernels.centers,
+            "kernel_concentrations": kernels.concentrations,
+            "kernel_weights": kernels.weights,
+            "shares": density.shares,
+        }
+    tensors = {name: tensor.contiguous() for name, tensor in tensors.items()}
+    return save(tensors, metadata={"orbiflow": json.dumps(header, allow_nan=False)})
 
 
 def read_density(path: str | Path) -> tuple[SymmetricDensity, dict[str, Any]]:
@@ -74,7 +92,7 @@ def read_density(path: str | Path) -> tuple[SymmetricDensity, dict[str, Any]]:
         header = json.loads(json.loads(data[8 : 8 + length])["__metadata__"]["orbiflow"])
         if header["format"] != FORMAT:
             raise ValueError(f"format {header['format']!r}")
-        return _restored(header, load(data)["parameters"]), header["extra"]
+        return _restored(header, load(data)), header["extra"]
     except (
         SafetensorError,
         OrbiflowError,
@@ -88,7 +106,8 @@ def read_density(path: str | Path) -> tuple[SymmetricDensity, dict[str, Any]]:
         ) from error
 
 
-def _restored(header: dict[str, Any], stack: torch.Tensor) -> SymmetricDensity:
+def _restored(header: dict[str, Any], tensors: dict[str, torch.Tensor]) -> SymmetricDensity:
+    stack = tensors["parameters"]
     options = dict(header["space"])
     space = make_space(str(options.pop("name")), **options)
     flow = header["flow"]
@@ -100,8 +119,9 @@ def _restored(header: dict[str, Any], stack: torch.Tensor) -> SymmetricDensity:
     if not bool(torch.isfinite(stack).all()):
         raise ValueError("parameters that are not finite")
     fields = []
+    kind = FIELDS[flow.get("field", "fourier")]
     for row in stack:
-        field = FourierField(space.group, frequency, smoothness=float(flow["smoothness"]))
+        field = kind(space.group, frequency, smoothness=float(flow["smoothness"]))
         if field.parameters_.shape != row.shape:
             raise ValueError(f"{len(row)} parameters where {field.size} belong")
         with torch.no_grad():
@@ -116,7 +136,12 @@ def _restored(header: dict[str, Any], stack: torch.Tensor) -> SymmetricDensity:
     base: Base = UniformBase(space)
     if header["base"]["kind"] == "von-mises":
         base = VonMisesBase(space, float(header["base"]["concentration"]))
-    return SymmetricDensity(space, restored, base)
+    if "shares" not in tensors:
+        return SymmetricDensity(space, restored, base)
+    parts = [tensors[f"kernel_{name}"] for name in ("centers", "concentrations", "weights")]
+    if len(parts[0]) > MAX_KERNELS:
+        raise ValueError(f"{len(parts[0])} kernels")
+    return MixedDensity(space, restored, base, AdaptiveKernels(space, *parts), tensors["shares"])
 
 
 def _bounded(value: Any, most: int, name: str) -> int:

@@ -3,6 +3,7 @@
 from orbiflow.fields.derivatives import divergence, jacobian
 from orbiflow.fields.fourier import FourierField
 from orbiflow.fields.neural import PeriodicFeatures, neural_field
+from orbiflow.fields.spline_field import SplineField
 from orbiflow.fields.symmetrize import (
     Symmetrized,
     VectorField,
@@ -15,6 +16,7 @@ from orbiflow.fields.symmetrize import (
 __all__ = [
     "FourierField",
     "PeriodicFeatures",
+    "SplineField",
     "Symmetrized",
     "VectorField",
     "divergence",

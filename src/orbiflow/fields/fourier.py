@@ -13,6 +13,7 @@ from torch import Tensor, nn
 from orbiflow.errors import OrbiflowError
 from orbiflow.fields.invariants import InvariantBasis, invariant_basis
 from orbiflow.fields.series import differentiate, evaluate, weight_cotangent
+from orbiflow.fields.sobolev import sobolev_weights
 from orbiflow.symmetry import CrystallographicGroup
 
 
@@ -90,7 +91,7 @@ class FourierField(nn.Module):
 
     def sobolev_weights(self, smoothness: float) -> np.ndarray:
         """(P,) factors (1 + |kappa|^2 vol^(2/d))^(-smoothness / 2), free of the unit of length."""
-        return _sobolev_weights(self.group, self.basis, smoothness)
+        return sobolev_weights(self.group, self.basis, smoothness)
 
     def weights(self) -> Tensor:
         """Fourier weights in the tensor basis of `series`: (S, d, A_1, ..., A_d), S = 1 if single."""
@@ -204,13 +205,6 @@ def _orders(basis: InvariantBasis) -> tuple[int, ...]:
     return tuple(np.abs(basis.frequencies).max(axis=0).tolist())
 
 
-def _sobolev_weights(
-    group: CrystallographicGroup, basis: InvariantBasis, smoothness: float
-) -> np.ndarray:
-    size = group.cell_volume ** (1 / group.dim)
-    return (1.0 + (basis.magnitude * size) ** 2) ** (-smoothness / 2)
-
-
 @lru_cache(maxsize=64)  # the segments of a flow share them
 def _constants(
     group: CrystallographicGroup,
@@ -224,7 +218,7 @@ def _constants(
     real = {
         "values": values,
         "frame": group.inverse_lattice,
-        "scale": _sobolev_weights(group, basis, smoothness),
+        "scale": sobolev_weights(group, basis, smoothness),
     }
     return {
         "rows": torch.tensor(rows, device=device),

@@ -1,0 +1,184 @@
+"""Sums of cubic B-splines on an even periodic grid, with hand-written derivatives.
+
+A point meets 4^d coefficients whatever the grid's size, so a fine field costs what a coarse one does.
+Points lie last inside: `u` is (d, N), in cells of the grid. The backward pass needs second derivatives,
+because the divergence is a value of its own; cubic splines have them everywhere.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor
+
+TAPS = 4
+"""Coefficients of a cubic spline that a point meets along an axis."""
+
+
+@lru_cache(maxsize=16)
+def _polynomials(orders: int, dtype: torch.dtype, device: torch.device) -> Tensor:
+    """(4 orders, 4): the B-splines' pieces and their derivatives as polynomials of the fraction."""
+    pieces = np.array([[1, -3, 3, -1], [4, 0, -6, 3], [1, 3, 3, -3], [0, 0, 0, 1]]) / 6
+    rows = [pieces]
+    for _ in range(orders - 1):
+        lower = rows[-1][:, 1:] * np.arange(1, 4)
+        rows.append(np.pad(lower, ((0, 0), (0, 1))))
+    with torch.inference_mode(False):
+        return torch.tensor(np.concatenate(rows), dtype=dtype, device=device)
+
+
+def cubic_weights(fraction: Tensor, orders: int = 1) -> Tensor:
+    """Weights (d, orders, 4, N) of the four nearest B-splines, and of their derivatives.
+
+    Args:
+        fraction: (d, N) position in a cell, 0 to 1.
+        orders: 1 for values only, 2 and 3 for first and second derivatives too.
+
+    >>> float(cubic_weights(torch.tensor([[0.25]])).sum())
+    1.0
+    """
+    square = fraction * fraction
+    powers = torch.stack([torch.ones_like(fraction), fraction, square, square * fraction])
+    table = _polynomials(orders, fraction.dtype, fraction.device) @ powers.reshape(TAPS, -1)
+    return table.reshape(orders, TAPS, *fraction.shape).permute(2, 0, 1, 3)
+
+
+def symbol(size: int) -> Tensor:
+    """Fourier transform (size,) of the B-spline on its grid: what interpolation divides by.
+
+    >>> float(symbol(8)[0])
+    1.0
+    """
+    k = torch.arange(size, dtype=torch.float64)
+    return 2 / 3 + torch.cos(2 * math.pi * k / size) / 3
+
+
+def padded(table: Tensor) -> Tensor:
+    """A periodic table (C, M_1, ..., M_d) with the three cells beyond each end that splines reach."""
+    for axis in range(1, table.dim()):
+        side = table.shape[axis]
+        table = torch.cat(
+            [table.narrow(axis, side - 1, 1), table, table.narrow(axis, 0, TAPS - 2)], dim=axis
+        )
+    return table
+
+
+def _cells(sides: tuple[int, ...], u: Tensor) -> tuple[Tensor, Tensor]:
+    """Flat positions (4^d, N) in a padded table that each point meets, and its fractions (d, N)."""
+    period = torch.tensor(sides, dtype=u.dtype, device=u.device)[:, None] - (TAPS - 1)
+    u = u - period * (u / period).floor()
+    first = u.floor()
+    fraction = u - first
+    # rounding can put a point just below 0 at the period itself
+    cell = torch.minimum(first, period - 1).long()
+    flat, offsets = cell[0], torch.arange(TAPS, device=u.device)
+    taps = offsets
+    for axis in range(1, len(sides)):
+        flat = flat * sides[axis] + cell[axis]
+        taps = (taps[:, None] * sides[axis] + offsets).reshape(-1)
+    return taps[:, None] + flat, fraction
+
+
+class _Near:
+    """Sums of one channel's near coefficients (4, ..., 4, N) against weights, partial ones kept."""
+
+    def __init__(self, values: Tensor, weights: Tensor) -> None:
+        self.weights = weights
+        self.kept: dict[tuple[int, ...], Tensor] = {(): values}
+
+    def sum(self, *orders: int) -> Tensor:
+        """(N,) for derivatives of these orders along the axes; the last axis is summed first."""
+        if orders not in self.kept:
+            rest, w = self.sum(*orders[1:]), self.weights[-len(orders)][orders[0]]
+            self.kept[orders] = (rest * w).sum(dim=-2)
+        return self.kept[orders]
+
+
+class _SplineSum(torch.autograd.Function):
+    """Values (C, N) at grid coordinates and, if asked, sum_c rate_c d value_c / du_c (N,)."""
+
+    @staticmethod
+    def forward(ctx: Any, table: Tensor, u: Tensor, rates: tuple[float, ...] | None) -> Any:
+        sides = tuple(table.shape[1:])
+        d = len(sides)
+        flat, fraction = _cells(sides, u)
+        shape = (*(TAPS,) * d, -1)
+        near = [c.reshape(-1).index_select(0, flat.reshape(-1)).reshape(shape) for c in table]
+        weights = cubic_weights(fraction, 1 if rates is None else 2)
+        sums = [_Near(c, weights) for c in near]
+        values = torch.stack([part.sum(*_unit(d)) for part in sums])
+        divergence = u.new_zeros(u.shape[1])
+        if rates is not None:
+            for axis, rate in enumerate(rates):
+                divergence = divergence.add(sums[axis].sum(*_unit(d, axis)), alpha=rate)
+        ctx.save_for_backward(flat, fraction, *near)
+        ctx.sides, ctx.rates = sides, rates
+        return values, divergence
+
+    @staticmethod
+    def backward(ctx: Any, *gradients: Any) -> Any:
+        by_value, by_divergence = gradients
+        flat, fraction, *near = ctx.saved_tensors
+        d, rates = len(ctx.sides), ctx.rates
+        weights = cubic_weights(fraction, 3)
+        on_table = on_u = None
+        if ctx.needs_input_grad[1]:
+            on_u = torch.zeros_like(fraction)
+            for c, values in enumerate(near):
+                part = _Near(values, weights)
+                for j in range(d):
+                    on_u[j].addcmul_(by_value[c], part.sum(*_unit(d, j)))
+                    if rates is not None:
+                        on_u[j].addcmul_(by_divergence, part.sum(*_unit(d, c, j)), value=rates[c])
+        if ctx.needs_input_grad[0]:
+            plain = [w[0] for w in weights]
+            channels = []
+            for c in range(len(near)):
+                factors = list(plain)
+                if rates is None:
+                    factors[0] = factors[0] * by_value[c]
+                else:
+                    slope = weights[c][1] * (rates[c] * by_divergence)
+                    factors[c] = (plain[c] * by_value[c]).add_(slope)
+                spread = _outer(factors).reshape(-1)
+                zeros = spread.new_zeros(math.prod(ctx.sides))
+                channels.append(zeros.scatter_add_(0, flat.reshape(-1), spread))
+            on_table = torch.stack(channels).reshape(-1, *ctx.sides)
+        return on_table, on_u, None
+
+
+def _unit(d: int, *axes: int) -> tuple[int, ...]:
+    """How often each of d axes is among `axes`."""
+    return tuple(axes.count(i) for i in range(d))
+
+
+def _outer(factors: list[Tensor]) -> Tensor:
+    """Product (4, ..., 4, N) of one (4, N) an axis."""
+    d = len(factors)
+    shaped = [w.reshape(*(1,) * i, TAPS, *(1,) * (d - 1 - i), -1) for i, w in enumerate(factors)]
+    product = shaped[-1]
+    for factor in reversed(shaped[:-1]):
+        product = factor * product
+    return product
+
+
+def spline_sum(table: Tensor, u: Tensor) -> Tensor:
+    """Values (C, N) of splines at `u` (d, N), in cells of the grid.
+
+    Args:
+        table: coefficients, `padded`.
+
+    Differentiable once in both.
+    """
+    return _SplineSum.apply(table, u, None)[0]  # type: ignore[index]
+
+
+def spline_sum_with_divergence(
+    table: Tensor, u: Tensor, rates: tuple[float, ...]
+) -> tuple[Tensor, Tensor]:
+    """As `spline_sum` for a vector field (C = d), and sum_i rates_i d value_i / du_i (N,)."""
+    return _SplineSum.apply(table, u, rates)  # type: ignore[return-value]
