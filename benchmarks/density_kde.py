@@ -13,6 +13,7 @@ from orbiflow.density import to_vectors
 
 Data = NDArray[np.float64]
 WIDTHS = np.geomspace(2.0, 1e7, 48)
+FLOORS = (0.0, 0.001, 0.003, 0.01, 0.03, 0.1)
 
 
 class KernelDensity:
@@ -22,9 +23,13 @@ class KernelDensity:
         train: (N, d) angles, or (N, 2) latitude and longitude in degrees.
         concentration: kappa of the kernels.
         round_: whether the data are directions.
+        floor: share of the uniform density, without which one lone point costs any number of nats.
     """
 
-    def __init__(self, train: Data, concentration: float, *, round_: bool) -> None:
+    def __init__(
+        self, train: Data, concentration: float, *, round_: bool, floor: float = 0.0
+    ) -> None:
+        self.floor = floor
         self.round, self.kappa = round_, float(concentration)
         self.train = self._embed(train)
         if round_:
@@ -52,13 +57,28 @@ class KernelDensity:
             )
             parts.append(table.logsumexp(dim=1))
         log_sum = torch.cat(parts).double().numpy()
-        return log_sum - math.log(len(self.train)) - self.log_normal
+        kernels = log_sum - math.log(len(self.train)) - self.log_normal
+        return with_floor(kernels, self.floor, self.volume(data))
+
+    def volume(self, data: Data) -> float:
+        """Of the whole space."""
+        return 4 * math.pi if self.round else (2 * math.pi) ** data.shape[1]
 
     @classmethod
     def tuned(cls, train: Data, validation: Data, *, round_: bool) -> KernelDensity:
-        """The concentration that suits the validation data best."""
+        """The concentration and floor that suit the validation data best."""
+        best = (-math.inf, 1.0, 0.0)
+        for kappa in WIDTHS:
+            bare = cls(train, kappa, round_=round_)
+            values, volume = bare.score_samples(validation), bare.volume(validation)
+            for floor in FLOORS:
+                score = float(with_floor(values, floor, volume).mean())
+                best = max(best, (score, float(kappa), floor))
+        return cls(train, best[1], round_=round_, floor=best[2])
 
-        def score(kappa: float) -> float:
-            return float(cls(train, kappa, round_=round_).score_samples(validation).mean())
 
-        return cls(train, max(WIDTHS, key=score), round_=round_)
+def with_floor(log_density: Data, floor: float, volume: float) -> Data:
+    """Log of (1 - floor) density + floor / volume."""
+    if floor == 0.0:
+        return log_density
+    return np.logaddexp(math.log1p(-floor) + log_density, math.log(floor / volume))

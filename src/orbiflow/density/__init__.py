@@ -4,10 +4,14 @@ from orbiflow.density.bases import Base, UniformBase, VonMisesBase
 from orbiflow.density.density import SymmetricDensity, kl_by_quadrature, midpoints
 from orbiflow.density.estimator import SPACES, DensityEstimator, make_space
 from orbiflow.density.fit import FitReport, FitSettings, fit_density
+from orbiflow.density.fit_neural import NeuralSettings, fit_neural
 from orbiflow.density.flat_spaces import KleinBottle, Torus
 from orbiflow.density.kernel_fit import mix_kernels
 from orbiflow.density.kernels import AdaptiveKernels
 from orbiflow.density.mixed import MixedDensity
+from orbiflow.density.mixture import MixtureBase
+from orbiflow.density.neural import NeuralField, NeuralFlow
+from orbiflow.density.patches import from_klein, to_klein
 from orbiflow.density.round_spaces import (
     ProjectivePlane,
     Sphere,
@@ -29,6 +33,10 @@ __all__ = [
     "FitSettings",
     "KleinBottle",
     "MixedDensity",
+    "MixtureBase",
+    "NeuralField",
+    "NeuralFlow",
+    "NeuralSettings",
     "ProjectivePlane",
     "Space",
     "Sphere",
@@ -40,11 +48,14 @@ __all__ = [
     "clear_rotation",
     "density_to_bytes",
     "fit_density",
+    "fit_neural",
+    "from_klein",
     "kl_by_quadrature",
     "make_space",
     "midpoints",
     "mix_kernels",
     "read_density",
+    "to_klein",
     "to_latlon",
     "to_vectors",
 ]

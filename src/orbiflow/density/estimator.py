@@ -11,11 +11,15 @@ from numpy.typing import ArrayLike
 
 from orbiflow.density.density import SymmetricDensity
 from orbiflow.density.fit import FitReport, FitSettings, Progress, fit_density
+from orbiflow.density.fit_neural import NeuralSettings, fit_neural
 from orbiflow.density.flat_spaces import KleinBottle, Torus
 from orbiflow.density.round_spaces import ProjectivePlane, Sphere, clear_rotation
 from orbiflow.density.space import Space
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry.isometry import Array
+
+MOST_SPLINE_DIM = 3
+"""Dimensions of spline flows; beyond, grids are too large."""
 
 SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")
 
@@ -51,6 +55,9 @@ class DensityEstimator:
         segments: stationary pieces of the flow.
         smoothness, ridge, roughness, kinetic, iterations, validation, base, kernels, seconds, seed:
             see `FitSettings`.
+
+    On tori of four or more angles the density is a neural flow on a mixture of von Mises chains
+    (`fit_neural`), and of these only `validation`, `seconds` and `seed` count.
 
     After `fit`: `space_`, `density_` (a `SymmetricDensity`), `report_` (a `FitReport`),
     `n_features_in_`.
@@ -117,7 +124,12 @@ class DensityEstimator:
         points = self.space_.to_chart(data)
         self.density_: SymmetricDensity
         self.report_: FitReport
-        self.density_, self.report_ = fit_density(self.space_, points, settings, progress=progress)
+        if self.space_.dim > MOST_SPLINE_DIM:
+            many = NeuralSettings(validation=self.validation, seconds=self.seconds, seed=self.seed)
+            found = fit_neural(self.space_, points, many, progress=progress)
+        else:
+            found = fit_density(self.space_, points, settings, progress=progress)
+        self.density_, self.report_ = found
         self.n_features_in_ = int(data.shape[1])
         return self
 

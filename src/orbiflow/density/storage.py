@@ -15,6 +15,17 @@ from orbiflow.density.density import SymmetricDensity
 from orbiflow.density.estimator import make_space
 from orbiflow.density.kernels import AdaptiveKernels
 from orbiflow.density.mixed import MixedDensity
+from orbiflow.density.mixture import MixtureBase
+from orbiflow.density.neural import NeuralFlow
+from orbiflow.density.neural_storage import (
+    mixture_from_header,
+    mixture_header,
+    mixture_tensors,
+    neural_from_header,
+    neural_header,
+    neural_tensors,
+)
+from orbiflow.density.space import Space
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.fields import FourierField, SplineField
 from orbiflow.flows import Flow
@@ -29,36 +40,25 @@ FIELDS: dict[str, type[FourierField | SplineField]] = {
 
 
 def density_to_bytes(density: SymmetricDensity, **extra: Any) -> bytes:
-    """A density whose flow is made of Fourier or spline fields, with `extra` JSON for the reader.
+    """A density whose flow has Fourier, spline or neural fields, with `extra` JSON for the reader.
 
     Raises:
         OrbiflowError: for other fields.
     """
-    fields = list(density.flow.segments)
-    names = [name for name, kind in FIELDS.items() if all(type(f) is kind for f in fields)]
-    if not names or any(f.parameters_.dim() != 1 for f in fields):  # type: ignore[union-attr]
-        raise OrbiflowError("only flows of single Fourier fields or spline fields are saved")
-    first = fields[0]
-    assert isinstance(first, FourierField | SplineField)
+    flow, tensors = _flow_parts(density.flow)
     base: dict[str, Any] = {"kind": "uniform"}
     if isinstance(density.base, VonMisesBase):
         base = {"kind": "von-mises", "concentration": density.base.concentration}
+    elif isinstance(density.base, MixtureBase):
+        base = mixture_header(density.base)
+        tensors |= mixture_tensors(density.base)
     header = {
         "format": FORMAT,
         "space": {"name": density.space.name, **density.space.settings()},
         "base": base,
-        "flow": {
-            "field": names[0],
-            "max_frequency": first.max_frequency,
-            "smoothness": first.smoothness,
-            "steps": density.flow.steps,
-            "method": density.flow.method,
-            "duration": density.flow.duration,
-        },
+        "flow": flow,
         "extra": extra,
     }
-    stack = torch.stack([f.parameters_.detach().double().cpu() for f in fields])  # type: ignore[union-attr]
-    tensors = {"parameters": stack}
     if isinstance(density, MixedDensity):
         kernels = density.kernels
         tensors |= {
@@ -69,6 +69,28 @@ def density_to_bytes(density: SymmetricDensity, **extra: Any) -> bytes:
         }
     tensors = {name: tensor.contiguous() for name, tensor in tensors.items()}
     return save(tensors, metadata={"orbiflow": json.dumps(header, allow_nan=False)})
+
+
+def _flow_parts(flow: Flow) -> tuple[dict[str, Any], dict[str, torch.Tensor]]:
+    """Header and tensors of a flow."""
+    if isinstance(flow, NeuralFlow):
+        return neural_header(flow), neural_tensors(flow)
+    fields = list(flow.segments)
+    names = [name for name, kind in FIELDS.items() if all(type(f) is kind for f in fields)]
+    if not names or any(f.parameters_.dim() != 1 for f in fields):  # type: ignore[union-attr]
+        raise OrbiflowError("only flows of Fourier, spline or neural fields are saved")
+    first = fields[0]
+    assert isinstance(first, FourierField | SplineField)
+    header = {
+        "kind": names[0],
+        "max_frequency": first.max_frequency,
+        "smoothness": first.smoothness,
+        "steps": flow.steps,
+        "method": flow.method,
+        "duration": flow.duration,
+    }
+    rows = [f.parameters_.detach().double().cpu() for f in fields]  # type: ignore[union-attr]
+    return header, {"parameters": torch.stack(rows)}
 
 
 def read_density(path: str | Path) -> tuple[SymmetricDensity, dict[str, Any]]:
@@ -107,41 +129,52 @@ def read_density(path: str | Path) -> tuple[SymmetricDensity, dict[str, Any]]:
 
 
 def _restored(header: dict[str, Any], tensors: dict[str, torch.Tensor]) -> SymmetricDensity:
-    stack = tensors["parameters"]
     options = dict(header["space"])
     space = make_space(str(options.pop("name")), **options)
-    flow = header["flow"]
-    frequency = _bounded(flow["max_frequency"], MAX_FREQUENCY, "max_frequency")
+    neural = header["flow"]["kind"] == "neural"
+    flow = (
+        neural_from_header(header["flow"], tensors, space)
+        if neural
+        else _tabled_flow(header["flow"], tensors["parameters"], space)
+    )
+    base: Base = UniformBase(space)
+    if header["base"]["kind"] == "von-mises":
+        base = VonMisesBase(space, float(header["base"]["concentration"]))
+    elif header["base"]["kind"] == "mixture":
+        base = mixture_from_header(header["base"], tensors, space)
+    if "shares" not in tensors:
+        return SymmetricDensity(space, flow, base)
+    parts = [tensors[f"kernel_{name}"] for name in ("centers", "concentrations", "weights")]
+    if len(parts[0]) > MAX_KERNELS:
+        raise ValueError(f"{len(parts[0])} kernels")
+    return MixedDensity(space, flow, base, AdaptiveKernels(space, *parts), tensors["shares"])
+
+
+def _tabled_flow(header: dict[str, Any], stack: torch.Tensor, space: Space) -> Flow:
+    """A flow of Fourier or spline fields."""
+    frequency = _bounded(header["max_frequency"], MAX_FREQUENCY, "max_frequency")
     if space.dim > 3:
-        raise ValueError("a Fourier flow has at most three dimensions")
+        raise ValueError("a flow of Fourier or spline fields has at most three dimensions")
     if stack.dim() != 2 or not 1 <= len(stack) <= MAX_SEGMENTS:
         raise ValueError(f"parameters of shape {tuple(stack.shape)}")
     if not bool(torch.isfinite(stack).all()):
         raise ValueError("parameters that are not finite")
     fields = []
-    kind = FIELDS[flow.get("field", "fourier")]
     for row in stack:
-        field = kind(space.group, frequency, smoothness=float(flow["smoothness"]))
+        field = FIELDS[header["kind"]](
+            space.group, frequency, smoothness=float(header["smoothness"])
+        )
         if field.parameters_.shape != row.shape:
             raise ValueError(f"{len(row)} parameters where {field.size} belong")
         with torch.no_grad():
             field.parameters_.copy_(row)
         fields.append(field)
-    restored = Flow(
+    return Flow(
         fields,
-        steps=_bounded(flow["steps"], MAX_STEPS, "steps"),
-        method=str(flow["method"]),
-        duration=float(flow["duration"]),
+        steps=_bounded(header["steps"], MAX_STEPS, "steps"),
+        method=str(header["method"]),
+        duration=float(header["duration"]),
     )
-    base: Base = UniformBase(space)
-    if header["base"]["kind"] == "von-mises":
-        base = VonMisesBase(space, float(header["base"]["concentration"]))
-    if "shares" not in tensors:
-        return SymmetricDensity(space, restored, base)
-    parts = [tensors[f"kernel_{name}"] for name in ("centers", "concentrations", "weights")]
-    if len(parts[0]) > MAX_KERNELS:
-        raise ValueError(f"{len(parts[0])} kernels")
-    return MixedDensity(space, restored, base, AdaptiveKernels(space, *parts), tensors["shares"])
 
 
 def _bounded(value: Any, most: int, name: str) -> int:
