@@ -51,6 +51,14 @@ def test_fit_score_sample_plot(space: str, tmp_path: Path, orbiflow) -> None:
     assert drawn.read_text() == first
 
 
+@pytest.fixture
+def small_pictures(monkeypatch) -> None:
+    for name, size in (("square._GRID", 40), ("page._CELLS", 20)):
+        monkeypatch.setattr(f"orbiflow.draw.density_{name}", size)
+    monkeypatch.setattr("orbiflow.draw.field._SAMPLES", 40)
+
+
+@pytest.mark.usefixtures("small_pictures")
 def test_plots(tmp_path: Path, orbiflow) -> None:
     data, model, out = table(tmp_path), tmp_path / "model", tmp_path / "plots"
     orbiflow("density", "fit", data, "--space", "sphere", "--out", model, *FIT)
@@ -59,6 +67,53 @@ def test_plots(tmp_path: Path, orbiflow) -> None:
     names = {path.name for path in out.iterdir()}
     assert names == {"density.png", "flow.png", "samples.png", "surface.html"}
     assert (out / "surface.html").read_text().lstrip().lower().startswith("<!doctype html>")
+
+
+@pytest.mark.usefixtures("small_pictures")
+def test_plot_of_angles_has_their_names_and_options(tmp_path: Path, orbiflow) -> None:
+    data, model = table(tmp_path), tmp_path / "model"
+    orbiflow("density", "fit", data, "--space", "torus", "--unit", "degrees", "--out", model, *FIT)
+    plot = ("density", "plot", "--model", model, "--data", data, "--scale", "linear", "--out")
+    pictures = {}
+    for name, *options in (
+        ("plain",),
+        ("zero", "--center", "0,0"),
+        ("dots", "--dots"),
+        ("turned", "--center", "180,180"),
+        ("log", "--scale", "log"),
+    ):
+        drawn = orbiflow(*plot, tmp_path / name, *options)
+        assert drawn.status == 0, drawn.err
+        pictures[name] = {path.name: path.read_bytes() for path in (tmp_path / name).iterdir()}
+    first = pictures["plain"]
+    assert first == pictures["zero"]
+    for name in ("dots", "turned", "log"):
+        assert first["density.png"] != pictures[name]["density.png"]
+    for name in ("dots", "log"):
+        assert first["samples.png"] == pictures[name]["samples.png"]
+    assert first["samples.png"] != pictures["turned"]["samples.png"]
+    page = first["surface.html"].decode()
+    assert "lat (degrees) runs round the ring, lon (degrees) round its tube" in page
+    assert '"dots": false' in page
+    assert '"dots": true' in pictures["dots"]["surface.html"].decode()
+
+
+def test_plot_of_three_angles_is_of_their_pairs(tmp_path: Path, orbiflow) -> None:
+    rng = np.random.default_rng(0)
+    data, model, out = tmp_path / "data.csv", tmp_path / "model", tmp_path / "plots"
+    rows = rng.normal(0, 0.5, (80, 3))
+    data.write_text("a,b,c\n" + "\n".join(",".join(f"{v:.4f}" for v in row) for row in rows) + "\n")
+    fit = ("density", "fit", data, "--space", "torus", "--detail", 1, "--segments", 1)
+    assert orbiflow(*fit, "--seconds", 1, "--out", model).status == 0
+    plot = ("density", "plot", "--model", model, "--out", out)
+    for options in ((), ("--data", data, "--center", "pi,0,-pi")):
+        drawn = orbiflow(*plot, *options)
+        assert drawn.status == 0, drawn.err
+        assert "drawn in two dimensions, this torus has 3" in drawn.out
+        assert {path.name for path in out.iterdir()} == {"samples.png"}
+    wrong = orbiflow(*plot, "--center", "0,0")
+    assert wrong.status == 2
+    assert "--center needs 3 angles" in wrong.err
 
 
 def test_measures_differ_by_their_areas(tmp_path: Path, orbiflow) -> None:
@@ -116,6 +171,9 @@ def test_mistakes_in_the_options(tmp_path: Path, orbiflow) -> None:
         ((*score, "--model", model, "--measure", "round"), "round"),
         (("density", "sample", "--model", model, "-n", 0), "-n must be from 1"),
         (("density", "plot", "--model", model, "--coastlines", data), "belongs to the sphere"),
+        (("density", "plot", "--model", model, "--center", "0,north"), "--center needs angles"),
+        (("density", "plot", "--model", model, "--center", "0,nan"), "--center needs 2 angles"),
+        (("density", "plot", "--model", model, "--scale", "root"), "root"),
     ):
         outcome = orbiflow(*arguments)
         assert outcome.status == 2, arguments

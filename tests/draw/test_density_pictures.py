@@ -10,19 +10,23 @@ import pytest
 import torch
 from PIL import Image
 
+from orbiflow.density.bases import UniformBase
 from orbiflow.density.density import SymmetricDensity
 from orbiflow.density.flat_spaces import KleinBottle, Torus
+from orbiflow.density.kernels import AdaptiveKernels, is_round
+from orbiflow.density.mixed import MixedDensity
+from orbiflow.density.neural import NeuralField, NeuralFlow
 from orbiflow.density.round_spaces import ProjectivePlane, Sphere, to_vectors
+from orbiflow.draw import density_square
+from orbiflow.draw.density_axes import angle_axis, axis_label, view_of
+from orbiflow.draw.density_corner import corner_png
+from orbiflow.draw.density_flow import flow_png
 from orbiflow.draw.density_page import density_page
-from orbiflow.draw.density_square import (
-    angle_text,
-    density_at,
-    density_png,
-    flow_png,
-    measure_label,
-    samples_png,
+from orbiflow.draw.density_scale import (
     shading,
 )
+from orbiflow.draw.density_square import density_png, samples_png
+from orbiflow.draw.density_values import density_at, density_on_grid, is_sharp, takes_logarithms
 from orbiflow.draw.immersions import boy_surface, edge_pairs, mesh
 from orbiflow.errors import OrbiflowError
 from orbiflow.fields import FourierField
@@ -62,6 +66,9 @@ def array(text, kind):
 @pytest.fixture(autouse=True)
 def _coarse(monkeypatch):
     monkeypatch.setattr("orbiflow.draw.density_square._GRID", 24)
+    monkeypatch.setattr("orbiflow.draw.density_square._FINE_GRID", 30)
+    monkeypatch.setattr("orbiflow.draw.density_page._FINE_CELLS", 20)
+    monkeypatch.setattr("orbiflow.draw.density_values._COARSE", 24)
     monkeypatch.setattr("orbiflow.draw.field._SAMPLES", 40)
 
 
@@ -155,33 +162,128 @@ def test_paired_edges_are_the_same_points(space):
         assert float(space.distance(one, other).max()) < 1e-6
 
 
-@pytest.mark.parametrize(
-    ("turns", "unit", "text"),
-    [
-        (0.5, "radians", "π"),
-        (-0.25, "radians", "−π/2"),
-        (0, "radians", "0"),
-        (0.125, "degrees", "45°"),
-        (0.25, "turns", "0.25"),
-    ],
-)
-def test_angles_are_written_in_their_unit(turns, unit, text):
-    assert angle_text(turns, unit) == text
+def test_scales_are_chosen_and_checked():
+    density = example(SPACES[0])
+    for scale in ("linear", "log", "auto"):
+        assert density_png(density, scale=scale, width_px=200)
+    assert not takes_logarithms(density, "natural", "auto")
+    assert takes_logarithms(peaked(SPACES[0], 400.0), "natural", "auto")
+    for draw in (density_png, density_page):
+        with pytest.raises(OrbiflowError, match="scale"):
+            draw(density, scale="square root")
+    page = density_page(peaked(SPACES[0], 400.0), scale="auto", resolution=12)
+    assert any("10" in tick["text"] for tick in page_data(page)["ticks"])
 
 
-def test_measures_are_named():
-    assert measure_label(SPACES[0], "natural") == "density, per degree²"
-    assert measure_label(SPACES[2], "natural") == "density, per steradian"
-    assert "uniform" in measure_label(SPACES[2], "uniform")
-    assert "square" in measure_label(SPACES[1], "square")
+def test_the_centre_moves_the_picture_but_not_its_colours(monkeypatch):
+    density, drawn = peaked(SPACES[0], 30.0, at=(0.1, 0.8)), []
+    shades = lambda values, *_, **__: drawn.append(values) or shading(values)  # noqa: E731
+    monkeypatch.setattr(density_square, "shading", shades)
+    for center in ((0, 0), (180, 180)):
+        assert density_png(density, center=center, width_px=200)
+    np.testing.assert_allclose(np.roll(drawn[0], 15, axis=(0, 1)), drawn[1], rtol=1e-6)
+    peak = np.unravel_index(drawn[0].argmax(), drawn[0].shape)
+    np.testing.assert_allclose((np.array(peak) + 0.5) / 30, (0.6, 0.3), atol=0.04)
+    assert samples_png(density, points(9), points(9), center=(180, 180), width_px=300) != (
+        samples_png(density, points(9), points(9), width_px=300)
+    )
+    assert flow_png(example(SPACES[0]), cells=1, center=(90, 0), width_px=200)
 
 
-def test_a_few_far_values_do_not_darken_the_picture():
-    values = np.full(10_000, 1.0)
-    assert shading(values) == (0.0, 1.0, False)
-    values[:5] = 50.0
-    assert shading(values) == (0.0, 1.0, True)
-    assert shading(values, np.where(values > 1, 1000.0, 1.0)) == (0.0, 50.0, False)
+@pytest.mark.parametrize("draw", [density_png, flow_png])
+def test_the_centre_is_checked(draw):
+    with pytest.raises(OrbiflowError, match="not on the klein-bottle"):
+        draw(example(SPACES[1]), center=(0, 0))
+    for center in ((0,), (0, np.nan)):
+        with pytest.raises(OrbiflowError, match="2 finite angles"):
+            draw(example(SPACES[0]), center=center)
+
+
+def test_axes_have_the_users_names():
+    view = view_of(SPACES[1], ("direction", "mixture"))
+    assert angle_axis(view, 0)[0] == "mixture (radians)"
+    assert angle_axis(view, 1)[0] == "direction (radians)"
+    assert axis_label(view_of(SPACES[0], ("x" * 99, "y")), 0) == f"{'x' * 39}… (degrees)"
+    assert density_png(example(SPACES[0]), names=("$x_", "a^$"), width_px=200)
+    page = density_page(example(SPACES[0]), names=("phi", "psi<b>"), resolution=4)
+    assert "phi (degrees) runs round the ring, psi&lt;b&gt; (degrees) round its tube" in page
+    assert {"phi 90°", "phi −90°"} <= {label["text"] for label in page_data(page)["labels"]}
+    with pytest.raises(OrbiflowError, match="2 names"):
+        density_png(example(SPACES[0]), names=("a",))
+
+
+def peaked(space, kappa, at=(0.3, 0.4), flow=0.01):
+    """Mostly one kernel."""
+    kernels = AdaptiveKernels(
+        space,
+        torch.tensor([at], dtype=torch.float64),
+        torch.full((1, 1 if is_round(space) else 2), kappa, dtype=torch.float64),
+        torch.ones(1, dtype=torch.float64),
+    )
+    shares = torch.tensor([flow, 0.99 - flow, 0.01], dtype=torch.float64)
+    return MixedDensity(space, example(space).flow, UniformBase(space), kernels, shares)
+
+
+@every_space
+@pytest.mark.parametrize("measure", ["natural", "square", "uniform"])
+def test_broad_kernels_are_drawn_as_they_are(space, measure):
+    density, t = peaked(space, 3.0, flow=0.4), torch.linspace(0.03, 0.97, 9, dtype=torch.float64)
+    grid = torch.stack(torch.meshgrid(t, t[:5], indexing="ij"), dim=-1).reshape(-1, 2)
+    found = density_on_grid(density, t, t[:5], measure, pixel=1e-6)
+    exact = density_at(density, grid, measure).reshape(9, 5)
+    np.testing.assert_allclose(found, exact, rtol=1e-5)
+    assert not is_sharp(density, 0.01)
+
+
+@every_space
+@pytest.mark.parametrize("at", [(0.3, 0.4), (0.3087, 0.4131), (0.316, 0.46)])
+def test_peaks_narrower_than_a_pixel_keep_their_mass_wherever_they_lie(space, at):
+    density, t = peaked(space, 1e7, at), (torch.arange(90, dtype=torch.float64) + 0.5) / 90
+    values = density_on_grid(density, t, t, "square")
+    assert values.mean() == pytest.approx(1.0, abs=0.03)
+    peak = (np.array(np.unravel_index(values.argmax(), values.shape)) + 0.5) / 90
+    assert abs(peak - at).max() < 1 / 90
+    assert is_sharp(density, 1 / 90)
+
+
+@every_space
+def test_densities_with_kernels_are_drawn_and_say_what_is_averaged(space):
+    density = peaked(space, 1e6)
+    assert density_png(density, width_px=250) != density_png(peaked(space, 10.0), width_px=250)
+    assert flow_png(density, cells=1, width_px=200)
+    assert samples_png(density, points(9), density.sample((20,)), width_px=300)
+    assert "narrower than" in density_page(density)
+    assert "narrower than" not in density_page(example(space), resolution=8)
+
+
+def test_a_flow_in_few_colours_is_small():
+    png = flow_png(example(SPACES[0]))
+    assert len(png) < 600_000
+    image = Image.open(io.BytesIO(png))
+    assert image.mode == "P"
+
+
+def test_a_field_that_changes_with_time_is_drawn():
+    density = SymmetricDensity(SPACES[0], NeuralFlow(NeuralField(2, width=8)))
+    assert flow_png(density, cells=1, width_px=200)
+
+
+@pytest.mark.parametrize("dim", [1, 2, 3, 5])
+def test_pairs_of_angles(dim):
+    density = SymmetricDensity(Torus(dim, unit="degrees"), NeuralFlow(NeuralField(dim, width=4)))
+    data = torch.tensor(np.random.default_rng(0).random((40, dim)))
+    names = [f"${k}_" for k in range(dim)]
+    both = corner_png(density, data, data[:9], names=names, width_px=400)
+    assert picture(both).size == (400, 400)
+    assert corner_png(density, None, data, center=[90] * dim, width_px=300)
+    with pytest.raises(OrbiflowError, match="chart points"):
+        corner_png(density, data[:, :0], data)
+
+
+@pytest.mark.parametrize("space", [Torus(9), SPACES[2]], ids=["torus", "sphere"])
+def test_pairs_of_other_spaces_are_refused(space):
+    with pytest.raises(OrbiflowError, match="1 to 8 angles"):
+        corner_png(SymmetricDensity(space, example(SPACES[0]).flow), None, torch.zeros(3, 9))
 
 
 @every_space
@@ -199,6 +301,7 @@ def test_page_stands_alone(space):
     assert 'aria-label="' in page
     data = page_data(page)
     assert len(array(data["samples"], "<f4")) == 27
+    assert data["dots"]
     assert len(array(data["colours"], "u1")) == 1024
     triangles = array(data["triangles"], "<u2")
     assert len(triangles) == 2 * 8 * 8 * 3
@@ -207,7 +310,7 @@ def test_page_stands_alone(space):
 
 
 def test_largest_page_is_below_three_megabytes():
-    page = density_page(example(SPACES[2]), resolution=200, samples=points(5000))
+    page = density_page(example(SPACES[2]), resolution=250, samples=points(5000))
     assert len(page.encode()) < 3_000_000
 
 

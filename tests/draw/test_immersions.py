@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from orbiflow.density.flat_spaces import KleinBottle, Torus
 from orbiflow.density.round_spaces import ProjectivePlane, Sphere
 from orbiflow.draw.immersions import boy_surface, immersion, mesh, normals
+from orbiflow.draw.viewpoint import EYE, viewpoint
 from orbiflow.errors import OrbiflowError
 from strategies import random_orthogonal, seeds
 
@@ -117,7 +118,31 @@ def test_other_dimensions_are_refused(dim):
         mesh(Torus(dim), 8)
 
 
-@pytest.mark.parametrize("resolution", [1, 201])
+@pytest.mark.parametrize("resolution", [1, 251])
 def test_resolution_out_of_range_is_refused(resolution):
     with pytest.raises(OrbiflowError, match="resolution"):
         mesh(Torus(2), resolution)
+
+
+# towards the reader on the outside of the ring, under it, and on the wall of its hole
+PLACES = [(0.1, 0.05), (0.7, 0.89), (0.4, 0.5), (0.85, 0.3), (0.55, 0.7), (0.25, 0.62)]
+
+
+@pytest.mark.parametrize("space", SPACES, ids=lambda s: s.name)
+@pytest.mark.parametrize("place", PLACES)
+def test_the_first_view_faces_a_place(space, place):
+    at = torch.tensor(place, dtype=torch.float64)
+    yaw, pitch, cut = viewpoint(space, at)
+    toward = np.array([np.cos(pitch) * np.cos(yaw), np.cos(pitch) * np.sin(yaw), np.sin(pitch)])
+    cloud = immersion(space)(mesh(space, 120).points)
+    center = (cloud.min(axis=0) + cloud.max(axis=0)) / 2
+    radius = np.linalg.norm(cloud - center, axis=1).max()
+    spot = immersion(space)(at[None])[0]
+    sight = center + EYE * radius * toward - spot
+    sight /= np.linalg.norm(sight)
+    along = (cloud - spot) @ sight
+    aside = np.linalg.norm(cloud - spot - along[:, None] * sight, axis=1)
+    kept = (cloud - center) @ toward <= (1 - cut / 50) * radius
+    assert not (kept & (along > 0.15 * radius) & (aside < 0.04 * radius)).any()
+    assert ((spot - center) @ toward < (1 - cut / 50) * radius) or cut == 0
+    assert abs(normals(space, at[None])[0] @ sight) > 0.4

@@ -8,6 +8,8 @@ from typing import Annotated
 
 import typer
 
+from orbiflow.cli.density_patches import patches
+
 density = typer.Typer(
     name="density",
     help="Fit, evaluate, sample and draw exact densities of angles, directions and axes.",
@@ -41,6 +43,14 @@ class Measure(StrEnum):
     UNIFORM = "uniform"
 
 
+class Scale(StrEnum):
+    """Of colours."""
+
+    AUTO = "auto"
+    LINEAR = "linear"
+    LOG = "log"
+
+
 Data = Annotated[Path, typer.Argument(help="CSV, TSV, NPY or Parquet.", show_default=False)]
 Columns = Annotated[
     str | None,
@@ -66,6 +76,12 @@ def fit(
         int, typer.Option(help="Waves of the flow along a side of the square, 1 to 64.")
     ] = 8,
     segments: Annotated[int, typer.Option(help="Stationary pieces of the flow.")] = 6,
+    kernels: Annotated[
+        bool,
+        typer.Option(
+            "--kernels", help="Add kernels about the points: for clusters sharper than the flow."
+        ),
+    ] = False,
     seconds: Annotated[
         float | None,
         typer.Option(help="Of refinement at most; default no limit.", show_default=False),
@@ -86,6 +102,7 @@ def fit(
         unit=unit.value,
         detail=detail,
         segments=segments,
+        kernels=kernels,
         seconds=seconds,
         seed=seed,
     )
@@ -134,7 +151,8 @@ def plot(
     data: Annotated[
         Path | None,
         typer.Option(
-            help="Table whose points are drawn, too; default samples.", show_default=False
+            help="Table to draw beside samples in samples.png, and as the dots of --dots.",
+            show_default=False,
         ),
     ] = None,
     columns: Columns = None,
@@ -146,17 +164,40 @@ def plot(
         ),
     ] = None,
     measure: Annotated[Measure, typer.Option(help="What the density is per.")] = Measure.NATURAL,
+    scale: Annotated[
+        Scale,
+        typer.Option(help="Of colours. Auto: log if a peak outshines nearly all of the area."),
+    ] = Scale.AUTO,
+    center: Annotated[
+        str | None,
+        typer.Option(
+            help="Angles in the middle of a torus' pictures, such as 180,180; default 0 each, so "
+            "that angles run from -180 to 180 degrees.",
+            show_default=False,
+        ),
+    ] = None,
+    dots: Annotated[
+        bool,
+        typer.Option(
+            "--dots", help="Draw data, or else samples, over density.png and the surface."
+        ),
+    ] = False,
     seed: Annotated[int, typer.Option(help="Of the samples.")] = 0,
 ) -> None:
-    """Draw a density: density.png, flow.png, samples.png and surface.html, which turns in 3-D."""
-    from orbiflow.cli.density_plot import run_plot
+    """Draw a density: density.png, flow.png, samples.png and surface.html, which turns in 3-D.
+
+    Of a torus of more or fewer than two angles: samples.png alone, all pairs of angles.
+    """
+    from orbiflow.cli.density_plot import Style, run_plot
 
     run_plot(
         model,
         out,
         data=data,
         columns=columns,
-        coastlines=coastlines,
-        measure=measure.value,
+        style=Style(measure.value, scale.value, dots, center, coastlines),
         seed=seed,
     )
+
+
+density.command()(patches)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import html
 import json
+import re
 from collections.abc import Sequence
 from importlib import resources
 from typing import Any
@@ -15,33 +16,51 @@ from numpy.typing import ArrayLike
 from torch import Tensor
 
 from orbiflow.density.density import SymmetricDensity
-from orbiflow.density.flat_spaces import Torus
+from orbiflow.density.flat_spaces import KleinBottle, Torus
+from orbiflow.density.mixed import MixedDensity
 from orbiflow.density.round_spaces import ProjectivePlane, Sphere, to_vectors
 from orbiflow.density.space import Space, checked_table
-from orbiflow.draw.density_square import (
-    COLOURS,
-    MAX_DOTS,
-    Shade,
-    density_at,
-    measure_label,
-    shading,
+from orbiflow.draw.density_axes import (
+    View,
+    angle_text,
+    axis_label,
+    column_name,
     space_title,
+    view_of,
 )
-from orbiflow.draw.immersions import Mesh, boy_surface, immersion, mesh, normals
+from orbiflow.draw.density_scale import bar_label, bar_ticks, shading
+from orbiflow.draw.density_square import COLOURS, MAX_DOTS, average_note
+from orbiflow.draw.density_values import density_on_grid, is_sharp, takes_logarithms
+from orbiflow.draw.immersions import (
+    KLEIN_RADIUS,
+    RING_RADIUS,
+    TUBE_RADIUS,
+    Mesh,
+    boy_surface,
+    immersion,
+    mesh,
+    normals,
+)
+from orbiflow.draw.viewpoint import EYE, viewpoint
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry.isometry import Array
 
 MAX_BYTES = 3_000_000
 
-_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_CELLS, _FINE_CELLS = 160, 240
+_SOFT = 1.6
+"""Cells that the narrowest peak is averaged over: of fewer, a triangle's corners would be seen."""
 
 
 def density_page(
     density: SymmetricDensity,
     *,
     measure: str = "natural",
+    scale: str = "linear",
+    names: Sequence[str] | None = None,
     samples: Tensor | None = None,
-    resolution: int = 160,
+    dots: bool = True,
+    resolution: int | None = None,
     coastlines: Sequence[ArrayLike] | None = None,
     title: str = "",
 ) -> str:
@@ -49,43 +68,56 @@ def density_page(
 
     Torus: a ring. Sphere: the unit sphere in the user's frame. Klein bottle: the figure-8 immersion.
     Projective plane: Boy's surface. The density is evaluated at every vertex, so the colours close
-    over the seams. WebGL 2 draws it, or a plain canvas where there is none.
+    over the seams; peaks narrower than its triangles are averaged over them, and the caption says so.
+    The page opens with the peak in front. WebGL 2 draws it, or a plain canvas where there is none.
 
     Args:
         density: on a two-dimensional space.
         measure: with respect to which the density is drawn (`orbiflow.density.space.MEASURES`).
+        scale: of the colours, one of `orbiflow.draw.density_scale.SCALES`.
+        names: of the data's columns on torus and Klein bottle, default `space.columns`.
         samples: chart points (N, 2) to draw as dots; of more than `MAX_DOTS`, a random choice.
-        resolution: cells along an edge of the square, 2 to 200.
+        dots: whether the samples are seen at first; a box in the page shows and hides them.
+        resolution: cells along an edge of the square, 2 to 250; default 160, or 240 for a density
+            with kernels.
         coastlines: for the sphere and the projective plane, lines (M, 2) of latitude and longitude
             in degrees in the data's frame.
         title: default "Density on the" and the space.
 
     Raises:
-        OrbiflowError: for a space of another dimension, an unknown measure, coastlines on a space
-            without latitudes, or a page above `MAX_BYTES`.
+        OrbiflowError: for a space of another dimension, an unknown measure or scale, names that do not
+            fit, coastlines on a space without latitudes, or a page above `MAX_BYTES`.
     """
     space = density.space
-    grid = mesh(space, resolution)
-    values = density_at(density, grid.points, measure)
+    cells = resolution or (_FINE_CELLS if isinstance(density, MixedDensity) else _CELLS)
+    grid, view = mesh(space, cells), view_of(space, names)
+    t = torch.linspace(0.0, 1.0, cells + 1, dtype=torch.float64)
+    values = density_on_grid(density, t, t, measure, pixel=_SOFT / cells).ravel()
     # by area on the surface: vertices crowd at the cone points
-    shade = shading(values, space.log_area(grid.points).exp().numpy())
+    areas = space.log_area(grid.points).exp().numpy()
+    shade = shading(values, areas, log=takes_logarithms(density, measure, scale))
     data = {
         **_surface(space, grid, values),
-        "values": _packed(65535 * np.clip(values / shade.high, 0, 1), "<u2"),
+        "values": _packed(65535 * np.clip(shade.places(values), 0, 1), "<u2"),
         "lines": [
             {"width": width, **_polylines(lines)}
             for width, lines in (*_grid(space), (1.6, _coast(space, coastlines)))
             if lines
         ],
         "samples": "",
-        "labels": _labels(space),
+        "dots": dots,
+        "labels": _labels(view),
         "colours": _packed(_colours(), "u1"),
-        "ticks": _ticks(shade),
-        "measure": measure_label(space, measure),
+        "ticks": [tick._asdict() for tick in bar_ticks(shade, ends=True)],
+        "measure": bar_label(shade, space, measure),
     }
     if samples is not None:
         data["samples"] = _packed(immersion(space)(_thinned(space, samples)), "<f4")
-    return _filled(title or f"Density on the {space_title(space)}", _caption(space), data)
+    caption = _caption(view)
+    if is_sharp(density, _SOFT / cells):
+        note = average_note(round(cells / _SOFT))
+        caption += f" {note[0].upper()}{note[1:]}."
+    return _filled(title or f"Density on the {space_title(space)}", caption, data)
 
 
 def _surface(space: Space, grid: Mesh, values: Array) -> dict[str, Any]:
@@ -95,7 +127,8 @@ def _surface(space: Space, grid: Mesh, values: Array) -> dict[str, Any]:
     return {
         "center": center.tolist(),
         "radius": float(np.linalg.norm(points - center, axis=1).max()),
-        "start": _start(points[values.argmax()] - center, space),
+        "start": viewpoint(space, grid.points[int(values.argmax())])._asdict(),
+        "eye": EYE,
         "round": isinstance(space, Sphere),
         "points": _packed(points, "<f4"),
         "normals": _packed(127 * normals(space, grid.points), "i1"),
@@ -110,8 +143,8 @@ def _filled(heading: str, text: str, data: dict[str, Any]) -> str:
         "%CAPTION%": html.escape(text),
         "%DATA%": json.dumps(data).replace("<", "\\u003c"),
     }
-    for name, part in parts.items():
-        template = template.replace(name, part)
+    # in one pass: a title may hold the name of a part
+    template = re.sub("|".join(parts), lambda found: parts[found[0]], template)
     size = len(template.encode())
     if size > MAX_BYTES:
         raise OrbiflowError(
@@ -161,18 +194,29 @@ def _of_vectors(space: Space, vectors: Array) -> Array:
     return vectors if isinstance(space, Sphere) else boy_surface(vectors)
 
 
-def _labels(space: Space) -> list[dict[str, Any]]:
-    """Names of the six directions along the axes, on a sphere."""
-    if not isinstance(space, Sphere):
+def _labels(view: View) -> list[dict[str, Any]]:
+    """Names of directions: on a sphere the six along the axes, round a ring the first angle's."""
+    space = view.space
+    if isinstance(space, Sphere):
+        latlon = ("0°", "90° E", "N", "180°", "90° W", "S")
+        names = latlon if space.form == "latlon" else ("+x", "+y", "+z", "−x", "−y", "−z")
+        ends = 1.07 * np.concatenate([np.eye(3), -np.eye(3)])
+    elif isinstance(space, Torus | KleinBottle):
+        turns = (0, 0.25, 0.5, -0.25) if isinstance(space, Torus) else (0, 0.125, 0.25, 0.375)
+        name = column_name(view, 0)
+        names = [f"{name} {angle_text(t, space.unit)}" for t in turns]
+        outside = 1.1 * (
+            RING_RADIUS + TUBE_RADIUS if isinstance(space, Torus) else KLEIN_RADIUS + 1
+        )
+        ends = outside * np.array([[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0]])
+    else:
         return []
-    latlon = ("0°", "90° E", "N", "180°", "90° W", "S")
-    names = latlon if space.form == "latlon" else ("+x", "+y", "+z", "−x", "−y", "−z")
-    ends = 1.07 * np.concatenate([np.eye(3), -np.eye(3)])
     return [{"text": n, "at": e.tolist()} for n, e in zip(names, ends, strict=True)]
 
 
-def _caption(space: Space) -> str:
+def _caption(view: View) -> str:
     """What is seen, and which way the coordinates run."""
+    space = view.space
     if isinstance(space, Sphere):
         return (
             "The sphere in the data's frame. Lines every 30°, heavier the equator and longitude 0."
@@ -184,12 +228,13 @@ def _caption(space: Space) -> str:
             "itself; sheets that cross are far apart on the projective plane."
         )
     lines = "Lines every 45°, heavier where an angle is 0."
+    first, second = (axis_label(view, column) for column in (0, 1))
     if isinstance(space, Torus):
-        return f"{space.columns[0]} runs round the ring, {space.columns[1]} round its tube. {lines}"
+        return f"{first} runs round the ring, {second} round its tube. {lines}"
     return (
-        "The Klein bottle as a figure eight that makes half a turn on its way round: theta runs round "
-        f"the ring, phi along the figure eight. {lines} The surface passes through itself along a "
-        "circle; the sheets that cross there are far apart on the bottle."
+        f"The Klein bottle as a figure eight that makes half a turn on its way round: {first} runs "
+        f"round the ring, {second} along the figure eight. {lines} The surface passes through itself "
+        "along a circle; the sheets that cross there are far apart on the bottle."
     )
 
 
@@ -215,27 +260,3 @@ def _colours() -> Array:
     from matplotlib import colormaps
 
     return 255 * colormaps[COLOURS](np.linspace(0, 1, 256))
-
-
-def _ticks(shade: Shade) -> list[dict[str, Any]]:
-    """Places from 0 to 1 on the colour bar and their texts."""
-    from matplotlib.ticker import MaxNLocator
-
-    places = [t for t in MaxNLocator(5).tick_values(shade.low, shade.high) if t <= shade.high]
-    found = [{"at": t / shade.high, "text": _number(t)} for t in places]
-    if shade.cut:
-        found = [tick for tick in found if tick["at"] < 0.93]
-        found.append({"at": 1.0, "text": f"≥ {_number(shade.high)}"})
-    return found
-
-
-def _start(peak: Array, space: Space) -> dict[str, float]:
-    """Yaw and pitch of an eye from which the place `peak`, relative to the centre, is in front."""
-    yaw, pitch = np.arctan2(peak[1], peak[0]), np.arctan2(peak[2], np.hypot(peak[0], peak[1]))
-    lowest = -0.9 if isinstance(space, Sphere | ProjectivePlane) else 0.4  # rings from above
-    return {"yaw": float(yaw), "pitch": float(np.clip(pitch, lowest, 0.9))}
-
-
-def _number(value: float) -> str:
-    digits, _, power = f"{value:.3g}".partition("e")
-    return f"{digits} × 10{str(int(power)).translate(_RAISED)}" if power else digits

@@ -28,7 +28,8 @@ RING_RADIUS, TUBE_RADIUS = 1.0, 0.45
 KLEIN_RADIUS = 2.2
 """Of the circle along which the figure eight is carried; above 2, so that the middle stays open."""
 
-MAX_RESOLUTION = 200
+MAX_RESOLUTION = 250
+"""Cells along an edge: their corners are numbered in 16 bits."""
 
 
 class Mesh(NamedTuple):

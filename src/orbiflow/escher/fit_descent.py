@@ -10,8 +10,8 @@ from orbiflow.escher.descent import Descent
 from orbiflow.escher.descent_settings import DescentSettings
 from orbiflow.escher.fit import Fit, Progress
 from orbiflow.escher.model import TileModel
-from orbiflow.escher.outline_starts import outline_starts, template_starts
-from orbiflow.escher.overlap import boundary_iou
+from orbiflow.escher.outline_starts import Starts, outline_starts, template_starts
+from orbiflow.escher.overlap import boundary_iou, region_of
 from orbiflow.escher.polish import polish
 from orbiflow.escher.prototiles import Prototiles
 from orbiflow.escher.ranking import rank_score
@@ -20,6 +20,9 @@ from orbiflow.escher.soft_target import SoftTarget
 from orbiflow.escher.target import Target
 from orbiflow.symmetry.isometry import Array
 from orbiflow.tilings import IsohedralClass
+
+FEW, POOR = 8, 0.4
+"""Starts from the outline, and IoU of the best of them, below which the template's join them."""
 
 NEAR = 0.01
 """IoU that a more recognisable candidate of a class may be behind the best."""
@@ -46,11 +49,11 @@ def fit_descent(
     settings = (settings or DescentSettings()).for_outline(outline.length)
     soft = soft or SoftTarget(target)
     report = progress or (lambda _share, _loss: None)
-    prototiles = _starts(target, kind, settings)
+    starts = _starts(target, kind, settings)
+    prototiles = starts.prototiles
     report(0.1, float("nan"))
     descent = Descent(kind, prototiles, settings)
-    goal = shapely.Polygon(target.normal)
-    shapely.prepare(goal)
+    goal = region_of(target.normal)
     crossed = 0
     best = 0.0
     for steps, survivors in settings.stages:
@@ -66,10 +69,27 @@ def fit_descent(
         best = float(iou.max())
     _best_first(target, goal, soft, descent)
     model = descent.flow_model()
+    if soft.weights is None and starts.iou.max() > _overlaps(goal, soft, descent)[0]:
+        model = _with_start(model, prototiles.take([int(starts.iou.argmax())]))
     if settings.polish and soft.weights is None:  # the exact overlap knows no emphasis
         report(0.92, 1 - best)
         model = _polished(target, model, settings)
     return Fit(model, len(prototiles), crossed, 1)
+
+
+def _with_start(model: TileModel, prototile: Prototiles) -> TileModel:
+    """The candidates after a start that none of them beats, with a flow that stays where it is."""
+    still = TileModel(
+        model.isohedral_class,
+        max_frequency=model.max_frequency,
+        smoothness=model.smoothness,
+        steps=model.flow.steps,
+        method=model.flow.method,
+        dtype=model.angle.dtype,
+        prototiles=prototile,
+    )
+    zero = torch.zeros_like(still.fourier_fields()[0].parameters_)
+    return TileModel.joined([still.with_fields([zero] * model.segments), model])
 
 
 def _polished(target: Target, model: TileModel, settings: DescentSettings) -> TileModel:
@@ -111,8 +131,9 @@ def _best_first(target: Target, goal: shapely.Polygon, soft: SoftTarget, descent
     descent.keep(np.argsort(-np.array(scores), kind="stable").tolist(), iou)
 
 
-def _starts(target: Target, kind: IsohedralClass, settings: DescentSettings) -> Prototiles:
+def _starts(target: Target, kind: IsohedralClass, settings: DescentSettings) -> Starts:
     phase = float(np.random.default_rng(settings.seed).random()) if settings.seed else 0.0
+    found: Starts | None = None
     if settings.starts == "outline":
         found = outline_starts(
             target,
@@ -124,12 +145,18 @@ def _starts(target: Target, kind: IsohedralClass, settings: DescentSettings) -> 
             vertices=settings.boundary,
             phase=phase,
         )
-        if len(found.prototiles):
-            return found.prototiles
-    return template_starts(
+        if len(found.prototiles) >= FEW and found.iou.max() >= POOR:
+            return found
+    templates = template_starts(
         kind,
         turns=settings.turns,
         stretch=settings.stretch if settings.lattice else 0.0,
         vertices=settings.boundary,
         phase=phase,
     )
+    # their overlap is not known: 0 says that any result is better
+    plain = Starts(templates, np.zeros(len(templates)))
+    if found is None or not len(found.prototiles):
+        return plain
+    joined = Prototiles.joined([found.prototiles, templates])
+    return Starts(joined, np.concatenate([found.iou, plain.iou]))

@@ -167,7 +167,7 @@ class TileModel(nn.Module):
     def joined(models: Sequence[TileModel]) -> TileModel:
         """The candidates of models that differ in their parameters alone, as one stack."""
         first = models[0]
-        stack = first.take([0] * len(models))
+        stack = first.take([0] * sum(model.size for model in models))
         parts = [dict(model.named_parameters()) for model in models]
         for name, parameter in stack.named_parameters():
             parameter.copy_(torch.cat([part[name] for part in parts]))

@@ -13,7 +13,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from orbiflow.escher.nearest_tile import NearestTiles, nearest_tiles
 from orbiflow.escher.outline import reverse
-from orbiflow.escher.overlap import boundary_iou
+from orbiflow.escher.overlap import boundary_iou, region_of
 from orbiflow.escher.placements import Complex, Placements, best_placements
 from orbiflow.escher.prototiles import Prototiles, subdivided
 from orbiflow.escher.starts import template_symmetries
@@ -170,8 +170,7 @@ def _simple_tiles(
     Where the nearest tile to the outline crosses itself, that to the outline smoothed may not: the
     limbs are shorter, their roots at the same places, and the descent lets them grow.
     """
-    goal = shapely.Polygon(ring)
-    shapely.prepare(goal)
+    goal = region_of(ring)
     for spread in SMOOTHING:
         if not len(placements.starts) or wanted < 1:
             return

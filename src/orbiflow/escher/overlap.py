@@ -8,6 +8,24 @@ import shapely
 from orbiflow.escher.outline import signed_area
 from orbiflow.symmetry.isometry import Array
 
+MANY, COARSE = 1500, 2e-3
+"""Vertices beyond which a region is simplified, and by how much of its size (area 1)."""
+
+
+def region_of(ring: Array) -> shapely.Polygon:
+    """The region of a ring (N, 2) of area about 1, prepared; simplified if its vertices are many.
+
+    For choosing among candidates: intersections with thousands of vertices cost seconds. What is
+    reported is measured with the ring itself.
+    """
+    region = shapely.Polygon(ring)
+    if len(ring) > MANY:
+        simpler = region.simplify(COARSE)
+        if isinstance(simpler, shapely.Polygon) and simpler.is_valid and not simpler.is_empty:
+            region = simpler
+    shapely.prepare(region)
+    return region
+
 
 def boundary_iou(goal: shapely.Polygon, boundaries: Array) -> Array:
     """IoU (S,) of rings (S, N, 2) with a polygon; -1 for those that cross themselves."""
@@ -26,12 +44,11 @@ class Overlap:
     P's boundary inside T; along a side the speed is linear between its ends.
 
     Args:
-        target: (M, 2) ring of the region, simple, in either sense.
+        target: (M, 2) ring of the region, simple, in either sense; see `region_of`.
     """
 
     def __init__(self, target: Array) -> None:
-        self.region = shapely.Polygon(target)
-        shapely.prepare(self.region)
+        self.region = region_of(target)
 
     def iou(self, ring: Array) -> tuple[float, Array]:
         """IoU of a simple ring (N, 2) with the region and its gradient (N, 2).
