@@ -273,5 +273,5 @@ def test_files_that_are_no_density(tmp_path) -> None:
 
 
 def test_other_flows_are_not_saved() -> None:
-    with pytest.raises(OrbiflowError, match="only flows of single Fourier fields"):
+    with pytest.raises(OrbiflowError, match="only flows of Fourier, spline or neural fields"):
         density_to_bytes(SymmetricDensity(Torus(2), Flow(lambda x: 0 * x)))
