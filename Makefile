@@ -24,6 +24,8 @@ bench: $(VENV)/.installed-dev
 	$(BIN)/python benchmarks/ablations.py --quick
 	$(BIN)/python benchmarks/density_kl.py --quick
 	$(BIN)/python benchmarks/density_nll.py --quick
+	$(BIN)/python benchmarks/density_rna.py --quick
+	$(BIN)/python benchmarks/density_unoriented.py --quick
 
 clean:
 	rm -rf $(VENV) out

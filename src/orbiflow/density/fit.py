@@ -27,7 +27,7 @@ MASS_TOLERANCE = 1e-3
 MOST_STEPS = 16
 """Runge-Kutta steps a segment, to which they are doubled where the integrator has not converged."""
 
-FINE_GRID = 1024
+FINE_GRID = 512
 """Points along a side for the integral where 256 are too few."""
 
 MOST_MATCHED = 6_000
