@@ -13,7 +13,7 @@ import torch
 from torch import Tensor
 
 from orbiflow.density.density import SymmetricDensity
-from orbiflow.fields import FourierField, SplineField
+from orbiflow.fields import InvariantField
 from orbiflow.symmetry.isometry import Array
 
 ORDER = 3
@@ -75,10 +75,8 @@ class Objective:
         self.density, self.points = density, points
         self.weights = _even(points) if weights is None else weights
         self.parameters = [p for p in density.flow.parameters() if p.requires_grad]
-        self.fields = [
-            f for f in density.flow.segments if isinstance(f, FourierField | SplineField)
-        ]
-        self.kinetic, self.roughness = kinetic, roughness
+        self.fields = [f for f in density.flow.segments if isinstance(f, InvariantField)]
+        self._weights = [self._penalty_weights(f, kinetic, roughness) for f in self.fields]
         self.last = math.inf
 
     def get(self) -> Array:
@@ -98,11 +96,15 @@ class Objective:
         """Kinetic energy and roughness, exact: the basis is orthonormal."""
         total = self.points.new_zeros(())
         count = len(self.fields)
-        for field in self.fields:
-            energy = (field.parameters_ * field.scale) ** 2
-            gradient = torch.as_tensor(field.basis.magnitude).to(energy) ** (2 * ORDER)
-            total = total + (energy * (self.kinetic + self.roughness * gradient)).sum()
+        for field, weights in zip(self.fields, self._weights, strict=True):
+            total = total + ((field.parameters_ * field.scale) ** 2 * weights).sum()
         return total * count  # a segment of duration 1 stands for a time 1 / count
+
+    @staticmethod
+    def _penalty_weights(field: InvariantField, kinetic: float, roughness: float) -> Tensor:
+        """Of each coefficient's square, (P,)."""
+        magnitude = torch.as_tensor(field.basis.magnitude).to(field.parameters_)
+        return kinetic + roughness * magnitude ** (2 * ORDER)
 
     def __call__(self, values: Array) -> tuple[float, Array]:
         """Loss and gradient; a barrier where the density is not finite."""

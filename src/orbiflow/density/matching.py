@@ -10,7 +10,7 @@ from scipy.optimize import linear_sum_assignment
 from torch import Tensor
 
 from orbiflow.density.space import Space
-from orbiflow.fields import FourierField, SplineField
+from orbiflow.fields import InvariantField
 
 ORDER = 3
 """Of the derivatives that the ridge holds small: the displacements are smooth, their noise is not."""
@@ -44,7 +44,7 @@ def coupled(
 
 @torch.no_grad()
 def match_flow(
-    fields: Sequence[FourierField | SplineField],
+    fields: Sequence[InvariantField],
     space: Space,
     start: Tensor,
     move: Tensor,
@@ -78,7 +78,7 @@ def match_flow(
 
 
 def _least_squares(
-    field: FourierField | SplineField, points: Tensor, values: Tensor, ridge: float, iterations: int
+    field: InvariantField, points: Tensor, values: Tensor, ridge: float, iterations: int
 ) -> Tensor:
     size = len(points)
     magnitude = torch.as_tensor(field.basis.magnitude).to(points)

@@ -27,7 +27,7 @@ from orbiflow.density.neural_storage import (
 )
 from orbiflow.density.space import Space
 from orbiflow.errors import InputFileError, OrbiflowError
-from orbiflow.fields import FourierField, SplineField
+from orbiflow.fields import FourierField, InvariantField, SplineField
 from orbiflow.flows import Flow
 
 FORMAT = "orbiflow-density/1"
@@ -80,7 +80,7 @@ def _flow_parts(flow: Flow) -> tuple[dict[str, Any], dict[str, torch.Tensor]]:
     if not names or any(f.parameters_.dim() != 1 for f in fields):  # type: ignore[union-attr]
         raise OrbiflowError("only flows of Fourier, spline or neural fields are saved")
     first = fields[0]
-    assert isinstance(first, FourierField | SplineField)
+    assert isinstance(first, InvariantField)
     header = {
         "kind": names[0],
         "max_frequency": first.max_frequency,

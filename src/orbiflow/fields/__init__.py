@@ -2,6 +2,7 @@
 
 from orbiflow.fields.derivatives import divergence, jacobian
 from orbiflow.fields.fourier import FourierField
+from orbiflow.fields.invariant_field import InvariantField
 from orbiflow.fields.neural import PeriodicFeatures, neural_field
 from orbiflow.fields.spline_field import SplineField
 from orbiflow.fields.symmetrize import (
@@ -15,6 +16,7 @@ from orbiflow.fields.symmetrize import (
 
 __all__ = [
     "FourierField",
+    "InvariantField",
     "PeriodicFeatures",
     "SplineField",
     "Symmetrized",

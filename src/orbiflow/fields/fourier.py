@@ -8,16 +8,16 @@ from functools import lru_cache
 
 import numpy as np
 import torch
-from torch import Tensor, nn
+from torch import Tensor
 
 from orbiflow.errors import OrbiflowError
+from orbiflow.fields.invariant_field import InvariantField, sobolev_weights
 from orbiflow.fields.invariants import InvariantBasis, invariant_basis
 from orbiflow.fields.series import differentiate, evaluate, weight_cotangent
-from orbiflow.fields.sobolev import sobolev_weights
 from orbiflow.symmetry import CrystallographicGroup
 
 
-class FourierField(nn.Module):
+class FourierField(InvariantField):
     """A vector field V with V(g p) = R_g V(p) for every g in the group.
 
     The parameters are coordinates in an orthonormal basis of the invariant Fourier coefficients, so
@@ -44,11 +44,7 @@ class FourierField(nn.Module):
     60
     """
 
-    rows: Tensor
-    columns: Tensor
-    values: Tensor
     frame: Tensor
-    scale: Tensor
 
     def __init__(
         self,
@@ -60,29 +56,19 @@ class FourierField(nn.Module):
         dtype: torch.dtype = torch.float64,
         device: torch.device | str | None = None,
     ) -> None:
-        super().__init__()
-        self.group = group
-        self.smoothness = smoothness
-        self.basis: InvariantBasis = invariant_basis(group, max_frequency)
-        self.max_frequency = int(max_frequency)
-        self.size = self.basis.size
-        shape = (self.size,) if batch is None else (batch, self.size)
-        self.parameters_ = nn.Parameter(torch.zeros(shape, dtype=dtype, device=device))
+        super().__init__(
+            group,
+            max_frequency,
+            batch=batch,
+            smoothness=smoothness,
+            dtype=dtype,
+            device=device,
+        )
         self._orders = _orders(self.basis)
         self._fill_buffers()
 
-    def _fill_buffers(self) -> None:
-        like = self.parameters_
-        for name, tensor in _constants(
-            self.group, self.max_frequency, self.smoothness, like.dtype, like.device
-        ).items():
-            self.register_buffer(name, tensor, persistent=False)
-
-    def _apply(self, fn: Callable[[Tensor], Tensor], recurse: bool = True) -> FourierField:
-        # a float32 field made float64 must be as symmetric as one born in float64
-        super()._apply(fn, recurse)
-        self._fill_buffers()
-        return self
+    def _constants(self, dtype: torch.dtype, device: torch.device) -> dict[str, Tensor]:
+        return _constants(self.group, self.max_frequency, self.smoothness, dtype, device)
 
     @staticmethod
     def _stacked(parameters: Tensor) -> Tensor:
@@ -196,9 +182,6 @@ class FourierField(nn.Module):
         u = (self.frame @ flat[0].mT)[None] if len(flat) == 1 else self.frame @ flat.mT
         values = evaluate(weights, u)
         return values.mT.reshape(*lead, weights.shape[1])
-
-    def extra_repr(self) -> str:
-        return f"{self.group!r}, max_frequency={self.max_frequency}, parameters={self.size}"
 
 
 def _orders(basis: InvariantBasis) -> tuple[int, ...]:

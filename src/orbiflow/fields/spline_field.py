@@ -8,11 +8,11 @@ from functools import lru_cache
 
 import numpy as np
 import torch
-from torch import Tensor, nn
+from torch import Tensor
 
 from orbiflow.errors import OrbiflowError
+from orbiflow.fields.invariant_field import InvariantField, sobolev_weights
 from orbiflow.fields.invariants import InvariantBasis, invariant_basis
-from orbiflow.fields.sobolev import sobolev_weights
 from orbiflow.fields.splines import padded, spline_sum, spline_sum_with_divergence, symbol
 from orbiflow.symmetry import CrystallographicGroup
 
@@ -20,7 +20,7 @@ PER_WAVE = 3
 """Grid points along the shortest wave, at least: a cubic spline follows it to about 2 per cent."""
 
 
-class SplineField(nn.Module):
+class SplineField(InvariantField):
     """The cubic spline through a `FourierField`'s values on an even grid, a field of its own.
 
     Same parameters, same symmetry (exactly: the group maps the grid to itself), twice continuously
@@ -43,12 +43,6 @@ class SplineField(nn.Module):
     (16, 16)
     """
 
-    rows: Tensor
-    columns: Tensor
-    values: Tensor
-    scale: Tensor
-    magnitude: Tensor
-
     def __init__(
         self,
         group: CrystallographicGroup,
@@ -58,29 +52,14 @@ class SplineField(nn.Module):
         dtype: torch.dtype = torch.float64,
         device: torch.device | str | None = None,
     ) -> None:
-        super().__init__()
-        self.group, self.smoothness = group, smoothness
-        self.basis: InvariantBasis = invariant_basis(group, max_frequency)
-        self.max_frequency = int(max_frequency)
-        self.size = self.basis.size
+        super().__init__(group, max_frequency, smoothness=smoothness, dtype=dtype, device=device)
         self.sides = grid_sides(group, self.basis)
         lengths = np.diag(group.lattice)
         self._per_length = tuple(float(m / a) for m, a in zip(self.sides, lengths, strict=True))
-        self.parameters_ = nn.Parameter(torch.zeros(self.size, dtype=dtype, device=device))
         self._fill_buffers()
 
-    def _fill_buffers(self) -> None:
-        like = self.parameters_
-        for name, tensor in _constants(
-            self.group, self.max_frequency, self.smoothness, like.dtype, like.device
-        ).items():
-            self.register_buffer(name, tensor, persistent=False)
-
-    def _apply(self, fn: Callable[[Tensor], Tensor], recurse: bool = True) -> SplineField:
-        # a float32 field made float64 must be as symmetric as one born in float64
-        super()._apply(fn, recurse)
-        self._fill_buffers()
-        return self
+    def _constants(self, dtype: torch.dtype, device: torch.device) -> dict[str, Tensor]:
+        return _constants(self.group, self.max_frequency, self.smoothness, dtype, device)
 
     def table(self) -> Tensor:
         """The spline's coefficients (d, M_1, ..., M_d)."""
@@ -132,9 +111,6 @@ class SplineField(nn.Module):
         rates = torch.tensor(self._per_length, dtype=points.dtype, device=points.device)
         return points.reshape(-1, d).mT * rates[:, None]
 
-    def extra_repr(self) -> str:
-        return f"{self.group!r}, max_frequency={self.max_frequency}, parameters={self.size}"
-
 
 def grid_sides(group: CrystallographicGroup, basis: InvariantBasis) -> tuple[int, ...]:
     """Points of the grid along each lattice vector, equally spaced and mapped to itself by the group.
@@ -176,7 +152,6 @@ def _constants(
     real = {
         "values": values,
         "scale": sobolev_weights(group, basis, smoothness),
-        "magnitude": basis.magnitude,
     }
     return {
         "rows": torch.tensor(rows, device=device),
