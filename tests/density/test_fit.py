@@ -24,7 +24,7 @@ from orbiflow.density import (
     midpoints,
     read_density,
 )
-from orbiflow.density.fit import split
+from orbiflow.density.fit_report import split
 from orbiflow.density.likelihood import Objective
 from orbiflow.density.matching import conjugate_gradients, coupled, match_flow
 from orbiflow.errors import InputFileError, OrbiflowError

@@ -18,8 +18,8 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 
 from orbiflow.cli.console import output
 from orbiflow.density import DensityEstimator, SymmetricDensity, density_to_bytes, read_density
-from orbiflow.density.fit import FitReport
-from orbiflow.density.fit import Progress as Watch
+from orbiflow.density.fit_report import FitReport
+from orbiflow.density.fit_report import Progress as Watch
 from orbiflow.density.tables import Table, append_column, read_table, to_csv
 from orbiflow.draw import write_atomic
 from orbiflow.draw.folder import make_folder

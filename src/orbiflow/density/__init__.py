@@ -3,8 +3,9 @@
 from orbiflow.density.bases import Base, UniformBase, VonMisesBase
 from orbiflow.density.density import SymmetricDensity, kl_by_quadrature, midpoints
 from orbiflow.density.estimator import SPACES, DensityEstimator, make_space
-from orbiflow.density.fit import FitReport, FitSettings, fit_density
+from orbiflow.density.fit import FitSettings, fit_density
 from orbiflow.density.fit_neural import NeuralSettings, fit_neural
+from orbiflow.density.fit_report import FitReport
 from orbiflow.density.flat_spaces import KleinBottle, Torus
 from orbiflow.density.kernel_fit import mix_kernels
 from orbiflow.density.kernels import AdaptiveKernels

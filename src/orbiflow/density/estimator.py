@@ -10,8 +10,9 @@ import torch
 from numpy.typing import ArrayLike
 
 from orbiflow.density.density import SymmetricDensity
-from orbiflow.density.fit import FitReport, FitSettings, Progress, fit_density
+from orbiflow.density.fit import FitSettings, fit_density
 from orbiflow.density.fit_neural import NeuralSettings, fit_neural
+from orbiflow.density.fit_report import FitReport, Progress
 from orbiflow.density.flat_spaces import KleinBottle, Torus
 from orbiflow.density.round_spaces import ProjectivePlane, Sphere, clear_rotation
 from orbiflow.density.space import Space

@@ -3,26 +3,32 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, fields
 
 import torch
 from torch import Tensor
 
 from orbiflow.density.bases import Base, UniformBase, VonMisesBase
 from orbiflow.density.density import SymmetricDensity
+from orbiflow.density.fit_report import (
+    MASS_TOLERANCE,
+    FitReport,
+    Progress,
+    mean_nll,
+    repeats_note,
+    settle,
+    split,
+    step_error,
+    steps_note,
+)
 from orbiflow.density.kernel_fit import mix_kernels
 from orbiflow.density.likelihood import Refinement, refine
 from orbiflow.density.matching import coupled, match_flow
 from orbiflow.density.merging import merged
-from orbiflow.density.mixed import MixedDensity
 from orbiflow.density.space import Space
 from orbiflow.errors import OrbiflowError
 from orbiflow.fields import SplineField
 from orbiflow.flows import Flow
-
-MASS_TOLERANCE = 1e-3
-"""Of the integral over the square, and of the log-likelihood at doubled steps."""
 
 MOST_STEPS = 16
 """Runge-Kutta steps a segment, to which they are doubled where the integrator has not converged."""
@@ -41,9 +47,6 @@ CELLS, LEAST_CELLS = (6, 12), (48, 96)
 
 MOST_HELD = 4096
 """Validation points at which the steps are checked."""
-
-Progress = Callable[[float, str], None]
-"""Told the share of the work done and what is being done."""
 
 
 @dataclass(frozen=True)
@@ -105,37 +108,6 @@ class FitSettings:
             raise OrbiflowError(f'base must be "uniform" or "von-mises", got {self.base!r}')
 
 
-@dataclass(frozen=True)
-class FitReport:
-    """What a fit did; log-likelihoods in nats with respect to the square.
-
-    - `points`, `duplicates`: data points, and those that equal an earlier one.
-    - `train`, `validation`: points of each.
-    - `train_nll`, `validation_nll`: mean negative log density at the end, of 20,000 points at most.
-    - `start_nll`: on the validation points, of the closed-form start.
-    - `stages`: one for each roughness.
-    - `steps`: RK4 steps a segment, in the end.
-    - `mass`: integral over the square on a grid, None above two dimensions.
-    - `integration_error`: change of the mean validation log density at doubled steps.
-    - `shares`: of flow, kernels and uniform floor, None without kernels.
-    - `notes`: what the user should know, in words.
-    """
-
-    points: int
-    duplicates: int
-    train: int
-    validation: int
-    start_nll: float
-    train_nll: float
-    validation_nll: float
-    stages: tuple[Refinement, ...]
-    steps: int
-    mass: float | None
-    integration_error: float
-    shares: tuple[float, ...] | None = None
-    notes: tuple[str, ...] = field(default=())
-
-
 def fit_density(
     space: Space,
     points: Tensor,
@@ -187,38 +159,41 @@ def fit_density(
         generator=generator,
     )
     density = SymmetricDensity(space, Flow(segments, steps=settings.steps), base)
-    with torch.no_grad():
-        start_nll = -float(density.log_prob(validation.to(dtype)).mean())
+    start_nll = mean_nll(density, validation.to(dtype))
     stages = _refined(density, train, validation, settings, say)
     density.flow.double()
-    error, mass = _converged(density, validation)
-    notes = _notes(space, len(points), duplicates, density, error, mass)
+    error = settle(density, validation[:MOST_REPORTED], MOST_STEPS)
+    mass = _mass(density)
+    notes = repeats_note(len(points), duplicates) + steps_note(density, error)
+    shares = None
     if settings.kernels:
         say(1.0, "kernels")
         density = mix_kernels(density, train, validation)
+        mass = None if mass is None else density.mixed_mass(mass)
+        shares = tuple(density.shares.tolist())
         notes.append(
             "the density is a mixture: flow {:.1%}, kernels {:.1%}, uniform floor {:.1%}".format(
-                *density.shares.tolist()
+                *shares
             )
         )
-    with torch.no_grad():
-        # after the shuffle the first are as good as any
-        nll = [
-            -float(density.log_prob(part[:MOST_REPORTED]).mean()) for part in (train, validation)
-        ]
+    notes += _mass_note(space, mass)
+    # after the shuffle the first are as good as any
+    train_nll, validation_nll = (
+        mean_nll(density, part[:MOST_REPORTED]) for part in (train, validation)
+    )
     report = FitReport(
         points=len(points),
         duplicates=duplicates,
         train=len(train),
         validation=len(validation),
         start_nll=start_nll,
-        train_nll=nll[0],
-        validation_nll=nll[1],
+        train_nll=train_nll,
+        validation_nll=validation_nll,
         stages=tuple(stages),
         steps=density.flow.steps,
         mass=mass,
         integration_error=error,
-        shares=tuple(density.shares.tolist()) if isinstance(density, MixedDensity) else None,
+        shares=shares,
         notes=tuple(notes),
     )
     return density, report
@@ -227,27 +202,6 @@ def fit_density(
 def max_frequency(space: Space, detail: int) -> int:
     """Frequency index that reaches `detail` waves along a side of the square."""
     return round(detail * float(space.group.lattice.diagonal().max()))
-
-
-def split(points: Tensor, share: float, generator: torch.Generator) -> tuple[Tensor, Tensor, int]:
-    """Shuffle and hold out a share, equal points on the same side; and how many repeat another.
-
-    Raises:
-        OrbiflowError: if there are fewer than ten different points.
-    """
-    # rounding keeps together what differs by the projection's last digit
-    unique, where = torch.unique((points * 1e9).round(), dim=0, return_inverse=True)
-    if len(unique) < 10:
-        raise OrbiflowError(
-            f"a density needs at least 10 different points, got {len(unique)} among {len(points)}"
-        )
-    held = torch.zeros(len(unique), dtype=torch.bool)
-    held[torch.randperm(len(unique), generator=generator)[: max(1, round(share * len(unique)))]] = (
-        True
-    )
-    order = torch.randperm(len(points), generator=generator)
-    points, held = points[order], held[where][order]
-    return points[~held], points[held], len(points) - len(unique)
 
 
 def _refined(
@@ -285,7 +239,7 @@ def _refined(
         )
         left -= stage.seconds
         stages.append(stage)
-        unconverged = _step_error(density, validation[:MOST_HELD].to(dtype)) > MASS_TOLERANCE
+        unconverged = step_error(density, validation[:MOST_HELD].to(dtype)) > MASS_TOLERANCE
         if unconverged and density.flow.steps < MOST_STEPS:
             density.flow.steps *= 2
         elif left <= 0 or (number > 1 and stage.best == 0):
@@ -297,54 +251,19 @@ def _cells(detail: int, stage: int) -> int:
     return max(LEAST_CELLS[stage], CELLS[stage] * detail)
 
 
-@torch.no_grad()
-def _step_error(density: SymmetricDensity, points: Tensor) -> float:
-    """Change of the mean log density at `points` when the steps are doubled."""
-    coarse = float(density.log_prob(points).mean())
-    with density.flow.with_steps(2 * density.flow.steps):
-        return abs(float(density.log_prob(points).mean()) - coarse)
-
-
-def _converged(density: SymmetricDensity, validation: Tensor) -> tuple[float, float | None]:
-    """Double the steps until the log-likelihood is right; what is left of error, and the mass."""
-    flow = density.flow
-    while True:
-        error = _step_error(density, validation[:MOST_REPORTED])
-        if error <= MASS_TOLERANCE / 2 or flow.steps >= MOST_STEPS:
-            break
-        flow.steps *= 2
+def _mass(density: SymmetricDensity) -> float | None:
     if density.space.dim != 2:
-        return error, None
+        return None
     mass = density.mass()
-    if abs(mass - 1) > MASS_TOLERANCE / 2:  # a sharp density asks for a finer grid, not more steps
+    if abs(mass - 1) > MASS_TOLERANCE / 2:  # a sharp density asks for a finer grid
         mass = density.mass(FINE_GRID)
-    return error, mass
+    return mass
 
 
-def _notes(
-    space: Space,
-    count: int,
-    duplicates: int,
-    density: SymmetricDensity,
-    error: float,
-    mass: float | None,
-) -> list[str]:
-    notes = []
-    if duplicates:
-        notes.append(
-            f"{duplicates} of {count} points repeat another: they count as often as they come, and "
-            "equal points were kept on the same side of the validation split"
-        )
-    if error > MASS_TOLERANCE:
-        notes.append(
-            f"the integrator has not converged at {density.flow.steps} steps a segment: the mean log "
-            f"density changes by {error:.1e} when they are doubled"
-        )
-    if mass is not None and abs(mass - 1) > MASS_TOLERANCE:
-        notes.append(
-            f"the density integrates to {mass:.4f} on a grid of this {space.name}, not to 1"
-        )
-    return notes
+def _mass_note(space: Space, mass: float | None) -> list[str]:
+    if mass is None or abs(mass - 1) <= MASS_TOLERANCE:
+        return []
+    return [f"the density integrates to {mass:.4f} on a grid of this {space.name}, not to 1"]
 
 
 KNOWN = tuple(f.name for f in fields(FitSettings))

@@ -13,7 +13,15 @@ from torch import Tensor
 
 from orbiflow.density.bases import Base, UniformBase
 from orbiflow.density.density import SymmetricDensity
-from orbiflow.density.fit import MASS_TOLERANCE, FitReport, Progress, split
+from orbiflow.density.fit_report import (
+    FitReport,
+    Progress,
+    mean_nll,
+    repeats_note,
+    settle,
+    split,
+    steps_note,
+)
 from orbiflow.density.flat_spaces import Torus
 from orbiflow.density.likelihood import Refinement
 from orbiflow.density.matching import coupled
@@ -164,22 +172,25 @@ def fit_neural(
     start_nll = trainer.match()
     stages = [trainer.refine()] if settings.refinement else []
     density.flow.double()
-    error = _converged(density, validation)
-    with torch.no_grad():
-        nll = [-float(density.log_prob(part).mean()) for part in (train, validation)]
+    error = settle(density, validation, MOST_STEPS)
+    notes = [
+        *repeats_note(len(points), duplicates),
+        *_notes(mixture, trainer),
+        *steps_note(density, error),
+    ]
     report = FitReport(
         points=len(points),
         duplicates=duplicates,
         train=len(train),
         validation=len(validation),
         start_nll=start_nll,
-        train_nll=nll[0],
-        validation_nll=nll[1],
+        train_nll=mean_nll(density, train),
+        validation_nll=mean_nll(density, validation),
         stages=tuple(stages),
         steps=density.flow.steps,
         mass=None,
         integration_error=error,
-        notes=_notes(len(points), duplicates, density, error, mixture, trainer),
+        notes=tuple(notes),
     )
     return density, report
 
@@ -337,33 +348,8 @@ def _average(mean: dict[str, Tensor], now: dict[str, Tensor], keep: float) -> No
         mean[name].lerp_(value, 1 - keep)
 
 
-@torch.no_grad()
-def _converged(density: SymmetricDensity, validation: Tensor) -> float:
-    """Double the steps until the mean log density has settled; by how much it still changes."""
-    flow = density.flow
-    now = float(density.log_prob(validation).mean())
-    while True:
-        with flow.with_steps(2 * flow.steps):
-            finer = float(density.log_prob(validation).mean())
-        if abs(finer - now) <= MASS_TOLERANCE / 2 or flow.steps >= MOST_STEPS:
-            return abs(finer - now)
-        flow.steps, now = 2 * flow.steps, finer
-
-
-def _notes(
-    count: int,
-    duplicates: int,
-    density: SymmetricDensity,
-    error: float,
-    mixture: MixtureFit | None,
-    trainer: _Trainer,
-) -> tuple[str, ...]:
+def _notes(mixture: MixtureFit | None, trainer: _Trainer) -> list[str]:
     notes = []
-    if duplicates:
-        notes.append(
-            f"{duplicates} of {count} points repeat another: they count as often as they come, and "
-            "equal points were kept on the same side of the validation split"
-        )
     if mixture is not None:
         notes.append(
             f"the base is the mean of {mixture.members} mixtures of {mixture.components} components"
@@ -377,9 +363,4 @@ def _notes(
         notes.append(
             "training was cut short by `seconds`: the result depends on the machine's speed"
         )
-    if error > MASS_TOLERANCE:
-        notes.append(
-            f"the integrator has not converged at {density.flow.steps} steps: the mean log density "
-            f"changes by {error:.1e} when they are doubled"
-        )
-    return tuple(notes)
+    return notes

@@ -82,8 +82,12 @@ class MixedDensity(SymmetricDensity):
 
         A grid would miss the narrowest kernels.
         """
+        return self.mixed_mass(self.flow_density.mass(resolution))
+
+    def mixed_mass(self, flow_mass: float) -> float:
+        """The mixture's integral, given that of the flow's part."""
         share = float(self.shares[0])
-        return share * self.flow_density.mass(resolution) + 1 - share
+        return share * flow_mass + 1 - share
 
     def __repr__(self) -> str:
         flow, kernels, floor = (f"{100 * s:.1f}%" for s in self.shares.tolist())
