@@ -67,9 +67,9 @@ def fit_descent(
         simple = ranking[: max(1, int((iou >= 0).sum()))]
         descent.keep(simple[:survivors].tolist(), iou)
         best = float(iou.max())
-    _best_first(target, goal, soft, descent)
+    first = _best_first(target, goal, soft, descent)
     model = descent.flow_model()
-    if soft.weights is None and starts.iou.max() > _overlaps(goal, soft, descent)[0]:
+    if soft.weights is None and starts.iou.max() > first:
         model = _with_start(model, prototiles.take([int(starts.iou.argmax())]))
     if settings.polish and soft.weights is None:  # the exact overlap knows no emphasis
         report(0.92, 1 - best)
@@ -117,8 +117,12 @@ def _overlaps(goal: shapely.Polygon, soft: SoftTarget, descent: Descent) -> Arra
     return np.where(plain < 0, plain, soft.weighted_iou(rings).numpy())
 
 
-def _best_first(target: Target, goal: shapely.Polygon, soft: SoftTarget, descent: Descent) -> None:
-    """Order the survivors by IoU and recognisability together, those that gave up IoU last."""
+def _best_first(target: Target, goal: shapely.Polygon, soft: SoftTarget, descent: Descent) -> float:
+    """Order the survivors by IoU and recognisability together, those that gave up IoU last.
+
+    Returns:
+        The IoU of the first.
+    """
     boundaries = descent.placed()
     iou = _overlaps(goal, soft, descent)
     recognise = Recogniser(target.normal)
@@ -128,7 +132,9 @@ def _best_first(target: Target, goal: shapely.Polygon, soft: SoftTarget, descent
         else -2.0
         for overlap, ring in zip(iou, boundaries, strict=True)
     ]
-    descent.keep(np.argsort(-np.array(scores), kind="stable").tolist(), iou)
+    order = np.argsort(-np.array(scores), kind="stable").tolist()
+    descent.keep(order, iou)
+    return float(iou[order[0]])
 
 
 def _starts(target: Target, kind: IsohedralClass, settings: DescentSettings) -> Starts:

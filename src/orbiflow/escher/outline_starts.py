@@ -86,10 +86,11 @@ def outline_starts(
     places: list[Array] = []
     for mirrored in (False,) if mirror_closed(kind) else (False, True):
         ring = reverse(target.normal * (1.0, -1.0)) if mirrored else target.normal
+        goal = region_of(ring)
         for points in resolutions:
             outline = resampled(ring, points, phase) @ [1, 1j]
             found = best_placements(kind, outline, projected)
-            for tiles, placements, score in _simple_tiles(kind, ring, outline, found, measured):
+            for tiles, placements, score in _simple_tiles(kind, goal, outline, found, measured):
                 parts.append(Prototiles.of(kind, tiles, vertices, mirrored=mirrored))
                 scores.append(score)
                 places.append((placements.starts[:, None] + tiles.corners) / points)
@@ -163,14 +164,17 @@ def _turn_order(kind: IsohedralClass, pair: EdgePair) -> int:
 
 
 def _simple_tiles(
-    kind: IsohedralClass, ring: Array, outline: Complex, placements: Placements, wanted: int
+    kind: IsohedralClass,
+    goal: shapely.Polygon,
+    outline: Complex,
+    placements: Placements,
+    wanted: int,
 ) -> Iterator[tuple[NearestTiles, Placements, Array]]:
     """The `wanted` nearest tiles that do not cross themselves, their placements and their IoU.
 
     Where the nearest tile to the outline crosses itself, that to the outline smoothed may not: the
     limbs are shorter, their roots at the same places, and the descent lets them grow.
     """
-    goal = region_of(ring)
     for spread in SMOOTHING:
         if not len(placements.starts) or wanted < 1:
             return
