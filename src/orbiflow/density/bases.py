@@ -9,7 +9,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from orbiflow.density.space import Space
+from orbiflow.density.space import Space, rectangle
 from orbiflow.errors import OrbiflowError
 
 
@@ -58,10 +58,7 @@ class VonMisesBase(Base):
         if not concentration > 0 or not math.isfinite(concentration):
             raise OrbiflowError(f"concentration must be positive, got {concentration}")
         self.concentration = float(concentration)
-        lattice = space.group.lattice
-        if not np.allclose(lattice, np.diag(np.diag(lattice))):
-            raise OrbiflowError("the von Mises base needs a rectangular lattice")
-        self.periods = torch.tensor(np.diag(lattice).copy())
+        self.periods = rectangle(space)
 
     def log_prob(self, points: Tensor) -> Tensor:
         images = self.space.group.images(points)

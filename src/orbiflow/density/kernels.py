@@ -10,7 +10,7 @@ from torch import Tensor
 
 from orbiflow.density.bases import Base
 from orbiflow.density.round_spaces import ProjectivePlane, Sphere
-from orbiflow.density.space import Space
+from orbiflow.density.space import Space, rectangle
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry.isometry import Array
 
@@ -87,25 +87,13 @@ class AdaptiveKernels(Base):
             return self.space.vectors_to_chart(vectors)
         angle = torch.tensor(rng.vonmises(0.0, kappa))
         return self.space.project(
-            self.centers[chosen] + angle / (2 * math.pi) * periods(self.space)
+            self.centers[chosen] + angle / (2 * math.pi) * rectangle(self.space)
         )
 
 
 def is_round(space: Space) -> bool:
     """Whether the space has the round area."""
     return isinstance(space, Sphere | ProjectivePlane)
-
-
-def periods(space: Space) -> Tensor:
-    """Lengths (d,) of the sides of the lattice's rectangle.
-
-    Raises:
-        OrbiflowError: if it is none.
-    """
-    lattice = space.group.lattice
-    if not np.allclose(lattice, np.diag(np.diag(lattice))):
-        raise OrbiflowError("kernels need a rectangular lattice")
-    return torch.tensor(np.diag(lattice).copy())
 
 
 def features(space: Space, points: Tensor) -> Tensor:
@@ -118,7 +106,7 @@ def features(space: Space, points: Tensor) -> Tensor:
         ends = [vectors, -vectors] if isinstance(space, ProjectivePlane) else [vectors]
         return torch.stack(ends)
     images = space.group.images(points)
-    angles = 2 * math.pi * images / periods(space).to(points)
+    angles = 2 * math.pi * images / rectangle(space).to(points)
     return torch.cat([angles.cos(), angles.sin()], dim=-1)
 
 
@@ -131,7 +119,7 @@ def kernel_rows(space: Space, centers: Tensor, kappa: Tensor) -> tuple[Tensor, T
         k = kappa[:, 0]
         offsets = (k / (2 * math.pi)).log() - torch.log1p(-torch.exp(-2 * k)) - k
         return kappa * centers, offsets
-    scaled = torch.special.i0e(kappa) * periods(space)
+    scaled = torch.special.i0e(kappa) * rectangle(space)
     return torch.cat([kappa, kappa], dim=1) * centers, -(scaled.log() + kappa).sum(dim=1)
 
 

@@ -134,6 +134,19 @@ class Space(ABC):
         return f"{type(self).__name__}({options})"
 
 
+def rectangle(space: Space) -> Tensor:
+    """Lengths (d,) of the sides of the lattice's rectangle, in sides of the square.
+
+    Raises:
+        OrbiflowError: if the lattice is not rectangular.
+    """
+    lattice = space.group.lattice
+    sides = np.diag(lattice)
+    if not np.allclose(lattice, np.diag(sides)):
+        raise OrbiflowError(f"the lattice of this {space.name} is not rectangular")
+    return torch.tensor(sides.copy())
+
+
 def checked_table(data: ArrayLike, widths: tuple[int, ...], what: str) -> Array:
     """Data as a finite float64 array (N, k), k one of `widths`.
 

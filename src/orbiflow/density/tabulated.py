@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
+
 import torch
 from torch import Tensor
 
-from orbiflow.density.density import SymmetricDensity
-from orbiflow.density.kernels import periods
+from orbiflow.density.density import SymmetricDensity, midpoints
+from orbiflow.density.space import rectangle
 from orbiflow.errors import OrbiflowError
 from orbiflow.fields.splines import padded, spline_sum, symbol
 
@@ -53,14 +55,13 @@ class TabulatedDensity:
 
     def _coefficients(self, density: SymmetricDensity) -> Tensor:
         space, n = self.space, self.resolution
-        sides = [round(n * float(p)) for p in periods(space)]
+        sides = [round(n * float(p)) for p in rectangle(space)]
         # half a step off: no point falls on a cone point, where the area factor is singular
         axes = [(torch.arange(m, dtype=torch.float64) + 0.5) / n for m in sides]
         grid = torch.stack(torch.meshgrid(*axes, indexing="ij"), dim=-1).reshape(-1, 2)
         cell = (space.project(grid) * n).floor().long().clamp(0, n - 1)
-        square = torch.stack(torch.meshgrid(*[axes[0][:n], axes[1][:n]], indexing="ij"), dim=-1)
         with torch.no_grad():
-            values = density.log_prob(square.reshape(-1, 2), measure="uniform").reshape(n, n)
+            values = density.log_prob(midpoints(space, n), measure="uniform").reshape(n, n)
         whole = values[cell[:, 0], cell[:, 1]].reshape(sides)
         along, across = (symbol(m) for m in sides)
         spectrum = torch.fft.fft2(whole) / (along[:, None] * across[None, :])
@@ -68,12 +69,18 @@ class TabulatedDensity:
 
     @torch.no_grad()
     def log_prob(self, points: Tensor, *, measure: str = "square") -> Tensor:
-        """Log densities (...,) at chart points (..., 2), interpolated; see `error`."""
+        """Log densities (...,) at chart points (..., 2), interpolated; see `error`.
+
+        Raises:
+            OrbiflowError: for an unknown measure.
+        """
         flat = points.reshape(-1, 2).double()
         cells = flat.mT * self.resolution - 0.5
         parts = [spline_sum(self._table, block)[0] for block in cells.split(BLOCK, dim=1)]
         values = torch.cat(parts)
-        if measure != "uniform":
+        if measure == "natural":  # the area factor, costlier than the table, drops out
+            values = values - math.log(self.space.volume)
+        elif measure != "uniform":
             values = values - self.space.log_density_factor(flat, "uniform")
             values = values + self.space.log_density_factor(flat, measure)
         return values.reshape(points.shape[:-1])

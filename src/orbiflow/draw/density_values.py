@@ -9,8 +9,9 @@ from torch import Tensor
 
 from orbiflow.density.bases import UniformBase
 from orbiflow.density.density import SymmetricDensity, midpoints
-from orbiflow.density.kernels import AdaptiveKernels, features, is_round, kernel_rows, periods
+from orbiflow.density.kernels import AdaptiveKernels, features, is_round, kernel_rows
 from orbiflow.density.mixed import MixedDensity
+from orbiflow.density.space import rectangle
 from orbiflow.draw.density_scale import SCALES, is_outshone
 from orbiflow.draw.immersions import off_cones
 from orbiflow.errors import OrbiflowError
@@ -103,7 +104,7 @@ def _half_pixels(kernels: AdaptiveKernels, pixel: float) -> Tensor:
         # the chart is conformal: a small square stays a square
         area = kernels.space.log_area(off_cones(kernels.centers)).exp()
         return pixel / 2 * area.sqrt()[:, None]
-    return math.pi * pixel / periods(kernels.space)
+    return math.pi * pixel / rectangle(kernels.space)
 
 
 def _flat_sums(kernels: AdaptiveKernels, kappa: Tensor, x: Tensor, y: Tensor) -> Tensor:
@@ -116,7 +117,7 @@ def _flat_sums(kernels: AdaptiveKernels, kappa: Tensor, x: Tensor, y: Tensor) ->
     total = x.new_zeros(len(x), len(y))
     for images in zip(across, along, strict=True):
         tables = []
-        for axis, (image, period) in enumerate(zip(images, periods(space).tolist(), strict=True)):
+        for axis, (image, period) in enumerate(zip(images, rectangle(space).tolist(), strict=True)):
             angle = 2 * math.pi * (image[:, None] - kernels.centers[:, axis]) / period
             peak = period * torch.special.i0e(kappa[:, axis])
             tables.append((kappa[:, axis] * (angle.cos() - 1)).exp() / peak)
