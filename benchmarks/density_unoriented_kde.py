@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 import torch
-from density_data import Data
+from density_kde import Data, with_floor
 from scipy.special import ive
 
 from orbiflow.density import to_vectors
@@ -64,7 +64,7 @@ class UnorientedKernelDensity:
 
     def score_samples(self, data: Data) -> Data:
         """Log densities (N,), per radian^2 or steradian."""
-        return mixed(self.kernels(data), self.kernel.share, self.area)
+        return with_floor(self.kernels(data), self.kernel.share, self.area)
 
     def _scaled(self, embedded: Data) -> torch.Tensor:
         # a product of two scaled embeddings is the kernel's exponent
@@ -76,12 +76,6 @@ class UnorientedKernelDensity:
             (kappa,) = self.kernel.concentrations
             return math.log(2 * math.pi / kappa) + math.log1p(-math.exp(-2 * kappa))
         return sum(math.log(2 * math.pi * float(ive(0, k))) for k in self.kernel.concentrations)
-
-
-def mixed(log_kernels: Data, share: float, area: float) -> Data:
-    """Log of (1 - share) kernels + share / area."""
-    with np.errstate(divide="ignore"):
-        return np.logaddexp(np.log1p(-share) + log_kernels, np.log(share) - math.log(area))
 
 
 def tuned(train: Data, held: Data, *, axes: bool) -> UnorientedKernelDensity:
@@ -96,7 +90,7 @@ def tuned(train: Data, held: Data, *, axes: bool) -> UnorientedKernelDensity:
         if concentrations not in seen:
             model = UnorientedKernelDensity(train, Kernel(concentrations, 0.0), axes=axes)
             log = model.kernels(held)
-            scores = [float(mixed(log, share, model.area).mean()) for share in SHARES]
+            scores = [float(with_floor(log, share, model.area).mean()) for share in SHARES]
             top = int(np.argmax(scores))
             model.kernel = Kernel(concentrations, SHARES[top])
             seen[concentrations] = scores[top], model

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from orbiflow.cli.density_options import Columns, Data, Measure, Model, Scale, Space, Unit
 from orbiflow.cli.density_patches import patches
 
 density = typer.Typer(
@@ -16,49 +16,6 @@ density = typer.Typer(
     no_args_is_help=True,
     rich_markup_mode="rich",
 )
-
-
-class Space(StrEnum):
-    """Where the data live."""
-
-    TORUS = "torus"
-    SPHERE = "sphere"
-    KLEIN_BOTTLE = "klein-bottle"
-    PROJECTIVE_PLANE = "projective-plane"
-
-
-class Unit(StrEnum):
-    """Of angles."""
-
-    RADIANS = "radians"
-    DEGREES = "degrees"
-    TURNS = "turns"
-
-
-class Measure(StrEnum):
-    """What a density is per."""
-
-    NATURAL = "natural"
-    SQUARE = "square"
-    UNIFORM = "uniform"
-
-
-class Scale(StrEnum):
-    """Of colours."""
-
-    AUTO = "auto"
-    LINEAR = "linear"
-    LOG = "log"
-
-
-Data = Annotated[Path, typer.Argument(help="CSV, TSV, NPY or Parquet.", show_default=False)]
-Columns = Annotated[
-    str | None,
-    typer.Option(help="Names or numbers of the columns, such as lat,lon.", show_default=False),
-]
-Model = Annotated[
-    Path, typer.Option("--model", "-m", help="Folder that `fit` wrote.", show_default=False)
-]
 
 
 @density.command()

@@ -2,19 +2,12 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-
-class AngleUnit(StrEnum):
-    """Of theta and phi."""
-
-    RADIANS = "radians"
-    DEGREES = "degrees"
-    TURNS = "turns"
+from orbiflow.cli.density_options import Unit
 
 
 def patches(
@@ -32,7 +25,7 @@ def patches(
         str | None,
         typer.Option(help="Names or numbers of the 9 or 8 columns.", show_default=False),
     ] = None,
-    unit: Annotated[AngleUnit, typer.Option(help="Of theta and phi.")] = AngleUnit.RADIANS,
+    unit: Annotated[Unit, typer.Option(help="Of theta and phi.")] = Unit.RADIANS,
     farthest: Annotated[
         float | None,
         typer.Option(

@@ -51,12 +51,20 @@ class View(NamedTuple):
         Raises:
             OrbiflowError: for points of another shape.
         """
-        dim = self.space.dim
-        if points.ndim != 2 or points.shape[1] != dim:
-            raise OrbiflowError(f"expected chart points (N, {dim}), got {tuple(points.shape)}")
-        moved = points.detach().double().cpu() - torch.tensor(self.low)
+        moved = chart_points(self.space, points) - torch.tensor(self.low)
         # a translation commutes with the torus' group, and is 0 elsewhere
         return self.space.project(moved).numpy()
+
+
+def chart_points(space: Space, points: Tensor) -> Tensor:
+    """Points (N, d) to draw, float64.
+
+    Raises:
+        OrbiflowError: for another shape.
+    """
+    if points.ndim != 2 or points.shape[1] != space.dim:
+        raise OrbiflowError(f"expected chart points (N, {space.dim}), got {tuple(points.shape)}")
+    return points.detach().double().cpu()
 
 
 def view_of(

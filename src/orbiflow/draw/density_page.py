@@ -24,12 +24,13 @@ from orbiflow.draw.density_axes import (
     View,
     angle_text,
     axis_label,
+    chart_points,
     column_name,
     space_title,
     view_of,
 )
 from orbiflow.draw.density_scale import bar_label, bar_ticks, shading
-from orbiflow.draw.density_square import COLOURS, MAX_DOTS, average_note
+from orbiflow.draw.density_square import COLOURS, average_note, thinned
 from orbiflow.draw.density_values import density_on_grid, is_sharp, takes_logarithms
 from orbiflow.draw.immersions import (
     KLEIN_RADIUS,
@@ -112,7 +113,8 @@ def density_page(
         "measure": bar_label(shade, space, measure),
     }
     if samples is not None:
-        data["samples"] = _packed(immersion(space)(_thinned(space, samples)), "<f4")
+        points = torch.tensor(thinned(chart_points(space, samples).numpy()))
+        data["samples"] = _packed(immersion(space)(space.project(points)), "<f4")
     caption = _caption(view)
     if is_sharp(density, _SOFT / cells):
         note = average_note(round(cells / _SOFT))
@@ -245,15 +247,6 @@ def _coast(space: Space, coastlines: Sequence[ArrayLike] | None) -> list[Array]:
         raise OrbiflowError(f"coastlines need latitudes and longitudes, the {space.name} has none")
     tables = [checked_table(line, (2,), "a coastline") for line in coastlines]
     return [_of_vectors(space, to_vectors(table)) for table in tables if len(table) > 1]
-
-
-def _thinned(space: Space, samples: Tensor) -> Tensor:
-    if samples.ndim != 2 or samples.shape[1] != space.dim:
-        raise OrbiflowError(f"expected chart points (N, {space.dim}), got {tuple(samples.shape)}")
-    points = space.project(samples.detach().double().cpu())
-    if len(points) > MAX_DOTS:
-        points = points[np.random.default_rng(0).choice(len(points), MAX_DOTS, replace=False)]
-    return points
 
 
 def _colours() -> Array:

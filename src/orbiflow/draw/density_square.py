@@ -161,12 +161,18 @@ def draw_dots(
     Args:
         shrink: what to multiply the dots' area by.
     """
-    if len(points) > (limit := min(limit, MAX_DOTS)):
-        points = points[np.random.default_rng(0).choice(len(points), limit, replace=False)]
+    points = thinned(points, min(limit, MAX_DOTS))
     axes.scatter(
         *points.T, s=shrink * max(2.0, 9.0 - len(points) / 500), c=fill, edgecolors=rim,
         linewidths=0.35, alpha=alpha, zorder=3,
     )  # fmt: skip
+
+
+def thinned(points: Array, limit: int = MAX_DOTS) -> Array:
+    """A random choice of at most `limit` of points (N, d), always the same."""
+    if len(points) <= limit:
+        return points
+    return points[np.random.default_rng(0).choice(len(points), limit, replace=False)]
 
 
 def _shade_bar(image: AxesImage, place: Axes, shade: Shade, label: str, size: float) -> None:

@@ -1,0 +1,52 @@
+"""Choices and arguments that commands of `orbiflow density` share."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+class Space(StrEnum):
+    """Where the data live."""
+
+    TORUS = "torus"
+    SPHERE = "sphere"
+    KLEIN_BOTTLE = "klein-bottle"
+    PROJECTIVE_PLANE = "projective-plane"
+
+
+class Unit(StrEnum):
+    """Of angles."""
+
+    RADIANS = "radians"
+    DEGREES = "degrees"
+    TURNS = "turns"
+
+
+class Measure(StrEnum):
+    """What a density is per."""
+
+    NATURAL = "natural"
+    SQUARE = "square"
+    UNIFORM = "uniform"
+
+
+class Scale(StrEnum):
+    """Of colours."""
+
+    AUTO = "auto"
+    LINEAR = "linear"
+    LOG = "log"
+
+
+Data = Annotated[Path, typer.Argument(help="CSV, TSV, NPY or Parquet.", show_default=False)]
+Columns = Annotated[
+    str | None,
+    typer.Option(help="Names or numbers of the columns, such as lat,lon.", show_default=False),
+]
+Model = Annotated[
+    Path, typer.Option("--model", "-m", help="Folder that `fit` wrote.", show_default=False)
+]
