@@ -1,35 +1,16 @@
 """Tables of numbers: what is read from each kind of file, what is refused, what is written."""
 
-import io
-import sys
 import tracemalloc
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from orbiflow.density.tables import append_column, files, read_table, text, to_csv
 from orbiflow.errors import InputFileError, OrbiflowError
-
-PROPERTY = settings(
-    max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
-
-
-def write(tmp_path: Path, content: str | bytes, name: str = "a.csv") -> Path:
-    path = tmp_path / name
-    path.write_bytes(content if isinstance(content, bytes) else content.encode())
-    return path
-
-
-def refuse(path: Path, match: str, columns: list[str] | None = None, width: int | None = 2) -> None:
-    with pytest.raises(InputFileError, match=match) as caught:
-        read_table(path, columns=columns, width=width)
-    assert str(caught.value).startswith(f"{path}: ")
-    assert len(str(caught.value)) < 2 * len(str(path)) + 400
+from table_files import PROPERTY, refuse, write
 
 
 @pytest.mark.parametrize(
@@ -282,144 +263,3 @@ def test_to_csv_quotes_names() -> None:
     assert header == '"a,b","c""d","#e",f g,é\n'
     with pytest.raises(ValueError, match="shape"):
         to_csv(["a"], [[1, 2]])
-
-
-# npy
-
-
-def npy(array: np.ndarray, **options: bool) -> bytes:
-    file = io.BytesIO()
-    np.save(file, array, **options)  # pyright: ignore[reportArgumentType]
-    return file.getvalue()
-
-
-@pytest.mark.parametrize(
-    "array",
-    [
-        np.array([[1, 2], [3, 4]]),
-        np.array([[1, 2], [3, 4]], dtype=">f4"),
-        np.asfortranarray(np.array([[1, 2], [3, 4]], dtype=np.uint8)),
-        np.array([[1, 2], [3, 4]], dtype=np.longdouble),
-        np.array([(1, b"a", 2), (3, b"b", 4)], dtype=[("lat", "f4"), ("s", "S3"), ("lon", "i2")]),
-    ],
-)
-@pytest.mark.parametrize("name", ["a.npy", "a"])
-def test_npy(tmp_path: Path, array: np.ndarray, name: str) -> None:
-    path = write(tmp_path, npy(array), name)
-    table = read_table(path, columns=None, width=2)
-    assert table.values.tolist() == [[1, 2], [3, 4]]
-    assert table.values.dtype == np.float64
-    assert table.columns == (("lat", "lon") if array.dtype.names else ("column1", "column2"))
-    assert table.lines.tolist() == [1, 2]
-    assert (table.header, table.delimiter) == (None, None)
-    out = append_column(table, path, "LAT", [5, 6]).decode().splitlines()
-    assert out[0] == ("lat,lon,LAT_2" if array.dtype.names else "column1,column2,LAT")
-    assert out[1:] == ["1,2,5", "3,4,6"]
-
-
-def test_npy_choice(tmp_path: Path) -> None:
-    path = write(tmp_path, npy(np.array([[1, 2, 3]])), "a.npy")
-    assert read_table(path, columns=["3", "column1"], width=2).values.tolist() == [[3, 1]]
-    refuse(path, "2 columns of numbers must be taken and it has 3")
-
-
-def claim(shape: str, descr: str = "'<f8'") -> bytes:
-    """An npy file whose header promises `shape` and that holds 16 bytes."""
-    header = f"{{'descr': {descr}, 'fortran_order': False, 'shape': {shape}}}\n".encode()
-    return b"\x93NUMPY\x01\x00" + len(header).to_bytes(2, "little") + header + bytes(16)
-
-
-@pytest.mark.parametrize(
-    ("content", "message"),
-    [
-        (npy(np.array([[{}, 1]], dtype=object), allow_pickle=True), "Python objects"),
-        (claim("(1,)", "[('a', '|O')]"), "Python objects"),
-        (npy(np.array([1.0, 2])), r"shape '\(2,\)'"),
-        (npy(np.zeros((2, 2, 2))), "shape"),
-        (npy(np.array(1.0)), "shape"),
-        (npy(np.zeros((0, 2))), "no rows"),
-        (npy(np.zeros((2, 0))), "it has 0"),
-        (npy(np.array([["a", "b"]])), "column 'column1' holds '<U1', not numbers"),
-        (npy(np.array([[1j, 2]])), "column 'column1' holds 'complex128'"),
-        (npy(np.array([[1j, 2, 3]])), "it has 0"),
-        (npy(np.array([[1, 2], [np.nan, np.inf]])), "2 cells empty, .* row 2, column 'column1'"),
-        (npy(np.zeros((9, 2)))[:-1], "promises 144 bytes of numbers and 143 follow"),
-        (claim("(10000000, 9000)"), "promises 720000000000 bytes"),
-        (claim("(4611686018427387904, 4)"), "promises 147573952589676412928 bytes"),
-        (claim("(1, 4611686018427387904)"), "promises"),
-        (claim("(20000001, 1)", "'|V0'"), "more than 20000000 rows"),
-        (claim("(0, 4611686018427387904)"), "more than 10000 columns"),
-        (claim("(-1, 2)"), "shape"),
-        (claim("(" * 900), "damaged"),
-        (claim("(1, 2)" + " " * 20_000), "damaged"),
-        (claim("(1, 2)", "'<q9'"), "damaged"),
-        (b"\x93NUMPY\x09\x00" + bytes(99), "damaged"),
-        (b"\x93NUM", "does not begin as a .npy file"),
-        (b"1,2\n", "does not begin as a .npy file"),
-    ],
-)
-@pytest.mark.filterwarnings("ignore:invalid escape")
-def test_bad_npy(tmp_path: Path, content: bytes, message: str) -> None:
-    refuse(write(tmp_path, content, "a.npy"), message)
-
-
-def test_npy_column_that_is_text(tmp_path: Path) -> None:
-    array = np.array([(1, b"a")], dtype=[("lat", "f4"), ("s", "S3")])
-    refuse(write(tmp_path, npy(array), "a.npy"), "column 's' holds", ["lat", "s"])
-
-
-# Parquet
-
-
-def test_parquet_without_pyarrow(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "pyarrow", None)
-    with pytest.raises(OrbiflowError, match=r"pip install 'orbiflow\[parquet\]'"):
-        read_table(write(tmp_path, "PAR1", "a.parquet"), columns=None, width=2)
-    refuse(write(tmp_path, "1,2", "a.parquet"), "does not begin as a .parquet file")
-
-
-def parquet(tmp_path: Path, columns: dict[str, Any], names: list[str] | None = None) -> Path:
-    arrow = pytest.importorskip("pyarrow")
-    table = arrow.table(columns)
-    path = tmp_path / "a.parquet"
-    pytest.importorskip("pyarrow.parquet").write_table(
-        table.rename_columns(names) if names else table, path
-    )
-    return path
-
-
-def test_parquet(tmp_path: Path) -> None:
-    path = parquet(tmp_path, {"lat": [1.0, 3], "city": ["a", "b"], "lon.x": [2**60 + 1, 4]})
-    table = read_table(path, columns=None, width=2)
-    assert table.values.tolist() == [[1, 2**60], [3, 4]]
-    assert table.columns == ("lat", "lon.x")
-    assert table.lines.tolist() == [1, 2]
-    assert append_column(table, path, "p", [5, 6]).startswith(b"lat,lon.x,p\n1,1.152921505e+18,5\n")
-    refuse(path, "column 'city' holds 'string', not numbers", ["lat", "CITY"])
-    refuse(path, "no column 'x'", ["x"])
-    with pytest.raises(InputFileError, match="more than 1 rows"):
-        read_table(path, columns=None, width=2, max_rows=1)
-
-
-def test_parquet_nulls_and_repeated_names(tmp_path: Path) -> None:
-    refuse(
-        parquet(tmp_path, {"a": [1, None, 2], "b": [1.0, None, float("nan")]}), "3 cells .* row 2"
-    )
-    refuse(parquet(tmp_path, {"a": np.zeros(0), "b": np.zeros(0)}), "no rows")
-    path = parquet(tmp_path, {"a": [1], "b": [2], "c": [3]}, ["a", "a", "c"])
-    refuse(path, "columns 1 and 2 are all called 'a'", ["1", "c"])
-
-
-@PROPERTY
-@given(data=st.data())
-def test_damaged_parquet(tmp_path: Path, data: st.DataObject) -> None:
-    path = parquet(tmp_path, {"a": list(range(50)), "b": [0.5] * 50})
-    content = bytearray(path.read_bytes())
-    for i in data.draw(st.lists(st.integers(4, len(content) - 1), min_size=1, max_size=4)):
-        content[i] ^= data.draw(st.integers(1, 255))
-    path.write_bytes(content[: data.draw(st.integers(4, len(content)))])
-    try:
-        table = read_table(path, columns=None, width=2, max_rows=1000)
-    except InputFileError:
-        return
-    assert len(table.values) == len(table.lines)

@@ -1,0 +1,26 @@
+"""Writing and refusing tables, shared by the tests of what reads them."""
+
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, settings
+
+from orbiflow.density.tables import read_table
+from orbiflow.errors import InputFileError
+
+PROPERTY = settings(
+    max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+
+
+def write(tmp_path: Path, content: str | bytes, name: str = "a.csv") -> Path:
+    path = tmp_path / name
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    return path
+
+
+def refuse(path: Path, match: str, columns: list[str] | None = None, width: int | None = 2) -> None:
+    with pytest.raises(InputFileError, match=match) as caught:
+        read_table(path, columns=columns, width=width)
+    assert str(caught.value).startswith(f"{path}: ")
+    assert len(str(caught.value)) < 2 * len(str(path)) + 400
