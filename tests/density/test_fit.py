@@ -9,6 +9,7 @@ import pytest
 import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from sklearn.model_selection import GridSearchCV
 
 from orbiflow.density import (
     DensityEstimator,
@@ -217,8 +218,7 @@ def test_parameters_of_the_estimator() -> None:
 
 
 def test_a_grid_search() -> None:
-    selection = pytest.importorskip("sklearn.model_selection", reason="scikit-learn is not there")
-    search = selection.GridSearchCV(
+    search = GridSearchCV(
         DensityEstimator("torus", segments=2, iterations=3), {"detail": [1, 2]}, cv=2
     ).fit(DATA["torus"])
     assert search.best_params_["detail"] in (1, 2)

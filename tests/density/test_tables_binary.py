@@ -6,6 +6,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow
+import pyarrow.parquet
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -109,12 +111,9 @@ def test_parquet_without_pyarrow(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 
 
 def parquet(tmp_path: Path, columns: dict[str, Any], names: list[str] | None = None) -> Path:
-    arrow = pytest.importorskip("pyarrow")
-    table = arrow.table(columns)
+    table = pyarrow.table(columns)
     path = tmp_path / "a.parquet"
-    pytest.importorskip("pyarrow.parquet").write_table(
-        table.rename_columns(names) if names else table, path
-    )
+    pyarrow.parquet.write_table(table.rename_columns(names) if names else table, path)
     return path
 
 
