@@ -5,8 +5,8 @@
 Targets on the unit square (reference.json): four and six Gaussians of variance 0.005, and the 5 x 5
 checkerboard. On sphere and projective plane also with the round area in place of the square's: the
 target is then the same function times the area factor. KL by quadrature on 200 x 200 points at
-doubled steps; mass on 256 x 256, or 512 x 512 where that is off by 5e-4. Bars: 0.01, 0.02, 0.08,
-each within 60 s on 2 cores (a fit uses one), mass 1 within 1e-3.
+doubled steps; mass as `SymmetricDensity.mass` has it. Bars: 0.01, 0.02, 0.08, each within 60 s on 2
+cores (a fit uses one), mass 1 within 1e-3.
 """
 
 from __future__ import annotations

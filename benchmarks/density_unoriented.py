@@ -6,7 +6,7 @@ Defined in docs/benchmark-unoriented.md. Mean negative log-likelihood of the tes
 radian^2 of theta, phi on the Klein bottle (area 2 pi^2) or per steradian on the projective plane (area
 2 pi), over random 80/10/10 splits: of a flow alone, of that flow mixed with kernels (`kernels=True`),
 beside the uniform density, a kernel density summed over the identification and tuned on the validation
-points, and, for the two synthetic sets, the true density. The integral is the flow's, on 256 x 256.
+points, and, for the two synthetic sets, the true density. The integral is the flow's.
 """
 
 from __future__ import annotations

@@ -17,6 +17,9 @@ from orbiflow.flows import Flow
 BLOCK = 65536
 """Points integrated at a time where no gradient is asked for: bounds the memory."""
 
+CARRIED = 4096
+"""Points carried at a time with the Jacobian of the carrying."""
+
 
 class SymmetricDensity(Distribution):
     """The push-forward of `base` by `flow` (paper, section 5; design point 14).
@@ -113,14 +116,32 @@ class SymmetricDensity(Distribution):
         points = self.sample((count,), generator)
         return (self.log_prob(points) - other.log_prob(points)).mean()
 
-    @torch.no_grad()
-    def mass(self, resolution: int = 256) -> float:
+    def mass(self, resolution: int = 64) -> float:
         """The density's integral over the square, by the midpoint rule on resolution^2 points.
+
+        The points are spread evenly over the base and carried by the flow, so that they crowd where
+        the density is high, and each counts for the area that its surroundings are carried to: the
+        Jacobian of the carrying, taken by automatic differentiation. What is off from 1 is the
+        integrator's error: a plain grid of 512^2 misses 1 % of a density in sharp clusters.
 
         Raises:
             OrbiflowError: in more than two dimensions, where a grid is out of reach.
         """
-        return float(self.log_prob(midpoints(self.space, resolution)).exp().mean())
+        grid = midpoints(self.space, resolution).to(self._like())
+        parts = [self._carried_mass(block) for block in grid.split(CARRIED)]
+        return float(torch.cat(parts).mean())
+
+    def _carried_mass(self, start: Tensor) -> Tensor:
+        with torch.enable_grad():
+            start = start.requires_grad_()
+            end = self.flow(start)
+            rows = [
+                torch.autograd.grad(end[:, k].sum(), start, retain_graph=k == 0)[0] for k in (0, 1)
+            ]
+        with torch.no_grad():
+            # signed: a map that folds still covers the square once
+            area = torch.linalg.det(torch.stack(rows, dim=1))
+            return self.log_prob(end.detach()).exp() * area
 
     @torch.no_grad()
     def integration_error(self, points: Tensor) -> float:

@@ -33,9 +33,6 @@ from orbiflow.flows import Flow
 MOST_STEPS = 16
 """Runge-Kutta steps a segment, to which they are doubled where the integrator has not converged."""
 
-FINE_GRID = 512
-"""Points along a side for the integral where 256 are too few."""
-
 MOST_MATCHED = 6_000
 """Points that the closed-form start looks at."""
 
@@ -163,7 +160,7 @@ def fit_density(
     stages = _refined(density, train, validation, settings, say)
     density.flow.double()
     error = settle(density, validation[:MOST_REPORTED], MOST_STEPS)
-    mass = _mass(density)
+    mass = density.mass() if space.dim == 2 else None
     notes = repeats_note(len(points), duplicates) + steps_note(density, error)
     shares = None
     if settings.kernels:
@@ -251,19 +248,10 @@ def _cells(detail: int, stage: int) -> int:
     return max(LEAST_CELLS[stage], CELLS[stage] * detail)
 
 
-def _mass(density: SymmetricDensity) -> float | None:
-    if density.space.dim != 2:
-        return None
-    mass = density.mass()
-    if abs(mass - 1) > MASS_TOLERANCE / 2:  # a sharp density asks for a finer grid
-        mass = density.mass(FINE_GRID)
-    return mass
-
-
 def _mass_note(space: Space, mass: float | None) -> list[str]:
     if mass is None or abs(mass - 1) <= MASS_TOLERANCE:
         return []
-    return [f"the density integrates to {mass:.4f} on a grid of this {space.name}, not to 1"]
+    return [f"the density integrates to {mass:.4f} over the {space.name}, not to 1"]
 
 
 KNOWN = tuple(f.name for f in fields(FitSettings))

@@ -29,7 +29,7 @@ class FitReport:
     - `start_nll`: on the validation points, of the closed-form start.
     - `stages`: one for each roughness.
     - `steps`: RK4 steps a segment, in the end.
-    - `mass`: integral over the square, the flow's part of it on a grid; None above two dimensions.
+    - `mass`: integral over the square, see `SymmetricDensity.mass`; None above two dimensions.
     - `integration_error`: change of the flow's mean validation log density at doubled steps.
     - `shares`: of flow, kernels and uniform floor, None without kernels.
     - `notes`: what the user should know, in words.

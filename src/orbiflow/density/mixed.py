@@ -77,7 +77,7 @@ class MixedDensity(SymmetricDensity):
         return drawn.reshape(*shape, self.space.dim)
 
     @torch.no_grad()
-    def mass(self, resolution: int = 256) -> float:
+    def mass(self, resolution: int = 64) -> float:
         """As of any density; kernels and floor, normalised in closed form, count as their shares.
 
         A grid would miss the narrowest kernels.
