@@ -66,14 +66,24 @@ class KernelDensity:
 
     @classmethod
     def tuned(cls, train: Data, validation: Data, *, round_: bool) -> KernelDensity:
-        """The concentration and floor that suit (at most 2,000 of) the validation data best."""
+        """The concentration and floor that suit (at most 2,000 of) the validation data best.
+
+        Of `WIDTHS` every fourth is tried, then those about the best.
+        """
         best, validation = (-math.inf, 1.0, 0.0), validation[:2000]
-        for kappa in WIDTHS:
-            bare = cls(train, kappa, round_=round_)
-            values, volume = bare.score_samples(validation), bare.volume(validation)
-            for floor in FLOORS:
-                score = float(with_floor(values, floor, volume).mean())
-                best = max(best, (score, float(kappa), floor))
+
+        def look(places: range) -> None:
+            nonlocal best
+            for kappa in WIDTHS[[k for k in places if 0 <= k < len(WIDTHS)]]:
+                bare = cls(train, kappa, round_=round_)
+                values, volume = bare.score_samples(validation), bare.volume(validation)
+                for floor in FLOORS:
+                    score = float(with_floor(values, floor, volume).mean())
+                    best = max(best, (score, float(kappa), floor))
+
+        look(range(0, len(WIDTHS), 4))
+        at = int(abs(WIDTHS - best[1]).argmin())
+        look(range(at - 3, at + 4))
         return cls(train, best[1], round_=round_, floor=best[2])
 
 

@@ -46,8 +46,10 @@ example() {
     shift 4
     echo "== $name"
     orbiflow density fit "$table" --columns "$columns" --seconds "$limit" --out "$work/$name" "$@"
+    # dots would hide the colours of the square
+    case $wanted in *density*) dots= ;; *) dots=--dots ;; esac
     orbiflow density plot --model "$work/$name" --data "$table" --columns "$columns" \
-        --out "$work/$name"
+        --out "$work/$name" $dots
     for picture in $wanted; do
         case $picture in
         surface) surface "$name" ;;
@@ -90,7 +92,7 @@ wildfires() {
         echo "== wildfires: left out, FIRES is not set"
         return
     fi
-    example wildfires "samples surface" "$FIRES" "${FIRES_COLUMNS:-1,2}" --space sphere
+    example wildfires "samples surface" "$FIRES" "${FIRES_COLUMNS:-1,2}" --space sphere --kernels
     score wildfires <<'TABLE'
 lat,lon
 6,-69
