@@ -28,6 +28,7 @@ from orbiflow.density import (
 from orbiflow.density.fit_report import split
 from orbiflow.density.likelihood import Objective
 from orbiflow.density.matching import conjugate_gradients, coupled, match_flow
+from orbiflow.density.merging import LEVELS, merged
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.fields import FourierField
 from orbiflow.flows import Flow
@@ -137,6 +138,28 @@ def test_few_or_equal_points_are_refused() -> None:
     for points in (torch.rand(9, 2), torch.full((500, 2), 0.3)):
         with pytest.raises(OrbiflowError, match="at least 10 different points, got"):
             fit_density(Torus(2), points, QUICK)
+
+
+@given(seeds, st.integers(1, 20), st.integers(1, 8), st.integers(1, 3))
+def test_merging_keeps_mean_and_mass(seed: int, cells: int, crowd: int, dim: int) -> None:
+    rng = np.random.default_rng(seed)
+    points = torch.tensor(rng.random((200, dim)) ** 4)  # crowded at 0
+    few, weights = merged(points, cells, crowd)
+    assert float(weights.sum()) == pytest.approx(1)
+    assert torch.allclose(weights @ few, points.mean(dim=0))
+    finest = (points * (cells << LEVELS)).floor()
+    fullest = int(finest.unique(dim=0, return_counts=True)[1].max())
+    assert float(weights.max()) <= max(crowd, fullest) / 200 + 1e-9
+    # every point is as near to its cell's mean as cells are wide
+    assert float(torch.cdist(points, few).amin(dim=1).max()) <= math.sqrt(dim) / cells
+
+
+def test_held_out_scores_are_of_the_points_themselves() -> None:
+    rng = np.random.default_rng(3)
+    sharp = np.where(rng.random((3000, 1)) < 0.5, 0.3, 0.7) + 0.01 * rng.normal(size=(3000, 2))
+    _, report = fit_density(Torus(2), torch.tensor(sharp), QUICK)
+    stage = report.stages[-1]
+    assert stage.validation[stage.best] == pytest.approx(report.validation_nll, abs=0.01)
 
 
 @pytest.mark.parametrize(

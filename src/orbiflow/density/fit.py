@@ -39,11 +39,17 @@ MOST_MATCHED = 6_000
 MOST_REPORTED = 20_000
 """Points over which the report's mean log densities are taken."""
 
-CELLS, LEAST_CELLS = (6, 12), (48, 96)
-"""Cells a wave, and a side at least, in which points are merged: in the first stage, and then."""
+CELLS, LEAST_CELLS = (4, 8), (32, 64)
+"""Cells a wave, and a side at least, in which points are merged: in the first stage, and then.
+
+Cells where points crowd are smaller, see `merged`.
+"""
+
+MERGED, CROWD = 4096, 2
+"""Into how many points the data are merged, roughly; and of how many fair shares a cell is too full."""
 
 MOST_HELD = 4096
-"""Validation points at which the steps are checked."""
+"""Validation points that refinement is scored on, and at which the steps are checked."""
 
 
 @dataclass(frozen=True)
@@ -212,7 +218,8 @@ def _refined(
     if not settings.iterations:
         return stages
     dtype = next(density.flow.parameters()).dtype
-    held, held_weights = merged(validation, _cells(settings.detail, -1))
+    # never merged: means of cells would call overfitting to means of cells good
+    held = validation[:MOST_HELD].to(dtype)
     count = len(settings.roughness)
     left = settings.seconds
     for number, roughness in enumerate(settings.roughness):
@@ -221,13 +228,16 @@ def _refined(
             share = (number + iteration / settings.iterations) / count
             say(share, f"likelihood: train {nll:.4f}, validation {score:.4f}")
 
-        points, weights = merged(train, _cells(settings.detail, min(number, 1)))
+        points, weights = merged(
+            train,
+            _cells(settings.detail, min(number, 1)),
+            crowd=math.ceil(CROWD * len(train) / MERGED),
+        )
         stage = refine(
             density,
             points.to(dtype),
-            held.to(dtype),
+            held,
             weights=weights.to(dtype),
-            held_weights=held_weights.to(dtype),
             iterations=settings.iterations,
             kinetic=settings.kinetic,
             roughness=roughness,
@@ -236,7 +246,7 @@ def _refined(
         )
         left -= stage.seconds
         stages.append(stage)
-        unconverged = step_error(density, validation[:MOST_HELD].to(dtype)) > MASS_TOLERANCE
+        unconverged = step_error(density, held) > MASS_TOLERANCE
         if unconverged and density.flow.steps < MOST_STEPS:
             density.flow.steps *= 2
         elif left <= 0 or (number > 1 and stage.best == 0):
