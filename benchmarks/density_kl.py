@@ -90,7 +90,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("spaces", nargs="*")
     parser.add_argument("--points", type=int, default=131072)
-    parser.add_argument("--seconds", type=float, default=40.0, help="of likelihood refinement")
+    parser.add_argument("--seconds", type=float, default=30.0, help="of likelihood refinement")
     parser.add_argument("--seeds", type=int, default=1, help="the worst is reported")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--quick", action="store_true", help="the torus, few points, 5 s each")

@@ -114,7 +114,7 @@ def main() -> None:
     parser.add_argument("data", nargs="*", choices=(*TORI, *EARTH, []))
     parser.add_argument("--splits", type=int, default=5)
     parser.add_argument("--grouped", action="store_true")
-    parser.add_argument("--seconds", type=float, default=30.0, help="of refinement")
+    parser.add_argument("--seconds", type=float, default=20.0, help="of refinement")
     parser.add_argument("--detail", type=int, default=8)
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--quick", action="store_true", help="proline, one split, 10 s")

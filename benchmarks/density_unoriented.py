@@ -103,7 +103,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("data", nargs="*", choices=(*KLEIN, *AXES, []))
     parser.add_argument("--splits", type=int, default=5)
-    parser.add_argument("--seconds", type=float, default=60.0, help="of refinement")
+    parser.add_argument("--seconds", type=float, default=20.0, help="of refinement")
     parser.add_argument("--detail", type=int, default=8)
     parser.add_argument("--quick", action="store_true", help="three-axes, one split, 5 s")
     options = parser.parse_args()

@@ -39,13 +39,10 @@ MOST_MATCHED = 6_000
 MOST_REPORTED = 20_000
 """Points over which the report's mean log densities are taken."""
 
-CELLS, LEAST_CELLS = (4, 8), (32, 64)
-"""Cells a wave, and a side at least, in which points are merged: in the first stage, and then.
+CELLS, LEAST_CELLS = 8, 64
+"""Cells a wave, and a side at least, in which points are merged; where they crowd in smaller ones."""
 
-Cells where points crowd are smaller, see `merged`.
-"""
-
-MERGED, CROWD = 4096, 2
+MERGED, CROWD = 8192, 2
 """Into how many points the data are merged, roughly; and of how many fair shares a cell is too full."""
 
 MOST_HELD = 4096
@@ -218,6 +215,14 @@ def _refined(
     if not settings.iterations:
         return stages
     dtype = next(density.flow.parameters()).dtype
+    points, weights = (
+        part.to(dtype)
+        for part in merged(
+            train,
+            max(LEAST_CELLS, CELLS * settings.detail),
+            crowd=math.ceil(CROWD * len(train) / MERGED),
+        )
+    )
     # never merged: means of cells would call overfitting to means of cells good
     held = validation[:MOST_HELD].to(dtype)
     count = len(settings.roughness)
@@ -228,16 +233,11 @@ def _refined(
             share = (number + iteration / settings.iterations) / count
             say(share, f"likelihood: train {nll:.4f}, validation {score:.4f}")
 
-        points, weights = merged(
-            train,
-            _cells(settings.detail, min(number, 1)),
-            crowd=math.ceil(CROWD * len(train) / MERGED),
-        )
         stage = refine(
             density,
-            points.to(dtype),
+            points,
             held,
-            weights=weights.to(dtype),
+            weights=weights,
             iterations=settings.iterations,
             kinetic=settings.kinetic,
             roughness=roughness,
@@ -252,10 +252,6 @@ def _refined(
         elif left <= 0 or (number > 1 and stage.best == 0):
             break
     return stages
-
-
-def _cells(detail: int, stage: int) -> int:
-    return max(LEAST_CELLS[stage], CELLS[stage] * detail)
 
 
 def _mass_note(space: Space, mass: float | None) -> list[str]:
