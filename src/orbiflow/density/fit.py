@@ -42,7 +42,7 @@ MOST_REPORTED = 20_000
 CELLS, LEAST_CELLS = 8, 64
 """Cells a wave, and a side at least, in which points are merged; where they crowd in smaller ones."""
 
-MERGED, CROWD = 8192, 2
+MERGED, CROWD = 4096, 2
 """Into how many points the data are merged, roughly; and of how many fair shares a cell is too full."""
 
 MOST_HELD = 4096
