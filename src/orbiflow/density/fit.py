@@ -162,8 +162,7 @@ def fit_density(
     start_nll = mean_nll(density, validation.to(dtype))
     stages = _refined(density, train, validation, settings, say)
     density.flow.double()
-    error = settle(density, validation[:MOST_REPORTED], MOST_STEPS)
-    mass = density.mass() if space.dim == 2 else None
+    error, mass = settle(density, validation[:MOST_REPORTED], MOST_STEPS)
     notes = repeats_note(len(points), duplicates) + steps_note(density, error)
     shares = None
     if settings.kernels:

@@ -172,7 +172,7 @@ def fit_neural(
     start_nll = trainer.match()
     stages = [trainer.refine()] if settings.refinement else []
     density.flow.double()
-    error = settle(density, validation, MOST_STEPS)
+    error, mass = settle(density, validation, MOST_STEPS)
     notes = [
         *repeats_note(len(points), duplicates),
         *_notes(mixture, trainer),
@@ -188,7 +188,7 @@ def fit_neural(
         validation_nll=mean_nll(density, validation),
         stages=tuple(stages),
         steps=density.flow.steps,
-        mass=None,
+        mass=mass,
         integration_error=error,
         notes=tuple(notes),
     )

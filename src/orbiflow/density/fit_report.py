@@ -82,20 +82,25 @@ def step_error(density: SymmetricDensity, points: Tensor) -> float:
     return abs(_finer(density, points) - mean_nll(density, points))
 
 
-def settle(density: SymmetricDensity, points: Tensor, most: int) -> float:
-    """Double the steps until the mean log density has settled; by how much it still changes.
+def settle(density: SymmetricDensity, points: Tensor, most: int) -> tuple[float, float | None]:
+    """Double the steps until the mean log density has settled and, in two dimensions, the mass is 1.
 
     Args:
         density: its flow's steps are changed, up to `most`.
         points: (N, d), at which it is looked at.
         most: steps a segment.
+
+    Returns:
+        By how much the mean log density still changes, and the mass (None in other dimensions).
     """
     flow, now = density.flow, mean_nll(density, points)
     while True:
         finer = _finer(density, points)
         error = abs(finer - now)
-        if error <= MASS_TOLERANCE / 2 or flow.steps >= most:
-            return error
+        mass = density.mass() if density.space.dim == 2 else None
+        off = max(error, 0.0 if mass is None else abs(mass - 1))
+        if off <= MASS_TOLERANCE / 2 or flow.steps >= most:
+            return error, mass
         flow.steps, now = 2 * flow.steps, finer
 
 
