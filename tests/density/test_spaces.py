@@ -45,7 +45,11 @@ def square(seed: int, count: int = 50, dim: int = 2) -> torch.Tensor:
 def test_data_and_chart_there_and_back(space, seed: int) -> None:
     points = square(seed)
     again = space.to_chart(space.from_chart(points))
-    assert float(space.distance(points, again).max()) < 1e-9
+    error = space.distance(points, again)
+    # at a cone point of the sphere the chart is as ill-conditioned as a fourth root
+    scale = (space.log_area(points) / 2).exp()
+    assert float((error * scale).max()) < 1e-12
+    assert float(error[scale > 1e-3].max()) < 1e-9
     assert bool(((again > -1e-9) & (again < 1 + 1e-9)).all())
 
 
