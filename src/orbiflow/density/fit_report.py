@@ -97,10 +97,11 @@ def settle(density: SymmetricDensity, points: Tensor, most: int) -> tuple[float,
     while True:
         finer = _finer(density, points)
         error = abs(finer - now)
-        mass = density.mass() if density.space.dim == 2 else None
-        off = max(error, 0.0 if mass is None else abs(mass - 1))
-        if off <= MASS_TOLERANCE / 2 or flow.steps >= most:
-            return error, mass
+        last = flow.steps >= most
+        if last or error <= MASS_TOLERANCE / 2:
+            mass = density.mass() if density.space.dim == 2 else None
+            if last or mass is None or abs(mass - 1) <= MASS_TOLERANCE / 2:
+                return error, mass
         flow.steps, now = 2 * flow.steps, finer
 
 
