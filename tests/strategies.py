@@ -23,12 +23,19 @@ from orbiflow.symmetry import (
     wallpaper_group,
 )
 from orbiflow.symmetry.isometry import Array
+from orbiflow.tilings.classes import CLASSES
 
 Operation = tuple[Sequence[Sequence[int]], Sequence[float]]
 
 seeds = st.integers(0, 2**32 - 1)
 angles = st.floats(-math.pi, math.pi)
 lengths = st.floats(0.4, 2.5)
+
+TABLED: dict[str, CrystallographicGroup] = {
+    **{name: row.group() for name, row in CLASSES.items()},
+    **{name: identification_group(name) for name in IDENTIFICATION_SPACES},
+}
+"""The groups of the nine classes and four spaces."""
 
 
 def random_points(seed: int, *shape: int, size: float = 3.0) -> Array:
@@ -201,6 +208,29 @@ def random_field(
     with torch.no_grad():
         field.parameters_.copy_(torch.tensor(values))
     return field
+
+
+small_fields = st.builds(random_field, groups, st.integers(1, 2), seeds)
+plane_fields = st.builds(random_field, plane_groups, st.integers(1, 5), seeds)
+
+
+def gentle_field(
+    group: CrystallographicGroup, max_frequency: int, seed: int, slope: float = 1.0
+) -> FourierField:
+    """A random field whose Lipschitz bound is `slope`: how far a flow can stretch in unit time."""
+    field = random_field(group, max_frequency, seed)
+    bound = field.lipschitz_bound()
+    if float(bound) > 0:
+        with torch.no_grad():
+            field.parameters_.mul_(slope / bound)
+    return field
+
+
+def several(
+    group: CrystallographicGroup, seed: int, segments: int = 3, slope: float = 1.0
+) -> list[FourierField]:
+    """Gentle fields of one group, for the segments of a flow."""
+    return [gentle_field(group, 2, seed + i, slope) for i in range(segments)]
 
 
 @torch.no_grad()

@@ -1,4 +1,4 @@
-"""Fourier fields: symmetry, parameters, values, derivatives, precision."""
+"""Fourier fields: symmetry, parameters, values, precision."""
 
 import copy
 import itertools
@@ -12,19 +12,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from orbiflow.errors import OrbiflowError
-from orbiflow.fields import FourierField, jacobian, symmetrize
+from orbiflow.fields import FourierField, symmetrize
 from orbiflow.fields.invariants import frequency_set
-from orbiflow.symmetry import (
-    IDENTIFICATION_SPACES,
-    WALLPAPER_GROUPS,
-    CrystallographicGroup,
-    identification_group,
-    wallpaper_group,
-)
+from orbiflow.symmetry import WALLPAPER_GROUPS, CrystallographicGroup, wallpaper_group
 from orbiflow.tilings.classes import CLASSES
 from strategies import (
     SMALL_SPACE_GROUPS,
-    central_difference,
+    TABLED,
     equivariance_error,
     groups,
     largest,
@@ -32,17 +26,11 @@ from strategies import (
     random_field,
     random_tensor,
     seeds,
+    small_fields,
     space_group,
     space_groups,
     wallpaper_groups,
 )
-
-TABLED = {
-    **{name: row.group() for name, row in CLASSES.items()},
-    **{name: identification_group(name) for name in IDENTIFICATION_SPACES},
-}
-small_fields = st.builds(random_field, groups, st.integers(1, 2), seeds)
-plane_fields = st.builds(random_field, plane_groups, st.integers(1, 5), seeds)
 
 
 def coefficients(field):
@@ -203,82 +191,6 @@ def test_the_norm_of_the_parameters_is_the_root_mean_square_of_the_field(field):
     assert rms == pytest.approx(field.parameters_.norm().item(), rel=1e-12)
 
 
-@settings(max_examples=20)
-@given(small_fields, seeds)
-def test_the_jacobian_agrees_with_autograd(field, seed):
-    points = random_tensor(seed, 4, field.group.dim)
-    by_autograd = jacobian(lambda p: field(p), points)
-    torch.testing.assert_close(field.jacobian(points), by_autograd, rtol=1e-11, atol=1e-10)
-
-
-@settings(max_examples=20)
-@given(small_fields, seeds)
-def test_the_jacobian_agrees_with_finite_differences(field, seed):
-    points = random_tensor(seed, 4, field.group.dim)
-    slopes = central_difference(field, points)
-    torch.testing.assert_close(field.jacobian(points), slopes, rtol=1e-8, atol=1e-7)
-
-
-@given(small_fields, seeds)
-def test_the_divergence_is_the_trace_of_the_jacobian(field, seed):
-    points = random_tensor(seed, 3, 4, field.group.dim)
-    trace = field.jacobian(points).diagonal(dim1=-2, dim2=-1).sum(dim=-1)
-    torch.testing.assert_close(field.divergence(points), trace, rtol=1e-12, atol=1e-11)
-
-
-@given(small_fields, seeds)
-def test_bound_forms_give_the_same_values(field, seed):
-    points = random_tensor(seed, 4, field.group.dim)
-    values, divergence = field.bound_with_divergence()(points)
-    torch.testing.assert_close(field.bound()(points), field(points), rtol=0, atol=0)
-    torch.testing.assert_close(values, field(points), rtol=0, atol=1e-13)
-    torch.testing.assert_close(divergence, field.divergence(points), rtol=1e-13, atol=1e-12)
-
-
-@settings(max_examples=10)
-@given(wallpaper_groups(), seeds)
-def test_gradients_of_parameters_and_points_pass_gradcheck(group, seed):
-    field = random_field(group, 2, seed, smoothness=1.0)
-
-    def values(parameters, points):
-        return torch.func.functional_call(field, {"parameters_": parameters}, (points,))
-
-    inputs = (
-        field.parameters_.detach().clone().requires_grad_(),
-        random_tensor(seed, 3, 2).requires_grad_(),
-    )
-    assert torch.autograd.gradcheck(values, inputs, atol=1e-6, rtol=1e-5)
-
-
-@pytest.mark.parametrize("quantity", ["forward", "divergence", "jacobian"])
-@pytest.mark.parametrize("dim", [1, 2, 3])
-def test_a_batch_of_fields_is_the_fields_one_by_one(quantity, dim):
-    group = {
-        1: CrystallographicGroup.generate([[1.3]]),
-        2: wallpaper_group("p6"),
-        3: space_group("P2_1/c", 0),
-    }[dim]
-    batch = random_field(group, 2, 0, batch=3)
-    points = random_tensor(1, 3, 4, 2, dim)
-    together = getattr(batch, quantity)(points)
-    for s in range(3):
-        single = FourierField(group, 2)
-        with torch.no_grad():
-            single.parameters_.copy_(batch.parameters_[s])
-        alone = getattr(single, quantity)(points[s])
-        torch.testing.assert_close(together[s], alone, rtol=1e-13, atol=1e-13)
-
-
-def test_a_batch_has_one_lipschitz_bound_a_field():
-    batch = random_field(wallpaper_group("p4"), 3, 0, batch=3)
-    bounds = batch.lipschitz_bound()
-    for s in range(3):
-        single = FourierField(batch.group, 3)
-        with torch.no_grad():
-            single.parameters_.copy_(batch.parameters_[s])
-        assert float(single.lipschitz_bound()) == pytest.approx(float(bounds[s]), rel=1e-14)
-
-
 @pytest.mark.parametrize("shape", [(2,), (0, 2), (1, 2), (3, 4, 5, 2)])
 def test_shapes_of_points_are_kept(shape):
     field = random_field(wallpaper_group("p3"), 2, 0)
@@ -316,24 +228,6 @@ def test_far_away_points_are_as_accurate_as_near_ones(dtype, away):
     near = torch.tensor(grid, dtype=dtype)
     error = largest(field(near + away) - field(near))
     assert error < 20 * torch.finfo(dtype).eps
-
-
-@settings(max_examples=20)
-@given(plane_fields, seeds)
-def test_no_sampled_jacobian_exceeds_the_lipschitz_bound(field, seed):
-    norms = torch.linalg.matrix_norm(field.jacobian(random_tensor(seed, 100, 2)), ord=2)
-    assert largest(norms) <= field.lipschitz_bound().item() * (1 + 1e-12)
-
-
-def test_the_lipschitz_bound_is_attained_by_a_single_mode():
-    field = FourierField(CrystallographicGroup.generate([[0.7]]), 3)
-    for index in range(1, field.size):
-        with torch.no_grad():
-            field.parameters_.zero_()
-            field.parameters_[index] = 1.0
-        grid = torch.linspace(0, 0.7, 8401, dtype=torch.float64)[:, None]
-        steepest = largest(field.jacobian(grid))
-        assert steepest == pytest.approx(float(field.lipschitz_bound()), rel=1e-6)
 
 
 @settings(max_examples=15)

@@ -1,4 +1,4 @@
-"""The flow of vector fields: map, inverse, log-determinant, gradients, equivariance."""
+"""The flow of vector fields: map, inverse, log-determinant, trajectories, shapes, errors."""
 
 import copy
 import io
@@ -15,44 +15,22 @@ from torch import nn
 from orbiflow.errors import OrbiflowError
 from orbiflow.fields import FourierField, neural_field, symmetrize
 from orbiflow.flows import METHODS, Flow
-from orbiflow.symmetry import (
-    IDENTIFICATION_SPACES,
-    identification_group,
-    rotation_matrix,
-    wallpaper_group,
-)
-from orbiflow.tilings.classes import CLASSES
+from orbiflow.symmetry import wallpaper_group
 from strategies import (
+    TABLED,
+    gentle_field,
     groups,
     largest,
-    map_equivariance_error,
     plane_groups,
     random_field,
     random_tensor,
     seeds,
+    several,
     space_group,
     wallpaper_groups,
 )
 
-TABLED = {
-    **{name: row.group() for name, row in CLASSES.items()},
-    **{name: identification_group(name) for name in IDENTIFICATION_SPACES},
-}
 names = st.sampled_from(sorted(METHODS))
-
-
-def gentle_field(group, max_frequency, seed, slope=1.0):
-    """A random field whose Lipschitz bound is `slope`: how far a flow can stretch in unit time."""
-    field = random_field(group, max_frequency, seed)
-    bound = field.lipschitz_bound()
-    if float(bound) > 0:
-        with torch.no_grad():
-            field.parameters_.mul_(slope / bound)
-    return field
-
-
-def several(group, seed, segments=3, slope=1.0):
-    return [gentle_field(group, 2, seed + i, slope) for i in range(segments)]
 
 
 @pytest.mark.parametrize("name", METHODS)
@@ -279,138 +257,6 @@ def test_the_error_estimate_predicts_the_error(name):
     power = 2 ** METHODS[name].order
     assert flow.error_estimate(points) * power / (power - 1) == pytest.approx(error, rel=0.2)
     assert flow.steps == 16
-
-
-@pytest.mark.parametrize(("method", "steps"), [("euler", 1), ("rk4", 1), ("rk5", 7)])
-@pytest.mark.parametrize("name", TABLED)
-def test_equivariance_holds_to_rounding_at_any_step_count(name, method, steps):
-    group = TABLED[name]
-    fields = [random_field(group, 5, seed) for seed in range(2)]
-    flow = Flow(fields, method=method, steps=steps, duration=0.1)
-    assert map_equivariance_error(flow, group, random_tensor(0, 20, 2)) < 1e-11
-    assert map_equivariance_error(flow.inverse, group, random_tensor(1, 20, 2)) < 1e-11
-
-
-@settings(max_examples=20)
-@given(groups, seeds, names, st.integers(1, 4))
-def test_equivariance_holds_to_rounding_for_any_group(group, seed, method, steps):
-    flow = Flow(random_field(group, 1, seed), method=method, steps=steps, duration=0.1)
-    assert map_equivariance_error(flow, group, random_tensor(seed, 8, group.dim)) < 1e-11
-
-
-def test_the_log_determinant_is_invariant():
-    group = wallpaper_group("p4g")
-    flow = Flow(gentle_field(group, 3, 0), steps=2)
-    points = random_tensor(0, 20, 2)
-    with torch.no_grad():
-        expected = flow.log_abs_det_jacobian(points)
-        for g in group.cosets:
-            found = flow.log_abs_det_jacobian(g(points))
-            torch.testing.assert_close(found, expected, rtol=0, atol=1e-12)
-
-
-@pytest.mark.parametrize("name", ["IH2", "IH3", "IH5", "IH6", "IH21"])
-@given(angle=st.floats(-3, 3), scale=st.floats(0.3, 3), seed=seeds)
-@settings(max_examples=8)
-def test_a_similarity_composed_with_a_flow_commutes_with_the_conjugate_group(
-    name, angle, scale, seed
-):
-    group = CLASSES[name].group()
-    matrix, offset = scale * rotation_matrix(angle), np.array([0.3, -1.2])
-    a, v = torch.tensor(matrix), torch.tensor(offset)
-    flow = Flow(random_field(group, 3, seed), steps=1, method="euler", duration=0.2)
-
-    def moved(z):
-        return flow((z - v) @ torch.linalg.inv(a).mT) @ a.mT + v
-
-    assert map_equivariance_error(
-        moved, group.conjugate(matrix, offset), random_tensor(seed, 10, 2)
-    ) < 1e-11 * max(1.0, scale)
-
-
-@pytest.mark.parametrize("angle", [0.3, 1.1])
-def test_flowing_along_the_papers_field_breaks_glide_symmetry(angle):
-    group = CLASSES["IH2"].group()
-    matrix = rotation_matrix(angle)
-    field = random_field(group, 3, 0)
-    flow = Flow(lambda z: field(z @ torch.tensor(matrix)), steps=4, duration=0.2)
-    error = map_equivariance_error(flow, group.conjugate(matrix), random_tensor(0, 40, 2))
-    assert error > 0.05  # a field of size one, followed for a time of 0.2
-
-
-@pytest.mark.parametrize("quantity", ["moved", "log_det"])
-@pytest.mark.parametrize("segments", [1, 2])
-def test_gradients_of_parameters_agree_with_finite_differences(quantity, segments):
-    fields = several(wallpaper_group("pg"), 0, segments)
-    flow = Flow(fields, steps=3)
-    points = random_tensor(0, 6, 2)
-
-    def loss():
-        moved, log_det = flow.forward_and_log_det(points)
-        return (moved.sin() if quantity == "moved" else log_det.square()).sum()
-
-    parameters = fields[0].parameters_
-    (gradient,) = torch.autograd.grad(loss(), parameters)
-    step = 1e-5
-    for i in range(0, parameters.numel(), 5):
-        with torch.no_grad():
-            parameters[i] += step
-            above = loss().item()
-            parameters[i] -= 2 * step
-            below = loss().item()
-            parameters[i] += step
-        slope = (above - below) / (2 * step)
-        assert gradient[i].item() == pytest.approx(slope, rel=1e-6, abs=1e-8)
-
-
-def test_gradients_of_points_agree_with_the_jacobian_of_the_inverse():
-    flow = Flow(gentle_field(wallpaper_group("p6"), 2, 0), steps=24, method="rk5")
-    p = random_tensor(0, 2)
-    q = flow(p).detach()
-    there = torch.autograd.functional.jacobian(flow, p)  # pyright: ignore[reportArgumentType]
-    back = torch.autograd.functional.jacobian(flow.inverse, q)
-    assert isinstance(there, torch.Tensor)
-    assert isinstance(back, torch.Tensor)
-    torch.testing.assert_close(there @ back, torch.eye(2).double(), rtol=0, atol=1e-8)
-
-
-def test_second_derivatives_pass_through_several_steps():
-    # inside an integrator the points depend on the parameters from the second stage on
-    field = gentle_field(wallpaper_group("p4"), 2, 0)
-    flow = Flow(field, steps=3, method="midpoint")
-    points = random_tensor(0, 4, 2)
-
-    def loss(parameters):
-        with torch.no_grad():
-            field.parameters_.copy_(parameters)
-        return flow(points).sin().sum()
-
-    start = field.parameters_.detach().clone()
-    (plain,) = torch.autograd.grad(loss(start), field.parameters_)
-    (gradient,) = torch.autograd.grad(loss(start), field.parameters_, create_graph=True)
-    torch.testing.assert_close(gradient.detach(), plain, rtol=1e-12, atol=1e-12)
-    direction = random_tensor(1, field.size)
-    (curvature,) = torch.autograd.grad(gradient @ direction, field.parameters_)
-    step = 1e-5
-    above, below = (
-        torch.autograd.grad(loss(start + sign * step * direction), field.parameters_)[0]
-        for sign in (1, -1)
-    )
-    torch.testing.assert_close(curvature, (above - below) / (2 * step), rtol=1e-5, atol=1e-7)
-
-
-def test_gradients_of_the_log_determinant_reach_tensors_that_a_function_closes_over():
-    scale = torch.tensor(0.7, dtype=torch.float64, requires_grad=True)
-    flow = Flow(lambda p: scale * p.sin(), steps=4)
-    points = random_tensor(0, 5, 2)
-    (gradient,) = torch.autograd.grad(flow.log_abs_det_jacobian(points).sum(), scale)
-    totals = []
-    for sign in (1, -1):
-        with torch.no_grad():
-            scale += sign * 1e-5
-            totals.append(float(flow.log_abs_det_jacobian(points).sum()))
-            scale -= sign * 1e-5
-    assert gradient.item() == pytest.approx((totals[0] - totals[1]) / 2e-5, rel=1e-7)
 
 
 def test_a_batch_of_fields_carries_a_batch_of_points():
