@@ -1,11 +1,13 @@
 """Test log-likelihoods on the seven torsion angles of RNA (torus T^7), with neural flows.
 
-    python benchmarks/density_rna.py [--splits K] [--seconds S] [--base BASE] [--quick]
+    python benchmarks/density_rna.py [--splits K] [--seconds S] [--base BASE] [--curve] [--quick]
 
 Random 80/10/10 splits, mean negative log-likelihood in nats per radian^7, beside a product von Mises
 kernel density estimate tuned on the same validation points, the mixture that is the flow's base, and
 the published rows of reference.json (RFM: Riemannian flow matching; RDM: Riemannian diffusion
 model). Then the seconds of the fit and for 10,000 query points. The fit is held to --seconds.
+
+--curve: the mixture alone, by its size: components of one member, then members of that size.
 """
 
 from __future__ import annotations
@@ -24,8 +26,12 @@ from density_kde import KernelDensity
 
 from orbiflow.density import Torus
 from orbiflow.density.fit_neural import NeuralSettings, fit_neural
+from orbiflow.density.mixture_fit import fit_mixture
 
 QUERIES = 10_000
+
+SIZES = ((8, 1), (16, 1), (32, 1), (64, 1), (64, 2), (64, 4), (64, 8), (64, 12), (64, 16))
+"""Components at most and members, of the curve."""
 
 
 class Outcome(NamedTuple):
@@ -78,15 +84,48 @@ def run(seed: int, seconds: float, base: str) -> Outcome:
     )
 
 
+def curve(count: int) -> None:
+    """Print the test NLL of mixtures of growing size."""
+    print(f"RNA, {count} random splits, mixtures alone")
+    print("components  members   numbers  validation     test    fit s  10k: s")
+    for components, members in SIZES:
+        rows = np.array([mixture_row(seed, components, members) for seed in range(count)])
+        numbers, validation, test, fit, queries = rows.mean(axis=0)
+        print(
+            f"{components:10}{members:9}{numbers:10.0f}{validation:12.3f}{test:9.3f}{fit:9.1f}"
+            f"{queries:8.2f}",
+            flush=True,
+        )
+
+
+def mixture_row(seed: int, components: int, members: int) -> tuple[float, ...]:
+    """Parameters, validation and test NLL, seconds to fit and for `QUERIES` points of one split."""
+    parts = splits(np.radians(rna()), seed + 1)[seed]
+    space = Torus(parts[0].shape[1])
+    train, held, test = (space.project(space.to_chart(part)) for part in parts)
+    found = fit_mixture(space, train, held, components=components, members=members, seed=seed)
+    mixture, d = found.mixture, space.dim
+    numbers = len(mixture.means) * (d * d + d + mixture.log_weights.shape[1])
+    nll = [math.log(space.volume) - float(mixture.log_prob(part).mean()) for part in (held, test)]
+    queries = torch.tensor(np.random.default_rng(seed).random((QUERIES, d)))
+    begin = time.perf_counter()
+    mixture.log_prob(queries)
+    return numbers, *nll, found.seconds, time.perf_counter() - begin
+
+
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--splits", type=int, default=5)
     parser.add_argument("--seconds", type=float, default=300.0, help="of each fit")
     parser.add_argument("--base", choices=("mixture", "uniform"), default="mixture")
+    parser.add_argument("--curve", action="store_true", help="by the mixture's size")
     parser.add_argument("--quick", action="store_true", help="one split, 10 s")
     options = parser.parse_args()
     torch.set_num_threads(1)
+    if options.curve:
+        curve(options.splits)
+        return
     count, seconds = (1, 10.0) if options.quick else (options.splits, options.seconds)
     published = json.loads((SHARED / "reference.json").read_text())["density_nll"]
     print(f"RNA, {count} random splits, {options.base} base, {seconds:g} s of fit")

@@ -44,9 +44,10 @@ def random_flow(dim: int, seed: int, *, size: float = 0.3, **options: Any) -> Ne
 def random_mixture(dim: int, seed: int, count: int = 4, most: float = 30.0) -> MixtureBase:
     rng = np.random.default_rng(seed)
     weights = rng.dirichlet(np.ones(count * len(SCALES))).reshape(count, -1)
-    means = torch.tensor(rng.normal(size=(count, dim, 1 + 2 * dim))) * chained(dim)
+    order = torch.tensor(rng.permuted(np.tile(np.arange(dim), (count, 1)), axis=1))
+    means = torch.tensor(rng.normal(size=(count, dim, 1 + 2 * dim))) * chained(order)
     kappa = torch.tensor(rng.uniform(0, most, (count, dim)))
-    return MixtureBase(Torus(dim), torch.tensor(np.log(weights)), means, kappa)
+    return MixtureBase(Torus(dim), torch.tensor(np.log(weights)), means, kappa, order)
 
 
 def random_density(dim: int, seed: int) -> SymmetricDensity:
@@ -140,6 +141,31 @@ def test_mixture_samples_follow_its_density(seed: int) -> None:
     expected.index_add_(0, number(grid), mixture.log_prob(grid).exp() / len(grid))
     found = torch.bincount(number(drawn), minlength=cells**2) / len(drawn)
     assert float((found - expected).abs().sum()) < 0.1
+
+
+@given(dims, seeds)
+def test_renaming_the_angles_renames_those_of_the_chains(dim: int, seed: int) -> None:
+    mixture, at = random_mixture(dim, seed), points(20, dim, seed)
+    name = torch.tensor(np.random.default_rng(seed).permutation(dim))  # of the new angle i
+    used = torch.cat([torch.tensor([0]), 1 + name, 1 + dim + name])
+    renamed = MixtureBase(
+        mixture.space,
+        mixture.log_weights,
+        mixture.means[:, name][:, :, used],
+        mixture.concentrations[:, name],
+        name.argsort()[mixture.order],
+    )
+    assert torch.allclose(renamed.log_prob(at[:, name]), mixture.log_prob(at), atol=1e-9)
+
+
+def test_orders_are_checked() -> None:
+    good = random_mixture(3, 0)
+    parts = (good.space, good.log_weights, good.means, good.concentrations)
+    for bad in (good.order[:, :2], good.order + 1, 0 * good.order, good.order + 0.5):
+        with pytest.raises(OrbiflowError, match="order"):
+            MixtureBase(*parts, bad)
+    with pytest.raises(OrbiflowError, match="chained"):
+        MixtureBase(*parts, good.order.flip(1))
 
 
 @given(st.lists(st.floats(0.01, 0.9999), min_size=1, max_size=5))

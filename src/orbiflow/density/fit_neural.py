@@ -74,7 +74,7 @@ class NeuralSettings:
 
     base: str = "mixture"
     components: int = 64
-    members: int = 8
+    members: int = 12
     width: int = 128
     depth: int = 3
     waves: int = 2

@@ -24,32 +24,42 @@ class MixtureBase(Base):
     """A mixture of chains of von Mises distributions, exact and normalised on the torus.
 
     In a component, angle i is von Mises about a trigonometric polynomial of the angles before it,
-    m_i = b_i + sum over j < i of (s_ij sin x_j + c_ij cos x_j): a circular regression (Fisher and
-    Lee, 1992), correlations at no cost, since each factor is normalised whatever the others are.
+    m_i = b_i + sum over j before i of (s_ij sin x_j + c_ij cos x_j): a circular regression (Fisher
+    and Lee, 1992), correlations at no cost, since each factor is normalised whatever the others are.
     Each component comes at several scales, its concentrations divided by `SCALES`.
 
     Args:
         space: a `Torus` of d angles.
         log_weights: (K, L) of each component and scale; exp sums to 1.
-        means: (K, d, 1 + 2 d): b_i, s_ij, c_ij in radians, zero for j >= i.
+        means: (K, d, 1 + 2 d): b_i, s_ij, c_ij in radians, zero unless j is before i.
         concentrations: (K, d), at least 0; 0 is uniform.
+        order: (K, d), the numbers of the angles from the first to the last of each chain; default
+            0, 1, ..., d - 1.
 
     Raises:
         OrbiflowError: for another space, wrong shapes or values that make no distribution.
     """
 
     def __init__(
-        self, space: Space, log_weights: Tensor, means: Tensor, concentrations: Tensor
+        self,
+        space: Space,
+        log_weights: Tensor,
+        means: Tensor,
+        concentrations: Tensor,
+        order: Tensor | None = None,
     ) -> None:
         super().__init__(space)
         if not isinstance(space, Torus):
             raise OrbiflowError(f"a mixture base needs a torus, got the {space.name}")
         d = space.dim
         count = concentrations.shape[0] if concentrations.dim() == 2 else 0
+        if order is None:
+            order = torch.arange(d).repeat(count, 1)
         shapes = (
             (log_weights, (count, len(SCALES)), "log_weights"),
             (means, (count, d, 1 + 2 * d), "means"),
             (concentrations, (count, d), "concentrations"),
+            (order, (count, d), "order"),
         )
         for tensor, shape, name in shapes:
             if count < 1 or tuple(tensor.shape) != shape:
@@ -59,11 +69,14 @@ class MixtureBase(Base):
             raise OrbiflowError("the weights of a mixture must sum to 1")
         if not bool(means.isfinite().all() and (concentrations >= 0).all()):
             raise OrbiflowError("the means and concentrations of a mixture must be finite")
-        if not bool((concentrations <= 1e9).all()) or bool((means * ~chained(d)).any()):
+        if not torch.equal(order.sort(dim=1).values, torch.arange(d).to(order).expand(count, d)):
+            raise OrbiflowError(f"each order of a mixture must hold 0 to {d - 1} once")
+        if not bool((concentrations <= 1e9).all()) or bool((means * ~chained(order)).any()):
             raise OrbiflowError("a mixture needs concentrations of at most 1e9 and chained means")
         self.log_weights, self.means, self.concentrations = (
             t.detach().double().clone() for t in (log_weights, means, concentrations)
         )
+        self.order = order.detach().long().clone()
 
     def log_prob(self, points: Tensor) -> Tensor:
         """Log density (...,) at points (..., d), in their dtype; differentiable in the points."""
@@ -92,10 +105,10 @@ class MixtureBase(Base):
         kappa = self.concentrations[component] / torch.tensor(SCALES)[chosen % len(SCALES), None]
         rng = np.random.default_rng(int(torch.randint(2**31, (), generator=generator)))
         noise = torch.tensor(rng.vonmises(0.0, kappa.numpy()))
-        angle = torch.zeros(count, self.space.dim, dtype=torch.float64)
-        for i in range(self.space.dim):
-            mean = (waves(angle) * self.means[component, i]).sum(dim=-1)
-            angle[:, i] = mean + noise[:, i]
+        angle, rows = torch.zeros(count, self.space.dim, dtype=torch.float64), torch.arange(count)
+        for now in self.order[component].mT:
+            mean = (waves(angle) * self.means[component, now]).sum(dim=-1)
+            angle[rows, now] = mean + noise[rows, now]
         return self.space.project(angle / (2 * math.pi))
 
     def _constant(self) -> Tensor:
@@ -104,10 +117,16 @@ class MixtureBase(Base):
         return self.log_weights.mT - torch.special.i0e(kappa).log().sum(dim=-1)
 
 
-def chained(dim: int) -> Tensor:
-    """Which of the means (d, 1 + 2 d) a chain may use: its constant, and the angles before."""
-    before = torch.ones(dim, dim).tril(-1).bool()
-    return torch.cat([torch.ones(dim, 1).bool(), before, before], dim=1)
+def chained(order: Tensor) -> Tensor:
+    """Which of the means (..., d, 1 + 2 d) chains of order (..., d) may use: constants, angles before.
+
+    >>> chained(torch.tensor([1, 0])).int()
+    tensor([[1, 0, 1, 0, 1],
+            [1, 0, 0, 0, 0]], dtype=torch.int32)
+    """
+    place = order.argsort(dim=-1)
+    before = place[..., None, :] < place[..., :, None]
+    return torch.cat([torch.ones_like(before[..., :1]), before, before], dim=-1)
 
 
 def waves(angle: Tensor) -> Tensor:
@@ -123,4 +142,5 @@ def averaged(mixtures: list[MixtureBase]) -> MixtureBase:
         torch.cat([m.log_weights for m in mixtures]) - math.log(len(mixtures)),
         torch.cat([m.means for m in mixtures]),
         torch.cat([m.concentrations for m in mixtures]),
+        torch.cat([m.order for m in mixtures]),
     )

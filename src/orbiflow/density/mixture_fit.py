@@ -56,7 +56,7 @@ def fit_mixture(
     validation: Tensor,
     *,
     components: int = 64,
-    members: int = 8,
+    members: int = 12,
     iterations: int = 60,
     seconds: float = math.inf,
     seed: int = 0,
@@ -65,7 +65,9 @@ def fit_mixture(
     """Mixtures of 8, 16, ... components while validation improves, then the mean of several starts.
 
     EM ends in another optimum from every start; the mean of their densities is better on new points
-    than any of them (Breiman, Bagging predictors, 1996, without the bootstrap).
+    than any of them (Breiman, Bagging predictors, 1996, without the bootstrap). Starts after the
+    first have their angles in random orders, so that they differ more (as in Germain et al., MADE,
+    2015).
 
     Args:
         space: a `Torus`.
@@ -86,14 +88,21 @@ def fit_mixture(
     most = max(1, min(components, len(train) // PER_POINT))
     generator = torch.Generator().manual_seed(seed)
     size, late = min(SMALLEST, most), False
-    best = _expectation_maximization(space, train, validation, size, iterations, generator)
+
+    def start(count: int, order: Tensor) -> MixtureBase:
+        return _expectation_maximization(
+            space, train, validation, count, order, iterations, generator
+        )
+
+    natural = torch.arange(space.dim)
+    best = start(size, natural)
     while size < most:
         if late := time.monotonic() - began > seconds:
             break
         larger = min(2 * size, most)
         if watch is not None:
             watch(0.0, f"mixture of {larger} components")
-        found = _expectation_maximization(space, train, validation, larger, iterations, generator)
+        found = start(larger, natural)
         if _nll(found, validation) > _nll(best, validation) - WORTHWHILE:
             break
         size, best = larger, found
@@ -103,7 +112,7 @@ def fit_mixture(
             break
         if watch is not None:
             watch(number / members, f"mixture of {size} components, start {number + 1}")
-        found = _expectation_maximization(space, train, validation, size, iterations, generator)
+        found = start(size, torch.randperm(space.dim, generator=generator))
         joint = torch.logaddexp(score, found.log_prob(validation))
         if _mean(joint, len(kept) + 1) > _mean(score, len(kept)):
             kept, score = [*kept, found], joint
@@ -124,12 +133,13 @@ def _expectation_maximization(
     train: Tensor,
     validation: Tensor,
     count: int,
+    order: Tensor,
     iterations: int,
     generator: torch.Generator,
 ) -> MixtureBase:
     """EM from seeds that are spread out; the iterate that was best on `validation`."""
-    step = _Maximization(train)
-    mixture = _started(space, step.angle, count, generator)
+    step = _Maximization(train, order)
+    mixture = _started(space, step.angle, count, order, generator)
     best, least, idle = mixture, _nll(mixture, validation), 0
     for iteration in range(1, iterations + 1):
         mixture = step(mixture, bent=iteration > STRAIGHT)
@@ -144,7 +154,9 @@ def _expectation_maximization(
     return best
 
 
-def _started(space: Space, angle: Tensor, count: int, generator: torch.Generator) -> MixtureBase:
+def _started(
+    space: Space, angle: Tensor, count: int, order: Tensor, generator: torch.Generator
+) -> MixtureBase:
     """A uniform component and `count` round ones at points far from each other (k-means++)."""
     chosen = [int(torch.randint(len(angle), (), generator=generator))]
     far = (1 - (angle - angle[chosen[0]]).cos()).sum(dim=1)
@@ -157,14 +169,14 @@ def _started(space: Space, angle: Tensor, count: int, generator: torch.Generator
     concentrations = angle.new_full((count + 1, d), 5.0)
     concentrations[0] = 0.0
     weights = angle.new_full((count + 1, len(SCALES)), 1.0 / (count + 1) / len(SCALES))
-    return MixtureBase(space, weights.log(), means, concentrations)
+    return MixtureBase(space, weights.log(), means, concentrations, order.repeat(count + 1, 1))
 
 
 class _Maximization:
-    """The E and M steps on fixed points; component 0 stays uniform."""
+    """The E and M steps on fixed points, of chains of one order (d,); component 0 stays uniform."""
 
-    def __init__(self, points: Tensor) -> None:
-        self.points = points
+    def __init__(self, points: Tensor, order: Tensor) -> None:
+        self.points, self.allowed = points, chained(order)
         self.angle = 2 * math.pi * points
         self.waves = waves(self.angle)
         self.products = (self.waves[:, :, None] * self.waves[:, None, :]).flatten(1)
@@ -182,12 +194,13 @@ class _Maximization:
         else:
             means[1:] = 0.0
             means[1:, :, 0] = center
-        moved = MixtureBase(mixture.space, self._weights(share), means, mixture.concentrations)
+        weights = self._weights(share)
+        moved = MixtureBase(mixture.space, weights, means, mixture.concentrations, mixture.order)
         loss = 1 - moved.residuals(self.points)[:, 1:].cos()
         spread = torch.einsum("nk,nkd->kd", precise, loss) + PRIOR * (1 - PRIOR_RESULTANT)
         concentrations = mixture.concentrations.clone()
         concentrations[1:] = concentration(1 - spread / (weight.sum(dim=0)[:, None] + PRIOR))
-        return MixtureBase(mixture.space, moved.log_weights, means, concentrations)
+        return MixtureBase(mixture.space, weights, means, concentrations, mixture.order)
 
     def _weights(self, share: Tensor) -> Tensor:
         count = share.sum(dim=0).mT
@@ -209,7 +222,7 @@ class _Maximization:
         force = torch.einsum("nkd,np->kdp", pull, self.waves) @ local.mT
         slopes = mixture.means[1:] @ back
         found = torch.zeros_like(slopes)
-        for i, used in enumerate(chained(d)):
+        for i, used in enumerate(self.allowed):
             at = used.nonzero()[:, 0]
             ridge = RIDGE / kappa[:, i, None] * torch.ones(len(at)).to(kappa)
             ridge[:, 0] = 1e-6
@@ -218,7 +231,7 @@ class _Maximization:
             right = force[:, i, at] - ridge * torch.cat([0 * now[:, :1], now[:, 1:]], dim=1)
             matrix = bessel[:, i, None, None] * gram[:, at][:, :, at] + torch.diag_embed(ridge)
             found[:, i, at] = now + torch.linalg.solve(matrix, right)
-        return (found @ local) * chained(d)
+        return (found @ local) * self.allowed
 
 
 def _local(center: Tensor) -> Tensor:

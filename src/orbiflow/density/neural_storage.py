@@ -86,11 +86,12 @@ def mixture_header(base: MixtureBase) -> dict[str, Any]:
 
 
 def mixture_tensors(base: MixtureBase) -> dict[str, Tensor]:
-    """Weights, means and concentrations, float64, by names that begin with "base."."""
+    """Weights, means, concentrations and orders, float64, by names that begin with "base."."""
     return {
         BASE + "log_weights": base.log_weights,
         BASE + "means": base.means,
         BASE + "concentrations": base.concentrations,
+        BASE + "order": base.order.double(),
     }
 
 
@@ -109,6 +110,7 @@ def mixture_from_header(
         "log_weights": (count, len(SCALES)),
         "means": (count, d, 1 + 2 * d),
         "concentrations": (count, d),
+        "order": (count, d),
     }
     parts = []
     for name, shape in shapes.items():
