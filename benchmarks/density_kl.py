@@ -19,7 +19,14 @@ from concurrent.futures import ProcessPoolExecutor
 import torch
 from torch import Tensor
 
-from orbiflow.density import FitSettings, fit_density, kl_by_quadrature, make_space, midpoints
+from orbiflow.density import (
+    SPACES,
+    FitSettings,
+    fit_density,
+    kl_by_quadrature,
+    make_space,
+    midpoints,
+)
 from orbiflow.density.space import Space
 
 BARS = {"4-gaussian": 0.01, "6-gaussian": 0.02, "checkerboard": 0.08}
@@ -88,14 +95,16 @@ def run(job: tuple[str, str, str, int, float, int]) -> tuple[float, float, float
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("spaces", nargs="*")
+    parser.add_argument("spaces", nargs="*", metavar="SPACE", help=f"{', '.join(SPACES)} (all)")
     parser.add_argument("--points", type=int, default=131072)
     parser.add_argument("--seconds", type=float, default=30.0, help="of likelihood refinement")
     parser.add_argument("--seeds", type=int, default=1, help="the worst is reported")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--quick", action="store_true", help="the torus, few points, 5 s each")
     options = parser.parse_args()
-    spaces = options.spaces or ["torus", "sphere", "klein-bottle", "projective-plane"]
+    if unknown := set(options.spaces) - set(SPACES):
+        parser.error(f"no such space: {', '.join(sorted(unknown))}")
+    spaces = options.spaces or list(SPACES)
     count, seconds = options.points, options.seconds
     if options.quick:
         spaces, count, seconds = ["torus"], 4096, 5.0
