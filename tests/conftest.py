@@ -1,9 +1,9 @@
-"""Settings for all tests: one torch thread, hypothesis without deadlines."""
+"""Settings for all tests: one torch thread and seed, hypothesis without deadlines."""
 
 import os
 
 import torch
-from hypothesis import HealthCheck, settings
+from hypothesis import HealthCheck, register_random, settings
 
 torch.set_num_threads(1)
 torch.set_warn_always(True)  # a warning must not depend on which test comes first
@@ -13,3 +13,20 @@ settings.register_profile(
 )
 settings.register_profile("ci", settings.get_profile("local"), derandomize=True, database=None)
 settings.load_profile("ci" if os.environ.get("CI") else "local")
+
+
+class TorchRandom:
+    """Torch's own generator, for hypothesis to seed before every example."""
+
+    seed = staticmethod(torch.manual_seed)
+    getstate = staticmethod(torch.get_rng_state)
+    setstate = staticmethod(torch.set_rng_state)
+
+
+torch_random = TorchRandom()  # hypothesis keeps a weak reference
+register_random(torch_random)
+
+
+def pytest_runtest_setup() -> None:
+    """A test that draws without a seed draws the same whichever tests went before."""
+    torch.manual_seed(0)
