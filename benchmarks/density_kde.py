@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from scipy.special import ive
 
 from orbiflow.density import to_vectors
+from orbiflow.density.kernels import BLOCK_ENTRIES
+from orbiflow.density.log_sum import log_sum_exp
 
 Data = NDArray[np.float64]
 WIDTHS = np.geomspace(2.0, 1e7, 48)
@@ -48,14 +50,16 @@ class KernelDensity:
         points = self._embed(data)
         axes = 1 if self.round else data.shape[1]
         parts = []
-        for block in points.split(512):  # cosines of all pairs are dot products
+        for block in points.split(
+            max(1, BLOCK_ENTRIES // len(self.train))
+        ):  # cosines of all pairs are dot products
             table = torch.addmm(
                 torch.tensor(-self.kappa * axes, dtype=torch.float64),
                 block,
                 self.train.mT,
                 alpha=self.kappa,
             )
-            parts.append(table.logsumexp(dim=1))
+            parts.append(log_sum_exp(table))
         log_sum = torch.cat(parts).double().numpy()
         kernels = log_sum - math.log(len(self.train)) - self.log_normal
         return with_floor(kernels, self.floor, self.volume(data))

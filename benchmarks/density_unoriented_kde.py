@@ -11,6 +11,8 @@ from density_kde import Data, with_floor
 from scipy.special import ive
 
 from orbiflow.density import to_vectors
+from orbiflow.density.kernels import BLOCK_ENTRIES
+from orbiflow.density.log_sum import log_sum_exp
 
 CONCENTRATIONS = np.geomspace(2.0, 2e4, 9)
 FINER = (1.78, 1.33)
@@ -18,7 +20,6 @@ FINER = (1.78, 1.33)
 RATIOS = (4.0, 2.0)
 """Factors to both sides of the best ratio of the two concentrations, in turn."""
 SHARES = (0.0, 1e-4, 1e-3, 3e-3, 0.01, 0.02, 0.04, 0.08, 0.15, 0.3)
-BLOCK = 64
 
 
 class Kernel(NamedTuple):
@@ -57,8 +58,8 @@ class UnorientedKernelDensity:
         most = sum(self.kernel.concentrations)
         shift = torch.tensor(-most, dtype=torch.float64)
         parts = [
-            torch.addmm(shift, block, self.points.mT).logsumexp(dim=1)
-            for block in queries.split(BLOCK)
+            log_sum_exp(torch.addmm(shift, block, self.points.mT))
+            for block in queries.split(max(1, BLOCK_ENTRIES // len(self.points)))
         ]
         return torch.cat(parts).numpy() - math.log(self.count) - self._log_normal()
 

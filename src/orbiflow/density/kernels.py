@@ -9,13 +9,14 @@ import torch
 from torch import Tensor
 
 from orbiflow.density.bases import Base
+from orbiflow.density.log_sum import log_sum_exp
 from orbiflow.density.round_spaces import ProjectivePlane, Sphere
 from orbiflow.density.space import Space, rectangle
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry.isometry import Array
 
-BLOCK_ENTRIES = 4_000_000
-"""Of the table of points against kernels worked on at a time: 32 MB."""
+BLOCK_ENTRIES = 250_000
+"""Of the table of points against kernels worked on at a time: few enough for the cache."""
 
 
 class AdaptiveKernels(Base):
@@ -59,19 +60,18 @@ class AdaptiveKernels(Base):
 
     def log_prob(self, points: Tensor) -> Tensor:
         flat = points.reshape(-1, self.space.dim).double()
+        rows, offsets = kernel_rows(self.space, self._center_features, self.concentrations)
+        rows, offsets = rows.mT.contiguous(), offsets + self.weights.log()
         block = max(1, BLOCK_ENTRIES // len(self.centers))
-        parts = [self._log_sum(part) for part in flat.split(block)]
+        parts = [self._log_sum(part, rows, offsets) for part in flat.split(block)]
         values = torch.cat(parts) if parts else flat.new_zeros(0)
         if is_round(self.space):
             values = values + self.space.log_area(flat)
         return values.reshape(points.shape[:-1]).to(points.dtype)
 
-    def _log_sum(self, points: Tensor) -> Tensor:
-        rows, offsets = kernel_rows(self.space, self._center_features, self.concentrations)
-        offsets = offsets + self.weights.log()
+    def _log_sum(self, points: Tensor, rows: Tensor, offsets: Tensor) -> Tensor:
         images = [
-            torch.addmm(offsets, image, rows.mT).logsumexp(dim=1)
-            for image in features(self.space, points)
+            log_sum_exp(torch.addmm(offsets, image, rows)) for image in features(self.space, points)
         ]
         return torch.stack(images).logsumexp(dim=0)
 

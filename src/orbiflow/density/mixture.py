@@ -10,14 +10,15 @@ from torch import Tensor
 
 from orbiflow.density.bases import Base
 from orbiflow.density.flat_spaces import Torus
+from orbiflow.density.log_sum import log_sum_exp
 from orbiflow.density.space import Space
 from orbiflow.errors import OrbiflowError
 
 SCALES = (1.0, 4.0, 16.0)
 """A component's concentrations are divided by these, each with its own weight: heavy tails."""
 
-BLOCK = 1024
-"""Points at a time: bounds the memory."""
+BLOCK = 256
+"""Points at a time: few enough for the cache."""
 
 
 class MixtureBase(Base):
@@ -81,7 +82,7 @@ class MixtureBase(Base):
     def log_prob(self, points: Tensor) -> Tensor:
         """Log density (...,) at points (..., d), in their dtype; differentiable in the points."""
         flat = points.reshape(-1, self.space.dim)
-        parts = [self.joint(block).flatten(1).logsumexp(dim=1) for block in flat.split(BLOCK)]
+        parts = [log_sum_exp(self.joint(block).flatten(1)) for block in flat.split(BLOCK)]
         return torch.cat(parts).reshape(points.shape[:-1])
 
     def joint(self, points: Tensor) -> Tensor:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
+from orbiflow.density.log_sum import shares_of
 from orbiflow.density.mixture import SCALES, MixtureBase, averaged, chained, waves
 from orbiflow.density.space import Space
 from orbiflow.errors import OrbiflowError
@@ -184,7 +185,7 @@ class _Maximization:
 
     def __call__(self, mixture: MixtureBase, *, bent: bool) -> MixtureBase:
         joint = mixture.joint(self.points)
-        share = (joint - joint.flatten(1).logsumexp(dim=1)[:, None, None]).exp()  # (N, L, K)
+        share = shares_of(joint.flatten(1)).reshape(joint.shape)  # (N, L, K)
         weight = share[..., 1:].sum(dim=1)  # (N, K) of each component
         precise = (share[..., 1:] / self.scale[:, None]).sum(dim=1)  # each as far as it counts
         center = torch.atan2(precise.mT @ self.angle.sin(), precise.mT @ self.angle.cos())
