@@ -50,9 +50,8 @@ class KernelDensity:
         points = self._embed(data)
         axes = 1 if self.round else data.shape[1]
         parts = []
-        for block in points.split(
-            max(1, BLOCK_ENTRIES // len(self.train))
-        ):  # cosines of all pairs are dot products
+        # cosines of all pairs are dot products
+        for block in points.split(max(1, BLOCK_ENTRIES // len(self.train))):
             table = torch.addmm(
                 torch.tensor(-self.kappa * axes, dtype=torch.float64),
                 block,

@@ -24,14 +24,18 @@ def log_sum_exp(table: Tensor) -> Tensor:
     >>> log_sum_exp(torch.tensor([[0.0, 0.0], [-1e9, 3.0]]))
     tensor([0.6931, 3.0000])
     """
-    top = table.amax(dim=-1, keepdim=True).clamp_min(torch.finfo(table.dtype).min)
-    # in place: at this size, fresh memory costs more than the arithmetic
-    terms = (table - top).clamp_min_(FAINT).exp_()
+    terms, top = _terms(table)
     return terms.sum(dim=-1).log_() + top.squeeze(-1)
 
 
 def shares_of(table: Tensor) -> Tensor:
     """`torch.softmax` over the last dimension, of logarithms (..., n); none is below e^-80 / n."""
-    top = table.amax(dim=-1, keepdim=True)
-    terms = (table - top).clamp_min_(FAINT).exp_()
+    terms, _ = _terms(table)
     return terms / terms.sum(dim=-1, keepdim=True)
+
+
+def _terms(table: Tensor) -> tuple[Tensor, Tensor]:
+    """Exponentials (..., n) relative to the largest, and its logarithm (..., 1)."""
+    top = table.amax(dim=-1, keepdim=True).clamp_min(torch.finfo(table.dtype).min)
+    # in place: at this size, fresh memory costs more than the arithmetic
+    return (table - top).clamp_min_(FAINT).exp_(), top
