@@ -16,17 +16,12 @@ import numpy as np
 import torch
 from common import SILHOUETTES
 
-from orbiflow.escher import (
-    ClassFailure,
-    DescentSettings,
-    OccupancySettings,
-    Target,
-    escherize_class,
-)
+from orbiflow.escher import ClassFailure, DescentSettings, OccupancySettings, escherize_class
 from orbiflow.escher.descent import Descent
 from orbiflow.escher.methods import Settings
 from orbiflow.escher.outline_starts import outline_starts
-from orbiflow.escher.soft_target import SoftTarget
+from orbiflow.silhouette import Target
+from orbiflow.silhouette.soft_target import SoftTarget
 from orbiflow.tilings import isohedral_class
 
 GOALS = ("bat_60", "beetle_60", "octpus_94")

@@ -27,7 +27,7 @@ from orbiflow.density import (
     make_space,
     midpoints,
 )
-from orbiflow.density.space import Space
+from orbiflow.density.spaces.space import Space
 
 BARS = {"4-gaussian": 0.01, "6-gaussian": 0.02, "checkerboard": 0.08}
 PAPER = {

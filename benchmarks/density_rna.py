@@ -25,8 +25,8 @@ from density_data import rna, splits
 from density_kde import KernelDensity
 
 from orbiflow.density import Torus
-from orbiflow.density.fit_neural import NeuralSettings, fit_neural
-from orbiflow.density.mixture_fit import fit_mixture
+from orbiflow.density.fitting.chains import fit_mixture
+from orbiflow.density.fitting.neural import NeuralSettings, fit_neural
 
 QUERIES = 10_000
 

@@ -19,9 +19,10 @@ import shapely
 import torch
 from common import SILHOUETTES, aligned, reference
 
-from orbiflow.escher import DescentSettings, Target, TileResult, escherize
-from orbiflow.escher.metrics import compare
-from orbiflow.escher.recognition import Recogniser
+from orbiflow.escher import DescentSettings, TileResult, escherize
+from orbiflow.likeness.metrics import compare
+from orbiflow.likeness.recognition import Recogniser
+from orbiflow.silhouette import Target
 from orbiflow.tilings import CLASSES
 
 DISTORTED = {"octpus_94": "octpus", "penguin_60": "penguin2", "squirrel1_60": "squirrel"}

@@ -12,7 +12,8 @@ import os
 import time
 from pathlib import Path
 
-from orbiflow.escher import ClassFailure, OccupancySettings, Target, TileResult, escherize
+from orbiflow.escher import ClassFailure, OccupancySettings, TileResult, escherize
+from orbiflow.silhouette import Target
 from orbiflow.tilings import CLASSES
 
 ROOT = Path(__file__).resolve().parents[1]

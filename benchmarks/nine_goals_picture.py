@@ -16,9 +16,10 @@ import numpy as np
 import torch
 from common import SILHOUETTES
 
-from orbiflow.draw import write_atomic
-from orbiflow.draw.canvas import blank_figure, fill_rings, plane_axes, png_bytes
-from orbiflow.escher import DescentSettings, Target, TileResult, escherize
+from orbiflow.escher import DescentSettings, TileResult, escherize
+from orbiflow.figures.canvas import blank_figure, fill_rings, plane_axes, png_bytes
+from orbiflow.files import write_atomic
+from orbiflow.silhouette import Target
 from orbiflow.tilings.patch import Window
 
 BEST = {

@@ -16,8 +16,9 @@ import torch
 from common import SILHOUETTES
 from PIL import Image, ImageDraw, ImageFont
 
-from orbiflow.draw.raster import overlay_png, tiling_png
-from orbiflow.escher import DescentSettings, Target, TileResult, escherize
+from orbiflow.escher import DescentSettings, TileResult, escherize
+from orbiflow.figures.tilings import overlay_png, tiling_png
+from orbiflow.silhouette import Target
 from orbiflow.tilings import CLASSES
 
 PANEL = 420  # pixels

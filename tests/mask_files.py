@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 from PIL import Image, ImageDraw
 
-from orbiflow.escher.emphasis import Emphasis
-from orbiflow.escher.target import Target
+from orbiflow.silhouette.emphasis import Emphasis
+from orbiflow.silhouette.target import Target
 
 # A picture of 200 x 100 pixels with a box drawn from (20, 10) to (180, 90).
 SIZE = (200, 100)

@@ -54,8 +54,8 @@ def test_fit_score_sample_plot(space: str, tmp_path: Path, orbiflow) -> None:
 @pytest.fixture
 def small_pictures(monkeypatch) -> None:
     for name, size in (("square._GRID", 40), ("page._CELLS", 20)):
-        monkeypatch.setattr(f"orbiflow.draw.density_{name}", size)
-    monkeypatch.setattr("orbiflow.draw.field._SAMPLES", 40)
+        monkeypatch.setattr(f"orbiflow.figures.density_{name}", size)
+    monkeypatch.setattr("orbiflow.figures.field._SAMPLES", 40)
 
 
 @pytest.mark.usefixtures("small_pictures")

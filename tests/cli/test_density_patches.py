@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from orbiflow.density.patches import klein_patch
+from orbiflow.density.spaces.patches import klein_patch
 
 
 def test_patches_to_angles(tmp_path: Path, orbiflow) -> None:

@@ -17,11 +17,12 @@ import torch
 from PIL import Image, ImageDraw
 
 from orbiflow import __version__
-from orbiflow.draw.folder import write_tile_folder
-from orbiflow.escher import Target, TileModel, load_model, methods
+from orbiflow.escher import TileModel, load_model, methods
 from orbiflow.escher.boundary import extract_tile
 from orbiflow.escher.fit import Fit
 from orbiflow.escher.result import best_tiles
+from orbiflow.export.folder import write_tile_folder
+from orbiflow.silhouette import Target
 from orbiflow.tilings import CLASSES
 
 DOCS = Path(__file__).parents[2] / "docs"

@@ -183,7 +183,7 @@ def test_large_batches_are_the_same_in_blocks(monkeypatch) -> None:
     density, points = make(KleinBottle()), square(0, 60).reshape(3, 20, 2)
     with torch.no_grad():
         whole = density.log_prob(points)
-        monkeypatch.setattr("orbiflow.density.density.BLOCK", 7)
+        monkeypatch.setattr("orbiflow.density.models.symmetric.BLOCK", 7)
         assert torch.allclose(density.log_prob(points), whole)
         draws = [density.sample((4, 5), torch.Generator().manual_seed(3)) for _ in range(2)]
     assert torch.equal(*draws)

@@ -25,10 +25,10 @@ from orbiflow.density import (
     midpoints,
     read_density,
 )
-from orbiflow.density.fit_report import split
-from orbiflow.density.likelihood import Objective
-from orbiflow.density.matching import conjugate_gradients, coupled, match_flow
-from orbiflow.density.merging import LEVELS, merged
+from orbiflow.density.fitting.flow_matching import conjugate_gradients, coupled, match_flow
+from orbiflow.density.fitting.likelihood import Objective
+from orbiflow.density.fitting.merging import LEVELS, merged
+from orbiflow.density.fitting.report import split
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.fields import FourierField
 from orbiflow.flows import Flow

@@ -19,8 +19,8 @@ from orbiflow.density import (
     mix_kernels,
     read_density,
 )
-from orbiflow.density.kernel_fit import FLOOR, proportions
-from orbiflow.density.kernels import is_round
+from orbiflow.density.fitting.kernels import FLOOR, proportions
+from orbiflow.density.models.kernels import is_round
 from orbiflow.errors import OrbiflowError
 from orbiflow.fields import SplineField
 from orbiflow.flows import Flow

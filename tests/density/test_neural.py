@@ -11,12 +11,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from orbiflow.density import SymmetricDensity, Torus
-from orbiflow.density.density import midpoints
-from orbiflow.density.fit_neural import NeuralSettings, fit_neural
-from orbiflow.density.mixture import SCALES, MixtureBase, chained
-from orbiflow.density.mixture_fit import concentration, fit_mixture
-from orbiflow.density.neural import NeuralField, NeuralFlow, speed, way
-from orbiflow.density.neural_storage import (
+from orbiflow.density.fitting.chains import concentration, fit_mixture
+from orbiflow.density.fitting.neural import NeuralSettings, fit_neural
+from orbiflow.density.models.chains import SCALES, MixtureBase, chained
+from orbiflow.density.models.neural import NeuralField, NeuralFlow, speed, way
+from orbiflow.density.models.symmetric import midpoints
+from orbiflow.density.spaces.round import Sphere
+from orbiflow.density.storage.neural import (
     mixture_from_header,
     mixture_header,
     mixture_tensors,
@@ -24,7 +25,6 @@ from orbiflow.density.neural_storage import (
     neural_header,
     neural_tensors,
 )
-from orbiflow.density.round_spaces import Sphere
 from orbiflow.errors import OrbiflowError
 
 seeds = st.integers(0, 2**31 - 1)

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from orbiflow.density import KleinBottle
-from orbiflow.density.patches import (
+from orbiflow.density.spaces.patches import (
     DCT_BASIS,
     dct_to_pixels,
     from_klein,

@@ -18,7 +18,7 @@ from orbiflow.density import (
     to_latlon,
     to_vectors,
 )
-from orbiflow.density.space import MEASURES
+from orbiflow.density.spaces.space import MEASURES
 from orbiflow.errors import OrbiflowError
 
 TURN = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))[0]

@@ -13,15 +13,15 @@ from orbiflow.escher.descent import CALM, Descent
 from orbiflow.escher.descent_settings import EFFORTS, DescentSettings
 from orbiflow.escher.fit_descent import fit_descent
 from orbiflow.escher.methods import fit, method_name
-from orbiflow.escher.metrics import iou
 from orbiflow.escher.occupancy import OccupancySettings
 from orbiflow.escher.outline_starts import template_starts
-from orbiflow.escher.overlap import boundary_iou
 from orbiflow.escher.preview import quick_tile
 from orbiflow.escher.search import Event, escherize, escherize_class
-from orbiflow.escher.soft_target import SoftTarget
 from orbiflow.escher.storage import SavedModel
-from orbiflow.escher.target import Target
+from orbiflow.likeness.metrics import iou
+from orbiflow.likeness.overlap import boundary_iou
+from orbiflow.silhouette.soft_target import SoftTarget
+from orbiflow.silhouette.target import Target
 from orbiflow.tilings import CLASSES, certify, isohedral_class
 
 BOOT = [[0, 0], [3, 0], [3.4, 1.2], [2.2, 1.5], [2.0, 2.8], [0.8, 2.5], [-0.3, 1.2]]

@@ -23,7 +23,7 @@ from orbiflow.escher.occupancy import (
     occupancy_loss,
 )
 from orbiflow.escher.result import best_tiles
-from orbiflow.escher.target import Target
+from orbiflow.silhouette.target import Target
 from orbiflow.tilings import CLASSES
 from strategies import seeds
 

@@ -25,7 +25,7 @@ from orbiflow.escher.placements import (
     edge_lengths,
 )
 from orbiflow.escher.prototiles import Prototiles
-from orbiflow.escher.target import Target
+from orbiflow.silhouette.target import Target
 from orbiflow.symmetry.isometry import Array
 from orbiflow.tilings import CLASSES, Tile, certify
 

@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 from orbiflow.escher.boundary import extract_tile
 from orbiflow.escher.descent_settings import DescentSettings
 from orbiflow.escher.fit_descent import fit_descent
-from orbiflow.escher.metrics import iou
 from orbiflow.escher.model import TileModel
-from orbiflow.escher.overlap import Overlap
 from orbiflow.escher.polish import polish
-from orbiflow.escher.target import Target
+from orbiflow.likeness.metrics import iou
+from orbiflow.likeness.overlap import Overlap
+from orbiflow.silhouette.target import Target
 from orbiflow.symmetry.isometry import Array
 from orbiflow.tilings import certify, isohedral_class
 

@@ -3,8 +3,9 @@
 import numpy as np
 import shapely
 
-from orbiflow.escher import ClassFailure, DescentSettings, Target, escherize_class
-from orbiflow.escher.overlap import MANY, Overlap, region_of
+from orbiflow.escher import ClassFailure, DescentSettings, escherize_class
+from orbiflow.likeness.overlap import MANY, Overlap, region_of
+from orbiflow.silhouette import Target
 
 FAST = DescentSettings.for_effort("fast")
 

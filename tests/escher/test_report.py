@@ -18,7 +18,7 @@ from orbiflow.escher.occupancy import OccupancySettings
 from orbiflow.escher.report import report
 from orbiflow.escher.result import ClassFailure
 from orbiflow.escher.search import escherize
-from orbiflow.escher.target import Target
+from orbiflow.silhouette.target import Target
 
 DOCS = Path(__file__).parents[2] / "docs"
 SCHEMA = json.loads((DOCS / "result.schema.json").read_text(encoding="utf-8"))

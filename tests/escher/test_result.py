@@ -8,7 +8,7 @@ from orbiflow.errors import CertificationError
 from orbiflow.escher.fit import Fit
 from orbiflow.escher.model import TileModel
 from orbiflow.escher.result import TileResult, best_tiles
-from orbiflow.escher.target import Target
+from orbiflow.silhouette.target import Target
 from orbiflow.tilings import CLASSES, certify
 
 KIND = CLASSES["IH21"]

@@ -13,7 +13,7 @@ from orbiflow.escher.model import TileModel
 from orbiflow.escher.occupancy import OccupancySettings
 from orbiflow.escher.result import ClassFailure, TileResult
 from orbiflow.escher.search import Event, escherize, escherize_class
-from orbiflow.escher.target import Target
+from orbiflow.silhouette.target import Target
 from orbiflow.tilings import CLASSES
 
 BOOT = [[0, 0], [3, 0], [3.4, 1.2], [2.2, 1.5], [2.0, 2.8], [0.8, 2.5], [-0.3, 1.2]]

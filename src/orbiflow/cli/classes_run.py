@@ -7,7 +7,8 @@ from pathlib import Path
 from rich.table import Table
 
 from orbiflow.cli.console import output
-from orbiflow.draw import classes_png, write_atomic
+from orbiflow.figures import classes_png
+from orbiflow.files import write_atomic
 from orbiflow.symmetry.elements import symmetry_elements
 from orbiflow.tilings import CLASSES, IsohedralClass
 

@@ -41,10 +41,10 @@ def patches(
     import numpy as np
 
     from orbiflow.cli.density_run import read_data, say
-    from orbiflow.density.patches import to_klein
+    from orbiflow.density.spaces.patches import to_klein
     from orbiflow.density.tables import to_csv
-    from orbiflow.draw import write_atomic
     from orbiflow.errors import OrbiflowError
+    from orbiflow.files import write_atomic
 
     if farthest is not None and not farthest >= 0:
         raise OrbiflowError(f"--farthest must be at least 0, got {farthest:g}")

@@ -11,18 +11,17 @@ import torch
 from torch import Tensor
 
 from orbiflow.cli.density_run import model_at, read_data, same_columns, say
-from orbiflow.density.density import SymmetricDensity
-from orbiflow.density.flat_spaces import KleinBottle, Torus
-from orbiflow.density.space import Space
+from orbiflow.density.models.symmetric import SymmetricDensity
+from orbiflow.density.spaces.flat import KleinBottle, Torus
+from orbiflow.density.spaces.space import Space
 from orbiflow.density.tables import read_table
-from orbiflow.draw import write_atomic
-from orbiflow.draw.density_axes import space_title, view_of
-from orbiflow.draw.density_corner import MOST_COLUMNS, corner_png
-from orbiflow.draw.density_flow import flow_png
-from orbiflow.draw.density_page import density_page
-from orbiflow.draw.density_square import density_png, samples_png
-from orbiflow.draw.folder import make_folder
 from orbiflow.errors import OrbiflowError
+from orbiflow.figures.density_axes import space_title, view_of
+from orbiflow.figures.density_corner import MOST_COLUMNS, corner_png
+from orbiflow.figures.density_flow import flow_png
+from orbiflow.figures.density_page import density_page
+from orbiflow.figures.density_square import density_png, samples_png
+from orbiflow.files import make_folder, write_atomic
 from orbiflow.symmetry.isometry import Array
 
 SAMPLES = 3000

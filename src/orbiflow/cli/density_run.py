@@ -18,12 +18,11 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 
 from orbiflow.cli.console import output
 from orbiflow.density import DensityEstimator, SymmetricDensity, density_to_bytes, read_density
-from orbiflow.density.fit_report import FitReport
-from orbiflow.density.fit_report import Progress as Watch
+from orbiflow.density.fitting.report import FitReport
+from orbiflow.density.fitting.report import Progress as Watch
 from orbiflow.density.tables import Table, append_column, read_table, to_csv
-from orbiflow.draw import write_atomic
-from orbiflow.draw.folder import make_folder
 from orbiflow.errors import OrbiflowError
+from orbiflow.files import make_folder, write_atomic
 
 MODEL = "density.safetensors"
 WIDTH = {"sphere": None, "projective-plane": None, "klein-bottle": 2, "torus": None}

@@ -15,22 +15,15 @@ from rich.table import Table
 
 from orbiflow.cli.console import errors, output
 from orbiflow.cli.progress import watched
-from orbiflow.draw import write_atomic
-from orbiflow.draw.folder import make_folder
-from orbiflow.draw.gallery import write_gallery
 from orbiflow.errors import OrbiflowError
-from orbiflow.escher import (
-    ClassFailure,
-    DescentSettings,
-    Emphasis,
-    OccupancySettings,
-    Target,
-    TileResult,
-)
+from orbiflow.escher import ClassFailure, DescentSettings, OccupancySettings, TileResult
 from orbiflow.escher import escherize as search
 from orbiflow.escher.methods import Settings
 from orbiflow.escher.report import report
 from orbiflow.escher.search import INTERRUPTED
+from orbiflow.export.gallery import write_gallery
+from orbiflow.files import make_folder, write_atomic
+from orbiflow.silhouette import Emphasis, Target
 from orbiflow.tilings import CLASSES, isohedral_class
 
 

@@ -1,28 +1,28 @@
 """Densities on the torus, the sphere, the Klein bottle and the projective plane."""
 
-from orbiflow.density.bases import Base, UniformBase, VonMisesBase
-from orbiflow.density.density import SymmetricDensity, kl_by_quadrature, midpoints
 from orbiflow.density.estimator import SPACES, DensityEstimator, make_space
-from orbiflow.density.fit import FitSettings, fit_density
-from orbiflow.density.fit_neural import NeuralSettings, fit_neural
-from orbiflow.density.fit_report import FitReport
-from orbiflow.density.flat_spaces import KleinBottle, Torus
-from orbiflow.density.kernel_fit import mix_kernels
-from orbiflow.density.kernels import AdaptiveKernels
-from orbiflow.density.mixed import MixedDensity
-from orbiflow.density.mixture import MixtureBase
-from orbiflow.density.neural import NeuralField, NeuralFlow
-from orbiflow.density.patches import from_klein, to_klein
-from orbiflow.density.round_spaces import (
+from orbiflow.density.fitting.flow import FitSettings, fit_density
+from orbiflow.density.fitting.kernels import mix_kernels
+from orbiflow.density.fitting.neural import NeuralSettings, fit_neural
+from orbiflow.density.fitting.report import FitReport
+from orbiflow.density.models.bases import Base, UniformBase, VonMisesBase
+from orbiflow.density.models.blend import MixedDensity
+from orbiflow.density.models.chains import MixtureBase
+from orbiflow.density.models.kernels import AdaptiveKernels
+from orbiflow.density.models.neural import NeuralField, NeuralFlow
+from orbiflow.density.models.symmetric import SymmetricDensity, kl_by_quadrature, midpoints
+from orbiflow.density.models.tabulated import TabulatedDensity
+from orbiflow.density.spaces.flat import KleinBottle, Torus
+from orbiflow.density.spaces.patches import from_klein, to_klein
+from orbiflow.density.spaces.round import (
     ProjectivePlane,
     Sphere,
     clear_rotation,
     to_latlon,
     to_vectors,
 )
-from orbiflow.density.space import MEASURES, Space
-from orbiflow.density.storage import density_to_bytes, read_density
-from orbiflow.density.tabulated import TabulatedDensity
+from orbiflow.density.spaces.space import MEASURES, Space
+from orbiflow.density.storage.files import density_to_bytes, read_density
 
 __all__ = [
     "MEASURES",

@@ -9,13 +9,13 @@ import numpy as np
 import torch
 from numpy.typing import ArrayLike
 
-from orbiflow.density.density import SymmetricDensity
-from orbiflow.density.fit import FitSettings, fit_density
-from orbiflow.density.fit_neural import NeuralSettings, fit_neural
-from orbiflow.density.fit_report import FitReport, Progress
-from orbiflow.density.flat_spaces import KleinBottle, Torus
-from orbiflow.density.round_spaces import ProjectivePlane, Sphere, clear_rotation
-from orbiflow.density.space import Space
+from orbiflow.density.fitting.flow import FitSettings, fit_density
+from orbiflow.density.fitting.neural import NeuralSettings, fit_neural
+from orbiflow.density.fitting.report import FitReport, Progress
+from orbiflow.density.models.symmetric import SymmetricDensity
+from orbiflow.density.spaces.flat import KleinBottle, Torus
+from orbiflow.density.spaces.round import ProjectivePlane, Sphere, clear_rotation
+from orbiflow.density.spaces.space import Space
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry.isometry import Array
 

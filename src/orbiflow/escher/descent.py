@@ -18,7 +18,7 @@ from torch import Tensor
 from orbiflow.escher.descent_settings import DescentSettings
 from orbiflow.escher.model import TileModel
 from orbiflow.escher.prototiles import Prototiles
-from orbiflow.escher.soft_target import SoftTarget
+from orbiflow.silhouette.soft_target import SoftTarget
 from orbiflow.symmetry.isometry import Array
 from orbiflow.tilings import IsohedralClass
 

@@ -11,13 +11,13 @@ from orbiflow.escher.descent_settings import DescentSettings
 from orbiflow.escher.fit import Fit, Progress
 from orbiflow.escher.model import TileModel
 from orbiflow.escher.outline_starts import Starts, outline_starts, template_starts
-from orbiflow.escher.overlap import boundary_iou, region_of
 from orbiflow.escher.polish import polish
 from orbiflow.escher.prototiles import Prototiles
-from orbiflow.escher.ranking import rank_score
-from orbiflow.escher.recognition import Recogniser
-from orbiflow.escher.soft_target import SoftTarget
-from orbiflow.escher.target import Target
+from orbiflow.likeness.overlap import boundary_iou, region_of
+from orbiflow.likeness.ranking import rank_score
+from orbiflow.likeness.recognition import Recogniser
+from orbiflow.silhouette.soft_target import SoftTarget
+from orbiflow.silhouette.target import Target
 from orbiflow.symmetry.isometry import Array
 from orbiflow.tilings import IsohedralClass
 

@@ -6,13 +6,13 @@ from dataclasses import replace
 from functools import lru_cache
 
 from orbiflow.escher.descent_settings import DescentSettings
-from orbiflow.escher.emphasis import Emphasis
 from orbiflow.escher.fit import Fit, Progress
 from orbiflow.escher.fit_descent import fit_descent
 from orbiflow.escher.occupancy import OccupancySettings, fit_occupancy
-from orbiflow.escher.soft_target import SoftTarget
 from orbiflow.escher.starts import initial_poses
-from orbiflow.escher.target import Target
+from orbiflow.silhouette.emphasis import Emphasis
+from orbiflow.silhouette.soft_target import SoftTarget
+from orbiflow.silhouette.target import Target
 from orbiflow.tilings import CLASSES, IsohedralClass
 
 Settings = DescentSettings | OccupancySettings

@@ -14,9 +14,9 @@ from torch import Tensor
 from orbiflow.errors import OrbiflowError
 from orbiflow.escher.fit import Progress
 from orbiflow.escher.model import TileModel
-from orbiflow.escher.signed_distance import signed_distance
 from orbiflow.escher.starts import initial_poses, template_symmetries
-from orbiflow.escher.target import Target
+from orbiflow.silhouette.signed_distance import signed_distance
+from orbiflow.silhouette.target import Target
 from orbiflow.tilings import IsohedralClass
 
 MAX_FREQUENCY = 60

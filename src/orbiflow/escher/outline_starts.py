@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
 from orbiflow.escher.nearest_tile import NearestTiles, nearest_tiles
-from orbiflow.escher.outline import reverse
-from orbiflow.escher.overlap import boundary_iou, region_of
 from orbiflow.escher.placements import Complex, Placements, best_placements
 from orbiflow.escher.prototiles import Prototiles, subdivided
 from orbiflow.escher.starts import template_symmetries
-from orbiflow.escher.target import Target
+from orbiflow.likeness.overlap import boundary_iou, region_of
+from orbiflow.silhouette.rings import reverse
+from orbiflow.silhouette.target import Target
 from orbiflow.symmetry import rotation_matrix
 from orbiflow.symmetry.isometry import Array
 from orbiflow.tilings import IsohedralClass

@@ -13,10 +13,10 @@ from torch import Tensor
 
 from orbiflow.escher.descent import CALM
 from orbiflow.escher.model import TileModel
-from orbiflow.escher.overlap import Overlap
-from orbiflow.escher.target import Target
 from orbiflow.fields import FourierField
 from orbiflow.flows import Flow
+from orbiflow.likeness.overlap import Overlap
+from orbiflow.silhouette.target import Target
 from orbiflow.symmetry.isometry import Array
 
 SMOOTHNESS = 1.25

@@ -11,7 +11,7 @@ from orbiflow.escher.fit import Fit
 from orbiflow.escher.model import TileModel
 from orbiflow.escher.outline_starts import outline_starts
 from orbiflow.escher.result import TileResult, best_tiles
-from orbiflow.escher.target import Target
+from orbiflow.silhouette.target import Target
 from orbiflow.tilings import isohedral_class
 
 PREFERRED = ("IH6", "IH5", "IH4", "IH2", "IH3", "IH7", "IH21", "IH28", "IH1")

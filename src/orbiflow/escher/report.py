@@ -12,10 +12,10 @@ import shapely
 import torch
 
 from orbiflow import __version__
-from orbiflow.escher.emphasis import Emphasis
 from orbiflow.escher.methods import Settings, method_name
 from orbiflow.escher.result import ClassFailure, TileResult
-from orbiflow.escher.target import Target
+from orbiflow.silhouette.emphasis import Emphasis
+from orbiflow.silhouette.target import Target
 from orbiflow.symmetry import CrystallographicGroup
 
 SCHEMA_VERSION = 1

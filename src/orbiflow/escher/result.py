@@ -10,12 +10,12 @@ import shapely
 from orbiflow.errors import CertificationError
 from orbiflow.escher.boundary import extract_tile
 from orbiflow.escher.fit import Fit
-from orbiflow.escher.metrics import ShapeMetrics, compare
 from orbiflow.escher.model import TileModel
-from orbiflow.escher.ranking import rank_score
-from orbiflow.escher.recognition import Recognisability, Recogniser
 from orbiflow.escher.storage import SavedModel
-from orbiflow.escher.target import Target
+from orbiflow.likeness.metrics import ShapeMetrics, compare
+from orbiflow.likeness.ranking import rank_score
+from orbiflow.likeness.recognition import Recognisability, Recogniser
+from orbiflow.silhouette.target import Target
 from orbiflow.tilings import Certificate, Tile, certify
 
 

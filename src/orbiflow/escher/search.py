@@ -16,13 +16,13 @@ import torch
 
 from orbiflow.errors import CertificationError, OrbiflowError
 from orbiflow.escher.descent_settings import DescentSettings
-from orbiflow.escher.emphasis import Emphasis
 from orbiflow.escher.methods import Settings, fit, prepare
 from orbiflow.escher.preview import quick_tile
 from orbiflow.escher.processes import process_context, quiet_fork
-from orbiflow.escher.ranking import diverse, tile_similarity
 from orbiflow.escher.result import ClassFailure, TileResult, best_tiles
-from orbiflow.escher.target import Target
+from orbiflow.likeness.ranking import diverse, tile_similarity
+from orbiflow.silhouette.emphasis import Emphasis
+from orbiflow.silhouette.target import Target
 from orbiflow.tilings import CLASSES, isohedral_class
 
 INTERRUPTED = "interrupted"

@@ -12,8 +12,8 @@ import shapely
 
 from orbiflow.errors import CertificationError, OrbiflowError
 from orbiflow.symmetry.isometry import Array
+from orbiflow.tilings.edge_matching import curve_distance, match_segments
 from orbiflow.tilings.images import Surroundings, expected_area, shoelace, surroundings
-from orbiflow.tilings.matching import curve_distance, match_segments
 from orbiflow.tilings.neighbours import neighbours_among
 from orbiflow.tilings.tile import Tile
 

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from orbiflow.symmetry import Isometry
 from orbiflow.symmetry.isometry import Array
+from orbiflow.tilings.edge_matching import segment_tree
 from orbiflow.tilings.images import Surroundings, surroundings
-from orbiflow.tilings.matching import segment_tree
 from orbiflow.tilings.tile import Tile
 
 _SAMPLES = 200  # points on the boundary at least, so that coarse polygons are seen as curves

@@ -1,0 +1,1 @@
+"""Fitting densities to points."""

@@ -1,0 +1,267 @@
+"""Fitting a mixture of von Mises chains: EM with a prior, size by validation, averaged starts."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from orbiflow.density.models.chains import SCALES, MixtureBase, averaged, chained, waves
+from orbiflow.density.models.log_sum import shares_of
+from orbiflow.density.spaces.space import Space
+from orbiflow.errors import OrbiflowError
+
+PRIOR, PRIOR_RESULTANT = 0.05, 0.9
+"""Imaginary points of a component and their mean cosine: none shrinks to a point."""
+
+SHARED = 5.0
+"""Imaginary points that draw a component's weights of the scales to those of all."""
+
+RIDGE = 10.0
+"""Prior precision of the slopes of the regressions."""
+
+STRAIGHT = 5
+"""First iterations of EM, without regressions."""
+
+EVERY, PATIENCE = 5, 2
+"""Iterations between looks at the validation points, and looks that may bring nothing better."""
+
+SMALLEST, PER_POINT = 8, 10
+"""Components tried first, and training points that each must have on average."""
+
+WORTHWHILE = 0.01
+"""Nats of validation that twice as many components must bring."""
+
+Watch = Callable[[float, str], None]
+"""Told the share of the work done and what is being done."""
+
+
+@dataclass(frozen=True)
+class MixtureFit:
+    """What a fit found: the mixture, components of each member, members; whether time ran out."""
+
+    mixture: MixtureBase
+    components: int
+    members: int
+    late: bool
+    seconds: float
+
+
+def fit_mixture(
+    space: Space,
+    train: Tensor,
+    validation: Tensor,
+    *,
+    components: int = 64,
+    members: int = 12,
+    iterations: int = 60,
+    seconds: float = math.inf,
+    seed: int = 0,
+    watch: Watch | None = None,
+) -> MixtureFit:
+    """Mixtures of 8, 16, ... components while validation improves, then the mean of several starts.
+
+    EM ends in another optimum from every start; the mean of their densities is better on new points
+    than any of them (Breiman, Bagging predictors, 1996, without the bootstrap). Starts after the
+    first have their angles in random orders, so that they differ more (as in Germain et al., MADE,
+    2015).
+
+    Args:
+        space: a `Torus`.
+        train, validation: (N, d) and (M, d) canonical points, float64.
+        components: at most, in each member.
+        members: starts that are averaged; those that do not help on `validation` are left out.
+        iterations: of EM, at most.
+        seconds: after which no further EM begins.
+        seed: of the starts.
+        watch: told how far it is.
+
+    Raises:
+        OrbiflowError: for a space that is not a torus, or fewer than two training points.
+    """
+    if len(train) < 2 or not len(validation):
+        raise OrbiflowError(f"a mixture needs 2 training points or more, got {len(train)}")
+    began = time.monotonic()
+    most = max(1, min(components, len(train) // PER_POINT))
+    generator = torch.Generator().manual_seed(seed)
+    size, late = min(SMALLEST, most), False
+
+    def start(count: int, order: Tensor) -> MixtureBase:
+        return _expectation_maximization(
+            space, train, validation, count, order, iterations, generator
+        )
+
+    natural = torch.arange(space.dim)
+    best = start(size, natural)
+    while size < most:
+        if late := time.monotonic() - began > seconds:
+            break
+        larger = min(2 * size, most)
+        if watch is not None:
+            watch(0.0, f"mixture of {larger} components")
+        found = start(larger, natural)
+        if _nll(found, validation) > _nll(best, validation) - WORTHWHILE:
+            break
+        size, best = larger, found
+    kept, score = [best], best.log_prob(validation)
+    for number in range(1, members):
+        if late := time.monotonic() - began > seconds:
+            break
+        if watch is not None:
+            watch(number / members, f"mixture of {size} components, start {number + 1}")
+        found = start(size, torch.randperm(space.dim, generator=generator))
+        joint = torch.logaddexp(score, found.log_prob(validation))
+        if _mean(joint, len(kept) + 1) > _mean(score, len(kept)):
+            kept, score = [*kept, found], joint
+    return MixtureFit(averaged(kept), size, len(kept), late, time.monotonic() - began)
+
+
+def _mean(log_sum: Tensor, count: int) -> float:
+    return float(log_sum.mean()) - math.log(count)
+
+
+def _nll(mixture: MixtureBase, points: Tensor) -> float:
+    return -float(mixture.log_prob(points).mean())
+
+
+@torch.no_grad()
+def _expectation_maximization(
+    space: Space,
+    train: Tensor,
+    validation: Tensor,
+    count: int,
+    order: Tensor,
+    iterations: int,
+    generator: torch.Generator,
+) -> MixtureBase:
+    """EM from seeds that are spread out; the iterate that was best on `validation`."""
+    step = _Maximization(train, order)
+    mixture = _started(space, step.angle, count, order, generator)
+    best, least, idle = mixture, _nll(mixture, validation), 0
+    for iteration in range(1, iterations + 1):
+        mixture = step(mixture, bent=iteration > STRAIGHT)
+        if iteration % EVERY == 0 or iteration == iterations:
+            score = _nll(mixture, validation)
+            if score < least:
+                best, least, idle = mixture, score, 0
+            else:
+                idle += 1
+                if idle > PATIENCE:
+                    break
+    return best
+
+
+def _started(
+    space: Space, angle: Tensor, count: int, order: Tensor, generator: torch.Generator
+) -> MixtureBase:
+    """A uniform component and `count` round ones at points far from each other (k-means++)."""
+    chosen = [int(torch.randint(len(angle), (), generator=generator))]
+    far = (1 - (angle - angle[chosen[0]]).cos()).sum(dim=1)
+    for _ in range(count - 1):
+        chosen.append(int(torch.multinomial(far + 1e-12, 1, generator=generator)))
+        far = torch.minimum(far, (1 - (angle - angle[chosen[-1]]).cos()).sum(dim=1))
+    d = angle.shape[1]
+    means = angle.new_zeros(count + 1, d, 1 + 2 * d)
+    means[1:, :, 0] = angle[chosen]
+    concentrations = angle.new_full((count + 1, d), 5.0)
+    concentrations[0] = 0.0
+    weights = angle.new_full((count + 1, len(SCALES)), 1.0 / (count + 1) / len(SCALES))
+    return MixtureBase(space, weights.log(), means, concentrations, order.repeat(count + 1, 1))
+
+
+class _Maximization:
+    """The E and M steps on fixed points, of chains of one order (d,); component 0 stays uniform."""
+
+    def __init__(self, points: Tensor, order: Tensor) -> None:
+        self.points, self.allowed = points, chained(order)
+        self.angle = 2 * math.pi * points
+        self.waves = waves(self.angle)
+        self.products = (self.waves[:, :, None] * self.waves[:, None, :]).flatten(1)
+        self.scale = points.new_tensor(SCALES)
+
+    def __call__(self, mixture: MixtureBase, *, bent: bool) -> MixtureBase:
+        joint = mixture.joint(self.points)
+        share = shares_of(joint.flatten(1)).reshape(joint.shape)  # (N, L, K)
+        weight = share[..., 1:].sum(dim=1)  # (N, K) of each component
+        precise = (share[..., 1:] / self.scale[:, None]).sum(dim=1)  # each as far as it counts
+        center = torch.atan2(precise.mT @ self.angle.sin(), precise.mT @ self.angle.cos())
+        means = mixture.means.clone()
+        if bent:
+            means[1:] = self._regressed(mixture, precise, center)
+        else:
+            means[1:] = 0.0
+            means[1:, :, 0] = center
+        weights = self._weights(share)
+        moved = MixtureBase(mixture.space, weights, means, mixture.concentrations, mixture.order)
+        loss = 1 - moved.residuals(self.points)[:, 1:].cos()
+        spread = torch.einsum("nk,nkd->kd", precise, loss) + PRIOR * (1 - PRIOR_RESULTANT)
+        concentrations = mixture.concentrations.clone()
+        concentrations[1:] = concentration(1 - spread / (weight.sum(dim=0)[:, None] + PRIOR))
+        return MixtureBase(mixture.space, weights, means, concentrations, mixture.order)
+
+    def _weights(self, share: Tensor) -> Tensor:
+        count = share.sum(dim=0).mT
+        pooled = count[1:].sum(dim=0)
+        drawn = (count + SHARED * pooled / pooled.sum()) / (count.sum(1, keepdim=True) + SHARED)
+        drawn[0] = 1 / len(SCALES)
+        total = count.sum(dim=1, keepdim=True) + 0.1
+        return (drawn * total / total.sum()).log()
+
+    def _regressed(self, mixture: MixtureBase, precise: Tensor, center: Tensor) -> Tensor:
+        """One Fisher scoring step of all circular regressions, their slopes held by a ridge."""
+        count, d = center.shape
+        kappa = mixture.concentrations[1:]
+        bessel = torch.special.i1e(kappa) / torch.special.i0e(kappa)
+        local = _local(center)
+        back = torch.linalg.inv(local)
+        gram = local @ (precise.mT @ self.products).reshape(count, 1 + 2 * d, -1) @ local.mT
+        pull = mixture.residuals(self.points)[:, 1:].sin() * precise[..., None]
+        force = torch.einsum("nkd,np->kdp", pull, self.waves) @ local.mT
+        slopes = mixture.means[1:] @ back
+        found = torch.zeros_like(slopes)
+        for i, used in enumerate(self.allowed):
+            at = used.nonzero()[:, 0]
+            ridge = RIDGE / kappa[:, i, None] * torch.ones(len(at)).to(kappa)
+            ridge[:, 0] = 1e-6
+            now = slopes[:, i, at]
+            # the constant is free
+            right = force[:, i, at] - ridge * torch.cat([0 * now[:, :1], now[:, 1:]], dim=1)
+            matrix = bessel[:, i, None, None] * gram[:, at][:, :, at] + torch.diag_embed(ridge)
+            found[:, i, at] = now + torch.linalg.solve(matrix, right)
+        return (found @ local) * self.allowed
+
+
+def _local(center: Tensor) -> Tensor:
+    """Matrices (K, p, p): 1, sin(x - c), 1 - cos(x - c) from 1, sin x, cos x.
+
+    About its centre a component's regression is well conditioned and its slopes can be compared.
+    """
+    count, d = center.shape
+    i = torch.arange(d)
+    local = center.new_zeros(count, 1 + 2 * d, 1 + 2 * d)
+    local[:, 0, 0] = 1
+    local[:, 1 + i, 1 + i] = center.cos()
+    local[:, 1 + i, 1 + d + i] = -center.sin()
+    local[:, 1 + d + i, 0] = 1
+    local[:, 1 + d + i, 1 + d + i] = -center.cos()
+    local[:, 1 + d + i, 1 + i] = -center.sin()
+    return local
+
+
+def concentration(resultant: Tensor) -> Tensor:
+    """kappa of mean cosines I1(kappa) / I0(kappa) in (0, 1): Best and Fisher (1981), then Newton."""
+    r = resultant.clamp(1e-6, 1 - 1e-8)
+    kappa = torch.where(
+        r < 0.53,
+        2 * r + r**3 + 5 * r**5 / 6,
+        torch.where(r < 0.85, -0.4 + 1.39 * r + 0.43 / (1 - r), 1 / (r**3 - 4 * r**2 + 3 * r)),
+    )
+    for _ in range(3):
+        ratio = torch.special.i1e(kappa) / torch.special.i0e(kappa)
+        kappa = kappa - (ratio - r) / (1 - ratio / kappa - ratio**2)
+        kappa = kappa.clamp(1e-6, 1e8)
+    return kappa

@@ -1,0 +1,95 @@
+"""Choosing the kernels' widths and their share beside a flow, on held-out points."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+import torch
+from scipy.spatial import KDTree
+from torch import Tensor
+
+from orbiflow.density.models.bases import UniformBase
+from orbiflow.density.models.blend import MixedDensity
+from orbiflow.density.models.kernels import AdaptiveKernels, features, is_round
+from orbiflow.density.models.symmetric import SymmetricDensity
+from orbiflow.density.spaces.space import Space
+
+MOST_KERNELS, MOST_HELD = 20_000, 2_000
+"""Centers at most, and held-out points that choose the widths."""
+
+NEIGHBOURS = (2, 4, 8, 16)
+SCALES = (0.1, 0.2, 0.4, 0.8, 1.6)
+ISOTROPY = (0.05, 0.3)
+NARROWEST, WIDEST = 1e7, 0.5
+"""Concentrations at most and at least: a deviation of 0.02 degrees, or nearly uniform."""
+
+FLOOR = 1e-3
+"""Least share of the uniform density: no observation is impossible."""
+
+
+def mix_kernels(density: SymmetricDensity, train: Tensor, held: Tensor) -> MixedDensity:
+    """A fitted density mixed with adaptive kernels about the training points and a uniform floor.
+
+    Each kernel's variance is a share of the mean square distance to its nearest neighbours (Breiman,
+    Meisel, Purcell, 1977), on tori axis by axis. The share, the number of neighbours and the
+    proportions of flow, kernels and floor are those best on the held-out points.
+
+    Args:
+        density: a flow's.
+        train, held: canonical points (N, d), float64.
+    """
+    space = density.space
+    centers, counts = torch.unique(train, dim=0, return_counts=True)
+    if len(centers) > MOST_KERNELS:
+        chosen = torch.randperm(len(centers), generator=torch.Generator().manual_seed(0))
+        centers, counts = centers[chosen[:MOST_KERNELS]], counts[chosen[:MOST_KERNELS]]
+    weights = counts.double() / counts.sum()
+    held = held[:MOST_HELD]
+    spreads = _spreads(space, centers, [m for m in NEIGHBOURS if m < len(centers)])
+    uniform = UniformBase(space).log_prob(held)
+    with torch.no_grad():
+        flow = density.log_prob(held)
+    best, found = -math.inf, None
+    shrinkage = (1.0,) if is_round(space) or space.dim == 1 else ISOTROPY
+    for spread, scale, share in itertools.product(spreads, SCALES, shrinkage):
+        mean = spread.mean(dim=1, keepdim=True)
+        kappa = 1 / (scale * ((1 - share) * spread + share * mean))
+        kernels = AdaptiveKernels(space, centers, kappa.clamp(WIDEST, NARROWEST), weights)
+        parts = torch.stack([flow, kernels.log_prob(held), uniform])
+        shares, score = proportions(parts)
+        if score > best:
+            best, found = score, MixedDensity(space, density.flow, density.base, kernels, shares)
+    assert found is not None
+    return found
+
+
+def proportions(parts: Tensor, *, iterations: int = 60) -> tuple[Tensor, float]:
+    """Mixing proportions (3,) that suit log densities `parts` (3, N) best, by EM; and their score.
+
+    The last is kept at `FLOOR` or more.
+    """
+    shares = torch.full_like(parts[:, 0], 1 / len(parts))
+    for _ in range(iterations):
+        joint = parts + shares.log()[:, None]
+        shares = (joint - joint.logsumexp(dim=0)).exp().mean(dim=1)
+    shares[-1] = shares[-1].clamp_min(FLOOR)
+    shares = shares.clamp_min(1e-12) / shares.clamp_min(1e-12).sum()
+    return shares, float((parts + shares.log()[:, None]).logsumexp(dim=0).mean())
+
+
+def _spreads(space: Space, centers: Tensor, neighbours: list[int]) -> list[Tensor]:
+    """Mean squares of the distance to the nearest neighbours, per axis: (N, 1) or (N, d) each."""
+    images = features(space, centers)
+    count = images.shape[1]
+    tree = KDTree(images.reshape(-1, images.shape[-1]).numpy())
+    _, nearest = tree.query(images[0].numpy(), k=neighbours[-1] + 1)
+    near = images.reshape(-1, images.shape[-1])[torch.as_tensor(np.asarray(nearest)[:, 1:])]
+    square = (near - images[0][:, None]) ** 2
+    if is_round(space):
+        square = square.sum(dim=-1, keepdim=True) / 2
+    else:  # a chord's square is nearly the angle's
+        square = square[..., : space.dim] + square[..., space.dim :]
+    assert square.shape[:2] == (count, neighbours[-1])
+    return [square[:, :m].mean(dim=1) + 1e-12 for m in neighbours]

@@ -1,0 +1,1 @@
+"""Densities: push-forwards of a base, kernels, chains and their blends."""

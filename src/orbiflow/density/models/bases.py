@@ -1,0 +1,77 @@
+"""Base distributions: what the flow carries to the data."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from orbiflow.density.spaces.space import Space, rectangle
+from orbiflow.errors import OrbiflowError
+
+
+class Base(ABC):
+    """A distribution on a space that needs no fit, invariant under the space's group."""
+
+    def __init__(self, space: Space) -> None:
+        self.space = space
+
+    @abstractmethod
+    def log_prob(self, points: Tensor) -> Tensor:
+        """Log density (...,) with respect to the area of the square, at points (..., d)."""
+
+    @abstractmethod
+    def sample(self, count: int, generator: torch.Generator) -> Tensor:
+        """Canonical points (count, d), float64."""
+
+
+class UniformBase(Base):
+    """Uniform in natural measure: on sphere and projective plane J / 4 pi and J / 2 pi.
+
+    An equivariant flow fixes the cone points, so a base that is flat in the chart could never be
+    corrected there (design point 13).
+    """
+
+    def log_prob(self, points: Tensor) -> Tensor:
+        return self.space.log_area(points) - math.log(self.space.volume)
+
+    def sample(self, count: int, generator: torch.Generator) -> Tensor:
+        return self.space.uniform(count, generator)
+
+
+class VonMisesBase(Base):
+    """The paper's base: a product of von Mises distributions about the square's centre.
+
+    Made invariant by summing over the group: with periods those of the lattice, the sum over coset
+    representatives integrates to 1 over the square.
+
+    Args:
+        space: any.
+        concentration: kappa > 0 of each factor.
+    """
+
+    def __init__(self, space: Space, concentration: float = 1.0) -> None:
+        super().__init__(space)
+        if not concentration > 0 or not math.isfinite(concentration):
+            raise OrbiflowError(f"concentration must be positive, got {concentration}")
+        self.concentration = float(concentration)
+        self.periods = rectangle(space)
+
+    def log_prob(self, points: Tensor) -> Tensor:
+        images = self.space.group.images(points)
+        periods = self.periods.to(points)
+        angle = 2 * math.pi * (images - 0.5) / periods
+        kappa = self.concentration
+        log_normal = torch.log(torch.special.i0e(torch.tensor(kappa, dtype=torch.float64))) + kappa
+        terms = kappa * angle.cos() - log_normal.to(points) - periods.log()
+        return terms.sum(dim=-1).logsumexp(dim=0)
+
+    def sample(self, count: int, generator: torch.Generator) -> Tensor:
+        seed = int(torch.randint(2**31, (), generator=generator))
+        angle = np.random.default_rng(seed).vonmises(
+            0.0, self.concentration, (count, self.space.dim)
+        )
+        return self.space.project(0.5 + torch.tensor(angle) / (2 * math.pi) * self.periods)

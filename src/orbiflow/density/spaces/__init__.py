@@ -1,0 +1,1 @@
+"""The four identification spaces: charts, measures and units."""

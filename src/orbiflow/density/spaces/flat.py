@@ -1,0 +1,137 @@
+"""The torus of any dimension and the Klein bottle, for data that are angles."""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import ArrayLike
+from torch import Tensor
+
+from orbiflow.density.spaces.space import Space, checked_table
+from orbiflow.errors import OrbiflowError
+from orbiflow.symmetry import CrystallographicGroup, identification_group
+from orbiflow.symmetry.isometry import Array
+
+TURN: dict[str, float] = {"radians": 2 * math.pi, "degrees": 360.0, "turns": 1.0}
+"""A whole turn in each unit."""
+
+MAX_DIM = 64
+
+
+def whole_turn(unit: str) -> float:
+    """360 degrees in `unit`.
+
+    Raises:
+        OrbiflowError: for an unknown unit.
+    """
+    if unit not in TURN:
+        raise OrbiflowError(f"unit must be one of {', '.join(TURN)}, got {unit!r}")
+    return TURN[unit]
+
+
+@lru_cache(maxsize=16)  # fields are cached by group identity
+def _integer_lattice(dim: int) -> CrystallographicGroup:
+    if dim == 2:
+        return identification_group("torus")
+    return CrystallographicGroup.generate(np.eye(dim), name="p1")
+
+
+@lru_cache(maxsize=1)
+def _klein_group() -> CrystallographicGroup:
+    return identification_group("klein-bottle")
+
+
+class Torus(Space):
+    """The torus of `dim` angles; the natural measure is their product in the user's unit.
+
+    Args:
+        dim: number of angles, 1 to 64.
+        unit: "radians", "degrees" or "turns" of the data; any real number is taken.
+
+    >>> space = Torus(2, unit="degrees")
+    >>> space.to_chart([[90.0, -90.0]]).tolist()
+    [[0.25, 0.75]]
+    """
+
+    name = "torus"
+
+    def __init__(self, dim: int = 2, *, unit: str = "radians") -> None:
+        if isinstance(dim, bool) or int(dim) != dim or not 1 <= dim <= MAX_DIM:
+            raise OrbiflowError(f"dim must be an integer from 1 to {MAX_DIM}, got {dim!r}")
+        self.period = whole_turn(unit)
+        self.unit = unit
+        self.group = _integer_lattice(int(dim))
+        self.columns = tuple(f"angle{k + 1}" for k in range(int(dim)))
+
+    @property
+    def volume(self) -> float:
+        return self.period**self.dim
+
+    def to_chart(self, data: ArrayLike) -> Tensor:
+        table = checked_table(data, (self.dim,), f"{self.dim} angles")
+        return self.project(torch.tensor(table / self.period))
+
+    def from_chart(self, points: Tensor) -> Array:
+        """Angles (N, dim) in [-1/2, 1/2) turns."""
+        x = points.detach().double().cpu().numpy()
+        return (x - np.floor(x + 0.5)) * self.period
+
+    def project(self, points: Tensor) -> Tensor:
+        return points - points.detach().floor()
+
+    def displacement(self, start: Tensor, end: Tensor) -> Tensor:
+        # exact in any dimension, where the images are 3^d
+        difference = end - start
+        return difference - difference.detach().round()
+
+    def squared_distances(self, start: Tensor, end: Tensor) -> Tensor:
+        table = self.displacement(start[:, None], end[None])
+        return (table**2).sum(dim=-1)
+
+    def settings(self) -> dict[str, Any]:
+        return {"dim": self.dim, "unit": self.unit}
+
+
+class KleinBottle(Space):
+    """The Klein bottle of angles with (theta + pi, pi - phi) ~ (theta, phi), both of period 2 pi.
+
+    These are the coordinates of 3 x 3 image patches cos(phi) l(theta) + sin(phi) q(theta), with l a
+    linear and q a quadratic gradient across direction theta (Carlsson, Ishkhanov, de Silva and
+    Zomorodian, On the local behavior of spaces of natural images, 2008; see `patches`).
+
+    In the chart x = (phi + pi/2) / 2 pi and y = theta / pi, so (x, y) ~ (1 - x, y + 1).
+
+    Args:
+        unit: "radians", "degrees" or "turns" of the data (N, 2): theta, phi.
+
+    >>> KleinBottle(unit="degrees").to_chart([[190.0, 150.0], [10.0, 30.0]]).numpy().round(6).tolist()
+    [[0.333333, 0.055556], [0.333333, 0.055556]]
+    """
+
+    name = "klein-bottle"
+    columns = ("theta", "phi")
+
+    def __init__(self, *, unit: str = "radians") -> None:
+        self.period = whole_turn(unit)
+        self.unit = unit
+        self.group = _klein_group()
+
+    @property
+    def volume(self) -> float:
+        return self.period**2 / 2
+
+    def to_chart(self, data: ArrayLike) -> Tensor:
+        theta, phi = checked_table(data, (2,), "theta and phi").T / self.period
+        return self.project(torch.tensor(np.stack([phi + 0.25, 2 * theta], axis=-1)))
+
+    def from_chart(self, points: Tensor) -> Array:
+        """(N, 2): theta in [0, 1/2) turns, phi in [-1/4, 3/4) turns."""
+        x, y = self.project(points).detach().double().cpu().numpy().T
+        return np.stack([y / 2, x - 0.25], axis=-1) * self.period
+
+    def settings(self) -> dict[str, Any]:
+        return {"unit": self.unit}

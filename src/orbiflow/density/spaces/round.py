@@ -1,0 +1,205 @@
+"""The sphere and the projective plane, with their round area (design point 13)."""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import ArrayLike, NDArray
+from torch import Tensor
+
+from orbiflow.density.spaces import uniformization
+from orbiflow.density.spaces.space import Space, checked_table
+from orbiflow.errors import OrbiflowError
+from orbiflow.symmetry import CrystallographicGroup, identification_group
+from orbiflow.symmetry.isometry import Array
+
+UNIT_TOLERANCE = 1e-3
+"""How far the length of what is given as a unit vector may be from 1."""
+
+FORMS: dict[str, tuple[str, ...]] = {"latlon": ("lat", "lon"), "vector": ("x", "y", "z")}
+"""How directions are written: degrees north and east, or unit vectors."""
+
+
+def to_vectors(data: ArrayLike) -> Array:
+    """Directions as unit vectors (N, 3), from (N, 2) latitude and longitude or (N, 3) vectors.
+
+    Raises:
+        OrbiflowError: for a latitude beyond 90 degrees, a longitude beyond 360, or a vector whose
+            length is not 1 within a thousandth.
+
+    >>> to_vectors([[0.0, 90.0]]).round(12).tolist()
+    [[0.0, 1.0, 0.0]]
+    """
+    table = checked_table(data, (2, 3), "directions")
+    if table.shape[1] == 3:
+        length = np.linalg.norm(table, axis=1)
+        _refuse(
+            abs(length - 1) > UNIT_TOLERANCE,
+            lambda row: (
+                f"the vector {table[row].tolist()} has length {length[row]:.4g}, not 1: "
+                "divide each by its length"
+            ),
+        )
+        return table / length[:, None]
+    _refuse(
+        abs(table[:, 0]) > 90,
+        lambda row: f"latitude {table[row, 0]:g} is beyond 90 degrees: are the columns lat, lon?",
+    )
+    _refuse(
+        abs(table[:, 1]) > 360,
+        lambda row: f"longitude {table[row, 1]:g} is beyond 360 degrees",
+    )
+    lat, lon = np.radians(table.T)
+    return np.stack([np.cos(lat) * np.cos(lon), np.cos(lat) * np.sin(lon), np.sin(lat)], axis=-1)
+
+
+def to_latlon(vectors: Array) -> Array:
+    """Unit vectors (N, 3) as degrees (N, 2): latitude, longitude in [-180, 180)."""
+    x, y, z = vectors.T
+    lon = np.degrees(np.arctan2(y, x))
+    lat = np.degrees(np.arctan2(z, np.hypot(x, y)))
+    return np.stack([lat, np.where(lon >= 180, lon - 360, lon)], axis=-1)
+
+
+def _refuse(wrong: NDArray[np.bool_], message: Any) -> None:
+    rows = np.flatnonzero(wrong)
+    if len(rows):
+        more = f" ({len(rows)} such rows)" if len(rows) > 1 else ""
+        raise OrbiflowError(f"row {rows[0] + 1}: {message(rows[0])}{more}")
+
+
+class _RoundSpace(Space):
+    """A quotient of the square with the area of the unit sphere.
+
+    Args:
+        form: "latlon" (degrees) or "vector": how `from_chart` writes directions; `to_chart` takes
+            both.
+        rotation: (3, 3) turn of the sphere in front of the chart: where the cone points lie is
+            where densities are least flexible, so it should move them away from the data
+            (`clear_rotation`).
+    """
+
+    power: int
+
+    def __init__(self, *, form: str = "latlon", rotation: ArrayLike | None = None) -> None:
+        if form not in FORMS:
+            raise OrbiflowError(f"form must be one of {', '.join(FORMS)}, got {form!r}")
+        turn = np.eye(3) if rotation is None else np.array(rotation, dtype=np.float64)
+        if turn.shape != (3, 3) or not np.allclose(turn @ turn.T, np.eye(3), atol=1e-9):
+            raise OrbiflowError("rotation must be an orthogonal (3, 3) matrix")
+        self.form, self.columns = form, FORMS[form]
+        self.rotation = turn
+        self.group = _group(self.name)
+
+    def log_area(self, points: Tensor) -> Tensor:
+        return uniformization.log_area(points, self.power)
+
+    def vectors_to_chart(self, vectors: Array) -> Tensor:
+        """Unit vectors (N, 3) to canonical points (N, 2)."""
+        turned = np.asarray(vectors) @ self.rotation.T
+        return self.project(torch.tensor(uniformization.from_sphere(turned, self.power)))
+
+    def vectors(self, points: Tensor) -> Array:
+        """Chart points (N, 2) to unit vectors (N, 3); of an axis, one of the two."""
+        turned = uniformization.to_sphere(self.project(points.detach().double().cpu()), self.power)
+        return turned.numpy() @ self.rotation
+
+    def to_chart(self, data: ArrayLike) -> Tensor:
+        return self.vectors_to_chart(to_vectors(data))
+
+    def from_chart(self, points: Tensor) -> Array:
+        vectors = self._representatives(self.vectors(points))
+        return vectors if self.form == "vector" else to_latlon(vectors)
+
+    def uniform(self, count: int, generator: torch.Generator) -> Tensor:
+        vectors = torch.randn(count, 3, dtype=torch.float64, generator=generator)
+        return self.vectors_to_chart((vectors / vectors.norm(dim=1, keepdim=True)).numpy())
+
+    def cone_vectors(self) -> Array:
+        """Unit vectors of the chart's cone points, in the data's frame."""
+        corners = torch.tensor([[0.0, 0.0], [1.0, 1.0], [1.0, 0.0]], dtype=torch.float64)
+        cones = corners if self.power == 4 else corners[[0, 2]]
+        return uniformization.to_sphere(cones, self.power).numpy() @ self.rotation
+
+    def settings(self) -> dict[str, Any]:
+        return {"form": self.form, "rotation": self.rotation.tolist()}
+
+    def _representatives(self, vectors: Array) -> Array:
+        return vectors
+
+    def round_distance(self, start: Tensor, end: Tensor) -> Tensor:
+        """Great-circle distance (...,) in radians."""
+        one, other = (
+            uniformization.to_sphere(self.project(points), self.power) for points in (start, end)
+        )
+        # well conditioned at both ends, as acos is not
+        angle = 2 * torch.atan2((one - other).norm(dim=-1), (one + other).norm(dim=-1))
+        return angle if self.power == 4 else torch.minimum(angle, math.pi - angle)
+
+
+class Sphere(_RoundSpace):
+    """The unit sphere of directions; densities are per steradian.
+
+    >>> space = Sphere()
+    >>> space.from_chart(space.to_chart([[48.2, 16.4]])).round(9).tolist()
+    [[48.2, 16.4]]
+    """
+
+    name = "sphere"
+    power = 4
+
+    @property
+    def volume(self) -> float:
+        return 4 * math.pi
+
+
+class ProjectivePlane(_RoundSpace):
+    """The projective plane of axes, which are directions without a sense; densities per steradian.
+
+    Of the two ends of an axis, `from_chart` gives that in the northern hemisphere.
+
+    >>> space = ProjectivePlane()
+    >>> space.from_chart(space.to_chart([[-30.0, 20.0]])).round(9).tolist()
+    [[30.0, -160.0]]
+    """
+
+    name = "projective-plane"
+    power = 2
+
+    @property
+    def volume(self) -> float:
+        return 2 * math.pi
+
+    def _representatives(self, vectors: Array) -> Array:
+        return np.where(vectors[:, 2:] < 0, -1.0, 1.0) * vectors
+
+
+def clear_rotation(
+    space: Sphere | ProjectivePlane, data: ArrayLike, *, trials: int = 400, seed: int = 0
+) -> Array:
+    """A rotation (3, 3) for `space` that puts the cone points where the data is thin.
+
+    Of `trials` random ones, that of least von Mises-Fisher kernel density (concentration 30) at the
+    cone points.
+    """
+    vectors = to_vectors(data)
+    rng = np.random.default_rng(seed)
+    if len(vectors) > 5000:
+        vectors = vectors[rng.choice(len(vectors), 5000, replace=False)]
+    cones = type(space)().cone_vectors()
+    turns = np.linalg.qr(rng.normal(size=(trials, 3, 3)))[0]
+    turns *= np.sign(np.linalg.det(turns))[:, None, None]
+    cosines = np.einsum("cj,tjk,nk->tcn", cones, turns, vectors)
+    if space.power == 2:
+        cosines = abs(cosines)
+    load = np.exp(30 * (cosines - 1)).sum(axis=(1, 2))
+    return turns[int(load.argmin())]
+
+
+@lru_cache(maxsize=2)
+def _group(name: str) -> CrystallographicGroup:
+    return identification_group(name)

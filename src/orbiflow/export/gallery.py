@@ -1,0 +1,102 @@
+"""All files of an escherization: a folder a class, and an overview."""
+
+from __future__ import annotations
+
+import io
+from collections import Counter
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+
+import torch
+from PIL import Image, ImageDraw, ImageFont
+
+from orbiflow.escher.processes import process_context, quiet_fork
+from orbiflow.escher.result import TileResult
+from orbiflow.export.folder import write_tile_folder
+from orbiflow.figures.tilings import overlay_png, tiling_png
+from orbiflow.files import write_atomic
+from orbiflow.silhouette.target import Target
+
+_PANEL, _HEADER = 560, 60  # pixels
+
+
+def write_gallery(
+    results: Sequence[TileResult], target: Target, out: Path, *, workers: int = 1
+) -> None:
+    """Write each class's folder and `overview.png`, in `workers` processes.
+
+    Raises:
+        OutputError: if a file cannot be written.
+    """
+    folders = [out / name for name in folder_names(results)]
+    targets = [target] * len(results)
+    if workers == 1:
+        for result, folder in zip(results, folders, strict=True):
+            write_tile_folder(result, target, folder)
+    else:
+        context = process_context()
+        with ProcessPoolExecutor(workers, context, torch.set_num_threads, (1,)) as pool:
+            with quiet_fork():
+                done = pool.map(write_tile_folder, results, targets, folders)
+            for _ in done:
+                pass
+    pictures = [
+        tuple((folder / name).read_bytes() for name in ("overlay.png", "tiling.png"))
+        for folder in folders
+    ]
+    write_atomic(out / "overview.png", overview_png(results, target, pictures))
+
+
+def folder_names(results: Sequence[TileResult]) -> list[str]:
+    """The class of each result; further tiles of a class are IH4-2, IH4-3 and so on."""
+    seen: Counter[str] = Counter()
+    names = []
+    for result in results:
+        seen[result.name] += 1
+        number = seen[result.name]
+        names.append(result.name if number == 1 else f"{result.name}-{number}")
+    return names
+
+
+def overview_png(
+    results: Sequence[TileResult],
+    target: Target,
+    pictures: Sequence[Sequence[bytes]] | None = None,
+) -> bytes:
+    """PNG of all tiles, best first: each over its target, and its tiling.
+
+    Args:
+        results: of one search.
+        target: of the search.
+        pictures: overlay and tiling of each result as PNGs, if they are at hand.
+    """
+    columns = min(3, len(results))
+    rows = -(-len(results) // columns)
+    sheet = Image.new("RGB", (columns * 2 * _PANEL, rows * (_PANEL + _HEADER)), "white")
+    pen = ImageDraw.Draw(sheet)
+    font = ImageFont.load_default(size=30)
+    for i, result in enumerate(results):
+        left, top = (i % columns) * 2 * _PANEL, (i // columns) * (_PANEL + _HEADER)
+        proof = "certified" if result.certificate.valid else "NOT CERTIFIED"
+        title = (
+            f"{result.name}  {result.group_name}    IoU {result.metrics.iou:.3f}    "
+            f"recognised {result.recognisability.score:.2f}    {proof}"
+        )
+        pen.text((left + 24, top + 14), title, fill="#1a1a1a", font=font)
+        both = (
+            pictures[i]
+            if pictures is not None
+            else (
+                overlay_png(result.tile, target.outline, y_down=target.y_down, width_px=900),
+                tiling_png(result.tile, y_down=target.y_down, width_px=900),
+            )
+        )
+        for j, picture in enumerate(both):
+            panel = Image.open(io.BytesIO(picture)).convert("RGB")
+            panel.thumbnail((_PANEL - 24, _PANEL - 24), Image.Resampling.LANCZOS)
+            x = left + j * _PANEL + (_PANEL - panel.width) // 2
+            sheet.paste(panel, (x, top + _HEADER + (_PANEL - panel.height) // 2))
+    buffer = io.BytesIO()
+    sheet.save(buffer, "PNG", compress_level=4)
+    return buffer.getvalue()

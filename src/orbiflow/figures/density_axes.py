@@ -1,0 +1,267 @@
+"""Axes of pictures on the canonical square: which window, ticks, edges that are one, cone points."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from orbiflow.density.spaces.flat import KleinBottle, Torus
+from orbiflow.density.spaces.space import Space
+from orbiflow.errors import OrbiflowError
+from orbiflow.figures.immersions import edge_pairs
+from orbiflow.figures.marks import CENTER_COLOURS, center_sign
+from orbiflow.symmetry import CrystallographicGroup
+from orbiflow.symmetry.elements import symmetry_elements
+from orbiflow.symmetry.isometry import Array
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+EDGE_COLOURS = ("#d95f02", "#1f78b4")
+"""Of the two pairs of edges that are one edge each."""
+
+INK = "#1a1a1a"
+LONGEST_NAME = 40
+
+
+class View(NamedTuple):
+    """A window of side 1 onto the chart of a space, with the names of the data's columns.
+
+    - `low`: (d,), its lower corner; the square's own except on the torus.
+    """
+
+    space: Space
+    names: tuple[str, ...]
+    low: Array
+
+    def to_chart(self, points: Tensor) -> Tensor:
+        """Points (N, d) of the window, [0, 1]^d, as chart points."""
+        return points + torch.tensor(self.low, dtype=points.dtype)
+
+    def places(self, points: Tensor) -> Array:
+        """Chart points (N, d) in the window, [0, 1]^d.
+
+        Raises:
+            OrbiflowError: for points of another shape.
+        """
+        moved = chart_points(self.space, points) - torch.tensor(self.low)
+        # a translation commutes with the torus' group, and is 0 elsewhere
+        return self.space.project(moved).numpy()
+
+
+def chart_points(space: Space, points: Tensor) -> Tensor:
+    """Points (N, d) to draw, float64.
+
+    Raises:
+        OrbiflowError: for another shape.
+    """
+    if points.ndim != 2 or points.shape[1] != space.dim:
+        raise OrbiflowError(f"expected chart points (N, {space.dim}), got {tuple(points.shape)}")
+    return points.detach().double().cpu()
+
+
+def view_of(
+    space: Space, names: Sequence[str] | None = None, center: Sequence[float] | None = None
+) -> View:
+    """The window of a space's flat pictures.
+
+    Args:
+        names: of the data's columns on torus and Klein bottle, default `space.columns`.
+        center: of the torus' window, an angle per column in the space's unit; default 0, so that
+            angles run from minus half a turn to half a turn.
+
+    Raises:
+        OrbiflowError: for another number of names or angles, an angle that is not finite, or a
+            centre on another space, whose window is the canonical square.
+    """
+    names = tuple(space.columns if names is None else names)
+    if len(names) != len(space.columns):
+        raise OrbiflowError(f"expected {len(space.columns)} names of columns, got {list(names)}")
+    if not isinstance(space, Torus):
+        if center is not None:
+            raise OrbiflowError(f"the window is centred on the torus, not on the {space.name}")
+        return View(space, names, np.zeros(space.dim))
+    turns = np.zeros(space.dim) if center is None else np.array(center, dtype=float) / space.period
+    if turns.shape != (space.dim,) or not np.isfinite(turns).all():
+        raise OrbiflowError(f"the centre needs {space.dim} finite angles, got {center!r}")
+    # 3.14 radians are meant as pi: the ticks would be cut off beside the window's edge
+    even = np.round(24 * turns) / 24
+    turns = np.where(abs(turns - even) < 1e-3, even, turns)
+    return View(space, names, turns - 0.5)
+
+
+def space_title(space: Space) -> str:
+    """The space's name in a sentence.
+
+    >>> space_title(KleinBottle())
+    'Klein bottle'
+    """
+    return space.name.replace("-", " ").replace("klein", "Klein")
+
+
+def column_name(view: View, column: int) -> str:
+    """A column's name, short enough for an axis."""
+    name = view.names[column]
+    return name if len(name) <= LONGEST_NAME else f"{name[: LONGEST_NAME - 1]}…"
+
+
+def axis_label(view: View, column: int) -> str:
+    """Name and unit of an angle."""
+    return f"{column_name(view, column)} ({getattr(view.space, 'unit', '')})"
+
+
+def angle_axis(view: View, axis: int) -> tuple[str, list[float], list[str]]:
+    """Label, places and texts of the ticks of one axis of a torus' or Klein bottle's window."""
+    space = view.space
+    assert isinstance(space, Torus | KleinBottle)
+    if isinstance(space, KleinBottle):
+        # the first column, theta, goes up: half a turn; phi starts a quarter before 0
+        turns = [k / 4 - 0.25 for k in range(5)] if axis == 0 else [k / 8 for k in range(5)]
+        texts = [angle_text(t, space.unit) for t in turns]
+        return axis_label(view, 1 - axis), [k / 4 for k in range(5)], texts
+    low = float(view.low[axis])
+    quarters = range(math.ceil(4 * low - 1e-9), math.floor(4 * low + 4 + 1e-9) + 1)
+    places = [k / 4 - low for k in quarters]
+    return axis_label(view, axis), places, [angle_text(k / 4, space.unit) for k in quarters]
+
+
+def angle_text(turns: float, unit: str) -> str:
+    """An angle in its unit.
+
+    >>> angle_text(0.375, "radians"), angle_text(0.25, "degrees")
+    ('3π/4', '90°')
+    """
+    if unit == "radians":
+        part = Fraction(turns) * 2
+        over = f"/{part.denominator}" if part.denominator > 1 else ""
+        times = "" if abs(part.numerator) == 1 else str(abs(part.numerator))
+        text = f"{times}π{over}" if part else "0"
+    else:
+        text = f"{abs(turns) * 360:g}°" if unit == "degrees" else f"{abs(turns):g}"
+    return f"\N{MINUS SIGN}{text}" if turns < 0 else text
+
+
+def dress(axes: Axes, view: View, size: float, *, places: bool = True) -> None:
+    """Ticks, edges with their arrows, and cone points, with `places` where these lie in the data."""
+    space = view.space
+    axes.set_xlim(0, 1)
+    axes.set_ylim(0, 1)
+    axes.set_aspect("equal")
+    for spine in axes.spines.values():
+        spine.set_visible(False)
+    axes.tick_params(labelsize=0.9 * size, length=0.3 * size, pad=0.5 * size)
+    axes.set_xticks([])
+    axes.set_yticks([])
+    if isinstance(space, Torus | KleinBottle):
+        label, at, texts = angle_axis(view, 0)
+        axes.set_xticks(at, texts)
+        axes.set_xlabel(label, fontsize=size, color=INK, parse_math=False)
+        label, at, texts = angle_axis(view, 1)
+        axes.set_yticks(at, texts)
+        axes.set_ylabel(label, fontsize=size, color=INK, labelpad=0.2 * size, parse_math=False)
+    for order, pair in enumerate(edge_pairs(space.group)):
+        for edge in pair:
+            _arrow(axes, edge, EDGE_COLOURS[order % 2], order + 1, size)
+    for corner, order in _cones(space.group):
+        sign = np.array(corner) + center_sign(order, 0.018)
+        axes.fill(
+            *sign.T, facecolor=CENTER_COLOURS[order], edgecolor="#ffffff", linewidth=0.08 * size,
+            zorder=8, clip_on=False,
+        )  # fmt: skip
+        if places:
+            _place(axes, space, corner, size)
+
+
+def legend(
+    figure: Figure, space: Space, size: float, *, dots: bool, notes: Sequence[str] = ()
+) -> None:
+    """What edges, signs and dots are, in the lower left corner, and further `notes`."""
+    from matplotlib.lines import Line2D
+
+    entries = [
+        Line2D([], [], color=colour, linewidth=0.28 * size, marker=">", label=_edges_label(text))
+        for colour, text in zip(EDGE_COLOURS, ("orange", "blue"), strict=True)
+    ]
+    for order in sorted({order for _, order in _cones(space.group)}, reverse=True):
+        outline = center_sign(order, 1.0)
+        style: dict[str, Any] = {"marker": np.concatenate([outline, outline[:1]])}
+        style |= {"color": CENTER_COLOURS[order], "markersize": size, "linestyle": "none"}
+        turn = {2: "half", 4: "quarter"}[order]
+        entries.append(
+            Line2D([], [], label=f"cone point of a {turn} turn: no flow moves it", **style)
+        )
+    if dots:
+        style = {"markerfacecolor": "#ffffff", "markeredgecolor": INK, "linestyle": "none"}
+        entries.append(Line2D([], [], marker="o", label="points", **style))
+    if hasattr(space, "cone_vectors"):
+        note = "dots crowd where the square shrinks areas"
+        notes = [*([note] if dots else []), *notes]
+    entries += [Line2D([], [], linestyle="none", label=note) for note in notes]
+    figure.legend(
+        handles=entries, loc="lower left", bbox_to_anchor=(0.05, 0.005), ncols=2, frameon=False,
+        fontsize=0.9 * size,
+    )  # fmt: skip
+
+
+def font(figure: Figure) -> float:
+    """Size of its texts, in points."""
+    return 9.5 * figure.get_figwidth() / 8
+
+
+def check_plane(space: Space) -> None:
+    """
+    Raises:
+        OrbiflowError: unless the space has two dimensions.
+    """
+    if space.dim != 2:
+        raise OrbiflowError(f"a picture needs two dimensions, this {space.name} has {space.dim}")
+
+
+def _edges_label(colour: str) -> str:
+    return f"both {colour} edges are one edge"
+
+
+def _arrow(axes: Axes, edge: Array, colour: str, heads: int, size: float) -> None:
+    """An edge with as many heads in its middle as the number of its pair."""
+    axes.plot(*edge.T, color=colour, linewidth=0.28 * size, clip_on=False, zorder=6)
+    along = edge[1] - edge[0]
+    across = np.array([-along[1], along[0]])
+    for k in range(heads):
+        tip = edge[0] + (0.53 + 0.035 * (k - (heads - 1) / 2)) * along
+        back = tip - 0.035 * along
+        ring = np.stack([tip, back + 0.016 * across, back - 0.016 * across])
+        axes.fill(
+            *ring.T, facecolor=colour, edgecolor="#ffffff", linewidth=0.06 * size,
+            clip_on=False, zorder=7,
+        )  # fmt: skip
+
+
+def _cones(group: CrystallographicGroup) -> list[tuple[tuple[float, float], int]]:
+    """Corners of the square that are rotation centres, and their orders."""
+    found = symmetry_elements(group, np.full(2, 0.5), 1.0).centers
+    corners = [(x, y) for x in (0.0, 1.0) for y in (0.0, 1.0)]
+    return [
+        (corner, center.order)
+        for corner in corners
+        for center in found
+        if np.allclose(center.point, corner)
+    ]
+
+
+def _place(axes: Axes, space: Space, corner: tuple[float, float], size: float) -> None:
+    """Where in the data's columns a cone point lies."""
+    digits = 2 if len(space.columns) == 3 else 0
+    row = space.from_chart(torch.tensor([corner], dtype=torch.float64))[0].round(digits) + 0.0
+    text = ", ".join(f"{n} {v:.{digits}f}" for n, v in zip(space.columns, row, strict=True))
+    axes.annotate(
+        text.replace("-", "\N{MINUS SIGN}"), corner, xytext=(0, size * (2 * corner[1] - 1)),
+        textcoords="offset points", ha="right" if corner[0] else "left",
+        va="bottom" if corner[1] else "top", fontsize=0.85 * size, color=INK,
+    )  # fmt: skip

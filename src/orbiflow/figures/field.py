@@ -1,0 +1,153 @@
+"""Picture of a symmetric vector field: magnitude, flow lines, cell and symmetries."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import torch
+
+from orbiflow.errors import OrbiflowError
+from orbiflow.figures.canvas import blank_figure, plane_axes, png_bytes
+from orbiflow.figures.flow_lines import flow_lines, symmetric_seeds
+from orbiflow.figures.marks import mark_symmetry, outline_cell
+from orbiflow.symmetry import CrystallographicGroup
+from orbiflow.symmetry.isometry import Array
+from orbiflow.symmetry.lattices import reduced_basis
+from orbiflow.tilings import Tile
+from orbiflow.tilings.patch import Window
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_SAMPLES = 400  # along the longer side
+
+
+def field_png(
+    velocity: Callable[[Any], Any],
+    group: CrystallographicGroup,
+    tile: Tile | None = None,
+    *,
+    window: Window | None = None,
+    width_px: int = 1200,
+    y_down: bool = False,
+    signs: bool = True,
+) -> bytes:
+    """PNG of a vector field: magnitude as colour, short flow lines over it.
+
+    After the paper's figure of results. The lines start at an orbit of the group, so the picture has
+    the symmetry that the field has, and shows it where the field has not.
+
+    Args:
+        velocity: from points (..., 2) to vectors (..., 2); called with a torch tensor, float64 or of
+            the module's dtype. For a NumPy field f give `lambda points: f(points.numpy())`.
+        group: whose lattice cell is outlined, and whose rotation centres and lines are marked.
+        tile: drawn on top, if given.
+        window: default about four cells around the tile or the origin.
+        width_px: the height follows from the window.
+        y_down: whether the y axis points down, as in images.
+        signs: whether to mark rotation centres and lines.
+
+    Raises:
+        OrbiflowError: if the field does not return finite vectors of the points' shape.
+    """
+    middle = np.zeros(2) if tile is None else tile.center
+    window = window or _about_four_cells(group, middle)
+    aspect = (window[3] - window[1]) / (window[2] - window[0])
+    figure = blank_figure(width_px, round(width_px * aspect))
+    axes = plane_axes(figure, window, y_down=y_down)
+    draw_magnitude(axes, velocity, window)
+    draw_flow(axes, velocity, group, window)
+    outline_cell(axes, group, middle)
+    if tile is not None:
+        ring = np.concatenate([tile.polygon, tile.polygon[:1]])
+        axes.plot(*ring.T, color="#111111", linewidth=2.6, zorder=5)
+        axes.plot(*ring.T, color="#ffd166", linewidth=1.5, zorder=5)
+    if signs:
+        mark_symmetry(axes, group, window, size=0.03 * np.sqrt(group.cell_volume))
+    return png_bytes(figure)
+
+
+def draw_magnitude(axes: Axes, velocity: Callable[[Any], Any], window: Window) -> None:
+    longer = max(window[2] - window[0], window[3] - window[1])
+    counts = [max(2, round(_SAMPLES * (window[i + 2] - window[i]) / longer)) for i in (0, 1)]
+    x, y = (np.linspace(window[i], window[i + 2], counts[i]) for i in (0, 1))
+    points = np.stack(np.meshgrid(x, y), axis=-1)
+    vectors = evaluate(velocity, points)
+    limits = axes.get_ylim()
+    speed = np.linalg.norm(vectors, axis=-1)
+    extent = (window[0], window[2], window[1], window[3])
+    axes.imshow(
+        speed, extent=extent, origin="lower", cmap="viridis", interpolation="bicubic", aspect="auto"
+    )
+    axes.set_xlim(window[0], window[2])  # imshow moves the limits
+    axes.set_ylim(*limits)
+    axes.set_aspect("equal")
+
+
+def draw_flow(
+    axes: Axes, velocity: Callable[[Any], Any], group: CrystallographicGroup, window: Window
+) -> None:
+    from matplotlib.collections import LineCollection, PolyCollection
+
+    scale = np.sqrt((window[2] - window[0]) * (window[3] - window[1]))
+    lines = flow_lines(
+        lambda points: evaluate(velocity, points),
+        _in_window(symmetric_seeds(group, 0.028 * scale), group, window, 0.05 * scale),
+        0.075 * scale,
+    )
+    # fading tails say which way the flow goes
+    segments = np.stack([lines[:, :-1], lines[:, 1:]], axis=2).reshape(-1, 2, 2)
+    alpha = np.tile(np.linspace(0.05, 0.9, lines.shape[1] - 1), len(lines))
+    colours = np.concatenate([np.ones((len(segments), 3)), alpha[:, None]], axis=1)
+    axes.add_collection(LineCollection(list(segments), colors=colours, linewidths=0.9, zorder=2))
+    # heads at the seeds, which keep their distance; at the ends they would pile up in every sink
+    middle = lines.shape[1] // 2
+    along = lines[:, middle + 1] - lines[:, middle - 1]
+    along = 0.009 * scale * along / np.maximum(np.linalg.norm(along, axis=1), 1e-300)[:, None]
+    across = 0.4 * along[:, ::-1] * (-1.0, 1.0)
+    seeds = lines[:, middle]
+    heads = np.stack([seeds + along, seeds + across, seeds - across], axis=1)
+    axes.add_collection(
+        PolyCollection(list(heads), facecolors="#ffffff", edgecolors="none", zorder=3)
+    )
+
+
+def _in_window(seeds: Array, group: CrystallographicGroup, window: Window, margin: float) -> Array:
+    """All translates of the seeds by lattice vectors that lie in the window or near it."""
+    low, high = np.array(window[:2]) - margin, np.array(window[2:]) + margin
+    corners = np.array([low, high, (low[0], high[1]), (high[0], low[1])]) @ group.inverse_lattice.T
+    ranges = [np.arange(np.floor(c.min()) - 1, np.ceil(c.max()) + 1) for c in corners.T]
+    shifts = np.stack(np.meshgrid(*ranges), axis=-1).reshape(-1, 1, 2) @ group.lattice.T
+    points = (seeds + shifts).reshape(-1, 2)
+    return points[((points >= low) & (points <= high)).all(axis=1)]
+
+
+def evaluate(velocity: Callable[[Any], Any], points: Array) -> Array:
+    """The field, written in torch, at NumPy points (..., 2).
+
+    Raises:
+        OrbiflowError: if it does not return finite vectors of the points' shape.
+    """
+    dtype = torch.float64
+    if isinstance(velocity, torch.nn.Module):
+        dtype = next((p.dtype for p in velocity.parameters()), dtype)
+    with torch.no_grad():
+        vectors = velocity(torch.as_tensor(points, dtype=dtype))
+    values = np.asarray(vectors, dtype=float)
+    if values.shape != points.shape or not np.isfinite(values).all():
+        raise OrbiflowError(
+            f"the field has to return finite vectors of shape {points.shape}, got {values.shape}"
+        )
+    return values
+
+
+def _about_four_cells(group: CrystallographicGroup, middle: Array) -> Window:
+    """A window of the area of some four cells, in the proportions of the cell within reason."""
+    sides = np.abs(reduced_basis(group.lattice)).sum(axis=1)
+    aspect = float(np.clip(sides[0] / sides[1], 2 / 3, 3 / 2))
+    area = 4.6 * group.cell_volume
+    half = np.sqrt(area * np.array([aspect, 1 / aspect])) / 2
+    low, high = middle - half, middle + half
+    return float(low[0]), float(low[1]), float(high[0]), float(high[1])

@@ -1,0 +1,1 @@
+"""Jobs: what the commands, a batch and a web page call alike."""

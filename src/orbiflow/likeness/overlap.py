@@ -1,0 +1,92 @@
+"""The exact overlap of polygons with a region, and its exact gradient in the vertices."""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+
+from orbiflow.silhouette.rings import signed_area
+from orbiflow.symmetry.isometry import Array
+
+MANY, COARSE = 1500, 2e-3
+"""Vertices beyond which a region is simplified, and by how much of its size (area 1)."""
+
+
+def region_of(ring: Array) -> shapely.Polygon:
+    """The region of a ring (N, 2) of area about 1, prepared; simplified if its vertices are many.
+
+    For choosing among candidates: intersections with thousands of vertices cost seconds. What is
+    reported is measured with the ring itself.
+    """
+    region = shapely.Polygon(ring)
+    if len(ring) > MANY:
+        simpler = region.simplify(COARSE)
+        if isinstance(simpler, shapely.Polygon) and simpler.is_valid and not simpler.is_empty:
+            region = simpler
+    shapely.prepare(region)
+    return region
+
+
+def boundary_iou(goal: shapely.Polygon, boundaries: Array) -> Array:
+    """IoU (S,) of rings (S, N, 2) with a polygon; -1 for those that cross themselves."""
+    polygons = np.asarray(shapely.polygons(boundaries))
+    good = np.asarray(shapely.is_valid(polygons))
+    scores = np.full(len(polygons), -1.0)
+    common = shapely.area(shapely.intersection(polygons[good], goal))
+    scores[good] = common / (shapely.area(polygons[good]) + goal.area - common)
+    return scores
+
+
+class Overlap:
+    """Overlap of rings with one region.
+
+    The area of P and T common changes at the rate of the normal speed integrated over the part of
+    P's boundary inside T; along a side the speed is linear between its ends.
+
+    Args:
+        target: (M, 2) ring of the region, simple, in either sense; see `region_of`.
+    """
+
+    def __init__(self, target: Array) -> None:
+        self.region = region_of(target)
+
+    def iou(self, ring: Array) -> tuple[float, Array]:
+        """IoU of a simple ring (N, 2) with the region and its gradient (N, 2).
+
+        >>> square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+        >>> value, gradient = Overlap(square).iou(0.5 * square + 0.25)
+        >>> value, gradient[:, 0].round(12).tolist()
+        (0.25, [-0.25, 0.25, 0.25, -0.25])
+        """
+        common = float(shapely.Polygon(ring).intersection(self.region).area)
+        inside = self.area_gradient(ring)
+        sign = 1.0 if signed_area(ring) > 0 else -1.0
+        area = abs(signed_area(ring))
+        sides = np.roll(ring, -1, axis=0) - np.roll(ring, 1, axis=0)
+        whole = sign * np.stack([sides[:, 1], -sides[:, 0]], axis=-1) / 2
+        union = area + self.region.area - common
+        return common / union, ((union + common) * inside - common * whole) / union**2
+
+    def area_gradient(self, ring: Array) -> Array:
+        """Gradient (N, 2) of the area of the ring's part inside the region."""
+        ends = np.roll(ring, -1, axis=0)
+        sides = ends - ring
+        lines = shapely.linestrings(np.stack([ring, ends], axis=1))
+        pieces, owner = shapely.get_parts(
+            shapely.intersection(lines, self.region), return_index=True
+        )
+        lengths = shapely.length(pieces)
+        pieces, owner = pieces[lengths > 0], owner[lengths > 0]  # not where they only touch
+        first, last = (
+            shapely.get_coordinates(shapely.get_point(pieces, index)) for index in (0, -1)
+        )
+        square = np.maximum((sides**2).sum(axis=1), 1e-300)[owner]
+        start, stop = (
+            ((p - ring[owner]) * sides[owner]).sum(axis=1) / square for p in (first, last)
+        )
+        low, high = np.minimum(start, stop), np.maximum(start, stop)
+        late = np.bincount(owner, (high**2 - low**2) / 2, minlength=len(ring))
+        early = np.bincount(owner, high - low, minlength=len(ring)) - late
+        sign = 1.0 if signed_area(ring) > 0 else -1.0
+        normal = sign * np.stack([sides[:, 1], -sides[:, 0]], axis=-1)
+        return early[:, None] * normal + np.roll(late[:, None] * normal, 1, axis=0)

@@ -1,0 +1,121 @@
+"""The silhouette that a tile is to look like, in the user's coordinates and in normal form."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from orbiflow.silhouette.readers import read_outline
+from orbiflow.silhouette.rings import centroid, clean_ring, orient, signed_area
+
+
+@dataclass(frozen=True, eq=False)
+class Target:
+    """A silhouette: one simple closed curve.
+
+    Make one with `Target.read` or `Target.from_polygon`, which check the outline.
+
+    - `outline`: (N, 2), without a repeated last vertex, in the input's own units. In an image the
+      unit is the pixel and (0, 0) the image's top left corner, so that pixel (row 0, column 0)
+      spans [0, 1] x [0, 1]. Run through so that the normal form is counter-clockwise; read-only.
+    - `y_down`: whether the input's y axis points down (images, SVG and `.dat` files).
+    - `notes`: what was decided for the user, in plain words.
+    - `source`: the file's name, or what stands in for it.
+    - `kind`: "image", "svg", "dat", "json" or "polygon".
+    - `size`: width and height of the picture or drawing, where there is one.
+
+    >>> target = Target.from_polygon([[0, 0], [2, 0], [2, 2], [0, 2]])
+    >>> target.normal.tolist()
+    [[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]]
+    >>> target.to_input([0.5, 0.5])
+    array([2., 2.])
+    """
+
+    outline: NDArray[np.float64]
+    y_down: bool
+    notes: tuple[str, ...] = ()
+    source: str = "polygon"
+    kind: str = "polygon"
+    size: tuple[float, float] | None = None
+
+    def __post_init__(self) -> None:
+        outline = orient(np.array(self.outline, float), counter_clockwise=not self.y_down)
+        object.__setattr__(self, "outline", _read_only(outline))
+
+    @classmethod
+    def read(
+        cls, path: str | Path, *, threshold: float | None = None, invert: bool | None = None
+    ) -> Self:
+        """Read a silhouette from an image (PNG, JPEG, WebP), an SVG, a `.json` or a `.dat` file.
+
+        For images, `threshold` (0 to 1) is the level that parts the shape from its background and
+        `invert` says that the shape is the light (or the transparent) part; both are found out from
+        the image where they are not given, and `notes` say what was found.
+
+        Raises `InputFileError` for a file without a usable silhouette, with what to do about it.
+        """
+        reading = read_outline(path, threshold=threshold, invert=invert)
+        return cls(
+            reading.outline, reading.y_down, reading.notes, str(path), reading.kind, reading.size
+        )
+
+    @classmethod
+    def from_polygon(
+        cls, points: ArrayLike, *, y_down: bool = False, source: str = "polygon"
+    ) -> Self:
+        """The silhouette bounded by the polygon `points` (N, 2), closed or not, in either sense.
+
+        Raises `OrbiflowError` for coordinates that are not finite, fewer than 3 vertices, no area,
+        or a polygon that crosses or touches itself.
+        """
+        with np.errstate(all="ignore"):  # what overflows is refused
+            outline, notes = clean_ring(points, source)
+        return cls(outline, y_down, tuple(notes), source)
+
+    @property
+    def area(self) -> float:
+        """Area of the silhouette in square input units."""
+        return abs(signed_area(self.outline))
+
+    @cached_property
+    def linear(self) -> NDArray[np.float64]:
+        """Matrix (2, 2) of the frame `input = normal @ linear.T + offset`: a scale, and y's flip."""
+        return _read_only(np.sqrt(self.area) * np.diag([1.0, -1.0 if self.y_down else 1.0]))
+
+    @cached_property
+    def offset(self) -> NDArray[np.float64]:
+        """Translation (2,) of the frame: the silhouette's centroid in input units."""
+        return _read_only(centroid(self.outline))
+
+    @cached_property
+    def normal(self) -> NDArray[np.float64]:
+        """The outline (N, 2) with y up, area 1, centroid 0 and counter-clockwise, vertex by vertex."""
+        return _read_only(self.to_normal(self.outline))
+
+    def to_input(self, points: ArrayLike) -> NDArray[np.float64]:
+        """`points` (..., 2) of the normal form in the input's units."""
+        return np.asarray(points, dtype=np.float64) @ self.linear.T + self.offset
+
+    def to_normal(self, points: ArrayLike) -> NDArray[np.float64]:
+        """`points` (..., 2) in the input's units, in the normal form."""
+        return (np.asarray(points, dtype=np.float64) - self.offset) / np.diag(self.linear)
+
+    def report(self) -> dict[str, Any]:
+        """What was read and decided, ready for JSON."""
+        return {
+            "source": self.source,
+            "kind": self.kind,
+            "size": None if self.size is None else list(self.size),
+            "vertices": len(self.outline),
+            "area": self.area,
+            "y_down": self.y_down,
+            "notes": list(self.notes),
+        }
+
+
+def _read_only(array: NDArray[np.float64]) -> NDArray[np.float64]:
+    array.setflags(write=False)
+    return array
