@@ -11,10 +11,11 @@ import shapely
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
-from orbiflow.escher.nearest_tile import NearestTiles, nearest_tiles
+from orbiflow.escher.nearest_tile import nearest_tiles
 from orbiflow.escher.placements import Complex, Placements, best_placements
 from orbiflow.escher.prototiles import Prototiles, subdivided
 from orbiflow.escher.starts import template_symmetries
+from orbiflow.escher.tile_space import NearestTiles
 from orbiflow.likeness.overlap import boundary_iou, region_of
 from orbiflow.silhouette.rings import reverse
 from orbiflow.silhouette.target import Target

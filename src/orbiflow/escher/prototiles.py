@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from orbiflow.escher.nearest_tile import NearestTiles
+from orbiflow.escher.tile_space import NearestTiles
 from orbiflow.symmetry.isometry import Array
 from orbiflow.tilings import IsohedralClass
 

@@ -1,0 +1,230 @@
+"""A silhouette as an elastic body: what it costs to deform it, and the shape of least cost.
+
+As rigid as possible (Sorkine and Alexa, As-Rigid-As-Possible Surface Modeling, SGP 2007; a distance
+for Escher tiles since Nagata and Imahori, 2021): with points x at rest, moved to z, and a rotation r_i
+of each, the energy is the sum over all pairs of w_ij |(z_i - z_j) - r_i (x_i - x_j)|^2. Cotangent
+weights measure the strain of areas; weights along the outline measure strain by length, so that
+small parts count: an ear has little area and much outline. Points are complex numbers x + iy; a batch
+of C shapes is (N, C).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.linalg
+import scipy.sparse
+from numpy.typing import NDArray
+
+from orbiflow.errors import OrbiflowError
+from orbiflow.silhouette.mesh import Mesh, triangulate
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+COTANGENTS = (0.05, 5.0)
+"""Bounds of the areas' weights: obtuse triangles have negative ones."""
+
+
+@dataclass(frozen=True)
+class Stiffness:
+    """What deforming costs, in a silhouette of area 1.
+
+    - `stretch`: of the outline, per unit of its length.
+    - `bend`: of the outline over two points, per unit of its length.
+    - `pose`: of the mean squared distance from the silhouette's best similar copy.
+    """
+
+    stretch: float = 0.2
+    bend: float = 0.1
+    pose: float = 3.0
+
+
+class Elastic:
+    """A triangulated silhouette of area about 1 and its energies.
+
+    Args:
+        ring: (n, 2) outline, counter-clockwise; the first n points of the body.
+        stiffness: what deforming costs.
+        stiff: (n,) or (N,) factors of the stiffness at the points, if some may deform less.
+        mesh: of the ring, if it is at hand.
+
+    Raises:
+        OrbiflowError: for a ring that cannot be triangulated.
+    """
+
+    def __init__(
+        self,
+        ring: Array,
+        stiffness: Stiffness | None = None,
+        *,
+        stiff: Array | None = None,
+        mesh: Mesh | None = None,
+    ) -> None:
+        self.mesh = mesh or triangulate(ring)
+        self.stiffness = stiffness or Stiffness()
+        self.size = len(ring)
+        self.rest: Complex = self.mesh.points @ np.array([1, 1j])
+        self.weights = self._weights(stiff)
+        pairs = self.weights.tocoo()
+        self._i, self._j, self._w = pairs.row, pairs.col, pairs.data
+        self._d = self.rest[self._i] - self.rest[self._j]
+        shape = self.weights.shape
+        weighted = self._w * self._d
+        self._sums = scipy.sparse.csr_matrix((weighted, (self._i, self._j)), shape=shape)
+        self._conjugate = self._sums.conjugate().tocsr()
+        self._own = np.asarray(self._sums.sum(axis=1)).ravel()
+        self._own_conjugate = np.conj(self._own)
+        self._solvers: dict[float, Array] = {}
+
+    def __len__(self) -> int:
+        return len(self.rest)
+
+    def rotations(self, z: Complex) -> Complex:
+        """The rotations (N, C), complex units, that suit shapes (N, C) best."""
+        sums = self._own_conjugate[:, None] * z - self._conjugate @ z
+        return sums / np.maximum(abs(sums), 1e-300)
+
+    def energy(self, z: Complex) -> Array:
+        """Energies (C,) of shapes (N, C) without the pose's."""
+        r = self.rotations(z)
+        strain = (z[self._i] - z[self._j]) - r[self._i] * self._d[:, None]
+        return self._w @ (strain.real**2 + strain.imag**2)
+
+    def displacement(self, z: Complex) -> Array:
+        """(C,) mean squared distance from the best similar copy, in areas of the copy."""
+        copy, factor = self._copies(z)
+        size = np.maximum(abs(factor) ** 2, 1e-12)
+        return (abs(z - copy) ** 2).mean(axis=0) / size
+
+    def forces(self, z: Complex) -> Complex:
+        """What the rotations and the pose of shapes (N, C) pull towards: b of `stiffness matrix` z = b."""
+        r = self.rotations(z)
+        copy, _ = self._copies(z)
+        pull = r * self._own[:, None] + self._sums @ r
+        return pull + self.stiffness.pose / len(self) * copy
+
+    @cached_property
+    def matrix(self) -> Array:
+        """(N, N) dense stiffness matrix, the pose's part included."""
+        degree = np.asarray(self.weights.sum(axis=1)).ravel()
+        pose = self.stiffness.pose / len(self)
+        return np.diag(2 * degree + pose) - 2 * self.weights.toarray()
+
+    def pulled(self, z: Complex, towards: Complex, strength: float, rounds: int) -> Complex:
+        """Let the outline (n, C) be pulled towards other points, as a spring a point would.
+
+        Args:
+            z: shapes (N, C) to start from.
+            towards: (n, C).
+            strength: of all springs together, in the unit of the energy.
+            rounds: of choosing rotations and solving.
+        """
+        mu = strength / self.size
+        solve = self._pulled_solver(mu)
+        for _ in range(rounds):
+            right = self.forces(z)
+            right[: self.size] += mu * towards
+            z = _times(solve, right)
+        return z
+
+    @cached_property
+    def condensed(self) -> Condensed:
+        """The inner points solved for: a matrix of the outline alone."""
+        n = self.size
+        inner = self.matrix[n:, n:]
+        if not len(inner):
+            none = np.zeros((0, n))
+            return Condensed(self.matrix, none, none[:, :0])
+        inverse = np.linalg.inv(inner)
+        follow = -inverse @ self.matrix[n:, :n]
+        return Condensed(self.matrix[:n, :n] + self.matrix[:n, n:] @ follow, follow, inverse)
+
+    def _pulled_solver(self, mu: float) -> Array:
+        if mu not in self._solvers:
+            if len(self._solvers) >= 16:
+                self._solvers.clear()
+            matrix = self.matrix.copy()
+            matrix[np.arange(self.size), np.arange(self.size)] += mu
+            factor = scipy.linalg.cho_factor(matrix, overwrite_a=True)
+            self._solvers[mu] = scipy.linalg.cho_solve(factor, np.eye(len(self)))
+        return self._solvers[mu]
+
+    def _copies(self, z: Complex) -> tuple[Complex, Complex]:
+        """Best similar copies (N, C) of the body at rest, and the similarities' factors (C,)."""
+        center = z.mean(axis=0)
+        rest = self.rest - self.rest.mean()
+        factor = np.conj(rest) @ (z - center) / (abs(rest) ** 2).sum()
+        return center + rest[:, None] * factor, factor
+
+    def _weights(self, stiff: Array | None) -> scipy.sparse.csr_matrix:
+        triangles, count, n = self.mesh.triangles, len(self), self.size
+        rows, columns, values = [], [], []
+        for k in range(3):
+            i, j, apex = triangles[:, k], triangles[:, k - 2], triangles[:, k - 1]
+            u = np.conj(self.rest[i] - self.rest[apex]) * (self.rest[j] - self.rest[apex])
+            rows.append(i)
+            columns.append(j)
+            values.append(u.real / np.maximum(2 * abs(u.imag), 1e-300))
+        areas = _symmetric(rows, columns, values, count)
+        areas.data = np.clip(areas.data, *COTANGENTS)
+        own = np.arange(n)
+        rows, columns, values = [], [], []
+        for apart, cost in ((1, self.stiffness.stretch), (2, self.stiffness.bend)):
+            other = (own + apart) % n
+            rows.append(own)
+            columns.append(other)
+            values.append(cost / np.maximum(abs(self.rest[other] - self.rest[own]), 1e-6))
+        total = (areas + _symmetric(rows, columns, values, count)).tocoo()
+        if stiff is not None:
+            factors = self._everywhere(stiff)
+            total.data = total.data * np.sqrt(factors[total.row] * factors[total.col])
+        return total.tocsr()
+
+    def _everywhere(self, stiff: Array) -> Array:
+        factors = np.asarray(stiff, dtype=np.float64)
+        if factors.shape not in ((self.size,), (len(self),)) or not (factors > 0).all():
+            raise OrbiflowError(
+                f"stiff needs ({self.size},) or ({len(self)},) positive factors, "
+                f"got shape {factors.shape}"
+            )
+        return np.concatenate([factors, np.ones(len(self) - len(factors))])
+
+
+@dataclass(frozen=True, eq=False)
+class Condensed:
+    """A body whose inner points follow its outline.
+
+    - `outline`: (n, n) stiffness matrix of the outline.
+    - `follow`: (N - n, n) where the inner points go with it.
+    - `inverse`: (N - n, N - n) of the inner points' own matrix.
+    """
+
+    outline: Array
+    follow: Array
+    inverse: Array
+
+    def forces(self, forces: Complex) -> Complex:
+        """Forces (N, C) as forces (n, C) on the outline."""
+        n = len(self.outline)
+        return forces[:n] + _times(self.follow.T, forces[n:])
+
+    def whole(self, outline: Complex, forces: Complex) -> Complex:
+        """All points (N, C), from the outline (n, C) and the forces (N, C)."""
+        n = len(self.outline)
+        inner = _times(self.follow, outline) + _times(self.inverse, forces[n:])
+        return np.concatenate([outline, inner])
+
+
+def _times(matrix: Array, z: Complex) -> Complex:
+    """A real matrix times complex columns, without making it complex."""
+    z = np.ascontiguousarray(z)
+    return (matrix @ z.view(np.float64)).view(np.complex128)
+
+
+def _symmetric(rows: list, columns: list, values: list, count: int) -> scipy.sparse.csr_matrix:
+    i, j, v = (np.concatenate(parts) for parts in (rows, columns, values))
+    both = (np.concatenate([v, v]), (np.concatenate([i, j]), np.concatenate([j, i])))
+    return scipy.sparse.csr_matrix(both, shape=(count, count))

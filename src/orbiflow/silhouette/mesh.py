@@ -1,0 +1,148 @@
+"""A triangulation of a silhouette: fine along its outline and in thin parts, coarser inside."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from scipy.spatial import Delaunay
+
+from orbiflow.errors import OrbiflowError
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+ROUNDS = 24
+"""Times that missing sides of the outline are halved."""
+
+FLAT = 1e-12
+"""Twice the area of a triangle, in areas of the polygon, below which it counts as flat."""
+
+
+class Mesh(NamedTuple):
+    """Triangles that fill a polygon.
+
+    - `points`: (N, 2); the polygon's n vertices first, then points on its sides, then inside.
+    - `triangles`: (M, 3) indices, counter-clockwise.
+    - `sides`: (k,) for each of the points n .. n + k, the side that it lies on.
+    - `shares`: (k,) how far along that side, 0 to 1.
+    - `size`: n.
+    """
+
+    points: Array
+    triangles: Integers
+    sides: Integers
+    shares: Array
+    size: int
+
+
+def triangulate(ring: Array, spacing: float | None = None) -> Mesh:
+    """Triangulate the inside of a simple polygon, its sides among the triangles' sides.
+
+    A Delaunay triangulation of the vertices and of points inside; sides of the polygon that are no
+    sides of triangles are halved until they are (Ruppert's first rule).
+
+    Args:
+        ring: (n, 2), counter-clockwise.
+        spacing: of the points inside next to the outline; default the mean length of a side.
+
+    Raises:
+        OrbiflowError: for a ring that crosses itself, or too thin to be filled in double precision.
+    """
+    polygon = shapely.Polygon(ring)
+    if not polygon.is_valid or not polygon.area > 0:
+        raise OrbiflowError("a polygon that crosses itself or has no area cannot be triangulated")
+    n = len(ring)
+    spacing = spacing or polygon.exterior.length / n
+    inside = _inside(polygon, spacing)
+    ends = np.stack([np.arange(n), (np.arange(n) + 1) % n], axis=1)
+    sides, low, high = np.arange(n), np.zeros(n), np.ones(n)
+    extra: Array = np.zeros((0, 2))
+    own_side: Integers = np.zeros(0, dtype=np.int64)
+    own_share: Array = np.zeros(0)
+    for _ in range(ROUNDS):
+        points = np.concatenate([ring, extra, inside])
+        triangles = Delaunay(points).simplices
+        missing = ~_are_sides(ends, triangles, len(points))
+        if not missing.any():
+            return _kept(Mesh(points, triangles, own_side, own_share, n), polygon)
+        middle = (low + high)[missing] / 2
+        fresh = n + len(extra) + np.arange(len(middle))
+        at, after = ring[sides[missing]], ring[(sides[missing] + 1) % n]
+        extra = np.concatenate([extra, at + middle[:, None] * (after - at)])
+        own_side = np.concatenate([own_side, sides[missing]])
+        own_share = np.concatenate([own_share, middle])
+        near = shapely.distance(shapely.points(inside), shapely.MultiPoint(extra))
+        inside = inside[near > spacing / 4]
+        old = ends[missing]
+        halves = np.concatenate([np.stack([old[:, 0], fresh], 1), np.stack([fresh, old[:, 1]], 1)])
+        ends = np.concatenate([ends[~missing], halves])
+        low, high = (
+            np.concatenate([low[~missing], low[missing], middle]),
+            np.concatenate([high[~missing], middle, high[missing]]),
+        )
+        sides = np.concatenate([sides[~missing], sides[missing], sides[missing]])
+    raise OrbiflowError(
+        "the silhouette is too thin somewhere to be triangulated: simplify or thicken it there"
+    )
+
+
+def _inside(polygon: shapely.Polygon, spacing: float) -> Array:
+    """Points inside on triangular grids, the farther from the outline the wider."""
+    xmin, ymin, xmax, ymax = polygon.bounds
+    found = []
+    for level, (least, most) in enumerate(((0.6, 1.7), (1.7, 4.5), (4.5, np.inf))):
+        step = spacing * 2**level
+        x = np.arange(xmin, xmax + step, step)
+        y = np.arange(ymin, ymax + step, step * np.sqrt(3) / 2)
+        grid = np.stack(np.meshgrid(x, y), axis=-1)
+        grid[1::2, :, 0] += step / 2
+        points = grid.reshape(-1, 2)
+        points = points[shapely.contains_xy(polygon, points[:, 0], points[:, 1])]
+        depth = shapely.distance(shapely.points(points), polygon.exterior) / spacing
+        found.append(points[(depth >= least) & (depth < most)])
+    return np.concatenate(found)
+
+
+def _are_sides(ends: Integers, triangles: Integers, count: int) -> NDArray[np.bool_]:
+    pairs = np.sort(
+        np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
+    )
+    known = np.unique(pairs[:, 0] * count + pairs[:, 1])
+    wanted = np.sort(ends, axis=1)
+    return np.isin(wanted[:, 0] * count + wanted[:, 1], known)
+
+
+def _kept(mesh: Mesh, polygon: shapely.Polygon) -> Mesh:
+    """The triangles inside the polygon, counter-clockwise, and the points that they use."""
+    corners = mesh.points[mesh.triangles]
+    middle = corners.mean(axis=1)
+    u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    area = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
+    triangles = np.where((area < 0)[:, None], mesh.triangles[:, ::-1], mesh.triangles)
+    inside = shapely.contains_xy(polygon, *middle.T)
+    flat = abs(area) < FLAT * polygon.area
+    triangles = _without_flat(triangles[inside & ~flat], mesh.triangles[flat])
+    used = np.zeros(len(mesh.points), dtype=bool)
+    used[: mesh.size + len(mesh.sides)] = True
+    used[triangles] = True
+    index = np.cumsum(used) - 1
+    return mesh._replace(points=mesh.points[used], triangles=index[triangles])
+
+
+def _without_flat(triangles: Integers, flat: Integers) -> Integers:
+    """Vertices in line may be the corners of one flat triangle alone: its neighbour is divided."""
+    known = set(triangles.ravel().tolist())
+    lost = [(row, k) for row in flat.tolist() for k in range(3) if row[k] not in known]
+    for row, k in lost:
+        b, ends = row[k], {row[k - 1], row[k - 2]}
+        for t, triangle in enumerate(triangles.tolist()):
+            if ends <= set(triangle):
+                i = next(i for i in range(3) if triangle[i] not in ends)
+                apex, start, end = triangle[i], triangle[i - 2], triangle[i - 1]
+                triangles = np.concatenate([triangles, [[apex, b, end]]])
+                triangles[t] = apex, start, b
+                break
+    return triangles.astype(np.int64)
