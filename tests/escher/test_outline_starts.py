@@ -14,7 +14,6 @@ from orbiflow.escher.nearest_tile import nearest_tiles
 from orbiflow.escher.outline_starts import (
     mirror_closed,
     outline_starts,
-    resampled,
     template_starts,
 )
 from orbiflow.escher.placements import (
@@ -25,6 +24,7 @@ from orbiflow.escher.placements import (
     edge_lengths,
 )
 from orbiflow.escher.prototiles import Prototiles
+from orbiflow.geometry import resampled
 from orbiflow.silhouette.target import Target
 from orbiflow.symmetry.isometry import Array
 from orbiflow.tilings import CLASSES, Tile, certify

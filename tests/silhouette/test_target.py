@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from PIL import Image, ImageDraw
 
 from orbiflow.errors import InputFileError, OrbiflowError
+from orbiflow.geometry import centroid, signed_area
 from orbiflow.likeness.metrics import compare, iou
-from orbiflow.silhouette.rings import centroid, signed_area
 from orbiflow.silhouette.target import Target
 
 DATA = Path(__file__).parents[2].parent / "shared" / "data" / "silhouettes"

@@ -13,6 +13,7 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.escher.prototiles import Prototiles
 from orbiflow.fields import FourierField
 from orbiflow.flows import Flow
+from orbiflow.geometry import subdivided
 from orbiflow.symmetry import CrystallographicGroup
 from orbiflow.symmetry.isometry import Array
 from orbiflow.tilings import IsohedralClass
@@ -153,9 +154,7 @@ class TileModel(nn.Module):
         Identified edges have as many sides each, so their samples correspond.
         """
         vertices, _ = self.prototile()
-        t = torch.arange(pieces, dtype=vertices.dtype, device=vertices.device)[:, None] / pieces
-        sides = vertices.roll(-1, dims=-2) - vertices
-        return (vertices[:, :, None] + t * sides[:, :, None]).flatten(1, 2)
+        return subdivided(vertices, pieces)
 
     def take(self, indices: list[int]) -> TileModel:
         """A new model with the candidates at `indices` only, at the same parameters."""

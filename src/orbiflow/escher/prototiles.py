@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orbiflow.escher.nearest_tile import NearestTiles
+from orbiflow.geometry import subdivided
 from orbiflow.symmetry.isometry import Array
 from orbiflow.tilings import IsohedralClass
 
@@ -73,14 +74,6 @@ class Prototiles:
             stretch,
             np.full(len(own), mirrored),
         )
-
-
-def subdivided(rings: Array, pieces: int) -> Array:
-    """Rings (S, N, 2) with every side divided evenly: (S, N pieces, 2)."""
-    count, size, _ = rings.shape
-    t = np.arange(pieces)[:, None] / pieces
-    sides = np.roll(rings, -1, axis=1) - rings
-    return (rings[:, :, None] + t * sides[:, :, None]).reshape(count, size * pieces, 2)
 
 
 def _pose(kind: IsohedralClass, linear: Array) -> tuple[Array, Array, Array]:

@@ -12,12 +12,12 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import gaussian_filter, map_coordinates
 
 from orbiflow.errors import InputFileError, OrbiflowError
+from orbiflow.silhouette.outlines import clean_ring, percent
 from orbiflow.silhouette.readers.mask import MaskReading, read_mask
 from orbiflow.silhouette.readers.reading import check_file, read_bytes
 from orbiflow.silhouette.readers.svg import MAX_BYTES as MAX_SVG_BYTES
 from orbiflow.silhouette.readers.svg_shapes import Drawing
 from orbiflow.silhouette.readers.svg_xml import parse_xml
-from orbiflow.silhouette.rings import clean_ring, percent
 from orbiflow.silhouette.target import Target
 
 MAX_STRENGTH = 100.0

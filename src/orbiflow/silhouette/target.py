@@ -8,8 +8,9 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from orbiflow.geometry import centroid, orient, signed_area
+from orbiflow.silhouette.outlines import clean_ring
 from orbiflow.silhouette.readers import read_outline
-from orbiflow.silhouette.rings import centroid, clean_ring, orient, signed_area
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +79,7 @@ class Target:
     @property
     def area(self) -> float:
         """Area of the silhouette in square input units."""
-        return abs(signed_area(self.outline))
+        return float(abs(signed_area(self.outline)))
 
     @cached_property
     def linear(self) -> NDArray[np.float64]:
