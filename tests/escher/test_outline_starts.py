@@ -153,7 +153,7 @@ def test_prototiles_are_placed_where_the_tiles_are(name: str, mirrored: bool) ->
     assert np.allclose(np.conj(placed) if mirrored else placed, tiles.vertices, atol=1e-8)
     twice = Prototiles.joined([prototiles, prototiles.take([0])])
     assert len(twice) == len(prototiles) + 1
-    assert np.array_equal(twice.outline[-1], prototiles.outline[0])
+    assert np.array_equal(twice.vertices[-1], prototiles.vertices[0])
 
 
 @pytest.mark.parametrize("name", CLASSES)

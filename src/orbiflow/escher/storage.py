@@ -22,7 +22,7 @@ from orbiflow.tilings import isohedral_class
 FORMAT = "orbiflow-tile/1"
 MAX_BYTES = 64 * 2**20
 MAX_SIDES = 100_000
-OUTLINE, CORNERS = "prototile.outline", "prototile.corners"
+VERTICES, CORNERS = "prototile.outline", "prototile.corners"
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,8 +55,8 @@ class SavedModel:
             name: parameter.detach().double().cpu().numpy()[0].copy()
             for name, parameter in model.named_parameters()
         }
-        if model.outline is not None and model.corners is not None:
-            arrays[OUTLINE] = model.outline.double().cpu().numpy()[0].copy()
+        if model.vertices is not None and model.corners is not None:
+            arrays[VERTICES] = model.vertices.cpu().numpy()[0].copy()
             arrays[CORNERS] = model.corners.cpu().numpy()[0].copy()
         return cls(settings, arrays)
 
@@ -92,32 +92,35 @@ class SavedModel:
                 if not np.isfinite(stored).all():
                     raise OrbiflowError(f"the model's {name} has NaN or infinite entries")
                 parameter.copy_(torch.tensor(stored)[None])
-        if OUTLINE in self.arrays or CORNERS in self.arrays:
-            outline, corners = self._prototile(len(model.template()[0]))
-            model.outline, model.corners = torch.tensor(outline)[None], torch.tensor(corners)[None]
+        if VERTICES in self.arrays or CORNERS in self.arrays:
+            vertices, corners = self._prototile(len(model.template()[0]))
+            model.vertices, model.corners = (
+                torch.tensor(vertices)[None],
+                torch.tensor(corners)[None],
+            )
         return model
 
     def _prototile(self, count: int) -> tuple[Array, Array]:
-        outline = np.asarray(self.arrays.get(OUTLINE, np.zeros((0, 2))), dtype=np.float64)
+        vertices = np.asarray(self.arrays.get(VERTICES, np.zeros((0, 2))), dtype=np.float64)
         corners = np.asarray(self.arrays.get(CORNERS, np.zeros(0)))
-        if outline.ndim != 2 or outline.shape[1] != 2 or not count <= len(outline) <= MAX_SIDES:
+        if vertices.ndim != 2 or vertices.shape[1] != 2 or not count <= len(vertices) <= MAX_SIDES:
             raise OrbiflowError(
-                f"the model's {OUTLINE} should have shape (N, 2) with N from {count} to "
-                f"{MAX_SIDES}, found {outline.shape}"
+                f"the model's {VERTICES} should have shape (N, 2) with N from {count} to "
+                f"{MAX_SIDES}, found {vertices.shape}"
             )
-        if not np.isfinite(outline).all():
-            raise OrbiflowError(f"the model's {OUTLINE} has NaN or infinite entries")
+        if not np.isfinite(vertices).all():
+            raise OrbiflowError(f"the model's {VERTICES} has NaN or infinite entries")
         if (
             corners.shape != (count,)
             or corners.dtype.kind != "i"
             or corners[0] != 0
-            or (np.diff(corners, append=len(outline)) < 1).any()
+            or (np.diff(corners, append=len(vertices)) < 1).any()
         ):
             raise OrbiflowError(
                 f"the model's {CORNERS} should be {count} increasing indices from 0, "
-                f"less than {len(outline)}"
+                f"less than {len(vertices)}"
             )
-        return outline, corners.astype(np.int64)
+        return vertices, corners.astype(np.int64)
 
     def _check_segments(self) -> None:
         # before anything is built: each segment takes time and memory
