@@ -42,7 +42,7 @@ def test_normal_form(points: np.ndarray, y_down: bool) -> None:
     assert signed_area(target.normal) == pytest.approx(1, rel=1e-9)
     assert np.allclose(centroid(target.normal), 0, atol=1e-9)
     assert np.allclose(target.to_input(target.normal), target.outline, rtol=1e-12)
-    rebuilt = target.normal @ target.linear.T + target.offset
+    rebuilt = target.normal @ target.frame.linear.T + target.frame.offset
     assert np.allclose(rebuilt, target.outline, rtol=1e-12)
     assert set(map(tuple, target.outline)) == set(map(tuple, points))
 
@@ -60,7 +60,7 @@ def test_y_down_flips_the_picture() -> None:
     up, down = Target.from_polygon(points), Target.from_polygon(points, y_down=True)
     assert up.normal[:, 1].max() > -up.normal[:, 1].min()
     assert down.normal[:, 1].max() < -down.normal[:, 1].min()
-    assert np.allclose(np.linalg.det(down.linear), -down.area)
+    assert np.allclose(np.linalg.det(down.frame.linear), -down.area)
 
 
 def test_frames_keep_leading_axes() -> None:
@@ -71,7 +71,7 @@ def test_frames_keep_leading_axes() -> None:
 
 def test_arrays_are_read_only() -> None:
     target = Target.from_polygon([[0, 0], [3, 0], [0, 3]])
-    for array in (target.outline, target.normal, target.linear, target.offset):
+    for array in (target.outline, target.normal, target.frame.linear, target.frame.offset):
         with pytest.raises(ValueError, match="read-only"):
             array[0] = 0
 

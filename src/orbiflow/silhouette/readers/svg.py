@@ -57,7 +57,8 @@ def read_svg(path: Path) -> Reading:
     outline, cleaned = clean_ring(_thinned(shape, size), str(path), InputFileError)
     box = drawing.box
     page = None if box is None else (box[2] - box[0], box[3] - box[1])
-    return Reading(outline, True, "svg", page, (*notes, *dropped, *kept, *cleaned))
+    corner = (0.0, 0.0) if box is None else (box[0], box[1])
+    return Reading(outline, True, "svg", page, (*notes, *dropped, *kept, *cleaned), corner)
 
 
 def _drawing_size(drawing: Drawing) -> float:
