@@ -12,9 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from orbiflow.errors import CertificationError
+from orbiflow.geometry import signed_area
 from orbiflow.symmetry import CrystallographicGroup, rotation, rotation_matrix
 from orbiflow.tilings import IsohedralClass, Tile, certify, isohedral_class
-from orbiflow.tilings.images import shoelace
 
 
 def square(side: float = 1.0) -> Tile:
@@ -193,7 +193,7 @@ def test_require() -> None:
 
 def test_area_far_from_the_origin() -> None:
     ring = square().polygon + np.array([1e6, -1e6])
-    assert shoelace(ring) == pytest.approx(1.0, abs=1e-12)
+    assert signed_area(ring) == pytest.approx(1.0, abs=1e-12)
 
 
 def test_two_thousand_vertices_are_fast(make_tile: Any) -> None:

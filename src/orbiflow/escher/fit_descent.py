@@ -13,7 +13,7 @@ from orbiflow.escher.model import TileModel
 from orbiflow.escher.outline_starts import Starts, outline_starts, template_starts
 from orbiflow.escher.polish import polish
 from orbiflow.escher.prototiles import Prototiles
-from orbiflow.likeness.overlap import boundary_iou, region_of
+from orbiflow.likeness.overlap import boundary_iou, prepared_region
 from orbiflow.likeness.ranking import rank_score
 from orbiflow.likeness.recognition import Recogniser
 from orbiflow.silhouette.soft_target import SoftTarget
@@ -53,7 +53,7 @@ def fit_descent(
     prototiles = starts.prototiles
     report(0.1, float("nan"))
     descent = Descent(kind, prototiles, settings)
-    goal = region_of(target.normal)
+    goal = prepared_region(target.normal)
     crossed = 0
     best = 0.0
     for steps, survivors in settings.stages:

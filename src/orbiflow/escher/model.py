@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Self
 
 import numpy as np
 import torch
@@ -13,6 +14,7 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.escher.prototiles import Prototiles
 from orbiflow.fields import FourierField
 from orbiflow.flows import Flow
+from orbiflow.geometry import subdivided
 from orbiflow.symmetry import CrystallographicGroup
 from orbiflow.symmetry.isometry import Array
 from orbiflow.tilings import IsohedralClass
@@ -24,6 +26,10 @@ class TileModel(nn.Module):
     The flow commutes with the class's group in the group's own frame; the lattice freedom L and the
     similarity A come after it, composed and not mixed in: the paper's V_sym(A^-1 z) loses the glide
     reflections as soon as A rotates (design point 6). A template of area 1 is the start.
+
+    Certificates outlive a change of precision: `.float()`, `.half()`, `.to(...)` round the parameters,
+    which only makes another tile, but `vertices`, whose identified edges must correspond, stay float64
+    whatever is asked, and the group's pose and the polygon (`extract_tile`) are computed in float64.
 
     Args:
         isohedral_class: of all S tiles.
@@ -42,7 +48,7 @@ class TileModel(nn.Module):
     """
 
     mirror: Tensor
-    outline: Tensor | None
+    vertices: Tensor | None
     corners: Tensor | None
 
     def __init__(
@@ -89,12 +95,11 @@ class TileModel(nn.Module):
     @torch.no_grad()
     def _start_from(self, prototiles: Prototiles | None) -> None:
         if prototiles is None:
-            self.register_buffer("outline", None)
+            self.register_buffer("vertices", None)
             self.register_buffer("corners", None)
             self.recentre()
             return
-        # float64 whatever the parameters are: its edges match to rounding
-        self.register_buffer("outline", torch.tensor(prototiles.outline, dtype=torch.float64))
+        self.register_buffer("vertices", torch.tensor(prototiles.vertices, dtype=torch.float64))
         self.register_buffer("corners", torch.tensor(prototiles.corners))
         for name in ("log_scale", "offset", "stretch"):
             getattr(self, name).copy_(torch.as_tensor(getattr(prototiles, name)))
@@ -110,12 +115,16 @@ class TileModel(nn.Module):
 
     def linear(self) -> Tensor:
         """The linear part of A o L, (S, 2, 2)."""
-        c, s = self.angle.cos(), self.angle.sin()
-        sign = torch.where(self.mirror, -1.0, 1.0).to(c.dtype)
-        turn = torch.stack([torch.stack([c, -s * sign], -1), torch.stack([s, c * sign], -1)], -2)
-        return (
-            self.log_scale.exp()[:, None, None] * turn @ self.isohedral_class.stretch(self.stretch)
+        return self._linear(self.angle.dtype)
+
+    def _linear(self, dtype: torch.dtype) -> Tensor:
+        angle, log_scale, stretch = (
+            p.to(dtype) for p in (self.angle, self.log_scale, self.stretch)
         )
+        c, s = angle.cos(), angle.sin()
+        sign = torch.where(self.mirror, -1.0, 1.0).to(dtype)
+        turn = torch.stack([torch.stack([c, -s * sign], -1), torch.stack([s, c * sign], -1)], -2)
+        return log_scale.exp()[:, None, None] * turn @ self.isohedral_class.stretch(stretch)
 
     @torch.no_grad()
     def recentre(self) -> None:
@@ -141,11 +150,11 @@ class TileModel(nn.Module):
 
     def prototile(self) -> tuple[Tensor, Tensor]:
         """What the flow starts from: vertices (S, N, 2) and the corners' indices (S, K)."""
-        if self.outline is None or self.corners is None:
+        if self.vertices is None or self.corners is None:
             template = self.template()
             corners = torch.arange(template.shape[1], device=template.device)
             return template, corners.expand(len(template), -1)
-        return self.outline.to(self.angle.dtype), self.corners
+        return self.vertices.to(self.angle.dtype), self.corners
 
     def boundary(self, pieces: int) -> Tensor:
         """Points (S, N pieces, 2) along the prototile, `pieces` evenly spaced on each side.
@@ -153,9 +162,7 @@ class TileModel(nn.Module):
         Identified edges have as many sides each, so their samples correspond.
         """
         vertices, _ = self.prototile()
-        t = torch.arange(pieces, dtype=vertices.dtype, device=vertices.device)[:, None] / pieces
-        sides = vertices.roll(-1, dims=-2) - vertices
-        return (vertices[:, :, None] + t * sides[:, :, None]).flatten(1, 2)
+        return subdivided(vertices, pieces)
 
     def take(self, indices: list[int]) -> TileModel:
         """A new model with the candidates at `indices` only, at the same parameters."""
@@ -172,8 +179,8 @@ class TileModel(nn.Module):
         for name, parameter in stack.named_parameters():
             parameter.copy_(torch.cat([part[name] for part in parts]))
         stack.mirror = torch.cat([model.mirror for model in models])
-        if first.outline is not None and first.corners is not None:
-            stack.outline = torch.cat([m.outline for m in models if m.outline is not None])
+        if first.vertices is not None and first.corners is not None:
+            stack.vertices = torch.cat([m.vertices for m in models if m.vertices is not None])
             stack.corners = torch.cat([m.corners for m in models if m.corners is not None])
         return stack
 
@@ -203,8 +210,8 @@ class TileModel(nn.Module):
         ).to(self.angle.device)
         for name in ("log_scale", "offset", "shape", "stretch"):
             getattr(model, name).copy_(getattr(self, name)[chosen])
-        if self.outline is not None and self.corners is not None:
-            model.outline = self.outline[chosen].clone()
+        if self.vertices is not None and self.corners is not None:
+            model.vertices = self.vertices[chosen].clone()
             model.corners = self.corners[chosen].clone()
         for own, parameters in zip(model.fourier_fields(), fields, strict=True):
             own.parameters_.copy_(parameters)
@@ -218,6 +225,14 @@ class TileModel(nn.Module):
         """
         if self.size != 1:
             raise OrbiflowError(f"take one candidate first: this model holds {self.size}")
-        linear: Array = self.linear().detach().double().numpy()[0]
-        offset: Array = self.offset.detach().double().numpy()[0]
+        linear: Array = self._linear(torch.float64).detach().cpu().numpy()[0]
+        offset: Array = self.offset.detach().double().cpu().numpy()[0]
         return self.group.conjugate(linear, np.asarray(offset))
+
+    def _apply(self, fn: Callable[[Tensor], Tensor], recurse: bool = True) -> Self:
+        # what .float(), .half() and .to(...) go through: the start follows them to a device alone
+        exact = {name: buffer for name, buffer in self._buffers.items() if buffer is not None}
+        super()._apply(fn, recurse)
+        for name, buffer in exact.items():
+            setattr(self, name, buffer.to(getattr(self, name).device))
+        return self

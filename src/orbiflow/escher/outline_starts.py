@@ -13,11 +13,11 @@ from scipy.ndimage import gaussian_filter1d
 
 from orbiflow.escher.nearest_tile import nearest_tiles
 from orbiflow.escher.placements import Complex, Placements, best_placements
-from orbiflow.escher.prototiles import Prototiles, subdivided
+from orbiflow.escher.prototiles import Prototiles
 from orbiflow.escher.starts import template_symmetries
 from orbiflow.escher.tile_space import NearestTiles
-from orbiflow.likeness.overlap import boundary_iou, region_of
-from orbiflow.silhouette.rings import reverse
+from orbiflow.geometry import resampled, reverse, subdivided
+from orbiflow.likeness.overlap import boundary_iou, prepared_region
 from orbiflow.silhouette.target import Target
 from orbiflow.symmetry import rotation_matrix
 from orbiflow.symmetry.isometry import Array
@@ -41,21 +41,6 @@ class Starts:
 
     prototiles: Prototiles
     iou: Array
-
-
-def resampled(ring: Array, count: int, phase: float = 0.0) -> Array:
-    """`count` points (count, 2) evenly spaced along the closed `ring` (N, 2).
-
-    `phase` moves them along by that share of their spacing.
-
-    >>> square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
-    >>> resampled(square, 4, phase=0.5).tolist()
-    [[0.5, 0.0], [1.0, 0.5], [0.5, 1.0], [0.0, 0.5]]
-    """
-    closed = np.concatenate([ring, ring[:1]])
-    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(closed, axis=0), axis=1))])
-    at = (np.arange(count) + phase) / count * along[-1]
-    return np.stack([np.interp(at, along, closed[:, i]) for i in (0, 1)], axis=-1)
 
 
 def outline_starts(
@@ -87,7 +72,7 @@ def outline_starts(
     places: list[Array] = []
     for mirrored in (False,) if mirror_closed(kind) else (False, True):
         ring = reverse(target.normal * (1.0, -1.0)) if mirrored else target.normal
-        goal = region_of(ring)
+        goal = prepared_region(ring)
         for points in resolutions:
             outline = resampled(ring, points, phase) @ [1, 1j]
             found = best_placements(kind, outline, projected)

@@ -100,7 +100,7 @@ class Elastic:
         return (abs(z - copy) ** 2).mean(axis=0) / size
 
     def forces(self, z: Complex) -> Complex:
-        """What the rotations and the pose of shapes (N, C) pull towards: b of `stiffness matrix` z = b."""
+        """What the rotations and the pose of shapes (N, C) pull towards: b of matrix z = b."""
         r = self.rotations(z)
         copy, _ = self._copies(z)
         pull = r * self._own[:, None] + self._sums @ r

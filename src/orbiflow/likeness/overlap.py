@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
-from orbiflow.silhouette.rings import signed_area
+from orbiflow.geometry import signed_area
 from orbiflow.symmetry.isometry import Array
 
 MANY, COARSE = 1500, 2e-3
 """Vertices beyond which a region is simplified, and by how much of its size (area 1)."""
 
 
-def region_of(ring: Array) -> shapely.Polygon:
+def prepared_region(ring: Array) -> shapely.Polygon:
     """The region of a ring (N, 2) of area about 1, prepared; simplified if its vertices are many.
 
     For choosing among candidates: intersections with thousands of vertices cost seconds. What is
@@ -44,11 +44,11 @@ class Overlap:
     P's boundary inside T; along a side the speed is linear between its ends.
 
     Args:
-        target: (M, 2) ring of the region, simple, in either sense; see `region_of`.
+        target: (M, 2) ring of the region, simple, in either sense; see `prepared_region`.
     """
 
     def __init__(self, target: Array) -> None:
-        self.region = region_of(target)
+        self.region = prepared_region(target)
 
     def iou(self, ring: Array) -> tuple[float, Array]:
         """IoU of a simple ring (N, 2) with the region and its gradient (N, 2).
@@ -61,7 +61,7 @@ class Overlap:
         common = float(shapely.Polygon(ring).intersection(self.region).area)
         inside = self.area_gradient(ring)
         sign = 1.0 if signed_area(ring) > 0 else -1.0
-        area = abs(signed_area(ring))
+        area = float(abs(signed_area(ring)))
         sides = np.roll(ring, -1, axis=0) - np.roll(ring, 1, axis=0)
         whole = sign * np.stack([sides[:, 1], -sides[:, 0]], axis=-1) / 2
         union = area + self.region.area - common

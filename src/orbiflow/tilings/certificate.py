@@ -13,7 +13,7 @@ import shapely
 from orbiflow.errors import CertificationError, OrbiflowError
 from orbiflow.symmetry.isometry import Array
 from orbiflow.tilings.edge_matching import curve_distance, match_segments
-from orbiflow.tilings.images import Surroundings, expected_area, shoelace, surroundings
+from orbiflow.tilings.images import Surroundings, expected_area, surroundings
 from orbiflow.tilings.neighbours import neighbours_among
 from orbiflow.tilings.tile import Tile
 
@@ -113,7 +113,7 @@ def certify(tile: Tile, *, tolerance: float = 1e-9) -> Certificate:
     Raises nothing for a bad tile: the certificate says what is wrong.
     """
     size = expected_area(tile)
-    area = shoelace(tile.polygon)
+    area = tile.signed_area
     figures = _Figures(area, size, tolerance)
     try:
         around = surroundings(tile, _MARGIN)

@@ -9,6 +9,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from orbiflow.geometry import subdivided
 from orbiflow.symmetry import Isometry
 from orbiflow.symmetry.isometry import Array
 from orbiflow.tilings.edge_matching import segment_tree
@@ -70,6 +71,4 @@ def neighbours_among(around: Surroundings, tolerance: float) -> Neighbours:
 def _boundary_samples(ring: Array) -> Array:
     """Interior points of the segments, midpoints among them: never the corners."""
     per_segment = 2 * math.ceil(_SAMPLES / (2 * len(ring))) + 1 if len(ring) < _SAMPLES else 1
-    fractions = (np.arange(per_segment) + 0.5) / per_segment
-    step = np.roll(ring, -1, axis=0) - ring
-    return (ring[:, None] + fractions[:, None] * step[:, None]).reshape(-1, 2)
+    return subdivided(ring, per_segment, phase=0.5)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from orbiflow.errors import OrbiflowError
+from orbiflow.geometry import signed_area
 from orbiflow.symmetry import CrystallographicGroup
 from orbiflow.symmetry.isometry import Array
 
@@ -48,8 +49,7 @@ class Tile:
     @property
     def signed_area(self) -> float:
         """Area, positive for counter-clockwise order (with y up)."""
-        x, y = self.polygon.T
-        return float(0.5 * np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
+        return float(signed_area(self.polygon))
 
     @property
     def center(self) -> Array:
