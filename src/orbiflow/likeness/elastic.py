@@ -4,8 +4,9 @@ As rigid as possible (Sorkine and Alexa, As-Rigid-As-Possible Surface Modeling, 
 for Escher tiles since Nagata and Imahori, 2021): with points x at rest, moved to z, and a rotation r_i
 of each, the energy is the sum over all pairs of w_ij |(z_i - z_j) - r_i (x_i - x_j)|^2. Cotangent
 weights measure the strain of areas; weights along the outline measure strain by length, so that
-small parts count: an ear has little area and much outline. Points are complex numbers x + iy; a batch
-of C shapes is (N, C).
+small parts count: an ear has little area and much outline. To these comes what it costs to bend the
+outline as a rod: the square of the change of its curvature, so that straight parts stay straight and
+corners stay corners. Points are complex numbers x + iy; a batch of C shapes is (N, C).
 """
 
 from __future__ import annotations
@@ -20,25 +21,35 @@ from numpy.typing import NDArray
 
 from orbiflow.errors import OrbiflowError
 from orbiflow.silhouette.mesh import Mesh, triangulate
+from orbiflow.silhouette.thickness import local_thickness
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-COTANGENTS = (0.05, 5.0)
+COTANGENTS = (0.05, 40.0)
 """Bounds of the areas' weights: obtuse triangles have negative ones."""
+
+THICK = 0.25
+"""Radius of a part that is not thin, in square roots of the area; a disc has 0.56."""
+
+SALIENT = (0.5, 8.0)
+"""Bounds of what thinness may multiply weights by."""
 
 
 @dataclass(frozen=True)
 class Stiffness:
     """What deforming costs, in a silhouette of area 1.
 
-    - `stretch`: of the outline, per unit of its length.
-    - `bend`: of the outline over two points, per unit of its length.
+    - `stretch`: of the outline, per unit of its length and squared strain.
+    - `bend`: of the outline, per unit of its length and squared change of curvature.
+    - `salience`: power of the thinness by which areas of thin parts weigh more: with 0 a leg of half
+      the width weighs half as much a length, with 1 the same.
     - `pose`: of the mean squared distance from the silhouette's best similar copy.
     """
 
     stretch: float = 0.2
-    bend: float = 0.1
+    bend: float = 0.0003
+    salience: float = 0.0
     pose: float = 3.0
 
 
@@ -77,6 +88,8 @@ class Elastic:
         self._conjugate = self._sums.conjugate().tocsr()
         self._own = np.asarray(self._sums.sum(axis=1)).ravel()
         self._own_conjugate = np.conj(self._own)
+        self._rod, self._rod_cost = self._bending(stiff)
+        self._curved = self._rod @ self.rest[: self.size]
         self._solvers: dict[float, Array] = {}
 
     def __len__(self) -> int:
@@ -84,14 +97,17 @@ class Elastic:
 
     def rotations(self, z: Complex) -> Complex:
         """The rotations (N, C), complex units, that suit shapes (N, C) best."""
+        n = self.size
         sums = self._own_conjugate[:, None] * z - self._conjugate @ z
+        sums[:n] += (self._rod_cost * np.conj(self._curved))[:, None] * (self._rod @ z[:n])
         return sums / np.maximum(abs(sums), 1e-300)
 
     def energy(self, z: Complex) -> Array:
         """Energies (C,) of shapes (N, C) without the pose's."""
         r = self.rotations(z)
         strain = (z[self._i] - z[self._j]) - r[self._i] * self._d[:, None]
-        return self._w @ (strain.real**2 + strain.imag**2)
+        bent = self._rod @ z[: self.size] - r[: self.size] * self._curved[:, None]
+        return self._w @ _squares(strain) + self._rod_cost @ _squares(bent)
 
     def displacement(self, z: Complex) -> Array:
         """(C,) mean squared distance from the best similar copy, in areas of the copy."""
@@ -104,6 +120,8 @@ class Elastic:
         r = self.rotations(z)
         copy, _ = self._copies(z)
         pull = r * self._own[:, None] + self._sums @ r
+        bends = (self._rod_cost * self._curved)[:, None] * r[: self.size]
+        pull[: self.size] += self._rod.T @ bends
         return pull + self.stiffness.pose / len(self) * copy
 
     @cached_property
@@ -111,7 +129,10 @@ class Elastic:
         """(N, N) dense stiffness matrix, the pose's part included."""
         degree = np.asarray(self.weights.sum(axis=1)).ravel()
         pose = self.stiffness.pose / len(self)
-        return np.diag(2 * degree + pose) - 2 * self.weights.toarray()
+        matrix = np.diag(2 * degree + pose) - 2 * self.weights.toarray()
+        rod = self._rod.T @ scipy.sparse.diags(self._rod_cost) @ self._rod
+        matrix[: self.size, : self.size] += rod.toarray()
+        return matrix
 
     def pulled(self, z: Complex, towards: Complex, strength: float, rounds: int) -> Complex:
         """Let the outline (n, C) be pulled towards other points, as a spring a point would.
@@ -161,27 +182,44 @@ class Elastic:
 
     def _weights(self, stiff: Array | None) -> scipy.sparse.csr_matrix:
         triangles, count, n = self.mesh.triangles, len(self), self.size
+        factors = self._salience()
         rows, columns, values = [], [], []
         for k in range(3):
             i, j, apex = triangles[:, k], triangles[:, k - 2], triangles[:, k - 1]
             u = np.conj(self.rest[i] - self.rest[apex]) * (self.rest[j] - self.rest[apex])
             rows.append(i)
             columns.append(j)
-            values.append(u.real / np.maximum(2 * abs(u.imag), 1e-300))
+            cotangent = np.clip(u.real / np.maximum(abs(u.imag), 1e-300), -5.0, 5.0)
+            values.append(factors * cotangent / 2)
         areas = _symmetric(rows, columns, values, count)
         areas.data = np.clip(areas.data, *COTANGENTS)
         own = np.arange(n)
-        rows, columns, values = [], [], []
-        for apart, cost in ((1, self.stiffness.stretch), (2, self.stiffness.bend)):
-            other = (own + apart) % n
-            rows.append(own)
-            columns.append(other)
-            values.append(cost / np.maximum(abs(self.rest[other] - self.rest[own]), 1e-6))
-        total = (areas + _symmetric(rows, columns, values, count)).tocoo()
+        after = (own + 1) % n
+        # each side counts twice, with either end's rotation
+        sides = self.stiffness.stretch / np.maximum(abs(self.rest[after] - self.rest[own]), 1e-6)
+        total = (areas + _symmetric([own], [after], [sides], count)).tocoo()
         if stiff is not None:
             factors = self._everywhere(stiff)
             total.data = total.data * np.sqrt(factors[total.row] * factors[total.col])
         return total.tocsr()
+
+    def _salience(self) -> Array:
+        if not self.stiffness.salience:
+            return np.ones(len(self.mesh.triangles))
+        thinness = THICK / local_thickness(self.mesh)
+        return np.clip(thinness**self.stiffness.salience, *SALIENT)
+
+    def _bending(self, stiff: Array | None) -> tuple[scipy.sparse.csr_matrix, Array]:
+        """The difference of unit steps at each of the outline's points (n, n), and its cost (n,)."""
+        n, rest = self.size, self.rest[: self.size]
+        own, after = np.arange(n), (np.arange(n) + 1) % n
+        length = np.maximum(abs(rest[after] - rest), 1e-6)
+        before = np.roll(length, 1)
+        values = np.concatenate([1 / length, -1 / length - 1 / before, 1 / before])
+        columns = np.concatenate([after, own, (own - 1) % n])
+        matrix = scipy.sparse.csr_matrix((values, (np.tile(own, 3), columns)), shape=(n, n))
+        cost = 2 * self.stiffness.bend / (length + before)
+        return matrix, cost if stiff is None else cost * self._everywhere(stiff)[:n]
 
     def _everywhere(self, stiff: Array) -> Array:
         factors = np.asarray(stiff, dtype=np.float64)
@@ -222,6 +260,10 @@ def _times(matrix: Array, z: Complex) -> Complex:
     """A real matrix times complex columns, without making it complex."""
     z = np.ascontiguousarray(z)
     return (matrix @ z.view(np.float64)).view(np.complex128)
+
+
+def _squares(z: Complex) -> Array:
+    return z.real**2 + z.imag**2
 
 
 def _symmetric(rows: list, columns: list, values: list, count: int) -> scipy.sparse.csr_matrix:

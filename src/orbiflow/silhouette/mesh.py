@@ -42,7 +42,9 @@ def triangulate(ring: Array, spacing: float | None = None) -> Mesh:
     """Triangulate the inside of a simple polygon, its sides among the triangles' sides.
 
     A Delaunay triangulation of the vertices and of points inside; sides of the polygon that are no
-    sides of triangles are halved until they are (Ruppert's first rule).
+    sides of triangles are halved until they are (Ruppert's first rule). Sides of triangles that cross
+    the inside from one point of the outline to another are halved, so that every triangle can follow
+    wherever the outline is moved.
 
     Args:
         ring: (n, 2), counter-clockwise.
@@ -67,7 +69,7 @@ def triangulate(ring: Array, spacing: float | None = None) -> Mesh:
         triangles = Delaunay(points).simplices
         missing = ~_are_sides(ends, triangles, len(points))
         if not missing.any():
-            return _kept(Mesh(points, triangles, own_side, own_share, n), polygon)
+            return _divided(_kept(Mesh(points, triangles, own_side, own_share, n), polygon))
         middle = (low + high)[missing] / 2
         fresh = n + len(extra) + np.arange(len(middle))
         at, after = ring[sides[missing]], ring[(sides[missing] + 1) % n]
@@ -146,3 +148,37 @@ def _without_flat(triangles: Integers, flat: Integers) -> Integers:
                 triangles[t] = apex, start, b
                 break
     return triangles.astype(np.int64)
+
+
+def _divided(mesh: Mesh) -> Mesh:
+    """Halve every side that crosses the inside between two points of the outline."""
+    on_outline = mesh.size + len(mesh.sides)
+    directed = {(t[k - 1], t[k]) for t in mesh.triangles.tolist() for k in range(3)}
+    crossing = sorted((a, b) for a, b in directed if a < b < on_outline and (b, a) in directed)
+    middle = {pair: len(mesh.points) + k for k, pair in enumerate(crossing)}
+    ends = np.array(crossing, dtype=np.int64).reshape(-1, 2)
+    triangles: list[tuple[int, int, int]] = []
+    for a, b, c in mesh.triangles.tolist():
+        triangles += _pieces(
+            (a, b, c), [middle.get((min(u, v), max(u, v))) for u, v in ((a, b), (b, c), (c, a))]
+        )
+    points = np.concatenate([mesh.points, mesh.points[ends].mean(axis=1)])
+    return mesh._replace(points=points, triangles=np.array(triangles, dtype=np.int64))
+
+
+def _pieces(corners: tuple[int, int, int], middles: list[int | None]) -> list[tuple[int, int, int]]:
+    """A triangle whose sides ab, bc, ca have these middles or none, in pieces without loose ends."""
+    a, b, c = corners
+    count = sum(m is not None for m in middles)
+    if count == 0:
+        return [corners]
+    while middles[0] is None or (count == 2 and middles[1] is None):
+        a, b, c = b, c, a
+        middles = [*middles[1:], middles[0]]
+    ab, bc, ca = middles
+    assert ab is not None
+    if bc is None:
+        return [(a, ab, c), (ab, b, c)]
+    if ca is None:
+        return [(ab, b, bc), (a, ab, bc), (a, bc, c)]
+    return [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]

@@ -1,0 +1,195 @@
+"""The search for likeness in one class: placements, co-deformation, the best worked out in detail."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from orbiflow.escher.bending_settings import BendingSettings
+from orbiflow.escher.co_deformation import drawn_to_tiles, held_on_tiles
+from orbiflow.escher.outline_starts import mirror_closed
+from orbiflow.escher.placements import Complex, Placements, best_placements
+from orbiflow.escher.tile_space import TileSpace
+from orbiflow.likeness.elastic import Elastic, Stiffness
+from orbiflow.silhouette.sampling import Samples, sampled
+from orbiflow.silhouette.target import Target
+from orbiflow.symmetry.isometry import Array
+from orbiflow.tilings import IsohedralClass
+
+POSE = 4.0
+"""What a displacement weighs beside the energy, in the order of candidates."""
+
+TWIN = 2e-4
+"""Mean squared distance of two bent outlines below which they are twins."""
+
+FIRST_ROUNDS = 6
+"""Steps of the minimisation for all that are held."""
+
+
+class Hand(NamedTuple):
+    """A silhouette or its mirror image, sampled and made elastic, coarse and fine."""
+
+    mirrored: bool
+    samples: Samples
+    coarse: Elastic
+    fine: Elastic
+
+
+class Bent(NamedTuple):
+    """A bent silhouette that is a tile.
+
+    - `hand`: what was bent.
+    - `points`: (N,) of the fine body; its outline is the tile, up to a similarity.
+    - `linear`, `offset`: the map from the group's own frame, of `points`.
+    - `placement`: one, of the fine outline.
+    - `energy`, `displacement`: of deforming.
+    """
+
+    hand: Hand
+    points: Complex
+    linear: Array
+    offset: Array
+    placement: Placements
+    energy: float
+    displacement: float
+
+    @property
+    def cost(self) -> float:
+        """What candidates are ordered by; smaller is better."""
+        return self.energy + POSE * self.displacement
+
+
+def hands(
+    target: Target, settings: BendingSettings, stiffness: Stiffness | None = None
+) -> tuple[Hand, Hand]:
+    """The silhouette and its mirror image in the x axis, ready to be bent.
+
+    Raises:
+        OrbiflowError: for a silhouette that cannot be sampled or triangulated.
+    """
+    phase = float(np.random.default_rng(settings.seed).random()) if settings.seed else 0.0
+    samples = sampled(np.asarray(target.normal), phase, settings.multiples)
+    # read backwards from the same first point: every k-th fine point stays beside a coarse one
+    mirror = Samples(*(np.roll(part[::-1], 1, axis=0) * (1.0, -1.0) for part in samples))
+    own, other = (
+        Hand(mirrored, both, *(Elastic(points, stiffness) for points in both))
+        for mirrored, both in ((False, samples), (True, mirror))
+    )
+    return own, other
+
+
+def bent_tiles(
+    both: Sequence[Hand],
+    kind: IsohedralClass,
+    settings: BendingSettings,
+    progress: Callable[[float], None] | None = None,
+) -> list[Bent]:
+    """The finalists of one class, least cost first, no two of them twins.
+
+    Args:
+        both: of the target.
+        kind: the class.
+        settings: of the search.
+        progress: told the share of the work done.
+    """
+    told = progress or (lambda _share: None)
+    found: list[Bent] = []
+    sides = both[:1] if mirror_closed(kind) else both
+    for number, hand in enumerate(sides):
+        for k, (placement, outline) in enumerate(_best_coarse(hand, kind, settings)):
+            bent = _detailed(hand, kind, placement, outline, settings.rounds)
+            if bent is not None:
+                found.append(bent)
+            told((number + 0.5 + 0.5 * (k + 1) / settings.finalists) / len(sides))
+    found.sort(key=lambda bent: bent.cost)
+    return found
+
+
+def _best_coarse(
+    hand: Hand, kind: IsohedralClass, settings: BendingSettings
+) -> list[tuple[Placements, Complex]]:
+    """Placements whose tiles cost least, with these: few points, all placements side by side."""
+    body = hand.coarse
+    outline = hand.samples.coarse @ np.array([1, 1j])
+    placements = best_placements(kind, outline, settings.placements)
+    z, space = drawn_to_tiles(body, kind, placements)
+    rough, _ = _costs(body, z)
+    chosen = np.argsort(rough, kind="stable")[: settings.held]
+    picked = placements._replace(turns=space.turns).take(chosen)
+    tiles = held_on_tiles(body, TileSpace(kind, picked), z[:, chosen], FIRST_ROUNDS)
+    costs, sound = _costs(body, tiles.points)
+    order = np.lexsort((costs, ~sound))
+    fresh = _without_twins(body, tiles.points, order, settings.finalists)
+    return [(tiles.placements.take(np.array([k])), tiles.points[: body.size, k]) for k in fresh]
+
+
+def _detailed(
+    hand: Hand, kind: IsohedralClass, placement: Placements, outline: Complex, rounds: int
+) -> Bent | None:
+    """The same placement with all of the outline's points; None if the tile crosses itself."""
+    body, n = hand.fine, len(outline)
+    multiple = body.size // n
+    fine = placement._replace(
+        lengths=placement.lengths * multiple, starts=placement.starts * multiple
+    )
+    space = TileSpace(kind, fine)
+    at = np.arange(body.size) / multiple
+    closed = np.append(outline, outline[0])
+    towards = np.interp(at, np.arange(n + 1), closed.real) + 1j * np.interp(
+        at, np.arange(n + 1), closed.imag
+    )
+    z = body.pulled(body.rest[:, None].copy(), towards[:, None], 60.0, 6)
+    z = body.pulled(z, towards[:, None], 600.0, 6)
+    tiles = held_on_tiles(body, space, z, rounds)
+    ring = tiles.points[: body.size, 0]
+    area = _areas(ring[:, None])[0]
+    simple = shapely.is_valid(shapely.Polygon(np.stack([ring.real, ring.imag], axis=-1)))
+    if not simple or area < 0.1 or np.linalg.det(tiles.linear[0]) < 1e-6:
+        return None
+    return Bent(
+        hand,
+        tiles.points[:, 0],
+        tiles.linear[0],
+        tiles.offset[0],
+        tiles.placements,
+        float(body.energy(tiles.points)[0] / area),
+        float(body.displacement(tiles.points)[0]),
+    )
+
+
+def _costs(body: Elastic, z: Complex) -> tuple[Array, NDArray[np.bool_]]:
+    """Costs (C,) of shapes, and which of them do not cross themselves."""
+    ring = z[: body.size]
+    area = _areas(ring)
+    sound = np.asarray(shapely.is_valid(shapely.polygons(_rings(ring)))) & (area > 0.1)
+    return body.energy(z) / np.maximum(area, 0.1) + POSE * body.displacement(z), sound
+
+
+def _areas(ring: Complex) -> Array:
+    return 0.5 * (np.conj(ring) * np.roll(ring, -1, axis=0)).imag.sum(axis=0)
+
+
+def _rings(z: Complex) -> Array:
+    return np.stack([z.T.real, z.T.imag], axis=-1)
+
+
+def _without_twins(body: Elastic, z: Complex, order: NDArray[np.int64], count: int) -> list[int]:
+    kept: list[int] = []
+    for k in order:
+        apart = [_apart(z[: body.size, k], z[: body.size, other]) for other in kept]
+        if min(apart, default=1.0) > TWIN:
+            kept.append(int(k))
+        if len(kept) == count:
+            break
+    return kept
+
+
+def _apart(a: Complex, b: Complex) -> float:
+    """Mean squared distance of two outlines after the best similarity."""
+    a, b = a - a.mean(), b - b.mean()
+    factor = np.vdot(a, b) / np.vdot(a, a).real
+    return float((abs(factor * a - b) ** 2).mean())

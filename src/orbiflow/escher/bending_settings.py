@@ -1,0 +1,64 @@
+"""Knobs of the search for likeness, and its levels of effort."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Any
+
+from orbiflow.errors import OrbiflowError
+
+
+@dataclass(frozen=True)
+class BendingSettings:
+    """Knobs of the search by co-deformation; the defaults are effort "normal".
+
+    - `placements`: ways to lay the outline along the template's edges that are tried, a class.
+    - `held`: of these, the best after the springs, whose energy is minimised among tiles.
+    - `finalists`: of these, the best that are worked out with all of the outline's detail, a class.
+    - `rounds`: steps of the minimisation for finalists.
+    - `multiples`: points of a tile for each point of the search, the first that holds the corners.
+    - `min_neck`: width of necks below which a tile ranks lower, in square roots of the area.
+    - `seed`: moves the outline's points.
+    """
+
+    placements: int = 300
+    held: int = 80
+    finalists: int = 5
+    rounds: int = 40
+    multiples: tuple[int, ...] = (4, 6)
+    min_neck: float = 0.01
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        for name in ("placements", "held", "finalists", "rounds"):
+            if getattr(self, name) < 1:
+                raise OrbiflowError(f"{name} must be at least 1, got {getattr(self, name)}")
+        if not self.multiples or min(self.multiples) < 1:
+            raise OrbiflowError(f"multiples must be at least 1, got {self.multiples}")
+        if not 0 <= self.min_neck <= 0.2:
+            raise OrbiflowError(f"min_neck must be from 0 to 0.2, got {self.min_neck}")
+        if not 0 <= self.seed < 2**32:
+            raise OrbiflowError(f"seed must be from 0 to 2^32 - 1, got {self.seed}")
+
+    @classmethod
+    def for_effort(cls, effort: str, **changes: Any) -> BendingSettings:
+        """The settings of a level of effort: "fast", "normal" or "best".
+
+        >>> BendingSettings.for_effort("fast", seed=3).seed
+        3
+        """
+        if effort not in EFFORTS:
+            raise OrbiflowError(f"effort must be one of {', '.join(EFFORTS)}, got {effort!r}")
+        known = {field.name for field in fields(cls)}
+        unknown = [name for name in changes if name not in known]
+        if unknown:
+            raise OrbiflowError(f"unknown settings {', '.join(unknown)}")
+        return cls(**{**EFFORTS[effort], **changes})
+
+
+EFFORTS: dict[str, dict[str, Any]] = {
+    "fast": {"placements": 80, "held": 20, "finalists": 1, "rounds": 20, "multiples": (4,)},
+    "normal": {},
+    "best": {"placements": 1500, "held": 300, "finalists": 16, "rounds": 80, "multiples": (6, 8)},
+}
+"""What each level changes."""

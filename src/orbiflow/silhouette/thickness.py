@@ -1,0 +1,52 @@
+"""How thick a silhouette is at each of its points."""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from orbiflow.silhouette.mesh import Mesh
+
+Array = NDArray[np.float64]
+
+ROUNDING = 1.02
+"""Balls reach a little beyond themselves: triangles have size."""
+
+
+def local_thickness(mesh: Mesh) -> Array:
+    """Radius (M,) of the largest disc in the polygon that covers the middle of each triangle.
+
+    The local thickness of Hildebrand and Rüegsegger (1997), over discs about the points inside and
+    about the centres of triangles' circumcircles, which lie near the medial axis.
+
+    Args:
+        mesh: of the polygon.
+    """
+    polygon = shapely.Polygon(mesh.points[: mesh.size])
+    corners = mesh.points[mesh.triangles]
+    centers = np.concatenate([mesh.points[mesh.size + len(mesh.sides) :], _circumcenters(corners)])
+    centers = centers[shapely.contains_xy(polygon, centers[:, 0], centers[:, 1])]
+    middle = corners.mean(axis=1)
+    outline = polygon.exterior
+    shapely.prepare(outline)
+    own = np.asarray(shapely.distance(shapely.points(middle), outline))
+    if not len(centers):
+        return own
+    radius = np.asarray(shapely.distance(shapely.points(centers), outline))
+    found = own.copy()
+    for start in range(0, len(middle), 512):  # bounds the memory
+        part = middle[start : start + 512]
+        apart = np.hypot(*(part[:, None] - centers[None]).transpose(2, 0, 1))
+        covering = np.where(apart <= ROUNDING * radius, radius, 0.0).max(axis=1)
+        found[start : start + 512] = np.maximum(own[start : start + 512], covering)
+    return found
+
+
+def _circumcenters(corners: Array) -> Array:
+    a, u, v = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    twice = 2 * (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
+    uu, vv = (u**2).sum(axis=1), (v**2).sum(axis=1)
+    x = (v[:, 1] * uu - u[:, 1] * vv) / twice
+    y = (u[:, 0] * vv - v[:, 0] * uu) / twice
+    return a + np.stack([x, y], axis=1)
