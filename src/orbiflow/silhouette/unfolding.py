@@ -91,14 +91,14 @@ class _Distortion:
         j = self._jacobians(x)
         det = np.linalg.det(j)
         root = np.sqrt(det**2 + self.epsilon**2)
-        bounded = (det + root) / 2
-        bounded = np.maximum(bounded, 1e-300)
+        # (det + root) / 2 without cancellation
+        bounded = np.where(det > 0, det + root, self.epsilon**2 / (root - det)) / 2
         norm = (j**2).sum(axis=(1, 2))
         cofactor = np.stack(
             [np.stack([j[:, 1, 1], -j[:, 1, 0]], -1), np.stack([-j[:, 0, 1], j[:, 0, 0]], -1)], 1
         )
         energy = self.area * norm / bounded
-        slope = -norm / bounded**2 * (1 + det / root) / 2
+        slope = -norm / (bounded * root)
         by_j = self.area[:, None, None] * (
             2 * j / bounded[:, None, None] + slope[:, None, None] * cofactor
         )
