@@ -29,6 +29,9 @@ TWIN = 2e-4
 FIRST_ROUNDS = 6
 """Steps of the minimisation for all that are held."""
 
+SOFTENINGS = 6
+"""Times that finalists are minimised anew with the forgiving energy."""
+
 
 class Hand(NamedTuple):
     """A silhouette or its mirror image, sampled and made elastic, coarse and fine."""
@@ -145,6 +148,8 @@ def _detailed(
     z = body.pulled(body.rest[:, None].copy(), towards[:, None], 60.0, 6)
     z = body.pulled(z, towards[:, None], 600.0, 6)
     tiles = held_on_tiles(body, space, z, rounds)
+    for _ in range(SOFTENINGS):
+        tiles = held_on_tiles(body.forgiving(tiles.points), space, tiles.points, 6)
     ring = tiles.points[: body.size, 0]
     area = _areas(ring[:, None])[0]
     simple = shapely.is_valid(shapely.Polygon(np.stack([ring.real, ring.imag], axis=-1)))
@@ -156,7 +161,7 @@ def _detailed(
         tiles.linear[0],
         tiles.offset[0],
         tiles.placements,
-        float(body.energy(tiles.points)[0] / area),
+        float(body.forgiving_energy(tiles.points)[0] / area),
         float(body.displacement(tiles.points)[0]),
     )
 

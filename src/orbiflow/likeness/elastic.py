@@ -11,6 +11,7 @@ corners stay corners. Points are complex numbers x + iy; a batch of C shapes is 
 
 from __future__ import annotations
 
+import copy
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -45,12 +46,14 @@ class Stiffness:
     - `salience`: power of the thinness by which areas of thin parts weigh more: with 0 a leg of half
       the width weighs half as much a length, with 1 the same.
     - `pose`: of the mean squared distance from the silhouette's best similar copy.
+    - `forgiven`: strain, and angle of a kink in radians, beyond which `forgiving_energy` forgives.
     """
 
     stretch: float = 0.2
     bend: float = 0.0003
-    salience: float = 0.0
+    salience: float = 0.5
     pose: float = 3.0
+    forgiven: tuple[float, float] = (0.1, 0.15)
 
 
 class Elastic:
@@ -78,18 +81,21 @@ class Elastic:
         self.stiffness = stiffness or Stiffness()
         self.size = len(ring)
         self.rest: Complex = self.mesh.points @ np.array([1, 1j])
-        self.weights = self._weights(stiff)
-        pairs = self.weights.tocoo()
-        self._i, self._j, self._w = pairs.row, pairs.col, pairs.data
+        pairs = self._pairs(stiff)
+        self._i, self._j = pairs.row, pairs.col
         self._d = self.rest[self._i] - self.rest[self._j]
-        shape = self.weights.shape
-        weighted = self._w * self._d
-        self._sums = scipy.sparse.csr_matrix((weighted, (self._i, self._j)), shape=shape)
+        self._rod, rod_cost = self._bending(stiff)
+        self._curved = self._rod @ self.rest[: self.size]
+        self._weigh(pairs.data, rod_cost)
+
+    def _weigh(self, pair_weights: Array, rod_cost: Array) -> None:
+        shape = (len(self), len(self))
+        self._w, self._rod_cost = pair_weights, rod_cost
+        self._weights = scipy.sparse.csr_matrix((self._w, (self._i, self._j)), shape=shape)
+        self._sums = scipy.sparse.csr_matrix((self._w * self._d, (self._i, self._j)), shape=shape)
         self._conjugate = self._sums.conjugate().tocsr()
         self._own = np.asarray(self._sums.sum(axis=1)).ravel()
         self._own_conjugate = np.conj(self._own)
-        self._rod, self._rod_cost = self._bending(stiff)
-        self._curved = self._rod @ self.rest[: self.size]
         self._solvers: dict[float, Array] = {}
 
     def __len__(self) -> int:
@@ -105,9 +111,48 @@ class Elastic:
     def energy(self, z: Complex) -> Array:
         """Energies (C,) of shapes (N, C) without the pose's."""
         r = self.rotations(z)
+        strain, bent = self._misfits(z, r)
+        return self._w @ _squares(strain) + self._rod_cost @ _squares(bent)
+
+    def forgiving_energy(self, z: Complex) -> Array:
+        """Energies (C,) that grow only in proportion to strains and kinks once these are large.
+
+        2 f^2 (sqrt(1 + (s / f)^2) - 1) in place of s^2 (Charbonnier et al., 1994), with f the
+        stiffness' `forgiven` strain and angle: a joint that bends, or a toe that is lost, costs
+        less than the same spread over all of the outline.
+        """
+        strain, bent = self._misfits(z, self.rotations(z))
+        f, g = self.stiffness.forgiven
+        length = abs(self._d)[:, None]
+        tamed = 2 * (f * length) ** 2 * (np.sqrt(1 + _squares(strain) / (f * length) ** 2) - 1)
+        kinks = 2 * g**2 * (np.sqrt(1 + _squares(bent) / g**2) - 1)
+        return self._w @ tamed + self._rod_cost @ kinks
+
+    def forgiving(self, z: Complex) -> Elastic:
+        """The body whose energy touches `forgiving_energy` at a shape (N,) or (N, 1) from above.
+
+        Minimising with it, anew and anew, minimises that energy (iteratively reweighted least
+        squares).
+        """
+        z = z.reshape(-1, 1)
+        strain, bent = self._misfits(z, self.rotations(z))
+        f, g = self.stiffness.forgiven
+        relative = _squares(strain)[:, 0] / (f * abs(self._d)) ** 2
+        # both ends of a pair at once
+        shape = (len(self), len(self))
+        both = scipy.sparse.csr_matrix((relative, (self._i, self._j)), shape=shape)
+        mean = np.asarray(((both + both.T) / 2)[self._i, self._j]).ravel()
+        body = copy.copy(self)
+        for name in ("matrix", "condensed"):
+            body.__dict__.pop(name, None)
+        kinked = _squares(bent)[:, 0] / g**2
+        body._weigh(self._w / np.sqrt(1 + mean), self._rod_cost / np.sqrt(1 + kinked))
+        return body
+
+    def _misfits(self, z: Complex, r: Complex) -> tuple[Complex, Complex]:
         strain = (z[self._i] - z[self._j]) - r[self._i] * self._d[:, None]
         bent = self._rod @ z[: self.size] - r[: self.size] * self._curved[:, None]
-        return self._w @ _squares(strain) + self._rod_cost @ _squares(bent)
+        return strain, bent
 
     def displacement(self, z: Complex) -> Array:
         """(C,) mean squared distance from the best similar copy, in areas of the copy."""
@@ -127,9 +172,9 @@ class Elastic:
     @cached_property
     def matrix(self) -> Array:
         """(N, N) dense stiffness matrix, the pose's part included."""
-        degree = np.asarray(self.weights.sum(axis=1)).ravel()
+        degree = np.asarray(self._weights.sum(axis=1)).ravel()
         pose = self.stiffness.pose / len(self)
-        matrix = np.diag(2 * degree + pose) - 2 * self.weights.toarray()
+        matrix = np.diag(2 * degree + pose) - 2 * self._weights.toarray()
         rod = self._rod.T @ scipy.sparse.diags(self._rod_cost) @ self._rod
         matrix[: self.size, : self.size] += rod.toarray()
         return matrix
@@ -180,7 +225,7 @@ class Elastic:
         factor = np.conj(rest) @ (z - center) / (abs(rest) ** 2).sum()
         return center + rest[:, None] * factor, factor
 
-    def _weights(self, stiff: Array | None) -> scipy.sparse.csr_matrix:
+    def _pairs(self, stiff: Array | None) -> scipy.sparse.coo_matrix:
         triangles, count, n = self.mesh.triangles, len(self), self.size
         factors = self._salience()
         rows, columns, values = [], [], []
@@ -201,7 +246,7 @@ class Elastic:
         if stiff is not None:
             factors = self._everywhere(stiff)
             total.data = total.data * np.sqrt(factors[total.row] * factors[total.col])
-        return total.tocsr()
+        return total
 
     def _salience(self) -> Array:
         if not self.stiffness.salience:
