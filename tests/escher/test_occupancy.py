@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 
 from orbiflow.errors import OrbiflowError
 from orbiflow.escher.fit import Fit
+from orbiflow.escher.max_frequency import MAX_FREQUENCY
 from orbiflow.escher.model import TileModel
 from orbiflow.escher.occupancy import (
-    MAX_FREQUENCY,
     OccupancySamples,
     OccupancySettings,
     _distinct,

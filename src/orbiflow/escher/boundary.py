@@ -9,6 +9,7 @@ import numpy as np
 import shapely
 import torch
 
+from orbiflow.arguments import instance
 from orbiflow.errors import CertificationError
 from orbiflow.escher.model import TileModel
 from orbiflow.symmetry.isometry import Array
@@ -79,9 +80,12 @@ def extract_tile(model: TileModel, *, force: bool = False) -> tuple[Tile, TileMo
         The tile, and the float64 model with the integration steps that made it.
 
     Raises:
+        OrbiflowError: if the model holds more than one candidate.
         CertificationError: if no sampling gives a simple polygon: the candidate has folded. With
             `force`, only if coordinates are not finite.
     """
+    instance(model, TileModel, "the model", "SavedModel.restore and the fits give one")
+    model.require_single()
     kind = model.isohedral_class
     model = model.take([0]).double()
     model.flow.method, model.flow.steps = "rk4", max(1, 8 // model.segments)

@@ -6,6 +6,7 @@ import numpy as np
 import shapely
 import torch
 
+from orbiflow.arguments import instance
 from orbiflow.escher.descent import Descent
 from orbiflow.escher.descent_settings import DescentSettings
 from orbiflow.escher.fit import Fit, Progress
@@ -19,7 +20,7 @@ from orbiflow.likeness.recognition import Recogniser
 from orbiflow.silhouette.soft_target import SoftTarget
 from orbiflow.silhouette.target import Target
 from orbiflow.symmetry.isometry import Array
-from orbiflow.tilings import IsohedralClass
+from orbiflow.tilings import IsohedralClass, isohedral_class
 
 FEW, POOR = 8, 0.4
 """Starts from the outline, and IoU of the best of them, below which the template's join them."""
@@ -30,7 +31,7 @@ NEAR = 0.01
 
 def fit_descent(
     target: Target,
-    kind: IsohedralClass,
+    kind: IsohedralClass | str,
     settings: DescentSettings | None = None,
     *,
     soft: SoftTarget | None = None,
@@ -40,13 +41,16 @@ def fit_descent(
 
     Args:
         target: the silhouette.
-        kind: the class.
+        kind: the class, or its name.
         settings: of the descent; default effort "normal".
         soft: of the target, if it is at hand already.
         progress: told 1 - IoU of the best so far as the loss.
     """
+    kind = isohedral_class(kind)
+    instance(target, Target, "the target", "Target.read and Target.from_polygon make one")
+    settings = instance(settings or DescentSettings(), DescentSettings, "settings")
     outline = shapely.Polygon(target.normal).exterior
-    settings = (settings or DescentSettings()).for_outline(outline.length)
+    settings = settings.for_outline(outline.length)
     soft = soft or SoftTarget(target)
     report = progress or (lambda _share, _loss: None)
     starts = _starts(target, kind, settings)

@@ -11,6 +11,8 @@ import shapely
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
+from orbiflow.arguments import instance, whole
+from orbiflow.errors import OrbiflowError
 from orbiflow.escher.nearest_tile import NearestTiles, nearest_tiles
 from orbiflow.escher.placements import Complex, Placements, best_placements
 from orbiflow.escher.prototiles import Prototiles
@@ -20,7 +22,7 @@ from orbiflow.likeness.overlap import boundary_iou, prepared_region
 from orbiflow.silhouette.target import Target
 from orbiflow.symmetry import rotation_matrix
 from orbiflow.symmetry.isometry import Array
-from orbiflow.tilings import IsohedralClass
+from orbiflow.tilings import IsohedralClass, isohedral_class
 from orbiflow.tilings.class_table import EdgePair
 
 APART = 0.025
@@ -44,7 +46,7 @@ class Starts:
 
 def outline_starts(
     target: Target,
-    kind: IsohedralClass,
+    kind: IsohedralClass | str,
     *,
     count: int,
     resolutions: Sequence[int] = (40, 60, 80),
@@ -66,6 +68,11 @@ def outline_starts(
         vertices: of every start tile.
         phase: of the points along the outline, in spacings; what a seed changes.
     """
+    kind = isohedral_class(kind)
+    instance(target, Target, "the target", "Target.read and Target.from_polygon make one")
+    for points in resolutions:
+        if vertices % whole(points, "a resolution", 24):
+            raise OrbiflowError(f"resolutions must divide vertices = {vertices}, got {points}")
     parts: list[Prototiles] = []
     scores: list[Array] = []
     places: list[Array] = []
@@ -85,7 +92,12 @@ def outline_starts(
 
 
 def template_starts(
-    kind: IsohedralClass, *, turns: int, stretch: float, vertices: int = 240, phase: float = 0.0
+    kind: IsohedralClass | str,
+    *,
+    turns: int,
+    stretch: float,
+    vertices: int = 240,
+    phase: float = 0.0,
 ) -> Prototiles:
     """The template itself, turned and stretched: starts that know nothing of the target.
 
@@ -97,6 +109,7 @@ def template_starts(
         vertices: of every start tile, a multiple of the template's.
         phase: of the angles, in steps.
     """
+    kind = isohedral_class(kind)
     order, symmetric = template_symmetries(kind)
     stretches = [np.zeros(kind.stretch_dim)]
     for axis, sign in itertools.product(np.eye(kind.stretch_dim), (1.0, -1.0)):

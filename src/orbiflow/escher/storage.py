@@ -14,10 +14,12 @@ import torch
 from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
+from orbiflow.arguments import instance
+from orbiflow.arguments import path as as_path
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.escher.descent_settings import MAX_SEGMENTS
+from orbiflow.escher.max_frequency import MAX_FREQUENCY
 from orbiflow.escher.model import TileModel
-from orbiflow.escher.occupancy import MAX_FREQUENCY
 from orbiflow.silhouette.frame import Frame
 from orbiflow.symmetry.isometry import Array
 from orbiflow.tilings import isohedral_class
@@ -52,8 +54,7 @@ class SavedModel:
         Raises:
             OrbiflowError: for a model that holds more than one.
         """
-        if model.size != 1:
-            raise OrbiflowError(f"take one candidate first: this model holds {model.size}")
+        instance(model, TileModel, "the model", "load_model and the fits give one").require_single()
         settings = {
             "class": model.isohedral_class.name,
             "max_frequency": model.max_frequency,
@@ -161,7 +162,7 @@ def load_saved(path: str | Path) -> SavedModel:
     Raises:
         InputFileError: for a file that is missing, too large or not such a model.
     """
-    path = Path(path)
+    path = as_path(path, "the model's file")
     data = _read(path)
     with _naming(path):
         arrays = load(data)
