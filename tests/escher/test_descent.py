@@ -214,8 +214,8 @@ def test_efforts_are_valid_settings(effort: str) -> None:
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"max_frequency": 0}, "max_frequency must be at least 1"),
-        ({"max_frequency": 61}, "from 1 to 60"),
+        ({"max_frequency": -1}, "max_frequency must be at least 0"),
+        ({"max_frequency": 61}, "from 0 to 60"),
         ({"candidates": 0}, "candidates must be at least 1"),
         ({"starts": "random"}, 'starts must be "outline" or "template"'),
         ({"boundary": 100}, "multiple of 30"),

@@ -26,7 +26,7 @@ MOST_TIMES = 6.0
 class DescentSettings:
     """Knobs of the descent; the defaults are effort "normal", measured on the paper's goals.
 
-    - `max_frequency`: Omega, at least 1.
+    - `max_frequency`: Omega; 0 moves pose and lattice alone, and IH1 to IH3 along their glides.
     - `starts`: "outline" (tiles that are near the target's outline already) or "template" (the
       template turned and stretched; also what is left when no outline start is simple).
     - `candidates`: outline starts that the descent begins with.
@@ -68,7 +68,7 @@ class DescentSettings:
     def __post_init__(self) -> None:
         for name in ("candidates", "projected", "measured", "turns", "finalists"):
             whole(getattr(self, name), name, 1)
-        check_max_frequency(self.max_frequency, least=1)
+        check_max_frequency(self.max_frequency)
         if self.starts not in ("outline", "template"):
             raise OrbiflowError(f'starts must be "outline" or "template", got {self.starts!r}')
         if whole(self.boundary, "boundary", 0) < 60 or self.boundary % 30:

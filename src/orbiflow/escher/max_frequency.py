@@ -9,14 +9,14 @@ MAX_FREQUENCY = 60
 """Largest Omega that a fit takes on; time and memory grow with its square."""
 
 
-def check_max_frequency(value: int, *, least: int) -> None:
-    """Do nothing for an Omega from `least` to `MAX_FREQUENCY`.
+def check_max_frequency(value: int) -> None:
+    """Do nothing for an Omega from 0, constant fields (paper, figure of Omega), to `MAX_FREQUENCY`.
 
     Raises:
         OrbiflowError: for any other.
     """
-    if not least <= whole(value, "max_frequency", least) <= MAX_FREQUENCY:
+    if not 0 <= whole(value, "max_frequency", 0) <= MAX_FREQUENCY:
         raise OrbiflowError(
-            f"max_frequency must be from {least} to {MAX_FREQUENCY}, got {value}: "
+            f"max_frequency must be from 0 to {MAX_FREQUENCY}, got {value}: "
             "10 is plenty for most silhouettes"
         )

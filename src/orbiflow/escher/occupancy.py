@@ -29,7 +29,7 @@ SHAPE_PENALTY = 0.02
 class OccupancySettings:
     """Knobs of the occupancy method; the defaults were measured on the paper's goals.
 
-    - `max_frequency`: Omega, at least 1.
+    - `max_frequency`: Omega; 0 leaves the flow the translations that commute with the group.
     - `turns`: starting rotations of the template.
     - `finalists`: starts that survive the affine phase; a third of the flow phase later the better
       half of them goes on.
@@ -64,7 +64,7 @@ class OccupancySettings:
     def __post_init__(self) -> None:
         for name in ("turns", "finalists", "iterations", "points", "segments", "steps"):
             whole(getattr(self, name), name, 1)
-        check_max_frequency(self.max_frequency, least=1)
+        check_max_frequency(self.max_frequency)
         integrator(instance(self.method, str, "method"))
         whole(self.affine_iterations, "affine_iterations", 0)
         number(self.smoothness, "smoothness", 0)

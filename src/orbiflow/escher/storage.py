@@ -85,7 +85,7 @@ class SavedModel:
                 isohedral_class(self.settings["class"]),
                 torch.zeros(1, dtype=torch.float64),
                 mirrored=torch.tensor([bool(self.settings["mirrored"])]),
-                max_frequency=_whole(self.settings["max_frequency"], MAX_FREQUENCY),
+                max_frequency=_whole(self.settings["max_frequency"], MAX_FREQUENCY, least=0),
                 segments=_whole(self.settings["segments"], MAX_SEGMENTS),
                 smoothness=_exponent(self.settings["smoothness"]),
                 steps=_whole(self.settings["steps"], 1_000_000),
@@ -216,7 +216,7 @@ def _exponent(value: Any) -> float:
     return number
 
 
-def _whole(value: Any, most: int) -> int:
-    if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= most:
-        raise OrbiflowError(f"expected a whole number from 1 to {most}, got {value!r}")
+def _whole(value: Any, most: int, least: int = 1) -> int:
+    if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
+        raise OrbiflowError(f"expected a whole number from {least} to {most}, got {value!r}")
     return value
