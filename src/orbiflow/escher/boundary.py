@@ -14,7 +14,6 @@ from orbiflow.errors import CertificationError
 from orbiflow.escher.model import TileModel
 from orbiflow.symmetry.isometry import Array
 from orbiflow.tilings import IsohedralClass, Tile
-from orbiflow.tilings.class_table import EdgePair
 
 DENSE = (960, 4320)
 """Least number of samples around the tile from which vertices are chosen; the second if need be."""
@@ -118,14 +117,14 @@ def _flowed_edges(model: TileModel, pieces: int, force: bool) -> list[Array]:
     spans = {}
     for pair in kind.identified_edges:
         start, end = first[pair.first], first[pair.first + 1]
-        spans[pair] = slice(start, (start + end) // 2 + 1 if _turns_over(pair) else end + 1)
+        spans[pair] = slice(start, (start + end) // 2 + 1 if pair.folded else end + 1)
     points = torch.cat([closed[span] for span in spans.values()])[None]
     flowed = converge(model, points, force=force)[0][0].numpy()
     ends = np.cumsum([span.stop - span.start for span in spans.values()])
     edges: dict[int, Array] = {}
     for pair, own in zip(spans, np.split(flowed, ends[:-1]), strict=True):
         image = kind.edge_isometry(pair)(own)
-        if _turns_over(pair):
+        if pair.folded:
             edges[pair.first] = np.concatenate([own, image[-2::-1]])
         else:
             edges[pair.first] = own
@@ -136,10 +135,6 @@ def _flowed_edges(model: TileModel, pieces: int, force: bool) -> list[Array]:
 def _placement(model: TileModel) -> Callable[[Array], Array]:
     linear, offset = (t.detach().numpy()[0] for t in (model.linear(), model.offset))
     return lambda points: points @ linear.T + offset
-
-
-def _turns_over(pair: EdgePair) -> bool:
-    return pair.first == pair.second  # a 2-fold centre at the midpoint
 
 
 def _polygons(kind: IsohedralClass, edges: list[Array]) -> Iterator[tuple[Array, tuple[int, ...]]]:
@@ -155,7 +150,7 @@ def _chosen_samples(kind: IsohedralClass, closed: list[Array], tolerance: float)
     masks: dict[int, Array] = {}
     for pair in kind.identified_edges:
         curve = closed[pair.first]
-        if _turns_over(pair):
+        if pair.folded:
             half = _simplified(curve[: len(curve) // 2 + 1], tolerance)
             masks[pair.first] = np.concatenate([half, half[-2::-1]])
             continue

@@ -31,7 +31,7 @@ from orbiflow.tilings.class_table import (
     OperatorRow,
     RotationRow,
 )
-from orbiflow.tilings.lattice_freedom import STRETCH_DIM, stretch_matrix
+from orbiflow.tilings.lattice_freedom import commutant, stretch_matrix
 from orbiflow.tilings.templates import template_vertices
 
 
@@ -78,8 +78,8 @@ class IsohedralClass:
 
     @property
     def stretch_dim(self) -> int:
-        """Number of parameters of the lattice freedom: 2, 1 or 0."""
-        return STRETCH_DIM[self.row.freedom]
+        """Number of parameters of the lattice freedom: 2, 1 or 0 (`commutant` of the point group)."""
+        return len(self._freedom)
 
     def template(self, shape: Points | None = None) -> Points:
         """Vertices (..., K, 2) of the template, counter-clockwise.
@@ -106,7 +106,7 @@ class IsohedralClass:
             OrbiflowError: if the last axis of `parameters` is not `stretch_dim` long.
         """
         tensor = self._parameters(parameters, self.stretch_dim, "stretch")
-        return _same_kind(stretch_matrix(self.row.freedom, tensor), parameters)
+        return _same_kind(stretch_matrix(self._freedom, tensor), parameters)
 
     def group(self) -> CrystallographicGroup:
         """The group of the template; the same for all shape parameters."""
@@ -150,6 +150,10 @@ class IsohedralClass:
         # another basis of the paper's lattice: with the shortest, |k_i| <= Omega is isotropic
         basis = reduced_basis(np.stack(columns, axis=1))
         return CrystallographicGroup.generate(basis, self.generators(), name=self.row.group)
+
+    @cached_property
+    def _freedom(self) -> Array:
+        return commutant(self._group.linear_parts)
 
     def _point(self, coefficients: Coefficients) -> Array:
         terms = [c * self._default[k] for k, c in coefficients.items()]
