@@ -86,8 +86,11 @@ class Frame:
         if isinstance(points, torch.Tensor):
             points = _tensor(points)
             return (points - points.new_tensor(self.offset)) @ points.new_tensor(self.inverse).T
-        plain = numbers(points, "points", (..., 2), finite=False)
-        return (plain - self.offset) @ self.inverse.T
+        local = numbers(points, "points", (..., 2), finite=False) - self.offset
+        scale = np.diag(self.linear)
+        if np.array_equal(self.linear, np.diag(scale)):
+            return local / scale  # rounded once
+        return local @ self.inverse.T
 
     def as_dict(self) -> dict[str, Any]:
         """Everything, ready for JSON; `from_dict` undoes it bit for bit."""
