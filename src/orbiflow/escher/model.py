@@ -258,7 +258,7 @@ class TileModel(nn.Module):
         chosen = list(range(self.size)) if indices is None else indices
         model = TileModel(
             self.isohedral_class,
-            self.angle.detach()[chosen],
+            np.zeros(len(chosen)),  # a fit that ran away has angles that none may begin with
             mirrored=self.mirror[chosen],
             max_frequency=self.max_frequency,
             segments=len(fields),
@@ -267,7 +267,7 @@ class TileModel(nn.Module):
             method=self.flow.method,
             dtype=self.angle.dtype,
         ).to(self.angle.device)
-        for name in ("log_scale", "offset", "shape", "stretch"):
+        for name in ("angle", "log_scale", "offset", "shape", "stretch"):
             getattr(model, name).copy_(getattr(self, name)[chosen])
         if self.vertices is not None and self.corners is not None:
             model.vertices = self.vertices[chosen].clone()
