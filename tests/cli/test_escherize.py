@@ -161,7 +161,7 @@ def test_a_run_on_a_polygon_with_y_up(tmp_path: Path, orbiflow) -> None:
 def test_no_tile_is_status_one(tmp_path: Path, orbiflow, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "boot.json"
     path.write_text(json.dumps(BOOT))
-    monkeypatch.setattr(methods, "fit_occupancy", lambda *_: crossed())
+    monkeypatch.setattr(methods, "fit_occupancy", lambda *_, **__: crossed())
     options = ["--classes", "IH21", "--workers", 1, *FEW]
     outcome = orbiflow("escherize", path, "-o", tmp_path / "o", *options)
     assert outcome.status == 1

@@ -14,6 +14,7 @@ import typer
 from rich.table import Table
 
 from orbiflow.cli.console import errors, output
+from orbiflow.cli.interrupts import stopped_by_interrupt
 from orbiflow.cli.progress import watched
 from orbiflow.errors import OrbiflowError
 from orbiflow.escher import ClassFailure, DescentSettings, OccupancySettings, TileResult
@@ -69,7 +70,7 @@ def run(request: Request) -> None:
     out = make_folder(request.out)
     for note in (*target.notes, *(emphasis.notes if emphasis else ())):
         output.print(f"  {note}", highlight=False, soft_wrap=True)
-    with watched(names) as watch:
+    with stopped_by_interrupt() as cancel, watched(names) as watch:
         results, failures = search(
             target,
             names,
@@ -79,6 +80,7 @@ def run(request: Request) -> None:
             workers=count,
             force=request.force,
             watch=watch,
+            cancel=cancel,
         )
     seconds = time.perf_counter() - begin
     document = report(

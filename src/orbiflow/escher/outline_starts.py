@@ -11,6 +11,7 @@ import shapely
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
+from orbiflow.cancel import Cancel
 from orbiflow.escher.nearest_tile import NearestTiles, nearest_tiles
 from orbiflow.escher.placements import Complex, Placements, best_placements
 from orbiflow.escher.prototiles import Prototiles, subdivided
@@ -67,6 +68,7 @@ def outline_starts(
     measured: int = 200,
     vertices: int = 240,
     phase: float = 0.0,
+    cancel: Cancel | None = None,
 ) -> Starts:
     """The best start tiles of one class for a target, no two of them twins.
 
@@ -80,7 +82,12 @@ def outline_starts(
         measured: of these, the nearest tiles whose overlap is measured.
         vertices: of every start tile.
         phase: of the points along the outline, in spacings; what a seed changes.
+        cancel: looked at before each resolution.
+
+    Raises:
+        Cancelled: if it was told to stop.
     """
+    cancel = cancel or Cancel()
     parts: list[Prototiles] = []
     scores: list[Array] = []
     places: list[Array] = []
@@ -88,6 +95,7 @@ def outline_starts(
         ring = reverse(target.normal * (1.0, -1.0)) if mirrored else target.normal
         goal = region_of(ring)
         for points in resolutions:
+            cancel.check()
             outline = resampled(ring, points, phase) @ [1, 1j]
             found = best_placements(kind, outline, projected)
             for tiles, placements, score in _simple_tiles(kind, goal, outline, found, measured):

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
+import functools
 import io
 from collections import Counter
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
-import torch
 from PIL import Image, ImageDraw, ImageFont
 
-from orbiflow.escher.processes import process_context, quiet_fork
+from orbiflow.escher.processes import work
 from orbiflow.escher.result import TileResult
 from orbiflow.export.folder import write_tile_folder
 from orbiflow.figures.tilings import overlay_png, tiling_png
@@ -30,22 +30,30 @@ def write_gallery(
         OutputError: if a file cannot be written.
     """
     folders = [out / name for name in folder_names(results)]
-    targets = [target] * len(results)
-    if workers == 1:
-        for result, folder in zip(results, folders, strict=True):
-            write_tile_folder(result, target, folder)
+    draw = functools.partial(_draw, results, target, folders)
+    if workers == 1 or len(results) == 1:
+        for k in range(len(results)):
+            draw(k)
     else:
-        context = process_context()
-        with ProcessPoolExecutor(workers, context, torch.set_num_threads, (1,)) as pool:
-            with quiet_fork():
-                done = pool.map(write_tile_folder, results, targets, folders)
-            for _ in done:
+        with contextlib.closing(work(draw, range(len(results)), workers)) as news:
+            for _ in news:
                 pass
     pictures = [
         tuple((folder / name).read_bytes() for name in ("overlay.png", "tiling.png"))
         for folder in folders
     ]
     write_atomic(out / "overview.png", overview_png(results, target, pictures))
+
+
+def _draw(
+    results: Sequence[TileResult],
+    target: Target,
+    folders: Sequence[Path],
+    index: int,
+    *_: object,
+) -> None:
+    """The folder of one result; in a worker process, too."""
+    write_tile_folder(results[index], target, folders[index])
 
 
 def folder_names(results: Sequence[TileResult]) -> list[str]:
