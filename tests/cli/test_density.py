@@ -187,3 +187,42 @@ def test_the_model_is_whole_and_readable(tmp_path: Path, orbiflow) -> None:
     density, extra = read_density(model / "density.safetensors")
     assert extra == {"columns": ["lat", "lon"]}
     assert density.mass(128) == pytest.approx(1.0, abs=2e-3)
+
+
+@pytest.mark.usefixtures("small_pictures")
+def test_nothing_of_an_earlier_model_stays(tmp_path: Path, orbiflow) -> None:
+    data, model = table(tmp_path), tmp_path / "model"
+    fit = ("density", "fit", data, "--space", "torus", "--unit", "degrees", *FIT, "--out", model)
+    plot = ("density", "plot", "--model", model, "--out", model)
+    assert orbiflow(*fit).status == 0
+    assert orbiflow(*plot, "--data", data).status == 0
+    names = {"density.png", "flow.png", "samples.png", "surface.html"}
+    assert {path.name for path in model.iterdir()} == names | {"density.safetensors", "report.json"}
+    # without data there is no picture of samples beside them
+    assert orbiflow(*plot).status == 0
+    assert not (model / "samples.png").exists()
+    assert (model / "density.safetensors").exists()
+    assert orbiflow(*fit).status == 0
+    assert {path.name for path in model.iterdir()} == {"density.safetensors", "report.json"}
+
+
+def test_a_fit_does_not_touch_what_it_did_not_write(tmp_path: Path, orbiflow) -> None:
+    data, model = table(tmp_path), tmp_path / "model"
+    model.mkdir()
+    (model / "density.png").write_text("mine")
+    refused = orbiflow("density", "fit", data, "--space", "torus", *FIT, "--out", model)
+    assert refused.status == 2
+    assert "holds density.png, which orbiflow did not write" in refused.err
+    assert (model / "density.png").read_text() == "mine"
+
+
+def test_a_plot_leaves_other_files_alone(tmp_path: Path, orbiflow) -> None:
+    data, model, out = table(tmp_path), tmp_path / "model", tmp_path / "plots"
+    orbiflow("density", "fit", data, "--space", "torus", *FIT, "--out", model)
+    out.mkdir()
+    (out / "notes.txt").write_text("mine")
+    (out / "surface.html").write_text("of an earlier model")
+    wrong = orbiflow("density", "plot", "--model", model, "--center", "0,0,0", "--out", out)
+    assert wrong.status == 2
+    assert (out / "surface.html").read_text() == "of an earlier model"
+    assert (out / "notes.txt").read_text() == "mine"

@@ -214,3 +214,36 @@ def test_help_does_not_import_torch() -> None:
         "sys.exit('torch' in sys.modules)"
     )
     assert subprocess.run([sys.executable, "-c", code], capture_output=True).returncode == 0
+
+
+def test_a_second_run_takes_the_place_of_the_first(
+    tmp_path: Path, orbiflow, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, out = tmp_path / "boot.json", tmp_path / "out"
+    path.write_text(json.dumps(BOOT))
+    run = ("escherize", path, "--workers", 1, *FEW)
+    assert orbiflow(*run, "-o", out, "--classes", "IH4,IH6").status == 0
+    assert orbiflow(*run, "-o", out, "--classes", "IH4").status == 0
+    assert {p.name for p in out.iterdir()} == {"IH4", "overview.png", "result.json"}
+    monkeypatch.chdir(out)
+    assert orbiflow(*run, "-o", ".", "--classes", "IH6").status == 0
+    assert {p.name for p in Path().iterdir()} == {"IH6", "overview.png", "result.json"}
+    before = (out / "result.json").read_bytes()
+    monkeypatch.setattr(methods, "fit_occupancy", lambda *_, **__: crossed())
+    none = orbiflow(*run, "-o", out, "--classes", "IH21")
+    assert none.status == 1
+    assert f"{out} still holds the tiles of an earlier run" in none.err
+    assert (out / "result.json").read_bytes() == before
+
+
+def test_a_folder_with_something_else_is_refused(tmp_path: Path, orbiflow) -> None:
+    path = tmp_path / "boot.json"
+    path.write_text(json.dumps(BOOT))
+    refused = orbiflow("escherize", path, "-o", tmp_path, "--classes", "IH4", *FEW)
+    assert refused.status == 2
+    assert (
+        f"{tmp_path} holds boot.json, which orbiflow did not write: choose another --out or move it"
+        in refused.err
+    )
+    assert "fitting" not in refused.out
+    assert [p.name for p in tmp_path.iterdir()] == ["boot.json"]
