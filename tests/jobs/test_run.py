@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import threading
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from jobs.searches import ENDLESS, boot_request, check_order
@@ -14,10 +16,12 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.export.folder import TILE_FILES
 from orbiflow.jobs import (
     ClassFailed,
+    DensityFitRequest,
     DensitySampleRequest,
     Event,
     Failed,
     Finished,
+    Preview,
     Progress,
     Request,
     TileFound,
@@ -110,6 +114,55 @@ def test_a_search_cancelled_on_the_way_keeps_what_was_found(tmp_path: Path) -> N
     assert [tile["class"] for tile in document["tiles"]] == ["IH4"]
     assert document["failed"] == [{"class": "IH6", "reason": "interrupted"}]
     assert (tmp_path / "out" / "IH4" / "tile.svg").is_file()
+
+
+def test_a_first_look_alone_is_kept_unless_there_is_more(tmp_path: Path) -> None:
+    request = dataclasses.replace(
+        boot_request(tmp_path, "IH4", "IH6"),
+        method="descent",
+        turns=None,
+        iterations=None,
+        effort="fast",
+    )
+
+    def cancelled() -> Finished:
+        cancel, events = Cancel(), []
+
+        def sink(event: Event) -> None:
+            events.append(event)
+            if isinstance(event, Preview):
+                cancel.cancel()
+
+        finished = run(request, sink, cancel)
+        check_order(events, "IH4", "IH6")
+        assert finished.state == "cancelled"
+        return finished
+
+    assert [tile["class"] for tile in cancelled().summary["tiles"]] == ["IH6"]
+    out = tmp_path / "out"
+    assert {p.name for p in out.iterdir()} == {"IH6", "overview.png", "result.json"}
+    assert run(dataclasses.replace(request, classes=("IH4",))).state == "done"
+    finished = cancelled()
+    assert not finished.summary["written"]
+    assert finished.summary["tiles"] == []
+    assert {p.name for p in out.iterdir()} == {"IH4", "overview.png", "result.json"}
+
+
+def test_a_fit_that_is_cancelled_writes_nothing(tmp_path: Path) -> None:
+    data = tmp_path / "data.csv"
+    rows = np.random.default_rng(0).normal(0.0, 0.5, (50, 2))
+    data.write_text("\n".join(f"{a:.4f},{b:.4f}" for a, b in rows))
+    cancel, events = Cancel(), []
+
+    def sink(event: Event) -> None:
+        events.append(event)
+        if isinstance(event, Progress):
+            cancel.cancel()
+
+    request = DensityFitRequest(data=data, space="torus", out=tmp_path / "out", detail=2)
+    assert run(request, sink, cancel).state == "cancelled"
+    check_order(events)
+    assert [p.name for p in tmp_path.iterdir()] == ["data.csv"]
 
 
 def test_what_the_sink_raises_comes_out(tmp_path: Path) -> None:

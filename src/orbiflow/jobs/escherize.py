@@ -34,11 +34,11 @@ from orbiflow.tilings import CLASSES, isohedral_class
 def escherize(request: EscherizeRequest, tell: Sink, cancel: Cancel) -> Finished:
     """Search, and write the folder whole.
 
-    A run that finds no tile leaves an earlier run's folder as it is.
+    A run that finishes no class with a tile leaves an earlier run's folder as it is.
 
     Returns:
-        `summary`: `folder`, whether it was `written`, `seconds` in all, `tiles` (best first) and
-        `failed`.
+        `summary`: `folder`, whether it was `written`, `seconds` in all, the `tiles` that it holds
+        now (best first), and `failed`.
 
     Raises:
         OrbiflowError: for anything that the user can mend.
@@ -71,7 +71,9 @@ def escherize(request: EscherizeRequest, tell: Sink, cancel: Cancel) -> Finished
         workers=workers,
         emphasis=emphasis,
     )
-    write = bool(results) or not folder.has_a_run
+    interrupted = {failure.name for failure in failures if failure.reason == search.INTERRUPTED}
+    # a first look at a class that was interrupted is less than an earlier run
+    write = not folder.has_a_run or any(r.name not in interrupted for r in results)
     if write:
         _write(folder, document, results, target, workers, tell)
     state: State = "done" if results else "nothing found"
@@ -79,10 +81,9 @@ def escherize(request: EscherizeRequest, tell: Sink, cancel: Cancel) -> Finished
         "folder": str(request.out),
         "written": write,
         "seconds": time.perf_counter() - begin,
-        "tiles": [_row(result) for result in results],
+        "tiles": [_row(result) for result in results if write],
         "failed": document["failed"],
     }
-    interrupted = any(failure.reason == search.INTERRUPTED for failure in failures)
     return Finished("cancelled" if interrupted or cancel.cancelled else state, summary)
 
 
