@@ -8,6 +8,7 @@ tell the same events. Importing this is quick: numerical libraries come with the
 True
 """
 
+from orbiflow.cancel import Cancel
 from orbiflow.jobs.events import (
     ClassFailed,
     Event,
@@ -36,6 +37,7 @@ from orbiflow.jobs.requests import (
 from orbiflow.jobs.run import Sink, run
 
 __all__ = [
+    "Cancel",
     "ClassFailed",
     "DensityFitRequest",
     "DensityPlotRequest",
