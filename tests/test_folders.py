@@ -156,6 +156,14 @@ def test_a_link_to_a_folder_stays_a_link(tmp_path: Path) -> None:
     assert files(tmp_path / "real") == {"result.json": "new"}
 
 
+def test_a_link_within_is_no_folder_of_ours(tmp_path: Path) -> None:
+    fill(tmp_path / "elsewhere", "tile.svg")
+    fill(tmp_path / "out", "result.json")
+    (tmp_path / "out" / "IH4").symlink_to(tmp_path / "elsewhere")
+    with pytest.raises(OutputError, match="holds IH4, which orbiflow did not write"):
+        folder_at(tmp_path / "out")
+
+
 def test_permissions_are_kept(tmp_path: Path) -> None:
     out = tmp_path / "out"
     out.mkdir(mode=0o750)

@@ -81,17 +81,18 @@ class ResultFolder:
         entries = [p for p in self._real.iterdir() if p != staged and not _is_litter(p.name)]
         known = self._known(self._real) if entries else set()
         above = {str(parent) for name in known for parent in PurePosixPath(name).parents}
-        for path in sorted(entries):
-            inside = [path, *sorted(path.rglob("*"))] if path.is_dir() else [path]
-            for found in inside:
-                name = found.relative_to(self._real).as_posix()
-                ours = name in above if found.is_dir() else name in known
-                if not (ours or _is_litter(found.name)):
-                    raise OutputError(
-                        f"{self.path} holds {name}, which orbiflow did not write: choose another "
-                        "--out or move it"
-                    )
-        return bool(entries)
+        while entries:
+            path = entries.pop()
+            name = path.relative_to(self._real).as_posix()
+            folder = path.is_dir() and not path.is_symlink()
+            if name not in (above if folder else known):
+                raise OutputError(
+                    f"{self.path} holds {name}, which orbiflow did not write: choose another "
+                    "--out or move it"
+                )
+            if folder:
+                entries += [p for p in path.iterdir() if not _is_litter(p.name)]
+        return bool(known)
 
     def _is_fixed(self) -> bool:
         """Whether the folder must stay where it is, and only its files can be exchanged."""

@@ -83,10 +83,10 @@ def work(
     Raises:
         OrbiflowError: if a worker dies; and whatever `function` raises.
     """
-    pool = _Pool(function, items, context or process_context())
+    pool = _Pool(function, items, context or process_context(), cancel or Cancel())
     try:
         pool.start(workers)
-        yield from pool.news(cancel or Cancel())
+        yield from pool.news()
     finally:
         pool.close()
 
@@ -98,8 +98,10 @@ class _Worker:
 
 
 class _Pool:
-    def __init__(self, function: Function, items: Iterable[Any], context: Any) -> None:
-        self.function, self.context = function, context
+    def __init__(
+        self, function: Function, items: Iterable[Any], context: Any, cancel: Cancel
+    ) -> None:
+        self.function, self.context, self.cancel = function, context, cancel
         self.waiting = deque(enumerate(items))
         self.workers: dict[Connection, _Worker] = {}
         self.ended: list[Any] = []
@@ -109,20 +111,22 @@ class _Pool:
         for _ in range(min(count, len(self.waiting))):
             ours, theirs = self.context.Pipe()
             # a fork inherits our ends: a worker would never learn that this process has gone
-            forked = self.context.get_start_method() == "fork"
-            inherited = (ours, *self.workers) if forked else ()
+            method = self.context.get_start_method()
+            inherited = (ours, *self.workers) if method == "fork" else ()
             process = self.context.Process(
                 target=_serve, args=(theirs, inherited, self.function), daemon=True
             )
-            with _quiet_fork(), _without_interrupts():
+            # a fork server would hand the blocked signal on to other people's processes
+            shielded = contextlib.nullcontext() if method == "forkserver" else _without_interrupts()
+            with _quiet_fork(), shielded:
                 process.start()
             theirs.close()
             self.workers[ours] = _Worker(process)
         for channel in list(self.workers):
             self._feed(channel)
 
-    def news(self, cancel: Cancel) -> Iterator[News]:
-        while self._go_on(cancel):
+    def news(self) -> Iterator[News]:
+        while self._go_on():
             for channel in wait(list(self.workers), POLL):
                 assert isinstance(channel, Connection)
                 worker = self.workers[channel]
@@ -135,7 +139,7 @@ class _Pool:
                 if what == "raised":
                     raise value
                 news = News(worker.index, value, what == "done")
-                self._listen(cancel)
+                self._listen()
                 if news.done:
                     self._feed(channel)
                 yield news
@@ -149,13 +153,13 @@ class _Pool:
         for process in self.ended:
             process.join()
 
-    def _go_on(self, cancel: Cancel) -> bool:
-        self._listen(cancel)
+    def _go_on(self) -> bool:
+        self._listen()
         return bool(self.workers) and (self.stop_by is None or time.monotonic() < self.stop_by)
 
-    def _listen(self, cancel: Cancel) -> None:
+    def _listen(self) -> None:
         """Tell the workers, once, that this is the end."""
-        if cancel.cancelled and self.stop_by is None:
+        if self.cancel.cancelled and self.stop_by is None:
             self.stop_by = time.monotonic() + GRACE
             self.waiting.clear()
             for channel, worker in self.workers.items():
@@ -171,6 +175,7 @@ class _Pool:
             self._ended(channel)
 
     def _lost(self, channel: Connection, error: Exception) -> None:
+        self._listen()  # Ctrl-C may have ended a worker that was only just starting
         if self.stop_by is None:
             raise OrbiflowError(
                 "a worker process died: was memory short, or is the script that called this "

@@ -11,7 +11,7 @@ from orbiflow.cancel import Cancel
 from orbiflow.escher import ClassFailure, DescentSettings, OccupancySettings, TileResult, search
 from orbiflow.escher.methods import Settings
 from orbiflow.escher.report import report
-from orbiflow.export.gallery import RESULT, write_gallery, written_files
+from orbiflow.export.gallery import OVERVIEW, RESULT, write_gallery, written_files
 from orbiflow.files import write_atomic
 from orbiflow.folders import ResultFolder
 from orbiflow.jobs.events import (
@@ -72,8 +72,9 @@ def escherize(request: EscherizeRequest, tell: Sink, cancel: Cancel) -> Finished
         emphasis=emphasis,
     )
     interrupted = {failure.name for failure in failures if failure.reason == search.INTERRUPTED}
-    # a first look at a class that was interrupted is less than an earlier run
-    write = not folder.has_a_run or any(r.name not in interrupted for r in results)
+    # a first look at a class that was interrupted is less than an earlier run's tiles
+    earlier = folder.has_a_run and (request.out / OVERVIEW).is_file()
+    write = not earlier or any(result.name not in interrupted for result in results)
     if write:
         _write(folder, document, results, target, workers, tell)
     state: State = "done" if results else "nothing found"
