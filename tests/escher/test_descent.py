@@ -7,6 +7,7 @@ import pytest
 import shapely
 import torch
 
+from orbiflow.cancel import Cancel
 from orbiflow.errors import OrbiflowError
 from orbiflow.escher.boundary import extract_tile
 from orbiflow.escher.descent import CALM, Descent
@@ -166,11 +167,13 @@ def test_several_tiles_of_a_class_are_not_twins() -> None:
 
 
 def test_a_first_tile_comes_at_once_and_survives_an_interrupt() -> None:
+    cancel = Cancel()
+
     def interrupt(event: Event) -> None:
         if event.preview is None:
-            raise KeyboardInterrupt
+            cancel.cancel()
 
-    results, failures = escherize(TARGET, ["IH4", "IH6"], QUICK, watch=interrupt)
+    results, failures = escherize(TARGET, ["IH4", "IH6"], QUICK, watch=interrupt, cancel=cancel)
     assert [r.name for r in results] == ["IH6"]
     assert results[0].certificate.valid
     assert {f.name for f in failures} == {"IH4", "IH6"}

@@ -12,6 +12,7 @@ import torch.nn.functional as F
 from torch import Tensor
 
 from orbiflow.arguments import instance, number, numbers, whole
+from orbiflow.cancel import Cancel
 from orbiflow.escher.fit import Progress
 from orbiflow.escher.max_frequency import check_max_frequency
 from orbiflow.escher.model import TileModel
@@ -133,20 +134,31 @@ def fit_occupancy(
     kind: IsohedralClass | str,
     settings: OccupancySettings | None = None,
     progress: Progress | None = None,
+    *,
+    cancel: Cancel | None = None,
 ) -> TileModel:
     """Fit tiles of one class to a target by the paper's method, all starts side by side.
 
     Returns:
         The surviving candidates, best loss first. They are not certified yet.
+
+    Raises:
+        Cancelled: if `cancel`, which is looked at before each step, says so.
     """
     kind = isohedral_class(kind)
     instance(target, Target, "the target", "Target.read and Target.from_polygon make one")
     settings = instance(settings or OccupancySettings(), OccupancySettings, "settings")
     # the mean over the candidates is all that couples them: separate fits, one tensor
     samples = OccupancySamples(target, 16384, seed=settings.seed)
-    model = _affine_phase(_start(kind, settings), samples, settings)
+    cancel = cancel or Cancel()
+    model = _affine_phase(_start(kind, settings), samples, settings, cancel)
     first = replace(settings, iterations=max(1, settings.iterations // 3))
-    report = progress or _silent
+    told = progress or _silent
+
+    def report(share: float, loss: float) -> None:
+        told(share, loss)
+        cancel.check()
+
     model = _flow_phase(model, samples, settings, 0, first.iterations, report)
     if model.size > 1:
         model = _ranked(model, samples, settings.hardness[1], keep=(model.size + 1) // 2)
@@ -178,10 +190,11 @@ def _pose(model: TileModel) -> list[torch.nn.Parameter]:
 
 
 def _affine_phase(
-    model: TileModel, samples: OccupancySamples, settings: OccupancySettings
+    model: TileModel, samples: OccupancySamples, settings: OccupancySettings, cancel: Cancel
 ) -> TileModel:
     optimizer = torch.optim.Adam(_pose(model), lr=0.03)
     for _ in range(settings.affine_iterations):
+        cancel.check()
         points, inside = samples.draw(512)
         optimizer.zero_grad()
         loss = occupancy_loss(model, points, inside, 15.0, affine=True)

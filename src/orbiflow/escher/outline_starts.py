@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
 from orbiflow.arguments import instance, whole
+from orbiflow.cancel import Cancel
 from orbiflow.errors import OrbiflowError
 from orbiflow.escher.nearest_tile import NearestTiles, nearest_tiles
 from orbiflow.escher.placements import Complex, Placements, best_placements
@@ -54,6 +55,7 @@ def outline_starts(
     measured: int = 200,
     vertices: int = 240,
     phase: float = 0.0,
+    cancel: Cancel | None = None,
 ) -> Starts:
     """The best start tiles of one class for a target, no two of them twins.
 
@@ -67,12 +69,17 @@ def outline_starts(
         measured: of these, the nearest tiles whose overlap is measured.
         vertices: of every start tile.
         phase: of the points along the outline, in spacings; what a seed changes.
+        cancel: looked at before each resolution.
+
+    Raises:
+        Cancelled: if it was told to stop.
     """
     kind = isohedral_class(kind)
     instance(target, Target, "the target", "Target.read and Target.from_polygon make one")
     for points in resolutions:
         if vertices % whole(points, "a resolution", 24):
             raise OrbiflowError(f"resolutions must divide vertices = {vertices}, got {points}")
+    cancel = cancel or Cancel()
     parts: list[Prototiles] = []
     scores: list[Array] = []
     places: list[Array] = []
@@ -80,6 +87,7 @@ def outline_starts(
         ring = reverse(target.normal * (1.0, -1.0)) if mirrored else target.normal
         goal = prepared_region(ring)
         for points in resolutions:
+            cancel.check()
             outline = resampled(ring, points, phase) @ [1, 1j]
             found = best_placements(kind, outline, projected)
             for tiles, placements, score in _simple_tiles(kind, goal, outline, found, measured):

@@ -11,6 +11,7 @@ import shapely
 import torch
 from torch import Tensor
 
+from orbiflow.cancel import Cancel
 from orbiflow.escher.descent import CALM
 from orbiflow.escher.model import TileModel
 from orbiflow.fields import FourierField
@@ -29,24 +30,36 @@ STALL = 2e-5
 """Polishing stops when ten iterations together gain less IoU than this."""
 
 
-def polish(model: TileModel, target: Target, iterations: int) -> TileModel:
+def polish(
+    model: TileModel, target: Target, iterations: int, *, cancel: Cancel | None = None
+) -> TileModel:
     """Improve a single candidate: a last stationary segment and its pose, by exact gradients.
 
     Args:
         model: one candidate, float32 or float64; left as it is.
         target: the silhouette.
         iterations: of L-BFGS at most; it stops early where the IoU stalls.
+        cancel: looked at before each evaluation.
 
     Returns:
         A float64 model with one segment more, or as many if nothing was gained. Its sampled
         boundary is simple and its IoU no smaller.
+
+    Raises:
+        Cancelled: if it was told to stop.
     """
+    cancel = cancel or Cancel()
     work = _Polish(model, target)
     if work.best_iou == 0.0:  # crosses itself already
         return model
+
+    def loss(x: Array) -> tuple[float, Array]:
+        cancel.check()
+        return work.loss(x)
+
     with contextlib.suppress(StopIteration):  # older SciPy lets it through
         scipy.optimize.minimize(
-            work.loss,
+            loss,
             np.zeros(work.size),
             jac=True,
             method="L-BFGS-B",
