@@ -8,7 +8,7 @@ import pytest
 
 from orbiflow.density import read_density
 
-FIT = ["--detail", 2, "--segments", 2, "--seconds", 2]
+FIT = ["--detail", 2, "--segments", 2]
 SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")
 
 
@@ -104,7 +104,7 @@ def test_plot_of_three_angles_is_of_their_pairs(tmp_path: Path, orbiflow) -> Non
     rows = rng.normal(0, 0.5, (80, 3))
     data.write_text("a,b,c\n" + "\n".join(",".join(f"{v:.4f}" for v in row) for row in rows) + "\n")
     fit = ("density", "fit", data, "--space", "torus", "--detail", 1, "--segments", 1)
-    assert orbiflow(*fit, "--seconds", 1, "--out", model).status == 0
+    assert orbiflow(*fit, "--out", model).status == 0
     plot = ("density", "plot", "--model", model, "--out", out)
     for options in ((), ("--data", data, "--center", "pi,0,-pi")):
         drawn = orbiflow(*plot, *options)

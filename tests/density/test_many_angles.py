@@ -20,7 +20,7 @@ def data(count: int = 400) -> np.ndarray:
 
 def test_five_angles(tmp_path: Path) -> None:
     points = data()
-    estimator = DensityEstimator("torus", unit="degrees", seconds=4.0).fit(points[:300])
+    estimator = DensityEstimator("torus", unit="degrees", evaluations=20).fit(points[:300])
     assert isinstance(estimator.density_.base, MixtureBase)
     assert estimator.score(points[300:]) > -5 * np.log(360) + 3
     assert estimator.sample(7, random_state=1).shape == (7, 5)

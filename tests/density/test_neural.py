@@ -302,16 +302,6 @@ def test_flow_matching_alone_beats_uniform() -> None:
     assert report.integration_error < 1e-3
 
 
-def test_time_cut_short_is_said() -> None:
-    options = NeuralSettings(components=2, members=1, width=8, depth=1, seconds=0.0)
-    density, report = fit_neural(Torus(4), chained_angles(100), options)
-    assert any("cut short" in note for note in report.notes)
-    # a single iteration gains too little
-    assert any("left at the identity" in note for note in report.notes)
-    at = points(5, 4, 0)
-    assert torch.equal(density.flow(at), at)
-
-
 def test_mixture_finds_correlations() -> None:
     data = chained_angles(800)
     found = fit_mixture(Torus(4), data[:700], data[700:], components=16, members=2)

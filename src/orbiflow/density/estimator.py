@@ -54,11 +54,11 @@ class DensityEstimator:
         unit: of angles on torus and Klein bottle: "radians", "degrees" or "turns".
         detail: largest wave number of the flow, in waves along a side of the square.
         segments: stationary pieces of the flow.
-        smoothness, ridge, roughness, kinetic, iterations, validation, base, kernels, seconds, seed:
-            see `FitSettings`.
+        smoothness, ridge, roughness, kinetic, iterations, evaluations, validation, base, kernels,
+            seconds, seed: see `FitSettings`.
 
     On tori of four or more angles the density is a neural flow on a mixture of von Mises chains
-    (`fit_neural`), and of these only `validation`, `seconds` and `seed` count.
+    (`fit_neural`), and of these only `evaluations`, `validation`, `seconds` and `seed` count.
 
     After `fit`: `space_`, `density_` (a `SymmetricDensity`), `report_` (a `FitReport`),
     `n_features_in_`.
@@ -82,6 +82,7 @@ class DensityEstimator:
         roughness: tuple[float, ...] = (1e-3, 1e-3, 1e-4),
         kinetic: float = 0.0,
         iterations: int = 100,
+        evaluations: int = 1000,
         validation: float = 0.1,
         base: str = "uniform",
         kernels: bool = False,
@@ -97,6 +98,7 @@ class DensityEstimator:
         self.roughness = roughness
         self.kinetic = kinetic
         self.iterations = iterations
+        self.evaluations = evaluations
         self.validation = validation
         self.base = base
         self.kernels = kernels
@@ -126,7 +128,12 @@ class DensityEstimator:
         self.density_: SymmetricDensity
         self.report_: FitReport
         if self.space_.dim > MOST_SPLINE_DIM:
-            many = NeuralSettings(validation=self.validation, seconds=self.seconds, seed=self.seed)
+            many = NeuralSettings(
+                refinement=min(NeuralSettings.refinement, self.evaluations),
+                validation=self.validation,
+                seconds=self.seconds,
+                seed=self.seed,
+            )
             found = fit_neural(self.space_, points, many, progress=progress)
         else:
             found = fit_density(self.space_, points, settings, progress=progress)

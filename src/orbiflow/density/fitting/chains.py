@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
+from orbiflow.density.fitting.budget import Budget
 from orbiflow.density.models.chains import SCALES, MixtureBase, averaged, chained, waves
 from orbiflow.density.models.log_sum import shares_of
 from orbiflow.density.spaces.space import Space
@@ -76,7 +77,8 @@ def fit_mixture(
         components: at most, in each member.
         members: starts that are averaged; those that do not help on `validation` are left out.
         iterations: of EM, at most.
-        seconds: after which no further EM begins.
+        seconds: after which no further iteration of EM begins; the first mixture has its start at
+            least.
         seed: of the starts.
         watch: told how far it is.
 
@@ -85,20 +87,20 @@ def fit_mixture(
     """
     if len(train) < 2 or not len(validation):
         raise OrbiflowError(f"a mixture needs 2 training points or more, got {len(train)}")
-    began = time.monotonic()
+    began, budget = time.monotonic(), Budget(seconds=seconds)
     most = max(1, min(components, len(train) // PER_POINT))
     generator = torch.Generator().manual_seed(seed)
-    size, late = min(SMALLEST, most), False
+    size = min(SMALLEST, most)
 
     def start(count: int, order: Tensor) -> MixtureBase:
         return _expectation_maximization(
-            space, train, validation, count, order, iterations, generator
+            space, train, validation, count, order, iterations, generator, budget
         )
 
     natural = torch.arange(space.dim)
     best = start(size, natural)
     while size < most:
-        if late := time.monotonic() - began > seconds:
+        if budget.is_spent:
             break
         larger = min(2 * size, most)
         if watch is not None:
@@ -109,7 +111,7 @@ def fit_mixture(
         size, best = larger, found
     kept, score = [best], best.log_prob(validation)
     for number in range(1, members):
-        if late := time.monotonic() - began > seconds:
+        if budget.is_spent:
             break
         if watch is not None:
             watch(number / members, f"mixture of {size} components, start {number + 1}")
@@ -117,7 +119,7 @@ def fit_mixture(
         joint = torch.logaddexp(score, found.log_prob(validation))
         if _mean(joint, len(kept) + 1) > _mean(score, len(kept)):
             kept, score = [*kept, found], joint
-    return MixtureFit(averaged(kept), size, len(kept), late, time.monotonic() - began)
+    return MixtureFit(averaged(kept), size, len(kept), budget.is_late, time.monotonic() - began)
 
 
 def _mean(log_sum: Tensor, count: int) -> float:
@@ -137,14 +139,17 @@ def _expectation_maximization(
     order: Tensor,
     iterations: int,
     generator: torch.Generator,
+    budget: Budget,
 ) -> MixtureBase:
     """EM from seeds that are spread out; the iterate that was best on `validation`."""
     step = _Maximization(train, order)
     mixture = _started(space, step.angle, count, order, generator)
     best, least, idle = mixture, _nll(mixture, validation), 0
     for iteration in range(1, iterations + 1):
-        mixture = step(mixture, bent=iteration > STRAIGHT)
-        if iteration % EVERY == 0 or iteration == iterations:
+        late = budget.is_spent
+        if not late:
+            mixture = step(mixture, bent=iteration > STRAIGHT)
+        if iteration % EVERY == 0 or iteration == iterations or late:
             score = _nll(mixture, validation)
             if score < least:
                 best, least, idle = mixture, score, 0
@@ -152,6 +157,8 @@ def _expectation_maximization(
                 idle += 1
                 if idle > PATIENCE:
                     break
+        if late:
+            break
     return best
 
 

@@ -8,12 +8,14 @@ from dataclasses import dataclass, fields
 import torch
 from torch import Tensor
 
+from orbiflow.density.fitting.budget import Budget
 from orbiflow.density.fitting.flow_matching import coupled, match_flow
 from orbiflow.density.fitting.kernels import mix_kernels
 from orbiflow.density.fitting.likelihood import Refinement, refine
 from orbiflow.density.fitting.merging import merged
 from orbiflow.density.fitting.report import (
     MASS_TOLERANCE,
+    MOST_REPORTED,
     FitReport,
     Progress,
     mean_nll,
@@ -30,14 +32,12 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.fields import SplineField
 from orbiflow.flows import Flow
 
-MOST_STEPS = 16
-"""Runge-Kutta steps a segment, to which they are doubled where the integrator has not converged."""
+MOST_STEPS, MOST_SETTLED = 16, 256
+"""Runge-Kutta steps a segment to which they are doubled where the integrator has not converged, in
+training and after it."""
 
 MOST_MATCHED = 6_000
 """Points that the closed-form start looks at."""
-
-MOST_REPORTED = 20_000
-"""Points over which the report's mean log densities are taken."""
 
 CELLS, LEAST_CELLS = 8, 64
 """Cells a wave, and a side at least, in which points are merged; where they crowd in smaller ones."""
@@ -62,12 +62,15 @@ class FitSettings:
       before was best on the validation points; largest first.
     - `kinetic`: weight of the kinetic energy.
     - `iterations`: of L-BFGS in each stage, at most; 0 keeps the closed-form start.
+    - `evaluations`: of the likelihood and its gradient in all stages together, at most. A stage of
+      100 iterations takes about 105, so the default leaves those of `iterations` alone.
     - `validation`: share of the points held out for early stopping.
     - `base`: "uniform" or "von-mises", the paper's.
     - `kernels`: mix the flow with adaptive kernels about the training points, for data sharper than
       the flow's waves; see `mix_kernels`.
     - `single`: train in float32, about twice as fast; the result is float64 in any case.
-    - `seconds`: of refinement at most.
+    - `seconds`: of refinement at most, looked at between evaluations. A fit that it ends depends on
+      the machine's speed, and its report says so; `evaluations` ends alike everywhere.
     - `seed`: of the split, the base points and the times.
     """
 
@@ -79,6 +82,7 @@ class FitSettings:
     roughness: tuple[float, ...] = (1e-3, 1e-3, 1e-4)
     kinetic: float = 0.0
     iterations: int = 100
+    evaluations: int = 1000
     validation: float = 0.1
     base: str = "uniform"
     kernels: bool = False
@@ -95,6 +99,7 @@ class FitSettings:
             ("ridge", 0, math.inf),
             ("kinetic", 0, math.inf),
             ("iterations", 0, 100_000),
+            ("evaluations", 0, 1_000_000_000),
             ("seconds", 0, math.inf),
         ):
             value = getattr(self, name)
@@ -160,10 +165,15 @@ def fit_density(
     )
     density = SymmetricDensity(space, Flow(segments, steps=settings.steps), base)
     start_nll = mean_nll(density, validation.to(dtype))
-    stages = _refined(density, train, validation, settings, say)
+    budget = Budget(settings.evaluations, settings.seconds)
+    stages = _refined(density, train, validation, settings, say, budget)
     density.flow.double()
-    error, mass = settle(density, validation[:MOST_REPORTED], MOST_STEPS)
-    notes = repeats_note(len(points), duplicates) + steps_note(density, error)
+    error, mass = settle(density, validation[:MOST_HELD], MOST_SETTLED)
+    notes = [
+        *repeats_note(len(points), duplicates),
+        *budget.notes(),
+        *steps_note(density, error),
+    ]
     shares = None
     if settings.kernels:
         say(1.0, "kernels")
@@ -209,6 +219,7 @@ def _refined(
     validation: Tensor,
     settings: FitSettings,
     say: Progress,
+    budget: Budget,
 ) -> list[Refinement]:
     stages: list[Refinement] = []
     if not settings.iterations:
@@ -225,8 +236,9 @@ def _refined(
     # never merged: means of cells would call overfitting to means of cells good
     held = validation[:MOST_HELD].to(dtype)
     count = len(settings.roughness)
-    left = settings.seconds
     for number, roughness in enumerate(settings.roughness):
+        if budget.is_spent:
+            break
 
         def watch(iteration: int, nll: float, score: float, number: int = number) -> None:
             share = (number + iteration / settings.iterations) / count
@@ -240,15 +252,14 @@ def _refined(
             iterations=settings.iterations,
             kinetic=settings.kinetic,
             roughness=roughness,
-            seconds=left,
+            budget=budget,
             watch=watch,
         )
-        left -= stage.seconds
         stages.append(stage)
         unconverged = step_error(density, held) > MASS_TOLERANCE
         if unconverged and density.flow.steps < MOST_STEPS:
             density.flow.steps *= 2
-        elif left <= 0 or (number > 1 and stage.best == 0):
+        elif number > 1 and stage.best == 0:
             break
     return stages
 

@@ -11,10 +11,12 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
+from orbiflow.density.fitting.budget import Budget
 from orbiflow.density.fitting.chains import MixtureFit, fit_mixture
 from orbiflow.density.fitting.flow_matching import coupled
 from orbiflow.density.fitting.likelihood import Refinement
 from orbiflow.density.fitting.report import (
+    MOST_REPORTED,
     FitReport,
     Progress,
     mean_nll,
@@ -67,8 +69,8 @@ class NeuralSettings:
     - `paired`: optimal transport within batches, for flow matching.
     - `matching_rate`, `refinement_rate`: of Adam, at their largest.
     - `validation`: share of the points held out to choose among iterates and mixtures.
-    - `seconds`: of training at most, half of it for the mixture; a fit that is cut short depends on
-      the machine's speed.
+    - `seconds`: of training at most, half of it for the mixture, looked at between iterations. A fit
+      that it ends depends on the machine's speed, and its report says so.
     - `seed`: of the split, the starts, the network and the batches.
     """
 
@@ -154,7 +156,7 @@ def fit_neural(
     if not isinstance(space, Torus):
         raise OrbiflowError(f"neural flows are for tori, not for the {space.name}")
     say = progress or (lambda _share, _what: None)
-    began = time.monotonic()
+    budget = Budget(seconds=settings.seconds)
     generator = torch.Generator().manual_seed(settings.seed)
     points = space.project(points.double())
     train, validation, duplicates = split(points, settings.validation, generator)
@@ -168,11 +170,11 @@ def fit_neural(
         dtype=torch.float32,
     )
     density = SymmetricDensity(space, NeuralFlow(field, steps=settings.first_steps), base)
-    trainer = _Trainer(density, train, validation[:HELD], settings, generator, say, began)
+    trainer = _Trainer(density, train, validation[:HELD], settings, generator, say, budget)
     start_nll = trainer.match()
     stages = [trainer.refine()] if settings.refinement else []
     density.flow.double()
-    error, mass = settle(density, validation, MOST_STEPS)
+    error, mass = settle(density, validation[:HELD], MOST_STEPS)
     notes = [
         *repeats_note(len(points), duplicates),
         *_notes(mixture, trainer),
@@ -184,8 +186,8 @@ def fit_neural(
         train=len(train),
         validation=len(validation),
         start_nll=start_nll,
-        train_nll=mean_nll(density, train),
-        validation_nll=mean_nll(density, validation),
+        train_nll=mean_nll(density, train[:MOST_REPORTED]),
+        validation_nll=mean_nll(density, validation[:MOST_REPORTED]),
         stages=tuple(stages),
         steps=density.flow.steps,
         mass=mass,
@@ -224,13 +226,13 @@ class _Trainer:
         settings: NeuralSettings,
         generator: torch.Generator,
         say: Progress,
-        began: float,
+        budget: Budget,
     ) -> None:
         self.density, self.settings, self.say = density, settings, say
         self.train, self.validation = train.float(), validation.float()
         self.generator = generator
-        self.deadline = began + settings.seconds
-        self.late = self.idle = False
+        self.budget = budget
+        self.idle = self.late = False
 
     def match(self) -> float:
         """Flow matching; the validation NLL after it."""
@@ -238,16 +240,16 @@ class _Trainer:
         if not count:
             return self._score()
         # half of what is left; the likelihood costs more but gains more
-        left = (self.deadline - time.monotonic()) / 2
-        until = time.monotonic() + left
+        half = Budget(seconds=self.budget.seconds_left / 2)
         rate = self.settings.matching_rate
-        done = self._descend(self._matching_loss, count, rate, until, "matching", keep=0.999)
+        done = self._descend(self._matching_loss, count, rate, half, "matching", keep=0.999)
+        self.late = half.is_late
         return done.validation[done.best]
 
     def refine(self) -> Refinement:
         """Descent on the exact negative log-likelihood; what gains too little is undone."""
         count, rate = self.settings.refinement, self.settings.refinement_rate
-        done = self._descend(self._nll, count, rate, self.deadline, "likelihood", keep=0.98)
+        done = self._descend(self._nll, count, rate, self.budget, "likelihood", keep=0.98)
         gain = done.validation[0] - done.validation[done.best]
         if self.settings.base == "mixture" and not self.settings.matchings and gain < WORTHWHILE:
             self.idle = True
@@ -290,7 +292,7 @@ class _Trainer:
         loss: Callable[[], Tensor],
         count: int,
         rate: float,
-        until: float,
+        budget: Budget,
         what: str,
         *,
         keep: float,
@@ -299,27 +301,30 @@ class _Trainer:
         field, began = self._field, time.monotonic()
         adam = torch.optim.Adam(field.parameters(), lr=rate, betas=(0.9, 0.99))
         mean = copy.deepcopy(field.state_dict())
-        trains, scores, best, kept = [math.nan], [self._score()], 0, copy.deepcopy(mean)
+        last = math.nan
+        trains, scores, best, kept = [last], [self._score()], 0, copy.deepcopy(mean)
         stopped = "iterations"
         for iteration in range(count):
-            late = time.monotonic() > until
-            _set_rate(adam, rate, iteration, count)
-            value = loss()
-            adam.zero_grad()
-            value.backward()
-            torch.nn.utils.clip_grad_norm_(field.parameters(), CLIP)
-            adam.step()
-            # early on, an average over all so far
-            _average(mean, field.state_dict(), min(keep, (1 + iteration) / (10 + iteration)))
-            if not late and (iteration + 1) % max(1, count // LOOKS) and iteration + 1 < count:
-                continue
-            trains.append(float(value.detach()))
+            late = budget.is_spent
+            if not late:
+                _set_rate(adam, rate, iteration, count)
+                value = loss()
+                adam.zero_grad()
+                value.backward()
+                torch.nn.utils.clip_grad_norm_(field.parameters(), CLIP)
+                adam.step()
+                # early on, an average over all so far
+                _average(mean, field.state_dict(), min(keep, (1 + iteration) / (10 + iteration)))
+                last = float(value.detach())
+                if (iteration + 1) % max(1, count // LOOKS) and iteration + 1 < count:
+                    continue
+            trains.append(last)
             scores.append(self._score_of(mean))
             if scores[-1] < scores[best] or not math.isfinite(scores[best]):
                 best, kept = len(scores) - 1, copy.deepcopy(mean)
             self.say((iteration + 1) / count, f"{what}: validation {scores[-1]:.4f}")
             if late:
-                stopped, self.late = "time", True
+                stopped = "time"
                 break
             if len(scores) - 1 - best >= PATIENCE:
                 stopped = "validation"
@@ -359,8 +364,8 @@ def _notes(mixture: MixtureFit | None, trainer: _Trainer) -> list[str]:
             f"the flow gained less than {WORTHWHILE} nats over its base on the validation points and "
             "was left at the identity"
         )
-    if trainer.late or (mixture is not None and mixture.late):
-        notes.append(
-            "training was cut short by `seconds`: the result depends on the machine's speed"
-        )
+    struck = mixture is not None and mixture.late
+    if struck or trainer.late or trainer.budget.is_late:
+        seconds = trainer.settings.seconds
+        notes.append(f"stopped by the limit of {seconds:g} s: another run may differ")
     return notes

@@ -15,6 +15,10 @@ from orbiflow.errors import OrbiflowError
 MASS_TOLERANCE = 1e-3
 """Of the integral over the square, and of the log-likelihood at doubled steps."""
 
+MOST_REPORTED = 20_000
+"""Points over which the report's mean log densities are taken; after the shuffle the first are as good
+as any."""
+
 Progress = Callable[[float, str], None]
 """Told the share of the work done and what is being done."""
 
@@ -25,7 +29,8 @@ class FitReport:
 
     - `points`, `duplicates`: data points, and those that equal an earlier one.
     - `train`, `validation`: points of each.
-    - `train_nll`, `validation_nll`: mean negative log density at the end, of 20,000 points at most.
+    - `train_nll`, `validation_nll`: mean negative log density at the end, of `MOST_REPORTED` points
+      at most.
     - `start_nll`: on the validation points, of the closed-form start.
     - `stages`: one for each roughness.
     - `steps`: RK4 steps a segment, in the end.
