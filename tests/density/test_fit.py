@@ -1,6 +1,5 @@
 """Fitting: coupling, the closed-form start, likelihood, the estimator, storage."""
 
-import json
 import math
 from typing import Any
 
@@ -20,16 +19,14 @@ from orbiflow.density import (
     SymmetricDensity,
     Torus,
     UniformBase,
-    density_to_bytes,
     fit_density,
     midpoints,
-    read_density,
 )
 from orbiflow.density.fitting.flow_matching import conjugate_gradients, coupled, match_flow
 from orbiflow.density.fitting.likelihood import Objective
 from orbiflow.density.fitting.merging import LEVELS, merged
 from orbiflow.density.fitting.report import split
-from orbiflow.errors import InputFileError, OrbiflowError
+from orbiflow.errors import OrbiflowError
 from orbiflow.fields import FourierField
 from orbiflow.flows import Flow
 
@@ -246,55 +243,3 @@ def test_a_grid_search() -> None:
     ).fit(DATA["torus"])
     assert search.best_params_["detail"] in (1, 2)
     assert math.isfinite(search.best_score_)
-
-
-@pytest.mark.parametrize("space", DATA)
-def test_saved_and_read(space: str, tmp_path) -> None:
-    estimator = DensityEstimator(space, detail=2, segments=2, iterations=3).fit(DATA[space])
-    path = tmp_path / "density.safetensors"
-    path.write_bytes(density_to_bytes(estimator.density_, columns=["a", "b"]))
-    density, extra = read_density(path)
-    assert extra == {"columns": ["a", "b"]}
-    points = estimator.space_.to_chart(DATA[space])
-    with torch.no_grad():
-        assert torch.equal(density.log_prob(points), estimator.density_.log_prob(points))
-
-
-def test_files_that_are_no_density(tmp_path) -> None:
-    path = tmp_path / "density.safetensors"
-    with pytest.raises(InputFileError, match="cannot read"):
-        read_density(path)
-    estimator = DensityEstimator("torus", detail=1, segments=1, iterations=0).fit(DATA["torus"])
-    good = density_to_bytes(estimator.density_)
-    length = int.from_bytes(good[:8], "little")
-    outer = json.loads(good[8 : 8 + length])
-
-    def changed(edit) -> bytes:
-        header = json.loads(outer["__metadata__"]["orbiflow"])
-        edit(header)
-        text = json.dumps(outer | {"__metadata__": {"orbiflow": json.dumps(header)}}).encode()
-        return len(text).to_bytes(8, "little") + text + good[8 + length :]
-
-    bad = [
-        b"",
-        b"hello world, this is no density",
-        good[:-9],
-        b"\xff" * 100,
-        changed(lambda h: h.update(format="orbiflow-tile/1")),
-        changed(lambda h: h["space"].update(name="moebius")),
-        changed(lambda h: h["space"].update(dim=40)),
-        changed(lambda h: h["flow"].update(max_frequency=10**6)),
-        changed(lambda h: h["flow"].update(max_frequency=2)),
-        changed(lambda h: h["flow"].update(steps=10**9)),
-        changed(lambda h: h["flow"].update(method="magic")),
-        changed(lambda h: h.pop("base")),
-    ]
-    for content in bad:
-        path.write_bytes(content)
-        with pytest.raises(InputFileError, match="not a density saved by orbiflow"):
-            read_density(path)
-
-
-def test_other_flows_are_not_saved() -> None:
-    with pytest.raises(OrbiflowError, match="only flows of Fourier, spline or neural fields"):
-        density_to_bytes(SymmetricDensity(Torus(2), Flow(lambda x: 0 * x)))

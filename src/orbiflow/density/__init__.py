@@ -1,6 +1,6 @@
 """Densities on the torus, the sphere, the Klein bottle and the projective plane."""
 
-from orbiflow.density.estimator import SPACES, DensityEstimator, make_space
+from orbiflow.density.estimator import DensityEstimator
 from orbiflow.density.fitting.flow import FitSettings, fit_density
 from orbiflow.density.fitting.kernels import mix_kernels
 from orbiflow.density.fitting.neural import NeuralSettings, fit_neural
@@ -12,6 +12,7 @@ from orbiflow.density.models.kernels import AdaptiveKernels
 from orbiflow.density.models.neural import NeuralField, NeuralFlow
 from orbiflow.density.models.symmetric import SymmetricDensity, kl_by_quadrature, midpoints
 from orbiflow.density.models.tabulated import TabulatedDensity
+from orbiflow.density.spaces.catalogue import SPACES, make_space
 from orbiflow.density.spaces.flat import KleinBottle, Torus
 from orbiflow.density.spaces.patches import from_klein, to_klein
 from orbiflow.density.spaces.round import (

@@ -13,7 +13,7 @@ from orbiflow.density.fitting.flow import FitSettings, fit_density
 from orbiflow.density.fitting.neural import NeuralSettings, fit_neural
 from orbiflow.density.fitting.report import FitReport, Progress
 from orbiflow.density.models.symmetric import SymmetricDensity
-from orbiflow.density.spaces.flat import KleinBottle, Torus
+from orbiflow.density.spaces.catalogue import make_space
 from orbiflow.density.spaces.round import ProjectivePlane, Sphere, clear_rotation
 from orbiflow.density.spaces.space import Space
 from orbiflow.errors import OrbiflowError
@@ -21,27 +21,6 @@ from orbiflow.symmetry.isometry import Array
 
 MOST_SPLINE_DIM = 3
 """Dimensions of spline flows; beyond, grids are too large."""
-
-SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")
-
-
-def make_space(name: str, **options: Any) -> Space:
-    """A space by its name; `options` are those of its class.
-
-    Raises:
-        OrbiflowError: for an unknown name or an option that the space does not have.
-
-    >>> make_space("torus", dim=2, unit="degrees")
-    Torus(dim=2, unit='degrees')
-    """
-    classes = {kind.name: kind for kind in (Torus, Sphere, KleinBottle, ProjectivePlane)}
-    if name not in classes:
-        raise OrbiflowError(f"unknown space {name!r}; the four are {', '.join(SPACES)}")
-    kind = classes[name]
-    wrong = [key for key in options if key not in inspect.signature(kind).parameters]
-    if wrong:
-        raise OrbiflowError(f"the {name} has no option {', '.join(wrong)}")
-    return kind(**options)
 
 
 class DensityEstimator:
