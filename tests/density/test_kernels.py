@@ -20,7 +20,6 @@ from orbiflow.density import (
     read_density,
 )
 from orbiflow.density.fitting.kernels import FLOOR, proportions
-from orbiflow.density.models.kernels import is_round
 from orbiflow.errors import OrbiflowError
 from orbiflow.fields import SplineField
 from orbiflow.flows import Flow
@@ -33,7 +32,7 @@ def kernels(name: str, seed: int, low: float = 2.0, high: float = 60.0) -> Adapt
     """Five random kernels."""
     space = make_space(name)
     torch.manual_seed(seed)
-    width = 1 if is_round(space) else 2
+    width = 1 if space.is_round else 2
     return AdaptiveKernels(
         space,
         torch.rand(5, 2, dtype=torch.float64),
@@ -59,7 +58,7 @@ def test_kernels_integrate_to_one_and_are_invariant(name: str, seed: int) -> Non
     assert float(found.log_prob(grid).exp().mean()) == pytest.approx(1, abs=2e-3)
     points = 4 * torch.rand(50, 2, dtype=torch.float64) - 2
     for element in found.space.group.cosets:
-        if is_round(found.space):
+        if found.space.is_round:
             images, points = found.space.project(element(points)), found.space.project(points)
         else:
             images = element(points)

@@ -13,8 +13,7 @@ from orbiflow.density.fitting.flow import FitSettings, fit_density
 from orbiflow.density.fitting.neural import NeuralSettings, fit_neural
 from orbiflow.density.fitting.report import FitReport, Progress
 from orbiflow.density.models.symmetric import SymmetricDensity
-from orbiflow.density.spaces.catalogue import make_space
-from orbiflow.density.spaces.round import ProjectivePlane, Sphere, clear_rotation
+from orbiflow.density.spaces.catalogue import space_class
 from orbiflow.density.spaces.space import Space
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry.isometry import Array
@@ -187,19 +186,7 @@ class DensityEstimator:
             return self.space
         if data.ndim != 2:
             raise OrbiflowError(f"expected data of shape (N, k), got {data.shape}")
-        match self.space:
-            case "torus":
-                return make_space("torus", dim=data.shape[1], unit=self.unit)
-            case "sphere" | "projective-plane":
-                form = "vector" if data.shape[1] == 3 else "latlon"
-                space = make_space(self.space, form=form)
-                assert isinstance(space, Sphere | ProjectivePlane)
-                turn = clear_rotation(space, data, seed=self.seed)
-                return make_space(self.space, form=form, rotation=turn)
-            case "klein-bottle":
-                return make_space("klein-bottle", unit=self.unit)
-            case _:
-                return make_space(str(self.space))
+        return space_class(self.space).for_data(data, unit=self.unit, seed=self.seed)
 
     def _fitted(self) -> SymmetricDensity:
         if not hasattr(self, "density_"):

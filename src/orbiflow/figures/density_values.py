@@ -9,7 +9,7 @@ from torch import Tensor
 
 from orbiflow.density.models.bases import UniformBase
 from orbiflow.density.models.blend import MixedDensity
-from orbiflow.density.models.kernels import AdaptiveKernels, features, is_round, kernel_rows
+from orbiflow.density.models.kernels import AdaptiveKernels, kernel_rows
 from orbiflow.density.models.symmetric import SymmetricDensity, midpoints
 from orbiflow.density.spaces.space import rectangle
 from orbiflow.errors import OrbiflowError
@@ -31,7 +31,7 @@ def density_at(density: SymmetricDensity, points: Tensor, measure: str) -> Array
     Raises:
         OrbiflowError: for an unknown measure.
     """
-    if hasattr(density.space, "cone_vectors"):
+    if density.space.is_round:
         points = off_cones(points)
     like = next(iter(density.flow.parameters()), points)
     return density.log_prob(points.to(like), measure=measure).double().cpu().exp().numpy()
@@ -59,11 +59,11 @@ def density_on_grid(
         return density_at(density, points, measure).reshape(shape)
     flow, kernels, floor = density.shares.tolist()
     values = flow * density_at(density.flow_density, points, "square")
-    if is_round(space):
+    if space.is_round:
         points = off_cones(points)
     values = values + floor * UniformBase(space).log_prob(points).exp().numpy()
     kappa = _widened(density.kernels, pixel or float(x[1] - x[0]))
-    sums = _round_sums if is_round(space) else _flat_sums
+    sums = _round_sums if space.is_round else _flat_sums
     values = values.reshape(shape) + kernels * sums(density.kernels, kappa, x, y).numpy()
     return values * space.log_density_factor(points, measure).exp().numpy().reshape(shape)
 
@@ -100,7 +100,7 @@ def _widened(kernels: AdaptiveKernels, pixel: float) -> Tensor:
 
 def _half_pixels(kernels: AdaptiveKernels, pixel: float) -> Tensor:
     """Half a pixel's side in the kernels' angles, (d,), or, on round spaces, (N, 1)."""
-    if is_round(kernels.space):
+    if kernels.space.is_round:
         # the chart is conformal: a small square stays a square
         area = kernels.space.log_area(off_cones(kernels.centers)).exp()
         return pixel / 2 * area.sqrt()[:, None]
@@ -130,14 +130,14 @@ def _round_sums(kernels: AdaptiveKernels, kappa: Tensor, x: Tensor, y: Tensor) -
     space = kernels.space
     points = torch.stack(torch.meshgrid(x, y, indexing="ij"), dim=-1).reshape(-1, 2)
     points = off_cones(points)
-    rows, offsets = kernel_rows(space, features(space, kernels.centers)[0], kappa)
+    rows, offsets = kernel_rows(space, space.features(kernels.centers)[0], kappa)
     # exponents are at most the peaks' logarithms: plain sums, in single precision for their speed
     rows, offsets = rows.mT.float(), (offsets + kernels.weights.log()).float()
     block = max(1, _BLOCK // len(offsets))
     # the clamp, far below anything drawn, keeps exp() from its slow path, fifty times slower
     sums = [
         sum(torch.addmm(offsets, end, rows).clamp_(-80).exp_().sum(dim=1) for end in ends)
-        for ends in features(space, points).float().split(block, dim=1)
+        for ends in space.features(points).float().split(block, dim=1)
     ]
     square = torch.cat([torch.as_tensor(part) for part in sums]).double()
     return (square * space.log_area(points).exp()).reshape(len(x), len(y))

@@ -12,7 +12,7 @@ from torch import Tensor
 
 from orbiflow.density.models.bases import UniformBase
 from orbiflow.density.models.blend import MixedDensity
-from orbiflow.density.models.kernels import AdaptiveKernels, features, is_round
+from orbiflow.density.models.kernels import AdaptiveKernels
 from orbiflow.density.models.symmetric import SymmetricDensity
 from orbiflow.density.spaces.space import Space
 
@@ -52,7 +52,7 @@ def mix_kernels(density: SymmetricDensity, train: Tensor, held: Tensor) -> Mixed
     with torch.no_grad():
         flow = density.log_prob(held)
     best, found = -math.inf, None
-    shrinkage = (1.0,) if is_round(space) or space.dim == 1 else ISOTROPY
+    shrinkage = (1.0,) if space.is_round or space.dim == 1 else ISOTROPY
     for spread, scale, share in itertools.product(spreads, SCALES, shrinkage):
         mean = spread.mean(dim=1, keepdim=True)
         kappa = 1 / (scale * ((1 - share) * spread + share * mean))
@@ -81,13 +81,13 @@ def proportions(parts: Tensor, *, iterations: int = 60) -> tuple[Tensor, float]:
 
 def _spreads(space: Space, centers: Tensor, neighbours: list[int]) -> list[Tensor]:
     """Mean squares of the distance to the nearest neighbours, per axis: (N, 1) or (N, d) each."""
-    images = features(space, centers)
+    images = space.features(centers)
     count = images.shape[1]
     tree = KDTree(images.reshape(-1, images.shape[-1]).numpy())
     _, nearest = tree.query(images[0].numpy(), k=neighbours[-1] + 1)
     near = images.reshape(-1, images.shape[-1])[torch.as_tensor(np.asarray(nearest)[:, 1:])]
     square = (near - images[0][:, None]) ** 2
-    if is_round(space):
+    if space.is_round:
         square = square.sum(dim=-1, keepdim=True) / 2
     else:  # a chord's square is nearly the angle's
         square = square[..., : space.dim] + square[..., space.dim :]

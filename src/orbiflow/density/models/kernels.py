@@ -10,7 +10,6 @@ from torch import Tensor
 
 from orbiflow.density.models.bases import Base
 from orbiflow.density.models.log_sum import log_sum_exp
-from orbiflow.density.spaces.round import ProjectivePlane, Sphere
 from orbiflow.density.spaces.space import Space, rectangle
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry.isometry import Array
@@ -40,7 +39,7 @@ class AdaptiveKernels(Base):
         self, space: Space, centers: Tensor, concentrations: Tensor, weights: Tensor
     ) -> None:
         super().__init__(space)
-        width = 1 if is_round(space) else space.dim
+        width = 1 if space.is_round else space.dim
         shapes = [tuple(t.shape) for t in (centers, concentrations, weights)]
         count = len(centers)
         if shapes != [(count, space.dim), (count, width), (count,)] or not count:
@@ -56,7 +55,7 @@ class AdaptiveKernels(Base):
         self.centers, self.concentrations, self.weights = (
             t.double() for t in (centers, concentrations, weights)
         )
-        self._center_features = features(space, self.centers)[0]
+        self._center_features = space.features(self.centers)[0]
 
     def log_prob(self, points: Tensor) -> Tensor:
         flat = points.reshape(-1, self.space.dim).double()
@@ -65,13 +64,13 @@ class AdaptiveKernels(Base):
         block = max(1, BLOCK_ENTRIES // len(self.centers))
         parts = [self._log_sum(part, rows, offsets) for part in flat.split(block)]
         values = torch.cat(parts) if parts else flat.new_zeros(0)
-        if is_round(self.space):
+        if self.space.is_round:
             values = values + self.space.log_area(flat)
         return values.reshape(points.shape[:-1]).to(points.dtype)
 
     def _log_sum(self, points: Tensor, rows: Tensor, offsets: Tensor) -> Tensor:
         images = [
-            log_sum_exp(torch.addmm(offsets, image, rows)) for image in features(self.space, points)
+            log_sum_exp(torch.addmm(offsets, image, rows)) for image in self.space.features(points)
         ]
         return torch.stack(images).logsumexp(dim=0)
 
@@ -81,41 +80,21 @@ class AdaptiveKernels(Base):
         weights = self.weights.numpy()
         chosen = rng.choice(len(weights), count, p=weights / weights.sum())
         kappa = self.concentrations.numpy()[chosen]
-        if is_round(self.space):
-            assert isinstance(self.space, Sphere | ProjectivePlane)
+        if self.space.is_round:
             vectors = _von_mises_fisher(self._center_features.numpy()[chosen], kappa[:, 0], rng)
-            return self.space.vectors_to_chart(vectors)
+            return self.space.vectors_to_chart(vectors)  # type: ignore[attr-defined]
         angle = torch.tensor(rng.vonmises(0.0, kappa))
         return self.space.project(
             self.centers[chosen] + angle / (2 * math.pi) * rectangle(self.space)
         )
 
 
-def is_round(space: Space) -> bool:
-    """Whether the space has the round area."""
-    return isinstance(space, Sphere | ProjectivePlane)
-
-
-def features(space: Space, points: Tensor) -> Tensor:
-    """(E, N, m): all that a kernel sees of points (N, d) and their images, its own image first.
-
-    Unit vectors on round spaces, cosines and sines of the lattice's angles on flat ones.
-    """
-    if isinstance(space, Sphere | ProjectivePlane):
-        vectors = torch.tensor(space.vectors(points))
-        ends = [vectors, -vectors] if isinstance(space, ProjectivePlane) else [vectors]
-        return torch.stack(ends)
-    images = space.group.images(points)
-    angles = 2 * math.pi * images / rectangle(space).to(points)
-    return torch.cat([angles.cos(), angles.sin()], dim=-1)
-
-
 def kernel_rows(space: Space, centers: Tensor, kappa: Tensor) -> tuple[Tensor, Tensor]:
-    """Log kernels as linear functions of `features`: rows (N, m) and offsets (N,).
+    """Log kernels as linear functions of the space's `features`: rows (N, m) and offsets (N,).
 
     With respect to the chart's area on flat spaces and to the round area on round ones.
     """
-    if is_round(space):
+    if space.is_round:
         k = kappa[:, 0]
         offsets = (k / (2 * math.pi)).log() - torch.log1p(-torch.exp(-2 * k)) - k
         return kappa * centers, offsets

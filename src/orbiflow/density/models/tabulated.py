@@ -67,9 +67,10 @@ class TabulatedDensity:
         spectrum = torch.fft.fft2(whole) / (along[:, None] * across[None, :])
         return torch.fft.ifft2(spectrum).real.contiguous()
 
-    @torch.no_grad()
     def log_prob(self, points: Tensor, *, measure: str = "square") -> Tensor:
         """Log densities (...,) at chart points (..., 2), interpolated; see `error`.
+
+        Differentiable once in the points.
 
         Raises:
             OrbiflowError: for an unknown measure.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import torch
@@ -67,6 +67,11 @@ class Torus(Space):
         self.group = _integer_lattice(int(dim))
         self.columns = tuple(f"angle{k + 1}" for k in range(int(dim)))
 
+    @classmethod
+    def for_data(cls, data: Array, *, unit: str = "radians", seed: int = 0) -> Self:
+        del seed
+        return cls(data.shape[1], unit=unit)
+
     @property
     def volume(self) -> float:
         return self.period**self.dim
@@ -119,6 +124,11 @@ class KleinBottle(Space):
         self.period = whole_turn(unit)
         self.unit = unit
         self.group = _klein_group()
+
+    @classmethod
+    def for_data(cls, data: Array, *, unit: str = "radians", seed: int = 0) -> Self:
+        del data, seed
+        return cls(unit=unit)
 
     @property
     def volume(self) -> float:
