@@ -10,7 +10,7 @@ from torch import Tensor
 from torch.distributions import Distribution, constraints
 
 from orbiflow.density.models.bases import Base, UniformBase
-from orbiflow.density.spaces.space import Space
+from orbiflow.density.spaces.space import CHART, Space
 from orbiflow.errors import OrbiflowError
 from orbiflow.flows import Flow
 
@@ -47,8 +47,8 @@ class SymmetricDensity(Distribution):
         """All of R^d: every point stands for its orbit."""
         return constraints.independent(constraints.real, 1)
 
-    def log_prob(self, value: Tensor, *, measure: str = "square") -> Tensor:
-        """Log density (...,) at chart points (..., d).
+    def log_prob(self, value: Tensor, *, measure: str = CHART) -> Tensor:
+        """Log density (...,) at chart points (..., d), with respect to `measure`.
 
         Raises:
             OrbiflowError: for points of another dimension, or an unknown measure.
@@ -102,10 +102,14 @@ class SymmetricDensity(Distribution):
         self,
         count: int = 16384,
         *,
-        measure: str = "natural",
+        measure: str = CHART,
         generator: torch.Generator | None = None,
     ) -> Tensor:
-        """Monte Carlo estimate of -E[log p], in nats, from `count` samples."""
+        """Monte Carlo estimate of -E[log p], in nats, from `count` samples.
+
+        With respect to `measure`, by default that of `log_prob`; "natural" for the entropy in the
+        user's units or per steradian.
+        """
         return -self.log_prob(self.sample((count,), generator), measure=measure).mean()
 
     @torch.no_grad()

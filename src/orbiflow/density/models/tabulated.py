@@ -8,7 +8,7 @@ import torch
 from torch import Tensor
 
 from orbiflow.density.models.symmetric import SymmetricDensity, midpoints
-from orbiflow.density.spaces.space import rectangle
+from orbiflow.density.spaces.space import CHART, rectangle
 from orbiflow.errors import OrbiflowError
 from orbiflow.fields.splines import padded, spline_sum, symbol
 
@@ -67,7 +67,7 @@ class TabulatedDensity:
         spectrum = torch.fft.fft2(whole) / (along[:, None] * across[None, :])
         return torch.fft.ifft2(spectrum).real.contiguous()
 
-    def log_prob(self, points: Tensor, *, measure: str = "square") -> Tensor:
+    def log_prob(self, points: Tensor, *, measure: str = CHART) -> Tensor:
         """Log densities (...,) at chart points (..., 2), interpolated; see `error`.
 
         Differentiable once in the points.

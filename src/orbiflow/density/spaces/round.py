@@ -111,7 +111,7 @@ class RoundSpace(Space):
         return self.project(torch.tensor(uniformization.from_sphere(turned, self.power)))
 
     def unit_vectors(self, points: Tensor) -> Tensor:
-        """Chart points (..., 2) to unit vectors (..., 3), differentiable; of an axis, one of the two."""
+        """Chart points (..., 2) to unit vectors (..., 3), of an axis one of the two; differentiable."""
         turned = uniformization.to_sphere(self.project(points), self.power)
         return turned @ torch.as_tensor(self.rotation).to(turned)
 

@@ -18,7 +18,14 @@ from orbiflow.symmetry.isometry import Array
 
 MEASURES = ("natural", "square", "uniform")
 """Natural: the user's units, or round area in steradians. Square: area of the canonical square.
-Uniform: the uniform distribution, so that a density of 1 is that of no structure at all."""
+Uniform: the uniform distribution, so that a density of 1 is that of no structure at all.
+
+Whatever takes chart points (`log_prob`, `entropy`) is with respect to the square by default, as torch
+wants of a distribution over them; whatever takes data in the user's units (`DensityEstimator`, the
+commands) and whatever people look at (pictures) is in natural measure."""
+
+CHART = "square"
+"""The default of all that takes chart points."""
 
 
 class Space(ABC):
