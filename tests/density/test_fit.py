@@ -1,17 +1,14 @@
 """Fitting: coupling, the closed-form start, likelihood, the estimator, storage."""
 
 import math
-from typing import Any
 
 import numpy as np
 import pytest
 import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from sklearn.model_selection import GridSearchCV
 
 from orbiflow.density import (
-    DensityEstimator,
     FitSettings,
     KleinBottle,
     ProjectivePlane,
@@ -20,7 +17,6 @@ from orbiflow.density import (
     Torus,
     UniformBase,
     fit_density,
-    midpoints,
 )
 from orbiflow.density.fitting.flow_matching import conjugate_gradients, coupled, match_flow
 from orbiflow.density.fitting.likelihood import Objective
@@ -179,67 +175,3 @@ def test_held_out_scores_are_of_the_points_themselves() -> None:
 def test_settings_out_of_range(changes) -> None:
     with pytest.raises(OrbiflowError, match=next(iter(changes))):
         FitSettings(**changes)
-
-
-def entropy(estimator: DensityEstimator) -> float:
-    """By quadrature, in natural measure."""
-    grid = midpoints(estimator.space_, 160)
-    with torch.no_grad():
-        square, natural = (
-            estimator.density_.log_prob(grid, measure=m) for m in ("square", "natural")
-        )
-    return -float((square.exp() * natural).mean())
-
-
-DATA = {
-    "torus": np.random.default_rng(0).vonmises([0.0, 1.0], 3.0, (300, 2)),
-    "sphere": np.random.default_rng(1).normal(20, 10, (300, 2)),
-    "klein-bottle": np.random.default_rng(2).vonmises([0.5, 0.0], 3.0, (300, 2)),
-    "projective-plane": np.random.default_rng(3).normal([60, 30], 10, (300, 2)).clip(-90, 90),
-}
-
-
-@pytest.mark.parametrize("space", DATA)
-def test_the_estimator(space: str) -> None:
-    estimator = DensityEstimator(space, detail=2, segments=2, iterations=8)
-    with pytest.raises(OrbiflowError, match="not fitted yet"):
-        estimator.sample()
-    assert estimator.fit(DATA[space]) is estimator
-    scores = estimator.score_samples(DATA[space])
-    assert scores.shape == (300,)
-    assert estimator.score(DATA[space]) == pytest.approx(scores.mean())
-    even = -math.log(estimator.space_.volume)
-    assert estimator.score(DATA[space]) > even + 0.3
-    relative = estimator.score_samples(DATA[space], measure="uniform")
-    assert np.allclose(relative, scores - even)
-    draws = estimator.sample(500, random_state=4)
-    assert draws.shape == (500, 2)
-    assert np.array_equal(draws, estimator.sample(500, random_state=4))
-    assert estimator.score(draws) == pytest.approx(-entropy(estimator), abs=0.3)
-
-
-def test_units_change_the_density_by_their_ratio() -> None:
-    small: dict[str, Any] = {"detail": 2, "segments": 2, "iterations": 5}
-    radians = DensityEstimator("torus", **small).fit(DATA["torus"])
-    degrees = DensityEstimator("torus", unit="degrees", **small).fit(np.degrees(DATA["torus"]))
-    shift = radians.score_samples(DATA["torus"]) - degrees.score_samples(np.degrees(DATA["torus"]))
-    assert np.allclose(shift, 2 * math.log(180 / math.pi), atol=1e-3)
-
-
-def test_parameters_of_the_estimator() -> None:
-    estimator = DensityEstimator("sphere", detail=3)
-    assert estimator.get_params()["detail"] == 3
-    assert estimator.set_params(detail=5).detail == 5
-    assert repr(estimator) == "DensityEstimator(space='sphere', detail=5)"
-    with pytest.raises(OrbiflowError, match="no parameter 'depth'"):
-        estimator.set_params(depth=1)
-    with pytest.raises(OrbiflowError, match="unknown space 'moebius'"):
-        DensityEstimator("moebius").fit(DATA["torus"])
-
-
-def test_a_grid_search() -> None:
-    search = GridSearchCV(
-        DensityEstimator("torus", segments=2, iterations=3), {"detail": [1, 2]}, cv=2
-    ).fit(DATA["torus"])
-    assert search.best_params_["detail"] in (1, 2)
-    assert math.isfinite(search.best_score_)

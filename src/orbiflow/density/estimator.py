@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import inspect
-from typing import Any
+import numbers
+from typing import Any, TypeAlias
 
 import numpy as np
 import torch
@@ -22,6 +23,16 @@ MOST_SPLINE_DIM = 3
 """Dimensions of spline flows; beyond, grids are too large."""
 
 
+ONLY_SPLINES = (
+    "detail", "segments", "smoothness", "ridge", "roughness", "kinetic", "iterations", "base",
+    "kernels",
+)  # fmt: skip
+"""Parameters without a meaning for neural flows."""
+
+RandomState: TypeAlias = int | np.random.RandomState | np.random.Generator | None
+"""As scikit-learn has it, and NumPy's newer generators."""
+
+
 class DensityEstimator:
     """Exact, normalised density of angles, directions, axes or Klein-bottle coordinates.
 
@@ -36,7 +47,8 @@ class DensityEstimator:
             seconds, seed: see `FitSettings`.
 
     On tori of four or more angles the density is a neural flow on a mixture of von Mises chains
-    (`fit_neural`), and of these only `evaluations`, `validation`, `seconds` and `seed` count.
+    (`fit_neural`): there only `evaluations`, `validation`, `seconds` and `seed` have a meaning, and the
+    others must be left at their defaults.
 
     After `fit`: `space_`, `density_` (a `SymmetricDensity`), `report_` (a `FitReport`),
     `n_features_in_`.
@@ -89,8 +101,8 @@ class DensityEstimator:
         """Fit to data (N, k) in the space's own units; `y` is ignored.
 
         Raises:
-            OrbiflowError: for data that are not of the space, too few points, or a setting out of
-                range.
+            OrbiflowError: for data that are not of the space, too few points, a setting out of range,
+                or one that has no meaning on a torus of so many angles.
         """
         del y
         settings = FitSettings(
@@ -106,6 +118,7 @@ class DensityEstimator:
         self.density_: SymmetricDensity
         self.report_: FitReport
         if self.space_.dim > MOST_SPLINE_DIM:
+            self._refuse_settings_of_splines()
             many = NeuralSettings(
                 refinement=min(NeuralSettings.refinement, self.evaluations),
                 validation=self.validation,
@@ -131,13 +144,22 @@ class DensityEstimator:
         del y
         return float(self.score_samples(X).mean())
 
-    def sample(self, n_samples: int = 1, random_state: int = 0) -> Array:
-        """New data (n_samples, k), the same for the same `random_state`."""
+    def sample(self, n_samples: int = 1, random_state: RandomState = None) -> Array:
+        """New data (n_samples, k) in the space's own units.
+
+        Args:
+            random_state: as scikit-learn has it. None: other points at every call, from NumPy's
+                global state, which `np.random.seed` sets. An integer: always the same points. A
+                NumPy `RandomState` or `Generator`: the next ones from it.
+
+        Raises:
+            OrbiflowError: before `fit`, for fewer than one sample, or another random state.
+        """
         density = self._fitted()
-        if n_samples < 1:
-            raise OrbiflowError(f"n_samples must be at least 1, got {n_samples}")
-        generator = torch.Generator().manual_seed(random_state)
-        return self.space_.from_chart(density.sample((n_samples,), generator))
+        if not isinstance(n_samples, numbers.Integral) or n_samples < 1:
+            raise OrbiflowError(f"n_samples must be an integer of at least 1, got {n_samples!r}")
+        generator = torch.Generator().manual_seed(_seed_of(random_state))
+        return self.space_.from_chart(density.sample((int(n_samples),), generator))
 
     def get_params(self, deep: bool = True) -> dict[str, Any]:
         """The constructor's arguments, by name."""
@@ -188,7 +210,32 @@ class DensityEstimator:
             raise OrbiflowError(f"expected data of shape (N, k), got {data.shape}")
         return space_class(self.space).for_data(data, unit=self.unit, seed=self.seed)
 
+    def _refuse_settings_of_splines(self) -> None:
+        defaults = inspect.signature(type(self)).parameters
+        set_ = [name for name in ONLY_SPLINES if getattr(self, name) != defaults[name].default]
+        if set_:
+            raise OrbiflowError(
+                f"{', '.join(set_)} would have no effect on a torus of {self.space_.dim} angles, where "
+                f"the flow is neural: leave {'it' if len(set_) == 1 else 'them'} out, or call "
+                "`fit_neural` with `NeuralSettings`"
+            )
+
     def _fitted(self) -> SymmetricDensity:
         if not hasattr(self, "density_"):
             raise OrbiflowError("this estimator is not fitted yet: call fit first")
         return self.density_
+
+
+def _seed_of(random_state: RandomState) -> int:
+    if random_state is None:
+        return int(np.random.randint(2**31))  # noqa: NPY002  scikit-learn's convention
+    if isinstance(random_state, np.random.RandomState):
+        return int(random_state.randint(2**31))
+    if isinstance(random_state, np.random.Generator):
+        return int(random_state.integers(2**31))
+    if isinstance(random_state, numbers.Integral) and not isinstance(random_state, bool):
+        return int(random_state) % 2**63
+    raise OrbiflowError(
+        "random_state must be None, an integer, a NumPy RandomState or Generator, got "
+        f"{random_state!r}"
+    )
