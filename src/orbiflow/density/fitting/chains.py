@@ -11,6 +11,7 @@ import torch
 from torch import Tensor
 
 from orbiflow.density.fitting.budget import Budget
+from orbiflow.density.fitting.training import training
 from orbiflow.density.models.chains import SCALES, MixtureBase, averaged, chained, waves
 from orbiflow.density.models.log_sum import shares_of
 from orbiflow.density.spaces.space import Space
@@ -52,6 +53,7 @@ class MixtureFit:
     seconds: float
 
 
+@training()
 def fit_mixture(
     space: Space,
     train: Tensor,

@@ -19,12 +19,14 @@ from orbiflow.density.fitting.report import (
     FitReport,
     Progress,
     mean_nll,
+    own,
     repeats_note,
     settle,
     split,
     step_error,
     steps_note,
 )
+from orbiflow.density.fitting.training import training
 from orbiflow.density.models.bases import Base, UniformBase, VonMisesBase
 from orbiflow.density.models.symmetric import SymmetricDensity
 from orbiflow.density.spaces.space import Space
@@ -113,6 +115,7 @@ class FitSettings:
             raise OrbiflowError(f'base must be "uniform" or "von-mises", got {self.base!r}')
 
 
+@training()
 def fit_density(
     space: Space,
     points: Tensor,
@@ -139,7 +142,7 @@ def fit_density(
     settings = settings or FitSettings()
     say = progress or (lambda _share, _what: None)
     generator = torch.Generator().manual_seed(settings.seed)
-    points = space.project(points.double())
+    points = space.project(own(points))
     train, validation, duplicates = split(points, settings.validation, generator)
     base: Base = UniformBase(space) if settings.base == "uniform" else VonMisesBase(space)
     dtype = torch.float32 if settings.single else torch.float64

@@ -10,6 +10,7 @@ import torch
 from scipy.spatial import KDTree
 from torch import Tensor
 
+from orbiflow.density.fitting.training import training
 from orbiflow.density.models.bases import UniformBase
 from orbiflow.density.models.blend import MixedDensity
 from orbiflow.density.models.kernels import AdaptiveKernels
@@ -29,6 +30,7 @@ FLOOR = 1e-3
 """Least share of the uniform density: no observation is impossible."""
 
 
+@training()
 def mix_kernels(density: SymmetricDensity, train: Tensor, held: Tensor) -> MixedDensity:
     """A fitted density mixed with adaptive kernels about the training points and a uniform floor.
 

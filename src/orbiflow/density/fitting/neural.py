@@ -20,11 +20,13 @@ from orbiflow.density.fitting.report import (
     FitReport,
     Progress,
     mean_nll,
+    own,
     repeats_note,
     settle,
     split,
     steps_note,
 )
+from orbiflow.density.fitting.training import training
 from orbiflow.density.models.bases import Base, UniformBase
 from orbiflow.density.models.neural import MAX_DEPTH, MAX_WAVES, MAX_WIDTH, NeuralField, NeuralFlow
 from orbiflow.density.models.symmetric import SymmetricDensity
@@ -127,6 +129,7 @@ class NeuralSettings:
         return 0 if self.base == "mixture" else 20_000
 
 
+@training()
 def fit_neural(
     space: Space,
     points: Tensor,
@@ -158,7 +161,7 @@ def fit_neural(
     say = progress or (lambda _share, _what: None)
     budget = Budget(seconds=settings.seconds)
     generator = torch.Generator().manual_seed(settings.seed)
-    points = space.project(points.double())
+    points = space.project(own(points))
     train, validation, duplicates = split(points, settings.validation, generator)
     base, mixture = _base(space, train, validation, settings, say)
     field = NeuralField(

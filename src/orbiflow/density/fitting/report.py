@@ -55,6 +55,11 @@ class FitReport:
     notes: tuple[str, ...] = field(default=())
 
 
+def own(points: Tensor) -> Tensor:
+    """The points in float64, detached: a copy, for those of `torch.inference_mode` cannot be used."""
+    return points.detach().double().clone()
+
+
 def split(points: Tensor, share: float, generator: torch.Generator) -> tuple[Tensor, Tensor, int]:
     """Shuffle and hold out a share, equal points on the same side; and how many repeat another.
 

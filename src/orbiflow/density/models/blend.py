@@ -13,6 +13,7 @@ from orbiflow.density.models.symmetric import SymmetricDensity
 from orbiflow.density.spaces.space import Space
 from orbiflow.errors import OrbiflowError
 from orbiflow.flows import Flow
+from orbiflow.threads import one_thread
 
 
 class MixedDensity(SymmetricDensity):
@@ -59,6 +60,7 @@ class MixedDensity(SymmetricDensity):
         mixed = torch.stack(weighted).logsumexp(dim=0)
         return mixed + self.space.log_density_factor(value, measure)
 
+    @one_thread()
     def rsample(self, sample_shape: Any = (), generator: torch.Generator | None = None) -> Tensor:
         """As `sample`, differentiable in the flow's parameters."""
         shape = torch.Size(sample_shape)

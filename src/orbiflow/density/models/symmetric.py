@@ -13,6 +13,7 @@ from orbiflow.density.models.bases import Base, UniformBase
 from orbiflow.density.spaces.space import CHART, Space
 from orbiflow.errors import OrbiflowError
 from orbiflow.flows import Flow
+from orbiflow.threads import one_thread
 
 BLOCK = 65536
 """Points integrated at a time where no gradient is asked for: bounds the memory."""
@@ -47,6 +48,7 @@ class SymmetricDensity(Distribution):
         """All of R^d: every point stands for its orbit."""
         return constraints.independent(constraints.real, 1)
 
+    @one_thread()
     def log_prob(self, value: Tensor, *, measure: str = CHART) -> Tensor:
         """Log density (...,) at chart points (..., d), with respect to `measure`.
 
@@ -76,6 +78,7 @@ class SymmetricDensity(Distribution):
         with torch.no_grad():
             return self.rsample(sample_shape, generator)
 
+    @one_thread()
     def rsample(  # pyright: ignore[reportIncompatibleMethodOverride]
         self, sample_shape: Any = (), generator: torch.Generator | None = None
     ) -> Tensor:
@@ -89,10 +92,12 @@ class SymmetricDensity(Distribution):
             moved = torch.cat([self.flow(block) for block in start.split(BLOCK)])
         return self.space.project(moved).reshape(*shape, self.space.dim)
 
+    @one_thread()
     def to_base(self, points: Tensor) -> Tensor:
         """Where data points (..., d) come from: canonical points distributed as the base."""
         return self.space.project(self.flow.inverse(self.space.project(points)))
 
+    @one_thread()
     def from_base(self, points: Tensor) -> Tensor:
         """Where base points (..., d) are carried, canonical."""
         return self.space.project(self.flow(points))
@@ -120,6 +125,7 @@ class SymmetricDensity(Distribution):
         points = self.sample((count,), generator)
         return (self.log_prob(points) - other.log_prob(points)).mean()
 
+    @one_thread()
     def mass(self, resolution: int = 64) -> float:
         """The density's integral over the square, by the midpoint rule on resolution^2 points.
 

@@ -11,6 +11,7 @@ from orbiflow.density.models.symmetric import SymmetricDensity, midpoints
 from orbiflow.density.spaces.space import CHART, rectangle
 from orbiflow.errors import OrbiflowError
 from orbiflow.fields.splines import padded, spline_sum, symbol
+from orbiflow.threads import one_thread
 
 CHECKED = 4096
 """Random points at which the table is compared with the density."""
@@ -37,6 +38,7 @@ class TabulatedDensity:
         OrbiflowError: for another dimension or a resolution out of range.
     """
 
+    @one_thread()
     def __init__(self, density: SymmetricDensity, resolution: int = 512, seed: int = 0) -> None:
         space = density.space
         if space.dim != 2:
@@ -67,6 +69,7 @@ class TabulatedDensity:
         spectrum = torch.fft.fft2(whole) / (along[:, None] * across[None, :])
         return torch.fft.ifft2(spectrum).real.contiguous()
 
+    @one_thread()
     def log_prob(self, points: Tensor, *, measure: str = CHART) -> Tensor:
         """Log densities (...,) at chart points (..., 2), interpolated; see `error`.
 

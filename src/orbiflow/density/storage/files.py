@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+import torch
 from safetensors import SafetensorError
 from safetensors.torch import load, save
 from torch import Tensor
@@ -164,7 +165,8 @@ def read_density(path: str | Path) -> tuple[SymmetricDensity, dict[str, Any]]:
         header = json.loads(json.loads(data[8 : 8 + length])["__metadata__"]["orbiflow"])
         if header["format"] not in (FORMAT, FORMAT_1):
             raise ValueError(f"format {header['format']!r}")
-        return _restored(header, load(data)), header["extra"]
+        with torch.inference_mode(False):  # what is made in it could never be differentiated
+            return _restored(header, load(data)), header["extra"]
     except (
         SafetensorError,
         OrbiflowError,
