@@ -1,6 +1,7 @@
 """What a fit may spend: evaluations decide, the clock only ends, and the integral is 1 in any case."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -23,7 +24,7 @@ from orbiflow.fields import SplineField
 from orbiflow.flows import Flow
 
 SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")
-SMALL = {"detail": 2, "segments": 2}
+SMALL: dict[str, Any] = {"detail": 2, "segments": 2}
 
 
 class Clock:

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from orbiflow.density import (
     MEASURES,
     AdaptiveKernels,
-    MixedDensity,
+    BlendedDensity,
     Space,
     SymmetricDensity,
     TabulatedDensity,
@@ -39,7 +39,7 @@ def density_of(kind: str, space: Space, seed: int) -> SymmetricDensity | Tabulat
         2 + 20 * torch.rand(5, width, dtype=torch.float64),
         torch.full((5,), 0.2),
     )
-    return MixedDensity(space, flow, base, kernels, torch.tensor([0.2, 0.7, 0.1]))
+    return BlendedDensity(space, flow, base, kernels, torch.tensor([0.2, 0.7, 0.1]))
 
 
 @pytest.mark.parametrize("name", SPACES)

@@ -8,8 +8,8 @@ import torch
 
 from orbiflow.density import (
     DensityEstimator,
-    MixtureBase,
     Torus,
+    VonMisesChains,
     density_to_bytes,
     read_density,
 )
@@ -27,7 +27,7 @@ def data(count: int = 400) -> np.ndarray:
 def test_five_angles(tmp_path: Path) -> None:
     points = data()
     estimator = DensityEstimator("torus", unit="degrees", evaluations=20).fit(points[:300])
-    assert isinstance(estimator.density_.base, MixtureBase)
+    assert isinstance(estimator.density_.base, VonMisesChains)
     assert estimator.score(points[300:]) > -5 * np.log(360) + 3
     assert estimator.sample(7, random_state=1).shape == (7, 5)
     path = tmp_path / "density.safetensors"

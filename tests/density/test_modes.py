@@ -1,6 +1,7 @@
 """Whatever torch's settings are: one thread inside, the caller's afterwards, and usable results."""
 
 import contextlib
+from typing import Any
 
 import numpy as np
 import pytest
@@ -22,7 +23,7 @@ from orbiflow.flows import Flow
 
 SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")
 DATA = np.random.default_rng(0).normal([20.0, 40.0], 10.0, (60, 2))
-QUICK = {"detail": 1, "segments": 1, "iterations": 3}
+QUICK: dict[str, Any] = {"detail": 1, "segments": 1, "iterations": 3}
 
 
 @pytest.fixture(name="three_threads")
@@ -117,4 +118,5 @@ def test_no_cache_is_poisoned_when_it_is_first_filled_under_inference(name: str,
     points.grad = None
     # a model that was read under inference is like any other
     density.log_prob(points).sum().backward()
+    assert points.grad is not None
     assert bool(points.grad.isfinite().all())

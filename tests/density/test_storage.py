@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from orbiflow.density import (
     AdaptiveKernels,
     Base,
+    BlendedDensity,
     DensityEstimator,
-    MixedDensity,
     NeuralField,
     NeuralFlow,
     Sphere,
@@ -138,7 +138,7 @@ REFUSED = {
     "has 1 segments of 5000 steps": lambda: SymmetricDensity(
         torus, Flow(FourierField(torus.group, 1), steps=5000)
     ),
-    "kernels is on Torus": lambda: MixedDensity(
+    "kernels is on Torus": lambda: BlendedDensity(
         Sphere(),
         Flow(FourierField(Sphere().group, 1)),
         UniformBase(Sphere()),

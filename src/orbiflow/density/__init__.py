@@ -2,12 +2,12 @@
 
 from orbiflow.density.estimator import DensityEstimator
 from orbiflow.density.fitting.flow import FitSettings, fit_density
-from orbiflow.density.fitting.kernels import mix_kernels
+from orbiflow.density.fitting.kernels import blend_kernels
 from orbiflow.density.fitting.neural import NeuralSettings, fit_neural
 from orbiflow.density.fitting.report import FitReport
 from orbiflow.density.models.bases import Base, UniformBase, VonMisesBase
-from orbiflow.density.models.blend import MixedDensity
-from orbiflow.density.models.chains import MixtureBase
+from orbiflow.density.models.blend import BlendedDensity
+from orbiflow.density.models.chains import VonMisesChains
 from orbiflow.density.models.kernels import AdaptiveKernels
 from orbiflow.density.models.neural import NeuralField, NeuralFlow
 from orbiflow.density.models.symmetric import SymmetricDensity, kl_by_quadrature, midpoints
@@ -30,12 +30,11 @@ __all__ = [
     "SPACES",
     "AdaptiveKernels",
     "Base",
+    "BlendedDensity",
     "DensityEstimator",
     "FitReport",
     "FitSettings",
     "KleinBottle",
-    "MixedDensity",
-    "MixtureBase",
     "NeuralField",
     "NeuralFlow",
     "NeuralSettings",
@@ -47,6 +46,8 @@ __all__ = [
     "Torus",
     "UniformBase",
     "VonMisesBase",
+    "VonMisesChains",
+    "blend_kernels",
     "clear_rotation",
     "density_to_bytes",
     "fit_density",
@@ -55,7 +56,6 @@ __all__ = [
     "kl_by_quadrature",
     "make_space",
     "midpoints",
-    "mix_kernels",
     "read_density",
     "to_klein",
     "to_latlon",

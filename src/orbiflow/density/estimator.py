@@ -29,7 +29,7 @@ ONLY_SPLINES = (
 )  # fmt: skip
 """Parameters without a meaning for neural flows."""
 
-RandomState: TypeAlias = int | np.random.RandomState | np.random.Generator | None
+RandomState: TypeAlias = int | np.integer | np.random.RandomState | np.random.Generator | None
 """As scikit-learn has it, and NumPy's newer generators."""
 
 

@@ -8,7 +8,7 @@ import torch
 from torch import Tensor
 
 from orbiflow.density.models.bases import UniformBase
-from orbiflow.density.models.blend import MixedDensity
+from orbiflow.density.models.blend import BlendedDensity
 from orbiflow.density.models.kernels import AdaptiveKernels, kernel_rows
 from orbiflow.density.models.symmetric import SymmetricDensity, midpoints
 from orbiflow.density.spaces.space import rectangle
@@ -55,7 +55,7 @@ def density_on_grid(
     """
     space, shape = density.space, (len(x), len(y))
     points = torch.stack(torch.meshgrid(x, y, indexing="ij"), dim=-1).reshape(-1, 2)
-    if not isinstance(density, MixedDensity):
+    if not isinstance(density, BlendedDensity):
         return density_at(density, points, measure).reshape(shape)
     flow, kernels, floor = density.shares.tolist()
     values = flow * density_at(density.flow_density, points, "square")
@@ -87,7 +87,7 @@ def takes_logarithms(density: SymmetricDensity, measure: str, scale: str) -> boo
 
 def is_sharp(density: SymmetricDensity, pixel: float) -> bool:
     """Whether peaks of the density may be narrower than pixels of that side show."""
-    if not isinstance(density, MixedDensity):
+    if not isinstance(density, BlendedDensity):
         return False
     deviations = density.kernels.concentrations**-0.5
     return bool((deviations < 2 * _half_pixels(density.kernels, pixel)).any())

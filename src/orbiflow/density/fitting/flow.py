@@ -10,7 +10,7 @@ from torch import Tensor
 
 from orbiflow.density.fitting.budget import Budget
 from orbiflow.density.fitting.flow_matching import coupled, match_flow
-from orbiflow.density.fitting.kernels import mix_kernels
+from orbiflow.density.fitting.kernels import blend_kernels
 from orbiflow.density.fitting.likelihood import Refinement, refine
 from orbiflow.density.fitting.merging import merged
 from orbiflow.density.fitting.report import (
@@ -68,8 +68,8 @@ class FitSettings:
       100 iterations takes about 105, so the default leaves those of `iterations` alone.
     - `validation`: share of the points held out for early stopping.
     - `base`: "uniform" or "von-mises", the paper's.
-    - `kernels`: mix the flow with adaptive kernels about the training points, for data sharper than
-      the flow's waves; see `mix_kernels`.
+    - `kernels`: blend the flow with adaptive kernels about the training points, for data sharper than
+      the flow's waves; see `blend_kernels`.
     - `single`: train in float32, about twice as fast; the result is float64 in any case.
     - `seconds`: of refinement at most, looked at between evaluations. A fit that it ends depends on
       the machine's speed, and its report says so; `evaluations` ends alike everywhere.
@@ -180,11 +180,11 @@ def fit_density(
     shares = None
     if settings.kernels:
         say(1.0, "kernels")
-        density = mix_kernels(density, train, validation)
-        mass = None if mass is None else density.mixed_mass(mass)
+        density = blend_kernels(density, train, validation)
+        mass = None if mass is None else density.mass_with(mass)
         shares = tuple(density.shares.tolist())
         notes.append(
-            "the density is a mixture: flow {:.1%}, kernels {:.1%}, uniform floor {:.1%}".format(
+            "the density is a blend: flow {:.1%}, kernels {:.1%}, uniform floor {:.1%}".format(
                 *shares
             )
         )

@@ -12,7 +12,7 @@ from torch import Tensor
 
 from orbiflow.density.fitting.training import training
 from orbiflow.density.models.bases import UniformBase
-from orbiflow.density.models.blend import MixedDensity
+from orbiflow.density.models.blend import BlendedDensity
 from orbiflow.density.models.kernels import AdaptiveKernels
 from orbiflow.density.models.symmetric import SymmetricDensity
 from orbiflow.density.spaces.space import Space
@@ -31,8 +31,8 @@ FLOOR = 1e-3
 
 
 @training()
-def mix_kernels(density: SymmetricDensity, train: Tensor, held: Tensor) -> MixedDensity:
-    """A fitted density mixed with adaptive kernels about the training points and a uniform floor.
+def blend_kernels(density: SymmetricDensity, train: Tensor, held: Tensor) -> BlendedDensity:
+    """A fitted density blended with adaptive kernels about the training points and a uniform floor.
 
     Each kernel's variance is a share of the mean square distance to its nearest neighbours (Breiman,
     Meisel, Purcell, 1977), on tori axis by axis. The share, the number of neighbours and the
@@ -62,13 +62,13 @@ def mix_kernels(density: SymmetricDensity, train: Tensor, held: Tensor) -> Mixed
         parts = torch.stack([flow, kernels.log_prob(held), uniform])
         shares, score = proportions(parts)
         if score > best:
-            best, found = score, MixedDensity(space, density.flow, density.base, kernels, shares)
+            best, found = score, BlendedDensity(space, density.flow, density.base, kernels, shares)
     assert found is not None
     return found
 
 
 def proportions(parts: Tensor, *, iterations: int = 60) -> tuple[Tensor, float]:
-    """Mixing proportions (3,) that suit log densities `parts` (3, N) best, by EM; and their score.
+    """Proportions (3,) that suit log densities `parts` (3, N) best, by EM; and their score.
 
     The last is kept at `FLOOR` or more.
     """

@@ -12,7 +12,7 @@ import torch
 from torch import Tensor
 
 from orbiflow.density.fitting.budget import Budget
-from orbiflow.density.fitting.chains import MixtureFit, fit_mixture
+from orbiflow.density.fitting.chains import ChainsFit, fit_chains
 from orbiflow.density.fitting.flow_matching import coupled
 from orbiflow.density.fitting.likelihood import Refinement
 from orbiflow.density.fitting.report import (
@@ -30,7 +30,6 @@ from orbiflow.density.fitting.training import training
 from orbiflow.density.models.bases import Base, UniformBase
 from orbiflow.density.models.neural import MAX_DEPTH, MAX_WAVES, MAX_WIDTH, NeuralField, NeuralFlow
 from orbiflow.density.models.symmetric import SymmetricDensity
-from orbiflow.density.spaces.flat import Torus
 from orbiflow.density.spaces.space import Space
 from orbiflow.errors import OrbiflowError
 
@@ -60,7 +59,7 @@ WARM = 50
 class NeuralSettings:
     """Knobs of `fit_neural`; the defaults are measured on RNA torsions (benchmarks/density_rna.py).
 
-    - `base`: "mixture" (of von Mises chains, see `fit_mixture`) or "uniform".
+    - `base`: "mixture" (of von Mises chains, see `fit_chains`) or "uniform".
     - `components`, `members`: of the mixture, at most.
     - `width`, `depth`, `waves`: of the network, see `NeuralField`.
     - `steps`: Runge-Kutta steps; doubled where the integrator has not converged. None for 2 with a
@@ -156,7 +155,7 @@ def fit_neural(
         OrbiflowError: for a space that is not a torus, or too few points.
     """
     settings = settings or NeuralSettings()
-    if not isinstance(space, Torus):
+    if not space.is_torus:
         raise OrbiflowError(f"neural flows are for tori, not for the {space.name}")
     say = progress or (lambda _share, _what: None)
     budget = Budget(seconds=settings.seconds)
@@ -202,10 +201,10 @@ def fit_neural(
 
 def _base(
     space: Space, train: Tensor, validation: Tensor, settings: NeuralSettings, say: Progress
-) -> tuple[Base, MixtureFit | None]:
+) -> tuple[Base, ChainsFit | None]:
     if settings.base == "uniform":
         return UniformBase(space), None
-    found = fit_mixture(
+    found = fit_chains(
         space,
         train,
         validation,
@@ -356,7 +355,7 @@ def _average(mean: dict[str, Tensor], now: dict[str, Tensor], keep: float) -> No
         mean[name].lerp_(value, 1 - keep)
 
 
-def _notes(mixture: MixtureFit | None, trainer: _Trainer) -> list[str]:
+def _notes(mixture: ChainsFit | None, trainer: _Trainer) -> list[str]:
     notes = []
     if mixture is not None:
         notes.append(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import cast
 
 import numpy as np
 import torch
@@ -10,6 +11,7 @@ from torch import Tensor
 
 from orbiflow.density.models.bases import Base
 from orbiflow.density.models.log_sum import log_sum_exp
+from orbiflow.density.spaces.round import RoundSpace
 from orbiflow.density.spaces.space import Space, rectangle
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry.isometry import Array
@@ -82,7 +84,7 @@ class AdaptiveKernels(Base):
         kappa = self.concentrations.numpy()[chosen]
         if self.space.is_round:
             vectors = _von_mises_fisher(self._center_features.numpy()[chosen], kappa[:, 0], rng)
-            return self.space.vectors_to_chart(vectors)  # type: ignore[attr-defined]
+            return cast(RoundSpace, self.space).vectors_to_chart(vectors)
         angle = torch.tensor(rng.vonmises(0.0, kappa))
         return self.space.project(
             self.centers[chosen] + angle / (2 * math.pi) * rectangle(self.space)

@@ -12,22 +12,16 @@ from safetensors.torch import load, save
 from torch import Tensor
 
 from orbiflow.density.models.bases import Base, UniformBase, VonMisesBase
-from orbiflow.density.models.blend import MixedDensity
-from orbiflow.density.models.chains import MixtureBase
+from orbiflow.density.models.blend import BlendedDensity
+from orbiflow.density.models.chains import VonMisesChains
 from orbiflow.density.models.kernels import AdaptiveKernels
 from orbiflow.density.models.neural import NeuralFlow
 from orbiflow.density.models.symmetric import SymmetricDensity
 from orbiflow.density.spaces.catalogue import make_space
 from orbiflow.density.spaces.space import Space
+from orbiflow.density.storage.chains import chains_from_header, chains_header, chains_tensors
 from orbiflow.density.storage.groups import check_group, group_header, is_same_group
-from orbiflow.density.storage.neural import (
-    mixture_from_header,
-    mixture_header,
-    mixture_tensors,
-    neural_from_header,
-    neural_header,
-    neural_tensors,
-)
+from orbiflow.density.storage.neural import neural_from_header, neural_header, neural_tensors
 from orbiflow.density.storage.series import series_from_header, series_parts
 from orbiflow.errors import InputFileError, OrbiflowError
 
@@ -46,16 +40,16 @@ def density_to_bytes(density: SymmetricDensity, **extra: Any) -> bytes:
     Raises:
         OrbiflowError: naming the part that cannot be saved, rather than save another density.
     """
-    if type(density) not in (SymmetricDensity, MixedDensity):
+    if type(density) not in (SymmetricDensity, BlendedDensity):
         raise OrbiflowError(
             f"the density is a {type(density).__name__}, which a file does not hold: save the "
-            "SymmetricDensity or MixedDensity that it is made of"
+            "SymmetricDensity or BlendedDensity that it is made of"
         )
     space = _checked_space(density.space)
     base, tensors = _base_parts(density)
     flow, more = _flow_parts(density)
     tensors |= more
-    if isinstance(density, MixedDensity):
+    if isinstance(density, BlendedDensity):
         tensors |= _kernel_tensors(density)
     header = {
         "format": FORMAT,
@@ -112,10 +106,10 @@ def _base_parts(density: SymmetricDensity) -> tuple[dict[str, Any], dict[str, Te
         return {"kind": "uniform"}, {}
     if type(base) is VonMisesBase:
         return {"kind": "von-mises", "concentration": base.concentration}, {}
-    if type(base) is MixtureBase:
-        return mixture_header(base), mixture_tensors(base)
+    if type(base) is VonMisesChains:
+        return chains_header(base), chains_tensors(base)
     raise OrbiflowError(
-        f"the base is a {type(base).__name__}: only UniformBase, VonMisesBase and MixtureBase are "
+        f"the base is a {type(base).__name__}: only UniformBase, VonMisesBase and VonMisesChains are "
         "saved; save its parameters yourself"
     )
 
@@ -128,7 +122,7 @@ def _flow_parts(density: SymmetricDensity) -> tuple[dict[str, Any], dict[str, Te
     return series_parts(flow, density.space)
 
 
-def _kernel_tensors(density: MixedDensity) -> dict[str, Tensor]:
+def _kernel_tensors(density: BlendedDensity) -> dict[str, Tensor]:
     kernels = density.kernels
     _check_shared_space(density, kernels, "mixture of kernels")
     if type(kernels) is not AdaptiveKernels or len(kernels.centers) > MAX_KERNELS:
@@ -193,7 +187,7 @@ def _restored(header: dict[str, Any], tensors: dict[str, Tensor]) -> SymmetricDe
     parts = [tensors[f"kernel_{name}"] for name in ("centers", "concentrations", "weights")]
     if len(parts[0]) > MAX_KERNELS:
         raise ValueError(f"{len(parts[0])} kernels")
-    return MixedDensity(space, flow, base, AdaptiveKernels(space, *parts), tensors["shares"])
+    return BlendedDensity(space, flow, base, AdaptiveKernels(space, *parts), tensors["shares"])
 
 
 def _restored_base(header: dict[str, Any], tensors: dict[str, Tensor], space: Space) -> Base:
@@ -203,5 +197,5 @@ def _restored_base(header: dict[str, Any], tensors: dict[str, Tensor], space: Sp
     if kind == "von-mises":
         return VonMisesBase(space, float(header["concentration"]))
     if kind == "mixture":
-        return mixture_from_header(header, tensors, space)
+        return chains_from_header(header, tensors, space)
     raise ValueError(f"a base of kind {kind!r}")

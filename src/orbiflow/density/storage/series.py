@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, cast
 
 import torch
 from torch import Tensor
@@ -42,7 +42,8 @@ def series_parts(flow: Flow, space: Space) -> tuple[dict[str, Any], dict[str, Te
     segments, tensors = [], {}
     for number, field in enumerate(flow.segments):
         segments.append(_segment(number, field, space))
-        tensors[f"flow.{number}"] = field.parameters_.detach().double().cpu()
+        parameters = cast(InvariantField, field).parameters_
+        tensors[f"flow.{number}"] = parameters.detach().double().cpu()
     header = {
         "kind": "series",
         "segments": segments,
