@@ -10,7 +10,7 @@ import numpy as np
 import torch
 from numpy.typing import ArrayLike
 
-from orbiflow.density.fitting.flow import FitSettings, fit_density
+from orbiflow.density.fitting.flow import MOST_DIM, FitSettings, fit_density
 from orbiflow.density.fitting.neural import NeuralSettings, fit_neural
 from orbiflow.density.fitting.report import FitReport, Progress
 from orbiflow.density.models.symmetric import SymmetricDensity
@@ -18,10 +18,6 @@ from orbiflow.density.spaces.catalogue import space_class
 from orbiflow.density.spaces.space import Space
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry.isometry import Array
-
-MOST_SPLINE_DIM = 3
-"""Dimensions of spline flows; beyond, grids are too large."""
-
 
 ONLY_SPLINES = (
     "detail", "segments", "smoothness", "ridge", "roughness", "kinetic", "iterations", "base",
@@ -117,7 +113,7 @@ class DensityEstimator:
         points = self.space_.to_chart(data)
         self.density_: SymmetricDensity
         self.report_: FitReport
-        if self.space_.dim > MOST_SPLINE_DIM:
+        if self.space_.dim > MOST_DIM:
             self._refuse_settings_of_splines()
             many = NeuralSettings(
                 refinement=min(NeuralSettings.refinement, self.evaluations),

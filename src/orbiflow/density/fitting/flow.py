@@ -8,6 +8,7 @@ from dataclasses import dataclass, fields
 import torch
 from torch import Tensor
 
+from orbiflow.density.arguments import check_kind, check_range, check_ranges, check_share
 from orbiflow.density.fitting.budget import Budget
 from orbiflow.density.fitting.flow_matching import coupled, match_flow
 from orbiflow.density.fitting.kernels import blend_kernels
@@ -19,7 +20,7 @@ from orbiflow.density.fitting.report import (
     FitReport,
     Progress,
     mean_nll,
-    own,
+    own_points,
     repeats_note,
     settle,
     split,
@@ -37,6 +38,9 @@ from orbiflow.flows import Flow
 MOST_STEPS, MOST_SETTLED = 16, 256
 """Runge-Kutta steps a segment to which they are doubled where the integrator has not converged, in
 training and after it."""
+
+MOST_DIM = 3
+"""Dimensions of a spline's grid; beyond, it would be too large."""
 
 MOST_MATCHED = 6_000
 """Points that the closed-form start looks at."""
@@ -93,24 +97,27 @@ class FitSettings:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        for name, low, high in (
+        whole = (
             ("detail", 1, 64),
             ("segments", 1, 256),
             ("steps", 1, 256),
+            ("iterations", 0, 100_000),
+            ("evaluations", 0, 1_000_000_000),
+            ("seed", -(2**63), 2**64 - 1),
+        )
+        real = (
             ("smoothness", 0, 8),
             ("ridge", 0, math.inf),
             ("kinetic", 0, math.inf),
-            ("iterations", 0, 100_000),
-            ("evaluations", 0, 1_000_000_000),
             ("seconds", 0, math.inf),
-        ):
-            value = getattr(self, name)
-            if not low <= value <= high:
-                raise OrbiflowError(f"{name} must be from {low:g} to {high:g}, got {value!r}")
-        if not 0 < self.validation < 1:
-            raise OrbiflowError(f"validation must be between 0 and 1, got {self.validation!r}")
-        if not self.roughness or min(self.roughness) < 0:
+        )
+        check_ranges(self, whole, integer=True)
+        check_ranges(self, real)
+        check_share(self.validation)
+        if not isinstance(self.roughness, tuple | list) or not self.roughness:
             raise OrbiflowError(f"roughness needs weights of at least 0, got {self.roughness!r}")
+        for weight in self.roughness:
+            check_range("each weight of roughness", weight, 0, math.inf)
         if self.base not in ("uniform", "von-mises"):
             raise OrbiflowError(f'base must be "uniform" or "von-mises", got {self.base!r}')
 
@@ -128,8 +135,8 @@ def fit_density(
     Points that share a small cell are merged, so the time hardly grows with their number.
 
     Args:
-        space: of two dimensions; see `fit_neural` for tori of more.
-        points: (N, d) in the chart, N >= 10 different ones.
+        space: of three dimensions at most; see `fit_neural` for tori of more.
+        points: (N, d) in the chart, anything that NumPy takes, N >= 10 different ones.
         settings: default `FitSettings()`.
         progress: told how far it is.
 
@@ -137,12 +144,18 @@ def fit_density(
         The density, float64, and the report.
 
     Raises:
-        OrbiflowError: for too few points.
+        OrbiflowError: for a space of four and more dimensions, points of another shape or too few.
     """
-    settings = settings or FitSettings()
+    settings = FitSettings() if settings is None else settings
+    check_kind(settings, FitSettings, "settings")
+    if check_kind(space, Space, "space", "see `make_space`").dim > MOST_DIM:
+        raise OrbiflowError(
+            f"splines have grids of {MOST_DIM} dimensions at most, this {space.name} has {space.dim}: "
+            "call `fit_neural`"
+        )
     say = progress or (lambda _share, _what: None)
     generator = torch.Generator().manual_seed(settings.seed)
-    points = space.project(own(points))
+    points = own_points(space, points)
     train, validation, duplicates = split(points, settings.validation, generator)
     base: Base = UniformBase(space) if settings.base == "uniform" else VonMisesBase(space)
     dtype = torch.float32 if settings.single else torch.float64

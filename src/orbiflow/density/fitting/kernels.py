@@ -10,12 +10,14 @@ import torch
 from scipy.spatial import KDTree
 from torch import Tensor
 
+from orbiflow.density.arguments import check_kind, points_tensor
 from orbiflow.density.fitting.training import training
 from orbiflow.density.models.bases import UniformBase
 from orbiflow.density.models.blend import BlendedDensity
 from orbiflow.density.models.kernels import AdaptiveKernels
 from orbiflow.density.models.symmetric import SymmetricDensity
 from orbiflow.density.spaces.space import Space
+from orbiflow.errors import OrbiflowError
 
 MOST_KERNELS, MOST_HELD = 20_000, 2_000
 """Centers at most, and held-out points that choose the widths."""
@@ -40,13 +42,24 @@ def blend_kernels(density: SymmetricDensity, train: Tensor, held: Tensor) -> Ble
 
     Args:
         density: a flow's.
-        train, held: canonical points (N, d), float64.
+        train, held: canonical points (N, d).
+
+    Raises:
+        OrbiflowError: for points of another shape, fewer than three different ones to train on, or none
+            held out.
     """
-    space = density.space
+    space = check_kind(density, SymmetricDensity, "density").space
+    train = points_tensor(train, space.dim, "training points", flat=True).double()
+    held = points_tensor(held, space.dim, "held points", flat=True).double()
     centers, counts = torch.unique(train, dim=0, return_counts=True)
     if len(centers) > MOST_KERNELS:
         chosen = torch.randperm(len(centers), generator=torch.Generator().manual_seed(0))
         centers, counts = centers[chosen[:MOST_KERNELS]], counts[chosen[:MOST_KERNELS]]
+    if len(centers) <= min(NEIGHBOURS) or not len(held):
+        raise OrbiflowError(
+            f"kernels need {min(NEIGHBOURS) + 1} different points or more and some held out, got "
+            f"{len(centers)} and {len(held)}"
+        )
     weights = counts.double() / counts.sum()
     held = held[:MOST_HELD]
     spreads = _spreads(space, centers, [m for m in NEIGHBOURS if m < len(centers)])

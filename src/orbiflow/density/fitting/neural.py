@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
+from orbiflow.density.arguments import check_kind, check_ranges, check_share
 from orbiflow.density.fitting.budget import Budget
 from orbiflow.density.fitting.chains import ChainsFit, fit_chains
 from orbiflow.density.fitting.flow_matching import coupled
@@ -20,7 +21,7 @@ from orbiflow.density.fitting.report import (
     FitReport,
     Progress,
     mean_nll,
-    own,
+    own_points,
     repeats_note,
     settle,
     split,
@@ -93,25 +94,22 @@ class NeuralSettings:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        for name, low, high in (
+        whole = [
             ("components", 1, 4096),
             ("members", 1, 64),
             ("width", 1, MAX_WIDTH),
             ("depth", 1, MAX_DEPTH),
             ("waves", 1, MAX_WAVES),
-            ("steps", 1, MOST_STEPS),
-            ("matching", 0, 10_000_000),
             ("refinement", 0, 1_000_000),
             ("batch", 1, 65536),
-            ("matching_rate", 0, 1),
-            ("refinement_rate", 0, 1),
-            ("seconds", 0, math.inf),
-        ):
-            value = getattr(self, name)
-            if value is not None and not low <= value <= high:
-                raise OrbiflowError(f"{name} must be from {low:g} to {high:g}, got {value!r}")
-        if not 0 < self.validation < 1:
-            raise OrbiflowError(f"validation must be between 0 and 1, got {self.validation!r}")
+            ("seed", -(2**63), 2**64 - 1),
+        ]
+        chosen = (("steps", 1, MOST_STEPS), ("matching", 0, 10_000_000))
+        whole += [row for row in chosen if getattr(self, row[0]) is not None]
+        real = (("matching_rate", 0, 1), ("refinement_rate", 0, 1), ("seconds", 0, math.inf))
+        check_ranges(self, whole, integer=True)
+        check_ranges(self, real)
+        check_share(self.validation)
         if self.base not in ("mixture", "uniform"):
             raise OrbiflowError(f'base must be "mixture" or "uniform", got {self.base!r}')
 
@@ -154,13 +152,14 @@ def fit_neural(
     Raises:
         OrbiflowError: for a space that is not a torus, or too few points.
     """
-    settings = settings or NeuralSettings()
-    if not space.is_torus:
+    settings = NeuralSettings() if settings is None else settings
+    check_kind(settings, NeuralSettings, "settings")
+    if not check_kind(space, Space, "space", "see `make_space`").is_torus:
         raise OrbiflowError(f"neural flows are for tori, not for the {space.name}")
     say = progress or (lambda _share, _what: None)
     budget = Budget(seconds=settings.seconds)
     generator = torch.Generator().manual_seed(settings.seed)
-    points = space.project(own(points))
+    points = own_points(space, points)
     train, validation, duplicates = split(points, settings.validation, generator)
     base, mixture = _base(space, train, validation, settings, say)
     field = NeuralField(

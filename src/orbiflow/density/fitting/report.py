@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 import torch
 from torch import Tensor
 
+from orbiflow.density.arguments import check_kind, points_tensor
 from orbiflow.density.fitting.likelihood import Refinement
 from orbiflow.density.models.symmetric import SymmetricDensity
+from orbiflow.density.spaces.space import Space
 from orbiflow.errors import OrbiflowError
 
 MASS_TOLERANCE = 1e-3
@@ -55,9 +58,14 @@ class FitReport:
     notes: tuple[str, ...] = field(default=())
 
 
-def own(points: Tensor) -> Tensor:
-    """The points in float64, detached: a copy, for those of `torch.inference_mode` cannot be used."""
-    return points.detach().double().clone()
+def own_points(space: Space, points: Any) -> Tensor:
+    """Canonical points (N, d), float64: a copy, for those of `torch.inference_mode` cannot be used.
+
+    Raises:
+        OrbiflowError: for another shape or values that are not finite, or what is no `Space`.
+    """
+    check_kind(space, Space, "space", "see `make_space`")
+    return space.project(points_tensor(points, space.dim, flat=True).detach().double().clone())
 
 
 def split(points: Tensor, share: float, generator: torch.Generator) -> tuple[Tensor, Tensor, int]:

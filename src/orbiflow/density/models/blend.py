@@ -7,9 +7,10 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from orbiflow.density.arguments import check_kind, float_tensor
 from orbiflow.density.models.bases import Base, UniformBase
 from orbiflow.density.models.kernels import AdaptiveKernels
-from orbiflow.density.models.symmetric import SymmetricDensity
+from orbiflow.density.models.symmetric import SymmetricDensity, shape_of
 from orbiflow.density.spaces.space import Space
 from orbiflow.errors import OrbiflowError
 from orbiflow.flows import Flow
@@ -35,6 +36,8 @@ class BlendedDensity(SymmetricDensity):
         self, space: Space, flow: Flow, base: Base, kernels: AdaptiveKernels, shares: Tensor
     ) -> None:
         super().__init__(space, flow, base)
+        check_kind(kernels, AdaptiveKernels, "kernels")
+        shares = float_tensor(shares, "shares")
         if (
             shares.shape != (3,)
             or not bool((shares > 0).all())
@@ -63,7 +66,7 @@ class BlendedDensity(SymmetricDensity):
     @one_thread()
     def rsample(self, sample_shape: Any = (), generator: torch.Generator | None = None) -> Tensor:
         """As `sample`, differentiable in the flow's parameters."""
-        shape = torch.Size(sample_shape)
+        shape = shape_of(sample_shape)
         source = generator or torch.default_generator
         part = torch.multinomial(self.shares, shape.numel(), replacement=True, generator=source)
         counts = torch.bincount(part, minlength=3).tolist()

@@ -8,6 +8,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from orbiflow.density.arguments import float_tensor
 from orbiflow.density.models.bases import Base
 from orbiflow.density.models.log_sum import log_sum_exp
 from orbiflow.density.spaces.space import Space
@@ -52,6 +53,14 @@ class VonMisesChains(Base):
         if not space.is_torus:
             raise OrbiflowError(f"von Mises chains need a torus, got the {space.name}")
         d = space.dim
+        log_weights, means, concentrations = (
+            float_tensor(value, name)
+            for value, name in (
+                (log_weights, "log_weights"),
+                (means, "means"),
+                (concentrations, "concentrations"),
+            )
+        )
         count = concentrations.shape[0] if concentrations.dim() == 2 else 0
         if order is None:
             order = torch.arange(d).repeat(count, 1)

@@ -9,6 +9,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from orbiflow.density.arguments import float_tensor
 from orbiflow.density.models.bases import Base
 from orbiflow.density.models.log_sum import log_sum_exp
 from orbiflow.density.spaces.round import RoundSpace
@@ -41,9 +42,17 @@ class AdaptiveKernels(Base):
         self, space: Space, centers: Tensor, concentrations: Tensor, weights: Tensor
     ) -> None:
         super().__init__(space)
+        centers, concentrations, weights = (
+            float_tensor(value, name)
+            for name, value in (
+                ("centers", centers),
+                ("concentrations", concentrations),
+                ("weights", weights),
+            )
+        )
         width = 1 if space.is_round else space.dim
         shapes = [tuple(t.shape) for t in (centers, concentrations, weights)]
-        count = len(centers)
+        count = len(centers) if centers.dim() else 0
         if shapes != [(count, space.dim), (count, width), (count,)] or not count:
             raise OrbiflowError(f"kernels of shapes {shapes} do not fit a {space.name}")
         if not (

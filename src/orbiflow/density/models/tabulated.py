@@ -7,6 +7,7 @@ import math
 import torch
 from torch import Tensor
 
+from orbiflow.density.arguments import check_kind, check_range, points_tensor
 from orbiflow.density.models.symmetric import SymmetricDensity, midpoints
 from orbiflow.density.spaces.space import CHART, rectangle
 from orbiflow.errors import OrbiflowError
@@ -40,11 +41,10 @@ class TabulatedDensity:
 
     @one_thread()
     def __init__(self, density: SymmetricDensity, resolution: int = 512, seed: int = 0) -> None:
-        space = density.space
+        space = check_kind(density, SymmetricDensity, "density").space
         if space.dim != 2:
             raise OrbiflowError(f"a table needs two dimensions, this {space.name} has {space.dim}")
-        if not 8 <= resolution <= 4096:
-            raise OrbiflowError(f"resolution must be from 8 to 4096, got {resolution}")
+        check_range("resolution", resolution, 8, 4096, integer=True)
         self.space, self.resolution = space, resolution
         self._table = padded(self._coefficients(density)[None])
         generator = torch.Generator().manual_seed(seed)
@@ -76,8 +76,9 @@ class TabulatedDensity:
         Differentiable once in the points.
 
         Raises:
-            OrbiflowError: for an unknown measure.
+            OrbiflowError: for points of another shape or that are not finite, or an unknown measure.
         """
+        points = points_tensor(points, 2)
         flat = points.reshape(-1, 2).double()
         cells = flat.mT * self.resolution - 0.5
         parts = [spline_sum(self._table, block)[0] for block in cells.split(BLOCK, dim=1)]

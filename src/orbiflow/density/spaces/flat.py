@@ -11,6 +11,7 @@ import torch
 from numpy.typing import ArrayLike
 from torch import Tensor
 
+from orbiflow.density.arguments import check_range
 from orbiflow.density.spaces.space import Space, checked_table
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import CrystallographicGroup, identification_group
@@ -28,7 +29,7 @@ def whole_turn(unit: str) -> float:
     Raises:
         OrbiflowError: for an unknown unit.
     """
-    if unit not in TURN:
+    if not isinstance(unit, str) or unit not in TURN:
         raise OrbiflowError(f"unit must be one of {', '.join(TURN)}, got {unit!r}")
     return TURN[unit]
 
@@ -60,8 +61,7 @@ class Torus(Space):
     name = "torus"
 
     def __init__(self, dim: int = 2, *, unit: str = "radians") -> None:
-        if isinstance(dim, bool) or int(dim) != dim or not 1 <= dim <= MAX_DIM:
-            raise OrbiflowError(f"dim must be an integer from 1 to {MAX_DIM}, got {dim!r}")
+        check_range("dim", dim, 1, MAX_DIM, integer=True)
         self.period = whole_turn(unit)
         self.unit = unit
         self.group = _integer_lattice(int(dim))
@@ -82,10 +82,11 @@ class Torus(Space):
 
     def from_chart(self, points: Tensor) -> Array:
         """Angles (N, dim) in [-1/2, 1/2) turns."""
-        x = points.detach().double().cpu().numpy()
+        x = self._checked(points).detach().double().cpu().numpy()
         return (x - np.floor(x + 0.5)) * self.period
 
     def project(self, points: Tensor) -> Tensor:
+        points = self._checked(points)
         return points - points.detach().floor()
 
     def displacement(self, start: Tensor, end: Tensor) -> Tensor:

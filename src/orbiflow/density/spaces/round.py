@@ -11,6 +11,7 @@ import torch
 from numpy.typing import ArrayLike, NDArray
 from torch import Tensor
 
+from orbiflow.density.arguments import check_kind
 from orbiflow.density.spaces import uniformization
 from orbiflow.density.spaces.space import Space, checked_table
 from orbiflow.errors import OrbiflowError
@@ -93,9 +94,9 @@ class RoundSpace(Space):
         return cls(form=form, rotation=clear_rotation(cls(form=form), data, seed=seed))
 
     def __init__(self, *, form: str = "latlon", rotation: ArrayLike | None = None) -> None:
-        if form not in FORMS:
+        if not isinstance(form, str) or form not in FORMS:
             raise OrbiflowError(f"form must be one of {', '.join(FORMS)}, got {form!r}")
-        turn = np.eye(3) if rotation is None else np.array(rotation, dtype=np.float64)
+        turn = np.eye(3) if rotation is None else checked_table(rotation, (3,), "rotation")
         if turn.shape != (3, 3) or not np.allclose(turn @ turn.T, np.eye(3), atol=1e-9):
             raise OrbiflowError("rotation must be an orthogonal (3, 3) matrix")
         self.form, self.columns = form, FORMS[form]
@@ -117,7 +118,7 @@ class RoundSpace(Space):
 
     def vectors(self, points: Tensor) -> Array:
         """As `unit_vectors`, float64 for NumPy."""
-        return self.unit_vectors(points.detach().double().cpu()).numpy()
+        return self.unit_vectors(self._checked(points).detach().double().cpu()).numpy()
 
     def features(self, points: Tensor) -> Tensor:
         return self.unit_vectors(points)[None]
@@ -204,6 +205,7 @@ def clear_rotation(
     Of `trials` random ones, that of least von Mises-Fisher kernel density (concentration 30) at the
     cone points.
     """
+    check_kind(space, RoundSpace, "space")
     vectors = to_vectors(data)
     rng = np.random.default_rng(seed)
     if len(vectors) > 5000:

@@ -12,6 +12,7 @@ import torch
 from numpy.typing import ArrayLike
 from torch import Tensor
 
+from orbiflow.density.arguments import float_tensor
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import CrystallographicGroup, DirichletDomain
 from orbiflow.symmetry.isometry import Array
@@ -72,8 +73,18 @@ class Space(ABC):
         return DirichletDomain(self.group, np.full(self.dim, 0.5))
 
     def project(self, points: Tensor) -> Tensor:
-        """Canonical representatives in [0, 1]^d of points (..., d); differentiable almost anywhere."""
-        return self.domain.project(points)
+        """Canonical representatives in [0, 1]^d of points (..., d); differentiable almost anywhere.
+
+        Raises:
+            OrbiflowError: for points of another dimension.
+        """
+        return self.domain.project(self._checked(points))
+
+    def _checked(self, points: Tensor) -> Tensor:
+        points = float_tensor(points, "points")
+        if not points.dim() or points.shape[-1] != self.dim:
+            raise OrbiflowError(f"expected points (..., {self.dim}), got {tuple(points.shape)}")
+        return points
 
     def log_area(self, points: Tensor) -> Tensor:
         """log of natural area over chart area (...,) at points (..., d)."""
@@ -106,7 +117,7 @@ class Space(ABC):
         Raises:
             OrbiflowError: for a measure that is not one of `MEASURES`.
         """
-        if measure not in MEASURES:
+        if not isinstance(measure, str) or measure not in MEASURES:
             raise OrbiflowError(f"measure must be one of {', '.join(MEASURES)}, got {measure!r}")
         if measure == "square":
             return torch.zeros_like(points[..., 0])

@@ -144,7 +144,10 @@ def read_density(path: str | Path) -> tuple[SymmetricDensity, dict[str, Any]]:
     Raises:
         InputFileError: if the file is missing, too large, damaged or of another kind.
     """
-    path = Path(path)
+    try:
+        path = Path(path)
+    except TypeError as error:
+        raise InputFileError(f"expected the path of a file, got {path!r}") from error
     try:
         size = path.stat().st_size
         if size > MAX_BYTES:
