@@ -40,7 +40,7 @@ def check_range(name: str, value: Any, low: float, high: float, *, integer: bool
     kind = numbers.Integral if integer else numbers.Real
     fits = isinstance(value, kind) and not isinstance(value, bool)
     if not fits or not low <= float(value) <= high:
-        what = "an integer " if integer else ""
+        what = "an integer " if integer and not fits else ""
         limits = f"from {low:g} to {high:g}" if high < math.inf else f"of at least {low:g}"
         raise OrbiflowError(f"{name} must be {what}{limits}, got {value!r}")
 

@@ -10,9 +10,10 @@ import numpy as np
 import torch
 from numpy.typing import ArrayLike
 
-from orbiflow.density.fitting.flow import MOST_DIM, FitSettings, fit_density
+from orbiflow.density.fitting.flow import MOST_DIM, fit_density
 from orbiflow.density.fitting.neural import NeuralSettings, fit_neural
 from orbiflow.density.fitting.report import FitReport, Progress
+from orbiflow.density.fitting.settings import FitSettings
 from orbiflow.density.models.symmetric import SymmetricDensity
 from orbiflow.density.spaces.catalogue import space_class
 from orbiflow.density.spaces.space import Space

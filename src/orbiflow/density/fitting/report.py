@@ -35,7 +35,7 @@ class FitReport:
     - `train_nll`, `validation_nll`: mean negative log density at the end, of `MOST_REPORTED` points
       at most.
     - `start_nll`: on the validation points, of the closed-form start.
-    - `stages`: one for each roughness.
+    - `stages`: one for each roughness, without those that were undone.
     - `steps`: RK4 steps a segment, in the end.
     - `mass`: integral over the square, see `SymmetricDensity.mass`; None above two dimensions.
     - `integration_error`: change of the flow's mean validation log density at doubled steps.
@@ -95,9 +95,15 @@ def mean_nll(density: SymmetricDensity, points: Tensor) -> float:
     return -float(density.log_prob(points).mean())
 
 
+def nll_at(density: SymmetricDensity, points: Tensor, steps: int) -> float:
+    """`mean_nll` with another number of Runge-Kutta steps a segment."""
+    with density.flow.with_steps(steps):
+        return mean_nll(density, points)
+
+
 def step_error(density: SymmetricDensity, points: Tensor) -> float:
     """Change of the mean log density at `points` when the steps are doubled."""
-    return abs(_finer(density, points) - mean_nll(density, points))
+    return abs(nll_at(density, points, 2 * density.flow.steps) - mean_nll(density, points))
 
 
 def settle(density: SymmetricDensity, points: Tensor, most: int) -> tuple[float, float | None]:
@@ -113,7 +119,7 @@ def settle(density: SymmetricDensity, points: Tensor, most: int) -> tuple[float,
     """
     flow, now = density.flow, mean_nll(density, points)
     while True:
-        finer = _finer(density, points)
+        finer = nll_at(density, points, 2 * flow.steps)
         error = abs(finer - now)
         last = flow.steps >= most
         if last or error <= MASS_TOLERANCE / 2:
@@ -121,11 +127,6 @@ def settle(density: SymmetricDensity, points: Tensor, most: int) -> tuple[float,
             if last or mass is None or abs(mass - 1) <= MASS_TOLERANCE / 2:
                 return error, mass
         flow.steps, now = 2 * flow.steps, finer
-
-
-def _finer(density: SymmetricDensity, points: Tensor) -> float:
-    with density.flow.with_steps(2 * density.flow.steps):
-        return mean_nll(density, points)
 
 
 def repeats_note(count: int, duplicates: int) -> list[str]:
