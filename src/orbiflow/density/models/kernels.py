@@ -73,17 +73,13 @@ class AdaptiveKernels(Base):
         rows, offsets = kernel_rows(self.space, self._center_features, self.concentrations)
         rows, offsets = rows.mT.contiguous(), offsets + self.weights.log()
         block = max(1, BLOCK_ENTRIES // len(self.centers))
-        parts = [self._log_sum(part, rows, offsets) for part in flat.split(block)]
-        values = torch.cat(parts) if parts else flat.new_zeros(0)
+        # features of all at once: block by block they would cost more than the kernels
+        images = self.space.features(flat)
+        parts = [_log_sum(part, rows, offsets) for part in images.split(block, dim=1)]
+        values = torch.cat(parts)
         if self.space.is_round:
             values = values + self.space.log_area(flat)
         return values.reshape(points.shape[:-1]).to(points.dtype)
-
-    def _log_sum(self, points: Tensor, rows: Tensor, offsets: Tensor) -> Tensor:
-        images = [
-            log_sum_exp(torch.addmm(offsets, image, rows)) for image in self.space.features(points)
-        ]
-        return torch.stack(images).logsumexp(dim=0)
 
     def sample(self, count: int, generator: torch.Generator) -> Tensor:
         seed = int(torch.randint(2**31, (), generator=generator))
@@ -98,6 +94,12 @@ class AdaptiveKernels(Base):
         return self.space.project(
             self.centers[chosen] + angle / (2 * math.pi) * rectangle(self.space)
         )
+
+
+def _log_sum(images: Tensor, rows: Tensor, offsets: Tensor) -> Tensor:
+    """(N,) of features (E, N, m): over kernels and images."""
+    sums = [log_sum_exp(torch.addmm(offsets, image, rows)) for image in images]
+    return torch.stack(sums).logsumexp(dim=0)
 
 
 def kernel_rows(space: Space, centers: Tensor, kappa: Tensor) -> tuple[Tensor, Tensor]:
