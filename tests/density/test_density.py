@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from orbiflow.density import (
+    MEASURES,
     KleinBottle,
     ProjectivePlane,
     Sphere,
@@ -166,10 +167,26 @@ def test_any_network_serves_as_a_field() -> None:
     assert torch.allclose(space.project(density.flow(start)).detach(), points, atol=1e-4)
 
 
+@every
+@pytest.mark.parametrize("measure", [None, *MEASURES])
+def test_entropy_is_the_mean_of_minus_log_prob(space, measure: str | None) -> None:
+    density, named = make(space, 1), {} if measure is None else {"measure": measure}
+    found = density.entropy(200, generator=torch.Generator().manual_seed(5), **named)
+    with torch.no_grad():
+        drawn = density.sample((200,), torch.Generator().manual_seed(5))
+        assert float(found) == pytest.approx(-float(density.log_prob(drawn, **named).mean()))
+        grid = midpoints(space, 200)
+        square, same = density.log_prob(grid), density.log_prob(grid, **named)
+    exact = -float((square.exp() * same).mean())
+    many = density.entropy(20_000, generator=torch.Generator().manual_seed(6), **named)
+    assert float(many) == pytest.approx(exact, abs=0.05)
+
+
 def test_entropy_and_divergence() -> None:
     flat = SymmetricDensity(Sphere(), make(Sphere(), 0, strength=0.0).flow)
     generator = torch.Generator().manual_seed(0)
-    assert float(flat.entropy(100, generator=generator)) == pytest.approx(math.log(4 * math.pi))
+    natural = flat.entropy(100, measure="natural", generator=generator)
+    assert float(natural) == pytest.approx(math.log(4 * math.pi))
     one, other = make(Torus(2), 1), make(Torus(2), 2)
     grid = midpoints(Torus(2), 150)
     with torch.no_grad():

@@ -11,8 +11,8 @@ import torch
 from PIL import Image
 
 from orbiflow.density.models.bases import UniformBase
-from orbiflow.density.models.blend import MixedDensity
-from orbiflow.density.models.kernels import AdaptiveKernels, is_round
+from orbiflow.density.models.blend import BlendedDensity
+from orbiflow.density.models.kernels import AdaptiveKernels
 from orbiflow.density.models.neural import NeuralField, NeuralFlow
 from orbiflow.density.models.symmetric import SymmetricDensity
 from orbiflow.density.spaces.flat import KleinBottle, Torus
@@ -217,11 +217,11 @@ def peaked(space, kappa, at=(0.3, 0.4), flow=0.01):
     kernels = AdaptiveKernels(
         space,
         torch.tensor([at], dtype=torch.float64),
-        torch.full((1, 1 if is_round(space) else 2), kappa, dtype=torch.float64),
+        torch.full((1, 1 if space.is_round else 2), kappa, dtype=torch.float64),
         torch.ones(1, dtype=torch.float64),
     )
     shares = torch.tensor([flow, 0.99 - flow, 0.01], dtype=torch.float64)
-    return MixedDensity(space, example(space).flow, UniformBase(space), kernels, shares)
+    return BlendedDensity(space, example(space).flow, UniformBase(space), kernels, shares)
 
 
 @every_space
