@@ -63,8 +63,7 @@ def test_it_integrates_to_one(space, base, seed: int) -> None:
 @settings(max_examples=5)
 @given(seed=seeds)
 def test_the_mass_tells_what_the_integrator_lost(space, seed: int) -> None:
-    density = make(space, seed, strength=0.2)
-    density.flow.steps = 1
+    density = make(space, seed, strength=0.2).with_steps(1)
     plain = on_a_plain_grid(density)
     assert density.mass(128) == pytest.approx(plain, abs=1e-4 + 0.1 * abs(plain - 1))
 

@@ -71,8 +71,7 @@ def test_log_prob_is_periodic(dim: int, seed: int) -> None:
 @settings(max_examples=6)
 @given(dims, seeds)
 def test_inverse_undoes_forward(dim: int, seed: int) -> None:
-    flow, at = random_flow(dim, seed), points(7, dim, seed)
-    flow.steps = 48
+    flow, at = random_flow(dim, seed).with_steps(48), points(7, dim, seed)
     with torch.no_grad():
         moved, log_det = flow.forward_and_log_det(at)
         back, minus = flow.inverse_and_log_det(moved)
@@ -99,8 +98,7 @@ def test_divergence_is_the_trace(dim: int, seed: int, depth: int, waves: int) ->
 @settings(max_examples=6)
 @given(st.integers(1, 4), seeds)
 def test_log_det_is_that_of_the_jacobian(dim: int, seed: int) -> None:
-    flow, at = random_flow(dim, seed), points(2, dim, seed)
-    flow.steps = 32
+    flow, at = random_flow(dim, seed).with_steps(32), points(2, dim, seed)
     log_det = flow.forward_and_log_det(at)[1]
     for k in range(2):
         table = torch.autograd.functional.jacobian(flow, at[k])
@@ -111,7 +109,7 @@ def test_log_det_is_that_of_the_jacobian(dim: int, seed: int) -> None:
 @given(st.integers(1, 2), seeds)
 def test_density_integrates_to_one(dim: int, seed: int) -> None:
     density = random_density(dim, seed)
-    density.flow.steps = 6
+    density = density.with_steps(6)
     with torch.no_grad():
         if dim == 2:
             grid = midpoints(density.space, 96)

@@ -247,7 +247,7 @@ def _refined(
         stages.append(stage)
         unconverged = step_error(density, held) > MASS_TOLERANCE
         if unconverged and density.flow.steps < MOST_STEPS:
-            density.flow.steps *= 2
+            density.flow = density.flow.with_steps(2 * density.flow.steps)
         elif left <= 0 or (number > 1 and stage.best == 0):
             break
     return stages

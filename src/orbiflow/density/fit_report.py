@@ -93,21 +93,20 @@ def settle(density: SymmetricDensity, points: Tensor, most: int) -> tuple[float,
     Returns:
         By how much the mean log density still changes, and the mass (None in other dimensions).
     """
-    flow, now = density.flow, mean_nll(density, points)
+    now = mean_nll(density, points)
     while True:
         finer = _finer(density, points)
         error = abs(finer - now)
-        last = flow.steps >= most
+        last = density.flow.steps >= most
         if last or error <= MASS_TOLERANCE / 2:
             mass = density.mass() if density.space.dim == 2 else None
             if last or mass is None or abs(mass - 1) <= MASS_TOLERANCE / 2:
                 return error, mass
-        flow.steps, now = 2 * flow.steps, finer
+        density.flow, now = density.flow.with_steps(2 * density.flow.steps), finer
 
 
 def _finer(density: SymmetricDensity, points: Tensor) -> float:
-    with density.flow.with_steps(2 * density.flow.steps):
-        return mean_nll(density, points)
+    return mean_nll(density.with_steps(2 * density.flow.steps), points)
 
 
 def repeats_note(count: int, duplicates: int) -> list[str]:

@@ -153,12 +153,13 @@ def refine(
     weights = _even(train) if weights is None else weights
     held_weights = _even(validation) if held_weights is None else held_weights
     objective = Objective(density, train, weights, kinetic=kinetic, roughness=roughness)
+    finer = density.with_steps(2 * density.flow.steps)
     began = time.monotonic()
 
     def score() -> float:
         # at doubled steps: what only exploits the integrator gains nothing here
-        with torch.no_grad(), density.flow.with_steps(2 * density.flow.steps):
-            return -float((held_weights * density.log_prob(validation)).sum())
+        with torch.no_grad():
+            return -float((held_weights * finer.log_prob(validation)).sum())
 
     with torch.no_grad():
         trains = [-float((weights * density.log_prob(train)).sum())]

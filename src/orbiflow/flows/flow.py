@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable, Iterable, Iterator
+from typing import Self
 
 import torch
 from torch import Tensor, nn
@@ -10,7 +12,8 @@ from torch import Tensor, nn
 from orbiflow.errors import OrbiflowError
 from orbiflow.fields.derivatives import with_divergence
 from orbiflow.fields.symmetrize import VectorField
-from orbiflow.flows.integrators import RungeKutta, method
+from orbiflow.flows.integrators import RungeKutta
+from orbiflow.flows.integrators import method as find_method
 
 
 class _Plain(nn.Module):
@@ -64,29 +67,47 @@ class Flow(nn.Module):
         if not listed:
             raise OrbiflowError("a flow needs at least one vector field")
         self.segments = nn.ModuleList(f if isinstance(f, nn.Module) else _Plain(f) for f in listed)
-        self.duration = float(duration)
-        self.steps = steps
-        self.method = method
+        self._duration = float(duration)
+        self._steps = _checked_steps(steps)
+        self._method: RungeKutta = find_method(method)
 
     @property
     def steps(self) -> int:
-        """Runge-Kutta steps in each segment; may be changed at any time."""
+        """Runge-Kutta steps in each segment; see `with_steps`."""
         return self._steps
-
-    @steps.setter
-    def steps(self, value: int) -> None:
-        if isinstance(value, bool) or int(value) != value or value < 1:
-            raise OrbiflowError(f"steps must be an integer of at least 1, got {value!r}")
-        self._steps = int(value)
 
     @property
     def method(self) -> str:
         """Name of the integrator."""
         return self._method.name
 
-    @method.setter
-    def method(self, name: str) -> None:
-        self._method: RungeKutta = method(name)
+    @property
+    def duration(self) -> float:
+        """Length of time of each segment."""
+        return self._duration
+
+    def with_steps(self, steps: int, *, method: str | None = None) -> Self:
+        """The same flow integrated otherwise: a view that shares fields and parameters.
+
+        This flow stays as it is, so others that hold it notice nothing. A view has the same
+        `state_dict`; training it trains this flow.
+
+        Args:
+            steps: Runge-Kutta steps in each segment.
+            method: as in the constructor; default this flow's.
+
+        Raises:
+            OrbiflowError: for `steps` < 1 or an unknown method.
+
+        >>> flow = Flow(torch.sin, steps=8)
+        >>> flow.with_steps(2 * flow.steps).steps, flow.steps
+        (16, 8)
+        """
+        view = copy.copy(self)  # shallow: of modules and parameters it holds the very same
+        view._steps = _checked_steps(steps)
+        if method is not None:
+            view._method = find_method(method)
+        return view
 
     def forward(self, points: Tensor) -> Tensor:
         """Where points (..., d) are carried."""
@@ -125,14 +146,9 @@ class Flow(nn.Module):
         For a method of order p the error at `steps` is about 2^p / (2^p - 1) times this.
         """
         apply = self.inverse if inverse else self.forward
-        coarse = apply(points)
-        with self.with_steps(2 * self.steps):
-            fine = apply(points)
-        return float((coarse - fine).norm(dim=-1).max())
-
-    def with_steps(self, steps: int) -> _StepsSet:
-        """Context manager: another number of steps inside a `with` block."""
-        return _StepsSet(self, steps)
+        finer = self.with_steps(2 * self.steps)
+        fine = finer.inverse(points) if inverse else finer(points)
+        return float((apply(points) - fine).norm(dim=-1).max())
 
     def _with_log_det(
         self, points: Tensor, segments: Iterable[nn.Module], duration: float
@@ -164,16 +180,10 @@ class Flow(nn.Module):
         return f"steps={self.steps}, method={self.method}, duration={self.duration}"
 
 
-class _StepsSet:
-    def __init__(self, flow: Flow, steps: int) -> None:
-        self._flow, self._steps, self._before = flow, steps, flow.steps
-
-    def __enter__(self) -> Flow:
-        self._flow.steps = self._steps
-        return self._flow
-
-    def __exit__(self, *_: object) -> None:
-        self._flow.steps = self._before
+def _checked_steps(value: int) -> int:
+    if isinstance(value, bool) or int(value) != value or value < 1:
+        raise OrbiflowError(f"steps must be an integer of at least 1, got {value!r}")
+    return int(value)
 
 
 def _slopes(
