@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import math
 
 import numpy as np
 import scipy.optimize
@@ -11,11 +10,12 @@ import shapely
 import torch
 from torch import Tensor
 
-from orbiflow.escher.descent import CALM
+from orbiflow.escher.descent import calm
 from orbiflow.escher.model import TileModel
 from orbiflow.escher.overlap import Overlap
 from orbiflow.escher.target import Target
 from orbiflow.fields import FourierField
+from orbiflow.fields.lipschitz import steepness
 from orbiflow.flows import Flow
 from orbiflow.symmetry.isometry import Array
 
@@ -67,7 +67,7 @@ class _Polish:
         self.flow = Flow([self.field], steps=STEPS, method="midpoint")
         magnitude = torch.tensor(self.field.basis.magnitude, dtype=torch.float64)
         self.scale = (1 + magnitude**2) ** (-SMOOTHNESS / 2)
-        self.steepness = math.sqrt(2.0) * 2 * math.pi * magnitude
+        self.magnitude, self.limit = magnitude, calm(self.field) * STEPS
         pose = (self.model.angle, self.model.log_scale, self.model.offset, self.model.stretch)
         self.pose = [parameter for parameter in pose if parameter.numel()]
         self.start = [p.detach().clone() for p in self.pose]
@@ -127,5 +127,4 @@ class _Polish:
         return [self.field.parameters_, *self.pose]
 
     def _calm(self) -> bool:
-        steep = float((self.field.parameters_.detach().abs() * self.steepness).sum())
-        return steep <= CALM * STEPS
+        return float(steepness(self.field.parameters_.detach(), self.magnitude)) <= self.limit
