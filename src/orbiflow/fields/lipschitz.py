@@ -31,7 +31,7 @@ from orbiflow.symmetry import CrystallographicGroup
 from orbiflow.symmetry.isometry import Array
 
 MOST_SIGNS = 6
-"""Terms of an orbit up to which all signs are tried: every plane group; else the triangle inequality."""
+"""Largest orbit, in terms, of which all signs are tried: no plane group has a larger one."""
 
 
 def steepness(parameters: Tensor, magnitude: Tensor) -> Tensor:
