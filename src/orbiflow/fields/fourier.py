@@ -179,6 +179,7 @@ def _orders(basis: InvariantBasis) -> tuple[int, ...]:
 
 
 @lru_cache(maxsize=64)  # the segments of a flow share them
+@torch.inference_mode(False)  # what the first caller may not train, no other could
 def _constants(
     group: CrystallographicGroup,
     max_frequency: int,

@@ -47,7 +47,8 @@ class InvariantField(nn.Module, ABC):
         self.max_frequency = int(max_frequency)
         self.size = self.basis.size
         shape = (self.size,) if batch is None else (batch, self.size)
-        self.parameters_ = nn.Parameter(torch.zeros(shape, dtype=dtype, device=device))
+        with torch.inference_mode(False):
+            self.parameters_ = nn.Parameter(torch.zeros(shape, dtype=dtype, device=device))
 
     @abstractmethod
     def _constants(self, dtype: torch.dtype, device: torch.device) -> dict[str, Tensor]:

@@ -38,9 +38,9 @@ class PeriodicFeatures(nn.Module):
             k = np.array([v for v in box if v > (0,) * d], dtype=np.float64)
         else:
             k = np.concatenate([m * np.eye(d) for m in range(1, max_frequency + 1)])
-        self.register_buffer(
-            "frequencies", torch.tensor(k @ group.inverse_lattice), persistent=False
-        )
+        with torch.inference_mode(False):  # or no derivative could be taken through it, ever
+            waves = torch.tensor(k @ group.inverse_lattice)
+        self.register_buffer("frequencies", waves, persistent=False)
 
     @property
     def size(self) -> int:
@@ -53,6 +53,7 @@ class PeriodicFeatures(nn.Module):
         return torch.cat([phase.cos(), phase.sin()], dim=-1)
 
 
+@torch.inference_mode(False)  # its divergence is taken by autograd
 def neural_field(
     group: CrystallographicGroup,
     *,

@@ -140,6 +140,7 @@ def grid_sides(group: CrystallographicGroup, basis: InvariantBasis) -> tuple[int
 
 
 @lru_cache(maxsize=64)  # the segments of a flow share them
+@torch.inference_mode(False)  # what the first caller may not train, no other could
 def _constants(
     group: CrystallographicGroup,
     max_frequency: int,
