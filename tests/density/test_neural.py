@@ -15,7 +15,7 @@ from orbiflow.density.density import midpoints
 from orbiflow.density.fit_neural import NeuralSettings, fit_neural
 from orbiflow.density.mixture import SCALES, MixtureBase, chained
 from orbiflow.density.mixture_fit import concentration, fit_mixture
-from orbiflow.density.neural import NeuralField, NeuralFlow, speed, way
+from orbiflow.density.neural import NeuralFlow, NeuralTorusField, speed, way
 from orbiflow.density.neural_storage import (
     mixture_from_header,
     mixture_header,
@@ -33,7 +33,7 @@ dims = st.integers(1, 5)
 
 def random_flow(dim: int, seed: int, *, size: float = 0.3, **options: Any) -> NeuralFlow:
     """A flow whose last layer is not zero."""
-    field = NeuralField(dim, **{"width": 16, "depth": 3, **options}, seed=seed)
+    field = NeuralTorusField(dim, **{"width": 16, "depth": 3, **options}, seed=seed)
     generator = torch.Generator().manual_seed(seed)
     with torch.no_grad():
         field.last.weight.normal_(0.0, size / 16, generator=generator)
@@ -241,9 +241,9 @@ def test_hostile_tensors_are_rejected() -> None:
 
 def test_arguments_are_checked() -> None:
     with pytest.raises(OrbiflowError, match="width"):
-        NeuralField(3, width=0)
+        NeuralTorusField(3, width=0)
     with pytest.raises(OrbiflowError, match="steps"):
-        NeuralFlow(NeuralField(3), steps=0)
+        NeuralFlow(NeuralTorusField(3), steps=0)
     with pytest.raises(OrbiflowError, match="for tori"):
         fit_neural(Sphere(), torch.rand(20, 2))
     with pytest.raises(OrbiflowError, match="10 different"):

@@ -15,7 +15,7 @@ from orbiflow.density.density import SymmetricDensity
 from orbiflow.density.flat_spaces import KleinBottle, Torus
 from orbiflow.density.kernels import AdaptiveKernels, is_round
 from orbiflow.density.mixed import MixedDensity
-from orbiflow.density.neural import NeuralField, NeuralFlow
+from orbiflow.density.neural import NeuralFlow, NeuralTorusField
 from orbiflow.density.round_spaces import ProjectivePlane, Sphere, to_vectors
 from orbiflow.draw import density_square
 from orbiflow.draw.density_axes import angle_axis, axis_label, view_of
@@ -264,13 +264,15 @@ def test_a_flow_in_few_colours_is_small():
 
 
 def test_a_field_that_changes_with_time_is_drawn():
-    density = SymmetricDensity(SPACES[0], NeuralFlow(NeuralField(2, width=8)))
+    density = SymmetricDensity(SPACES[0], NeuralFlow(NeuralTorusField(2, width=8)))
     assert flow_png(density, cells=1, width_px=200)
 
 
 @pytest.mark.parametrize("dim", [1, 2, 3, 5])
 def test_pairs_of_angles(dim):
-    density = SymmetricDensity(Torus(dim, unit="degrees"), NeuralFlow(NeuralField(dim, width=4)))
+    density = SymmetricDensity(
+        Torus(dim, unit="degrees"), NeuralFlow(NeuralTorusField(dim, width=4))
+    )
     data = torch.tensor(np.random.default_rng(0).random((40, dim)))
     names = [f"${k}_" for k in range(dim)]
     both = corner_png(density, data, data[:9], names=names, width_px=400)

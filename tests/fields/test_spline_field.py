@@ -160,3 +160,14 @@ def test_other_groups_are_refused(group: CrystallographicGroup) -> None:
 def test_points_of_another_dimension_are_refused() -> None:
     with pytest.raises(OrbiflowError, match="expected points"):
         SplineField(identification_group("torus"), 2)(torch.zeros(3, 3, dtype=torch.float64))
+
+
+@given(names, seeds)
+@settings(max_examples=20, deadline=None)
+def test_no_sampled_slope_exceeds_its_lipschitz_bound(name: str, seed: int) -> None:
+    spline, _, _ = pair(name, seed)
+    with torch.no_grad():
+        slopes = jacobian(spline, 6 * torch.rand(500, 2, dtype=torch.float64) - 3)
+    steepest = float(torch.linalg.matrix_norm(slopes, ord=2).max())
+    bound = float(spline.lipschitz_bound())
+    assert 0.3 * bound < steepest <= bound

@@ -11,7 +11,7 @@ from orbiflow.density.kernel_fit import mix_kernels
 from orbiflow.density.kernels import AdaptiveKernels
 from orbiflow.density.mixed import MixedDensity
 from orbiflow.density.mixture import MixtureBase
-from orbiflow.density.neural import NeuralField, NeuralFlow
+from orbiflow.density.neural import NeuralFlow, NeuralTorusField
 from orbiflow.density.patches import from_klein, to_klein
 from orbiflow.density.round_spaces import (
     ProjectivePlane,
@@ -35,9 +35,9 @@ __all__ = [
     "KleinBottle",
     "MixedDensity",
     "MixtureBase",
-    "NeuralField",
     "NeuralFlow",
     "NeuralSettings",
+    "NeuralTorusField",
     "ProjectivePlane",
     "Space",
     "Sphere",

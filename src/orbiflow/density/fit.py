@@ -158,7 +158,7 @@ def fit_density(
         ridge=settings.ridge,
         generator=generator,
     )
-    density = SymmetricDensity(space, Flow(segments, steps=settings.steps), base)
+    density = SymmetricDensity(space, Flow(segments, steps=settings.steps, warn=False), base)
     start_nll = mean_nll(density, validation.to(dtype))
     stages = _refined(density, train, validation, settings, say)
     density.flow.double()

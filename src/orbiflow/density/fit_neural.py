@@ -26,7 +26,7 @@ from orbiflow.density.flat_spaces import Torus
 from orbiflow.density.likelihood import Refinement
 from orbiflow.density.matching import coupled
 from orbiflow.density.mixture_fit import MixtureFit, fit_mixture
-from orbiflow.density.neural import MAX_DEPTH, MAX_WAVES, MAX_WIDTH, NeuralField, NeuralFlow
+from orbiflow.density.neural import MAX_DEPTH, MAX_WAVES, MAX_WIDTH, NeuralFlow, NeuralTorusField
 from orbiflow.density.space import Space
 from orbiflow.errors import OrbiflowError
 
@@ -58,7 +58,7 @@ class NeuralSettings:
 
     - `base`: "mixture" (of von Mises chains, see `fit_mixture`) or "uniform".
     - `components`, `members`: of the mixture, at most.
-    - `width`, `depth`, `waves`: of the network, see `NeuralField`.
+    - `width`, `depth`, `waves`: of the network, see `NeuralTorusField`.
     - `steps`: Runge-Kutta steps; doubled where the integrator has not converged. None for 2 with a
       mixture, 8 without.
     - `matching`: iterations of flow matching; None for 0 with a mixture, 20,000 without.
@@ -159,7 +159,7 @@ def fit_neural(
     points = space.project(points.double())
     train, validation, duplicates = split(points, settings.validation, generator)
     base, mixture = _base(space, train, validation, settings, say)
-    field = NeuralField(
+    field = NeuralTorusField(
         space.dim,
         width=settings.width,
         depth=settings.depth,
@@ -252,7 +252,7 @@ class _Trainer:
         if self.settings.base == "mixture" and not self.settings.matchings and gain < WORTHWHILE:
             self.idle = True
             # a new field is zero, and this one costs next to nothing
-            still = NeuralField(self.density.space.dim, width=1, depth=1, waves=1)
+            still = NeuralTorusField(self.density.space.dim, width=1, depth=1, waves=1)
             self.density.flow = NeuralFlow(still, steps=1)
         return done
 
@@ -274,9 +274,9 @@ class _Trainer:
         return -self.density.log_prob(self._batch()).mean()
 
     @property
-    def _field(self) -> NeuralField:
+    def _field(self) -> NeuralTorusField:
         field = self.density.flow.field
-        assert isinstance(field, NeuralField)  # by construction
+        assert isinstance(field, NeuralTorusField)  # by construction
         return field
 
     @torch.no_grad()

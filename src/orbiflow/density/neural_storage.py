@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 
 from orbiflow.density.mixture import SCALES, MixtureBase
-from orbiflow.density.neural import MAX_DEPTH, MAX_WAVES, MAX_WIDTH, NeuralField, NeuralFlow
+from orbiflow.density.neural import MAX_DEPTH, MAX_WAVES, MAX_WIDTH, NeuralFlow, NeuralTorusField
 from orbiflow.density.space import Space
 from orbiflow.errors import OrbiflowError
 
@@ -62,7 +62,7 @@ def neural_from_header(
         raise OrbiflowError(f"a flow of {header['dim']} angles on a torus of {space.dim}")
     # on the meta device, shapes cost nothing
     with torch.device("meta"):
-        field = NeuralField(space.dim, width=width, depth=depth, waves=waves)
+        field = NeuralTorusField(space.dim, width=width, depth=depth, waves=waves)
     expected = {FLOW + name: value.shape for name, value in field.state_dict().items()}
     found = {name: value for name, value in tensors.items() if name.startswith(FLOW)}
     if expected.keys() != found.keys():

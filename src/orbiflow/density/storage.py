@@ -174,6 +174,7 @@ def _tabled_flow(header: dict[str, Any], stack: torch.Tensor, space: Space) -> F
         steps=_bounded(header["steps"], MAX_STEPS, "steps"),
         method=str(header["method"]),
         duration=float(header["duration"]),
+        warn=False,  # the fit has settled them and said if it could not
     )
 
 

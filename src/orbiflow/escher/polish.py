@@ -64,7 +64,7 @@ class _Polish:
         self.field = FourierField(
             model.group, model.max_frequency, batch=1, smoothness=0.0, dtype=torch.float64
         )
-        self.flow = Flow([self.field], steps=STEPS, method="midpoint")
+        self.flow = Flow([self.field], steps=STEPS, method="midpoint", warn=False)
         magnitude = torch.tensor(self.field.basis.magnitude, dtype=torch.float64)
         self.scale = (1 + magnitude**2) ** (-SMOOTHNESS / 2)
         self.magnitude, self.limit = magnitude, calm(self.field) * STEPS

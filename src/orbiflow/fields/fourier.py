@@ -10,7 +10,6 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from orbiflow.errors import OrbiflowError
 from orbiflow.fields.invariant_field import InvariantField, sobolev_weights
 from orbiflow.fields.invariants import InvariantBasis, invariant_basis
 from orbiflow.fields.lipschitz import coefficient_bound
@@ -162,10 +161,7 @@ class FourierField(InvariantField):
 
     def _values(self, weights: Tensor, points: Tensor) -> Tensor:
         d = self.group.dim
-        single = self.parameters_.dim() == 1
-        if points.shape[-1] != d or (not single and points.shape[0] != weights.shape[0]):
-            expected = f"(..., {d})" if single else f"({weights.shape[0]}, ..., {d})"
-            raise OrbiflowError(f"expected points of shape {expected}, got {tuple(points.shape)}")
+        self._check_points(points)
         lead = points.shape[:-1]
         flat = points.reshape(weights.shape[0], -1, d)
         # for a single field a plain product: the batched one is slower

@@ -14,11 +14,10 @@ import torch
 from numpy.typing import ArrayLike
 from torch import Tensor, nn
 
+from orbiflow.fields.protocol import VectorField, is_time_dependent
 from orbiflow.symmetry import CrystallographicGroup, Line, identity, rotation, transflection
+from orbiflow.symmetry.group import checked_group
 from orbiflow.symmetry.isometry import Isometry
-
-VectorField = Callable[[Tensor], Tensor]
-"""A map from points (..., d) to vectors (..., d)."""
 
 
 class Symmetrized(nn.Module):
@@ -28,19 +27,19 @@ class Symmetrized(nn.Module):
     """
 
     def __init__(
-        self, field: VectorField, group: CrystallographicGroup, *, periodic: bool = False
+        self, field: Callable[..., Tensor], group: CrystallographicGroup, *, periodic: bool = False
     ) -> None:
         super().__init__()
         self.field = field
-        self.group = group
+        self.group = checked_group(group)
         self.periodic = periodic
+        self.time_dependent = is_time_dependent(field)
 
-    def forward(self, points: Tensor) -> Tensor:
-        """V at points (..., d)."""
+    def forward(self, points: Tensor, *time: Tensor) -> Tensor:
+        """V at points (..., d), and at a time () if the field is time-dependent."""
         images = self.group.images(points)
-        values = (
-            self.field(images) if self.periodic else blend(self.field, self.group.lattice, images)
-        )
+        field = _at_time(self.field, time)
+        values = field(images) if self.periodic else blend(field, self.group.lattice, images)
         linear = torch.tensor(self.group.linear_parts, dtype=values.dtype, device=values.device)
         # the inverse of R acts on row vectors as multiplication by R
         flat = values.reshape(self.group.order, -1, self.group.dim) @ linear
@@ -50,18 +49,26 @@ class Symmetrized(nn.Module):
         return f"{self.group!r}, periodic={self.periodic}"
 
 
+def _at_time(field: Callable[..., Tensor], time: tuple[Tensor, ...]) -> VectorField:
+    return (lambda points: field(points, *time)) if time else field
+
+
 def symmetrize(
-    field: VectorField, group: CrystallographicGroup, *, periodic: bool = False
+    field: Callable[..., Tensor], group: CrystallographicGroup, *, periodic: bool = False
 ) -> Symmetrized:
     """Make any field commute with `group`: V(g p) = R_g V(p).
 
     Args:
         field: any callable from points (..., d) to vectors of the same shape: a torch module, a
-            function, a lambda. It need not be periodic: translates of it are blended smoothly over
-            neighbouring cells (2^d evaluations). A field that commutes already is left unchanged.
+            function, a lambda, or a `TimeDependentField`. It need not be periodic: translates of it
+            are blended smoothly over neighbouring cells (2^d evaluations). A field that commutes
+            already is left unchanged.
         group: of R^d.
         periodic: set it if `field` is known to be periodic under the group's lattice (for instance a
             network behind `PeriodicFeatures`): skips the blending.
+
+    Raises:
+        OrbiflowError: if `group` is no group, or, when called, for points of another dimension.
 
     >>> import torch
     >>> from orbiflow.symmetry import wallpaper_group

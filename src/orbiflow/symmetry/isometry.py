@@ -31,6 +31,13 @@ def matching(array: Array, like: Points) -> Points:
     return cast(Points, array)
 
 
+def check_dimension(points: Points, dim: int) -> None:
+    """Raise GroupError for points that are not of shape (..., dim)."""
+    shape = tuple(np.shape(points))
+    if not shape or shape[-1] != dim:
+        raise GroupError(f"expected points of shape (..., {dim}), got {shape}")
+
+
 @dataclass(frozen=True, eq=False)
 class Isometry:
     """The map p -> linear @ p + translation.
@@ -83,12 +90,22 @@ class Isometry:
         return 1 if np.linalg.det(self.linear) > 0 else -1
 
     def __call__(self, points: Points) -> Points:
-        """Image of points, shape (..., d), NumPy or torch."""
+        """Image of points, shape (..., d), NumPy or torch.
+
+        Raises:
+            GroupError: for points of another dimension.
+        """
+        check_dimension(points, self.dim)
         linear, translation = (matching(a, points) for a in (self.linear, self.translation))
         return points @ linear.T + translation
 
     def push(self, vectors: Points) -> Points:
-        """Push-forward of tangent vectors, shape (..., d): the linear part alone."""
+        """Push-forward of tangent vectors, shape (..., d): the linear part alone.
+
+        Raises:
+            GroupError: for vectors of another dimension.
+        """
+        check_dimension(vectors, self.dim)
         return vectors @ matching(self.linear, vectors).T
 
     def __matmul__(self, other: Isometry) -> Isometry:
