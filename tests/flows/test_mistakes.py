@@ -36,9 +36,10 @@ def test_three_columns_into_a_planar_field(kind):
     with pytest.raises(OrbiflowError, match=r"points of shape \(\.\.\., 2\), got \(4, 3\)"):
         Flow(PLANAR[kind], steps=1)(THREE)
     for apply in (P4.images, P4.wrap, P4.cosets[1], P4.cosets[1].push):
-        for points in (THREE, THREE.numpy()):
-            with pytest.raises(GroupError, match=r"shape \(\.\.\., 2\), got \(4, 3\)"):
-                apply(points)
+        with pytest.raises(GroupError, match=r"shape \(\.\.\., 2\), got \(4, 3\)"):
+            apply(THREE)
+        with pytest.raises(GroupError, match=r"shape \(\.\.\., 2\), got \(4, 3\)"):
+            apply(THREE.numpy())
 
 
 @pytest.mark.parametrize("kind", ["fourier", "spline", "network"])
