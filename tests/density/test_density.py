@@ -37,7 +37,7 @@ def make(space, seed: int = 0, *, base=UniformBase, segments: int = 2, strength:
         noise = torch.randn(field.size, generator=generator, dtype=torch.float64)
         field.parameters_.data.copy_(strength * noise / noise.norm())  # of rms `strength` at most
         fields.append(field)
-    return SymmetricDensity(space, Flow(fields, steps=6), base(space))
+    return SymmetricDensity(space, Flow(fields, steps=6, warn=False), base(space))
 
 
 def square(seed: int, count: int = 40, dim: int = 2) -> torch.Tensor:

@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import torch
 from numpy.typing import ArrayLike
 from torch import Tensor, nn
 
+from orbiflow.fields.derivatives import prepared_with_divergence
 from orbiflow.fields.protocol import VectorField, is_time_dependent
 from orbiflow.symmetry import CrystallographicGroup, Line, identity, rotation, transflection
 from orbiflow.symmetry.group import checked_group
@@ -40,6 +42,31 @@ class Symmetrized(nn.Module):
         images = self.group.images(points)
         field = _at_time(self.field, time)
         values = field(images) if self.periodic else blend(field, self.group.lattice, images)
+        return self._mean(values, points)
+
+    def with_divergence(self, points: Tensor, *time: Tensor) -> tuple[Tensor, Tensor]:
+        """V (..., d) and its divergence (...,): the mean of the given field's own at the images.
+
+        Derivatives are asked of the given field alone, not of what symmetrizes it: R^-1 J R has the
+        trace of J.
+        """
+        images = self.group.images(points)
+        joint = _at_time(prepared_with_divergence(self.field), time)
+        if not self.periodic:
+            values, divergence = blend_with_divergence(joint, self.group.lattice, images)
+        else:
+            values, divergence = joint(images)
+        return self._mean(values, points), divergence.mean(dim=0)
+
+    def divergence(self, points: Tensor, *time: Tensor) -> Tensor:
+        """Trace of the Jacobian at points (..., d), as (...,)."""
+        return self.with_divergence(points, *time)[1]
+
+    def bound_with_divergence(self) -> Callable[[Tensor], tuple[Tensor, Tensor]]:
+        """V and its divergence together, see `with_divergence`."""
+        return self.with_divergence
+
+    def _mean(self, values: Tensor, points: Tensor) -> Tensor:
         linear = torch.tensor(self.group.linear_parts, dtype=values.dtype, device=values.device)
         # the inverse of R acts on row vectors as multiplication by R
         flat = values.reshape(self.group.order, -1, self.group.dim) @ linear
@@ -49,7 +76,7 @@ class Symmetrized(nn.Module):
         return f"{self.group!r}, periodic={self.periodic}"
 
 
-def _at_time(field: Callable[..., Tensor], time: tuple[Tensor, ...]) -> VectorField:
+def _at_time(field: Callable[..., Any], time: tuple[Tensor, ...]) -> Callable[[Tensor], Any]:
     return (lambda points: field(points, *time)) if time else field
 
 
@@ -88,13 +115,43 @@ def blend(field: VectorField, lattice: ArrayLike, points: Tensor) -> Tensor:
     w(u) = prod cos^2(pi u_i / 2) on [-1, 1]^d sums to one over the translates, so a periodic field is
     unchanged and a smooth field stays continuously differentiable.
     """
+    shifted, at = _translates(lattice, points)
+    weight = torch.cos(shifted * (torch.pi / 2)).square().prod(dim=-1, keepdim=True)
+    return (weight * field(at)).sum(dim=0)
+
+
+def blend_with_divergence(
+    joint: Callable[[Tensor], tuple[Tensor, Tensor]], lattice: ArrayLike, points: Tensor
+) -> tuple[Tensor, Tensor]:
+    """As `blend` for a field that gives V and its divergence, both: div(w V) = w div V + grad w . V."""
+    shifted, at = _translates(lattice, points)
+    values, divergence = joint(at)
+    single = torch.cos(shifted * (torch.pi / 2)).square()
+    weight = single.prod(dim=-1)
+    slopes = []
+    for axis in range(points.shape[-1]):
+        others = [i for i in range(points.shape[-1]) if i != axis]
+        along = -torch.pi / 2 * torch.sin(torch.pi * shifted[..., axis])
+        slopes.append(along * single[..., others].prod(dim=-1))
+    gradient = torch.stack(slopes, dim=-1) @ _inverse(lattice, points)
+    total = weight * divergence + (gradient * values).sum(dim=-1)
+    return (weight[..., None] * values).sum(dim=0), total.sum(dim=0)
+
+
+def _translates(lattice: ArrayLike, points: Tensor) -> tuple[Tensor, Tensor]:
+    """u - n for the 2^d corners n of the cell, fractional (2^d, ..., d), and as points."""
     basis = torch.as_tensor(np.array(lattice), dtype=points.dtype, device=points.device)
-    u = points @ torch.linalg.inv(basis).mT
+    u = points @ _inverse(lattice, points).mT
     u = u - u.detach().floor()
     corners = itertools.product((0.0, 1.0), repeat=basis.shape[0])
     shifted = torch.stack([u - u.new_tensor(corner) for corner in corners])
-    weight = torch.cos(shifted * (torch.pi / 2)).square().prod(dim=-1, keepdim=True)
-    return (weight * field(shifted @ basis.mT)).sum(dim=0)
+    return shifted, shifted @ basis.mT
+
+
+def _inverse(lattice: ArrayLike, like: Tensor) -> Tensor:
+    return torch.linalg.inv(
+        torch.as_tensor(np.array(lattice), dtype=like.dtype, device=like.device)
+    )
 
 
 def periodic_operator(field: VectorField, lattice: ArrayLike) -> VectorField:
