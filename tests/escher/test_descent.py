@@ -127,7 +127,7 @@ def test_a_fit_certifies_and_survives_storage(name: str) -> None:
 
 def test_the_inverse_of_the_flow_takes_the_tile_back() -> None:
     model = fit_descent(TARGET, isohedral_class("IH6"), QUICK).model.take([0]).double()
-    model.flow.method, model.flow.steps = "rk4", 4
+    model.flow = model.flow.with_steps(4, method="rk4")
     with torch.no_grad():
         points = model.prototile()[0]
         assert (model.inverse(model(points)) - points).abs().max() < 1e-6

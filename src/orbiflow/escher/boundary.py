@@ -48,12 +48,12 @@ def converge(
     """
     coarse = model.flow(points)
     while True:
-        with model.flow.with_steps(2 * model.flow.steps):
-            fine = model.flow(points)
+        finer = model.flow.with_steps(2 * model.flow.steps)
+        fine = finer(points)
         error = float((fine - coarse).abs().max())
         if not math.isfinite(error):
             raise CertificationError("the flow has no finite values: lower the learning rate")
-        model.flow.steps *= 2
+        model.flow = finer
         if error <= tolerance or (force and model.flow.steps >= MAX_STEPS):
             return fine, error
         if model.flow.steps >= MAX_STEPS:
@@ -87,7 +87,7 @@ def extract_tile(model: TileModel, *, force: bool = False) -> tuple[Tile, TileMo
     model.require_single()
     kind = model.isohedral_class
     model = model.take([0]).double()
-    model.flow.method, model.flow.steps = "rk4", max(1, 8 // model.segments)
+    model.flow = model.flow.with_steps(max(1, 8 // model.segments), method="rk4")
     sides = model.prototile()[0].shape[1]
     tile = None
     for count in DENSE:

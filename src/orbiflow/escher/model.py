@@ -104,7 +104,7 @@ class TileModel(nn.Module):
             FourierField(self.group, max_frequency, batch=size, smoothness=smoothness, dtype=dtype)
             for _ in range(segments)
         ]
-        self.flow = Flow(fields, steps=steps, method=method)
+        self.flow = Flow(fields, steps=steps, method=method, warn=False)
         self.max_frequency = max_frequency
         self.segments = segments
         self.smoothness = smoothness

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import math
 
 import numpy as np
 import scipy.optimize
@@ -12,9 +11,10 @@ import torch
 from torch import Tensor
 
 from orbiflow.cancel import Cancel
-from orbiflow.escher.descent import CALM
+from orbiflow.escher.descent import calm
 from orbiflow.escher.model import TileModel
 from orbiflow.fields import FourierField
+from orbiflow.fields.lipschitz import steepness
 from orbiflow.flows import Flow
 from orbiflow.likeness.overlap import Overlap
 from orbiflow.silhouette.target import Target
@@ -77,10 +77,10 @@ class _Polish:
         self.field = FourierField(
             model.group, model.max_frequency, batch=1, smoothness=0.0, dtype=torch.float64
         )
-        self.flow = Flow([self.field], steps=STEPS, method="midpoint")
+        self.flow = Flow([self.field], steps=STEPS, method="midpoint", warn=False)
         magnitude = torch.tensor(self.field.basis.magnitude, dtype=torch.float64)
         self.scale = (1 + magnitude**2) ** (-SMOOTHNESS / 2)
-        self.steepness = math.sqrt(2.0) * 2 * math.pi * magnitude
+        self.magnitude, self.limit = magnitude, calm(self.field) * STEPS
         pose = (self.model.angle, self.model.log_scale, self.model.offset, self.model.stretch)
         self.pose = [parameter for parameter in pose if parameter.numel()]
         self.start = [p.detach().clone() for p in self.pose]
@@ -140,5 +140,4 @@ class _Polish:
         return [self.field.parameters_, *self.pose]
 
     def _calm(self) -> bool:
-        steep = float((self.field.parameters_.detach().abs() * self.steepness).sum())
-        return steep <= CALM * STEPS
+        return float(steepness(self.field.parameters_.detach(), self.magnitude)) <= self.limit
