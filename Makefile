@@ -23,8 +23,8 @@ bench: $(VENV)/.installed-dev
 	$(BIN)/python benchmarks/escherization.py --quick
 	$(BIN)/python benchmarks/ablations.py --quick
 	$(BIN)/python benchmarks/density_kl.py --quick
-	$(BIN)/python benchmarks/density_nll.py --quick
-	$(BIN)/python benchmarks/density_rna.py --quick
+	$(BIN)/python benchmarks/density_nll.py --quick || test $$? -eq 2 # its data are not here
+	$(BIN)/python benchmarks/density_rna.py --quick || test $$? -eq 2
 	$(BIN)/python benchmarks/density_unoriented.py --quick
 
 clean:

@@ -14,24 +14,18 @@ from dataclasses import replace
 
 import numpy as np
 import torch
-from common import SILHOUETTES
+from common import goal
 
 from orbiflow.escher import ClassFailure, DescentSettings, OccupancySettings, escherize_class
 from orbiflow.escher.descent import Descent
 from orbiflow.escher.methods import Settings
 from orbiflow.escher.outline_starts import outline_starts
-from orbiflow.silhouette import Target
 from orbiflow.silhouette.soft_target import SoftTarget
 from orbiflow.tilings import isohedral_class
 
 GOALS = ("bat_60", "beetle_60", "octpus_94")
 CLASSES = ("IH4", "IH6", "IH7")
 NORMAL = DescentSettings()
-
-
-def goal(name: str) -> Target:
-    """One of the nine goals."""
-    return Target.read(SILHOUETTES / "nagata" / f"{name}.dat")
 
 
 def measured(

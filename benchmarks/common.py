@@ -1,8 +1,9 @@
-"""What the benchmarks share: where inputs are, and the best similarity between two shapes."""
+"""What the benchmarks share: inputs, published figures, the best similarity of two shapes."""
 
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 from typing import Any
 
@@ -11,20 +12,46 @@ import scipy.optimize
 import shapely
 from numpy.typing import NDArray
 
+from orbiflow.silhouette import Target
+
 ROOT = Path(__file__).resolve().parents[1]
 BUNDLED = ROOT / "examples" / "silhouettes"
-SHARED = ROOT.parent / "shared" / "data"
-SILHOUETTES = SHARED / "silhouettes"
+DATA = Path(os.environ.get("ORBIFLOW_DATA") or ROOT.parent / "shared" / "data")
+"""What is not in the repository: see docs/benchmarks.md."""
+
+GOALS = (
+    "bat_60",
+    "beetle_60",
+    "camel_60",
+    "dolphin_60",
+    "octpus_94",
+    "pegasus_60",
+    "penguin_60",
+    "spider_120",
+    "squirrel1_60",
+)
+"""The paper's nine, by their files' names."""
 
 Ring = NDArray[np.float64]
 
 
-def reference() -> dict[str, Any]:
-    """Published and measured figures of the nine goals, by name."""
-    if not SHARED.exists():
-        raise SystemExit(f"the paper's goals and their figures are expected in {SHARED}")
-    document = json.loads((SHARED / "reference.json").read_text())
-    return document["escherization"]["goals"]
+def goal(name: str) -> Target:
+    """One of the nine goals, at its true aspect."""
+    return Target.read(BUNDLED / "nagata" / f"{name}.dat")
+
+
+def published(section: str) -> dict[str, Any]:
+    """Figures to compare with: "nine_goals" or "density_nll"; the file says where each comes from."""
+    document = json.loads((ROOT / "benchmarks" / "data" / "published.json").read_text())
+    return document[section]["figures"]
+
+
+def needed(path: Path, what: str) -> Path:
+    """`path`, or one line and exit status 2 where those data are not at hand."""
+    if not path.exists():
+        print(f"{what} are not here ({path}): docs/benchmarks.md says where to get them")
+        raise SystemExit(2)
+    return path
 
 
 def aligned(tile: Ring, goal: Ring) -> Ring:

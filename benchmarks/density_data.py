@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
 import numpy as np
-from common import SHARED
+from common import DATA, needed
 from numpy.typing import NDArray
 
 Data = NDArray[np.float64]
 
-DENSITY = SHARED / "density"
 TORI = ("general", "glycine", "proline", "prepro")
 EARTH = ("quakes", "fire")
 
 ROUNDED = 0.01
 """Radians, of the backbone angles."""
+
+
+def _file(name: str, what: str) -> Path:
+    return needed(DATA / "density" / name, what)
 
 
 def backbone(kind: str) -> Data:
@@ -36,7 +40,9 @@ def backbone(kind: str) -> Data:
                 rows.append((name, float(phi), float(psi), after))
         chain.clear()
 
-    for line in (DENSITY / "torus" / "pyro_top500" / "top500.txt").read_text().splitlines():
+    for line in (
+        _file("torus/pyro_top500/top500.txt", "the Top500 backbones").read_text().splitlines()
+    ):
         if line.startswith("#"):
             close()
             continue
@@ -57,7 +63,7 @@ def backbone(kind: str) -> Data:
 def earth(kind: str) -> Data:
     """lat, lon (N, 2) in degrees of earthquakes or wildfires."""
     name = {"quakes": "quakes_all", "fire": "fire"}[kind]
-    lines = (DENSITY / "earth" / f"{name}.csv").read_text().splitlines()
+    lines = _file(f"earth/{name}.csv", "the earthquakes and wildfires").read_text().splitlines()
     return np.array(
         [[float(x) for x in line.split(",")] for line in lines if re.match(r"-?[\d.]+,", line)]
     )
@@ -65,12 +71,12 @@ def earth(kind: str) -> Data:
 
 def rna() -> Data:
     """Seven torsion angles (N, 7) in degrees."""
-    return np.loadtxt(DENSITY / "torus" / "rna.tsv", usecols=range(2, 9))
+    return np.loadtxt(_file("torus/rna.tsv", "the torsion angles of RNA"), usecols=range(2, 9))
 
 
 def poles() -> Data:
     """Virtual geomagnetic poles (N, 2), lat and lon in degrees: of both polarities, so axes."""
-    lines = (DENSITY / "rp2" / "dsdp522_sites_with_vgps.txt").read_text().splitlines()
+    lines = _file("rp2/dsdp522_sites_with_vgps.txt", "the magnetic poles").read_text().splitlines()
     header = lines[1].split("\t")
     at = [header.index("vgp_lat"), header.index("vgp_lon")]
     rows = [line.split("\t") for line in lines[2:]]

@@ -5,23 +5,22 @@
 Random 80/10/10 splits (--grouped: equal locations stay together, since duplicates leak), mean negative
 log-likelihood in nats, per radian^2 or steradian, beside a von Mises or von Mises-Fisher kernel
 density estimate whose width and uniform floor are tuned on the same validation points, and the
-published rows of reference.json (RFM: Riemannian flow matching; RDM: Riemannian diffusion model). Then
-the seconds for 100,000 query points, on the first split: exactly, by the kernels (timed on 5,000 and
-scaled) and from a table (with the root mean square error of its log densities). All are fitted with
-kernels beside the flow. The backbone angles are rounded; see `density_data.backbone`.
+published rows of data/published.json (RFM: Riemannian flow matching; RDM: Riemannian diffusion
+model). Then the seconds for 100,000 query points, on the first split: exactly, by the kernels (timed
+on 5,000 and scaled) and from a table (with the root mean square error of its log densities). All are
+fitted with kernels beside the flow. The backbone angles are rounded; see `density_data.backbone`.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 import time
 from concurrent.futures import ProcessPoolExecutor
 from typing import NamedTuple
 
 import numpy as np
 import torch
-from common import SHARED
+from common import published
 from density_data import EARTH, TORI, Data, backbone, earth, splits
 from density_kde import KernelDensity
 
@@ -123,7 +122,9 @@ def main() -> None:
     count, seconds = options.splits, options.seconds
     if options.quick:
         names, count, seconds = ["proline"], 1, 10.0
-    published = json.loads((SHARED / "reference.json").read_text())["density_nll"]
+    for name in names:
+        load(name)  # what is missing is said here, once
+    figures = published("density_nll")
     print(f"{count} {'grouped' if options.grouped else 'random'} splits, detail {options.detail}")
     print(
         "data         flow            kde      (difference)     rfm    rdm   fit s   100k: exact s"
@@ -138,7 +139,7 @@ def main() -> None:
             rows = np.array([next(found) for _ in range(count)])
             mean, spread = rows.mean(axis=0), rows.std(axis=0)
             mean[3:7] = rows[0, 3:7]  # what the first split alone was timed on
-            rfm, rdm = (published[k].get(PUBLISHED.get(name, name), np.nan) for k in ("rfm", "rdm"))
+            rfm, rdm = (figures[k].get(PUBLISHED.get(name, name), np.nan) for k in ("rfm", "rdm"))
             worst = rows[abs(rows[:, 7] - 1).argmax(), 7]
             print(
                 f"{name:9}{mean[0]:7.3f} +- {spread[0]:.3f}{mean[1]:8.3f} +- {spread[1]:.3f}"

@@ -4,7 +4,7 @@
 
 Random 80/10/10 splits, mean negative log-likelihood in nats per radian^7, beside a product von Mises
 kernel density estimate tuned on the same validation points, the mixture that is the flow's base, and
-the published rows of reference.json (RFM: Riemannian flow matching; RDM: Riemannian diffusion
+the published rows of data/published.json (RFM: Riemannian flow matching; RDM: Riemannian diffusion
 model). Then the seconds of the fit and for 10,000 query points. The fit is held to --seconds.
 
 --curve: the mixture alone, by its size: components of one member, then members of that size.
@@ -13,14 +13,13 @@ model). Then the seconds of the fit and for 10,000 query points. The fit is held
 from __future__ import annotations
 
 import argparse
-import json
 import math
 import time
 from typing import NamedTuple
 
 import numpy as np
 import torch
-from common import SHARED
+from common import published
 from density_data import rna, splits
 from density_kde import KernelDensity
 
@@ -123,11 +122,12 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="one split, 10 s")
     options = parser.parse_args()
     torch.set_num_threads(1)
+    rna()  # what is missing is said here
     if options.curve:
         curve(options.splits)
         return
     count, seconds = (1, 10.0) if options.quick else (options.splits, options.seconds)
-    published = json.loads((SHARED / "reference.json").read_text())["density_nll"]
+    figures = published("density_nll")
     print(f"RNA, {count} random splits, {options.base} base, {seconds:g} s of fit")
     print(
         "split        flow     base      kde    fit s  10k: flow s   kde s  steps  change at twice"
@@ -140,7 +140,7 @@ def main() -> None:
     print(f"mean    {_line(table.mean(axis=0))}")
     print(f"spread  {_line(table.std(axis=0))}")
     for key in ("rfm", "rdm", "kde_random_split"):
-        print(f"published {key:18}{published[key]['rna']:7.2f}")
+        print(f"published {key:18}{figures[key]['rna']:7.2f}")
 
 
 def _line(row: np.ndarray) -> str:

@@ -2,7 +2,7 @@
 
     python benchmarks/nine_classes.py [--quick] [IMAGE ...]
 
-Without images: the bundled ones, and the shared data's bat and squirrel where they are there.
+Without images: the bundled squirrel, bat, turtle and night monkey.
 """
 
 from __future__ import annotations
@@ -12,20 +12,15 @@ import os
 import time
 from pathlib import Path
 
+from common import BUNDLED
+
 from orbiflow.escher import ClassFailure, OccupancySettings, TileResult, escherize
 from orbiflow.silhouette import Target
 from orbiflow.tilings import CLASSES
 
-ROOT = Path(__file__).resolve().parents[1]
-BUNDLED = ROOT / "examples" / "silhouettes"
-SHARED = ROOT.parent / "shared" / "data" / "silhouettes"
-
-
-def inputs() -> list[Path]:
-    """Squirrel, bat (if the shared data are there) and two PhyloPic images."""
-    bat = SHARED / "nagata" / "bat_60.dat"
-    found = [BUNDLED / "squirrel.dat", bat, BUNDLED / "turtle.png", BUNDLED / "night-monkey.png"]
-    return [path for path in found if path.exists()]
+IMAGES = [
+    BUNDLED / n for n in ("squirrel.dat", "nagata/bat_60.dat", "turtle.png", "night-monkey.png")
+]
 
 
 def row(outcome: TileResult | ClassFailure) -> str:
@@ -47,7 +42,7 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="one image, few iterations")
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
     options = parser.parse_args()
-    images = options.images or inputs()[: 1 if options.quick else None]
+    images = options.images or IMAGES[: 1 if options.quick else None]
     settings = OccupancySettings(iterations=60) if options.quick else OccupancySettings()
     head = "class group    IoU    Dice  Hausd.   mismatch    overlap  uncovered  cert.  starts  dropped"
     for image in images:

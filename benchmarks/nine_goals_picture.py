@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from common import SILHOUETTES
+from common import goal
 
 from orbiflow.escher import DescentSettings, TileResult, escherize
 from orbiflow.figures.canvas import blank_figure, fill_rings, plane_axes, png_bytes
@@ -42,10 +42,10 @@ TILE, GOAL, INK = "#8ab6d9", "#c0480a", "#1a1a1a"
 Found = tuple[str, Target, TileResult]
 
 
-def fitted(goal: str, effort: str, seed: int) -> Found:
+def fitted(file: str, effort: str, seed: int) -> Found:
     """The goal's name, the goal, and its certified tile."""
-    name, isohedral = BEST[goal]
-    target = Target.read(SILHOUETTES / "nagata" / f"{goal}.dat")
+    name, isohedral = BEST[file]
+    target = goal(file)
     settings = DescentSettings.for_effort(effort, seed=seed)
     results, failures = escherize(target, [isohedral], settings)
     assert not failures, failures
@@ -106,13 +106,11 @@ def main() -> None:
     parser.add_argument("--picture", type=Path, default=Path("out/nine-goals.png"))
     parser.add_argument("--quick", action="store_true", help="three goals, effort fast")
     options = parser.parse_args()
-    if not SILHOUETTES.exists():
-        raise SystemExit(f"the paper's goals are expected in {SILHOUETTES / 'nagata'}")
     torch.set_num_threads(1)
     effort = "fast" if options.quick else options.effort
     found = []
-    for goal in list(BEST)[: COLUMNS if options.quick else None]:
-        name, target, result = fitted(goal, effort, options.seed)
+    for file in list(BEST)[: COLUMNS if options.quick else None]:
+        name, target, result = fitted(file, effort, options.seed)
         print(
             f"{name:10}{result.name:6}IoU {result.metrics.iou:.4f}  {result.seconds:5.1f} s",
             flush=True,

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from common import SILHOUETTES
+from common import DATA, needed
 from PIL import Image, ImageDraw, ImageFont
 
 from orbiflow.escher import DescentSettings, TileResult, escherize
@@ -53,7 +53,8 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="two silhouettes, effort fast")
     options = parser.parse_args()
     torch.set_num_threads(1)
-    files = sorted((SILHOUETTES / "phylopic").glob("*.png"))[: 2 if options.quick else None]
+    folder = needed(DATA / "silhouettes" / "phylopic", "the twenty PhyloPic silhouettes")
+    files = sorted(folder.glob("*.png"))[: 2 if options.quick else None]
     settings = DescentSettings.for_effort("fast" if options.quick else options.effort)
     print("silhouette         vertices class     IoU   Dice  recog  certified  failed seconds")
     found: list[tuple[str, Target, TileResult]] = []

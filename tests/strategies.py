@@ -264,3 +264,18 @@ def central_difference(function: VectorField, points: Tensor, step: float = 1e-4
         far = function(points + 2 * axis) - function(points - 2 * axis)
         columns.append((8 * near - far) / (12 * step))
     return torch.stack(columns, dim=-1)
+
+
+@st.composite
+def dyadic_rings(draw: st.DrawFn) -> Array:
+    """A simple ring (N, 2) in either sense, star-shaped, of any size and first vertex.
+
+    Coordinates are multiples of 2^-20 below 2^4: adding whole numbers up to 2^28 is exact.
+    """
+    rng = np.random.default_rng(draw(seeds))
+    count = draw(st.integers(3, 24))
+    turns = (np.arange(count) + rng.uniform(-0.3, 0.3, count)) * 2 * np.pi / count
+    radii = draw(st.floats(0.01, 4.0)) * rng.uniform(0.4, 1.0, count)
+    ring = rng.uniform(-3, 3, 2) + radii[:, None] * np.stack([np.cos(turns), np.sin(turns)], -1)
+    ring = np.roll(np.round(ring * 2**20) / 2**20, draw(st.integers(0, count - 1)), axis=0)
+    return ring if draw(st.booleans()) else ring[::-1].copy()

@@ -5,9 +5,11 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+import numpy as np
 import torch
 
 from orbiflow.escher import SavedModel, TileModel
+from orbiflow.silhouette import Frame
 from orbiflow.tilings import isohedral_class
 
 README = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
@@ -26,14 +28,15 @@ def test_the_symmetric_field_snippet_runs():
 
 
 def test_the_model_snippet_maps_there_and_back(tmp_path, monkeypatch):
-    (snippet,) = [s for s in SNIPPETS if "load_model" in s]
+    (snippet,) = [s for s in SNIPPETS if "load_saved" in s]
     folder = tmp_path / "out" / "turtle" / "IH6"
     folder.mkdir(parents=True)
     model = TileModel(isohedral_class("IH6"), torch.tensor([0.4]), max_frequency=2, steps=64)
     with torch.no_grad():
         for parameter in model.flow.parameters():
             parameter.normal_(std=0.05, generator=torch.Generator().manual_seed(0))
-    (folder / "model.safetensors").write_bytes(SavedModel.of(model).to_bytes())
+    frame = Frame(np.diag([200.0, -200.0]), np.array([320.0, 240.0]), "image", (640, 480))
+    (folder / "model.safetensors").write_bytes(SavedModel.of(model, frame).to_bytes())
     monkeypatch.chdir(tmp_path)
     names = run(snippet)
     torch.testing.assert_close(names["back"], names["inside"], atol=1e-8, rtol=0)

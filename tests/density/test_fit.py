@@ -80,7 +80,7 @@ def test_matching_recovers_a_field(space) -> None:
 def test_the_gradient_of_the_objective(seed: int) -> None:
     space = Sphere()
     fields = [FourierField(space.group, 3, smoothness=1.0) for _ in range(2)]
-    density = SymmetricDensity(space, Flow(fields, steps=2), UniformBase(space))
+    density = SymmetricDensity(space, Flow(fields, steps=2, warn=False), UniformBase(space))
     objective = Objective(density, blob(space, 30), kinetic=0.1, roughness=1e-3)
     rng = np.random.default_rng(seed)
     at, along = 0.05 * rng.normal(size=(2, len(objective.get())))

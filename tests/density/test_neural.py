@@ -14,7 +14,7 @@ from orbiflow.density import SymmetricDensity, Torus
 from orbiflow.density.fitting.chains import concentration, fit_chains
 from orbiflow.density.fitting.neural import NeuralSettings, fit_neural
 from orbiflow.density.models.chains import SCALES, VonMisesChains, chained
-from orbiflow.density.models.neural import NeuralField, NeuralFlow, speed, way
+from orbiflow.density.models.neural import NeuralFlow, NeuralTorusField, speed, way
 from orbiflow.density.models.symmetric import midpoints
 from orbiflow.density.spaces.round import Sphere
 from orbiflow.density.storage.chains import chains_from_header, chains_header, chains_tensors
@@ -27,7 +27,7 @@ dims = st.integers(1, 5)
 
 def random_flow(dim: int, seed: int, *, size: float = 0.3, **options: Any) -> NeuralFlow:
     """A flow whose last layer is not zero."""
-    field = NeuralField(dim, **{"width": 16, "depth": 3, **options}, seed=seed)
+    field = NeuralTorusField(dim, **{"width": 16, "depth": 3, **options}, seed=seed)
     generator = torch.Generator().manual_seed(seed)
     with torch.no_grad():
         field.last.weight.normal_(0.0, size / 16, generator=generator)
@@ -65,8 +65,7 @@ def test_log_prob_is_periodic(dim: int, seed: int) -> None:
 @settings(max_examples=6)
 @given(dims, seeds)
 def test_inverse_undoes_forward(dim: int, seed: int) -> None:
-    flow, at = random_flow(dim, seed), points(7, dim, seed)
-    flow.steps = 48
+    flow, at = random_flow(dim, seed).with_steps(48), points(7, dim, seed)
     with torch.no_grad():
         moved, log_det = flow.forward_and_log_det(at)
         back, minus = flow.inverse_and_log_det(moved)
@@ -93,8 +92,7 @@ def test_divergence_is_the_trace(dim: int, seed: int, depth: int, waves: int) ->
 @settings(max_examples=6)
 @given(st.integers(1, 4), seeds)
 def test_log_det_is_that_of_the_jacobian(dim: int, seed: int) -> None:
-    flow, at = random_flow(dim, seed), points(2, dim, seed)
-    flow.steps = 32
+    flow, at = random_flow(dim, seed).with_steps(32), points(2, dim, seed)
     log_det = flow.forward_and_log_det(at)[1]
     for k in range(2):
         table = torch.autograd.functional.jacobian(flow, at[k])
@@ -105,7 +103,7 @@ def test_log_det_is_that_of_the_jacobian(dim: int, seed: int) -> None:
 @given(st.integers(1, 2), seeds)
 def test_density_integrates_to_one(dim: int, seed: int) -> None:
     density = random_density(dim, seed)
-    density.flow.steps = 6
+    density = density.with_steps(6)
     with torch.no_grad():
         if dim == 2:
             grid = midpoints(density.space, 96)
@@ -237,9 +235,9 @@ def test_hostile_tensors_are_rejected() -> None:
 
 def test_arguments_are_checked() -> None:
     with pytest.raises(OrbiflowError, match="width"):
-        NeuralField(3, width=0)
+        NeuralTorusField(3, width=0)
     with pytest.raises(OrbiflowError, match="steps"):
-        NeuralFlow(NeuralField(3), steps=0)
+        NeuralFlow(NeuralTorusField(3), steps=0)
     with pytest.raises(OrbiflowError, match="for tori"):
         fit_neural(Sphere(), torch.rand(20, 2))
     with pytest.raises(OrbiflowError, match="10 different"):

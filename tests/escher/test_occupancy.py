@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 
 from orbiflow.errors import OrbiflowError
 from orbiflow.escher.fit import Fit
+from orbiflow.escher.max_frequency import MAX_FREQUENCY
 from orbiflow.escher.model import TileModel
 from orbiflow.escher.occupancy import (
-    MAX_FREQUENCY,
     OccupancySamples,
     OccupancySettings,
     _distinct,
@@ -27,10 +27,7 @@ from orbiflow.silhouette.target import Target
 from orbiflow.tilings import CLASSES
 from strategies import seeds
 
-DATA = Path(__file__).parents[2].parent / "shared" / "data" / "silhouettes"
-needs_data = pytest.mark.skipif(
-    not DATA.is_dir(), reason="the shared silhouettes are not beside this checkout"
-)
+SQUIRREL = Path(__file__).parents[2] / "examples" / "silhouettes" / "squirrel.dat"
 
 BOOT = [[0, 0], [3, 0], [3.4, 1.2], [2.2, 1.5], [2.0, 2.8], [0.8, 2.5], [-0.3, 1.2]]
 QUICK = OccupancySettings(
@@ -143,8 +140,8 @@ def test_gradient_matches_differences(name: str, affine: bool) -> None:
 @pytest.mark.parametrize(
     ("setting", "value", "message"),
     [
-        ("max_frequency", 0, "max_frequency must be at least 1, got 0"),
-        ("max_frequency", MAX_FREQUENCY + 1, f"from 1 to {MAX_FREQUENCY}, got {MAX_FREQUENCY + 1}"),
+        ("max_frequency", -1, "max_frequency must be at least 0, got -1"),
+        ("max_frequency", MAX_FREQUENCY + 1, f"from 0 to {MAX_FREQUENCY}, got {MAX_FREQUENCY + 1}"),
         ("turns", 0, "turns must be at least 1, got 0"),
         ("finalists", -3, "finalists must be at least 1, got -3"),
         ("iterations", 0, "iterations must be at least 1, got 0"),
@@ -222,9 +219,8 @@ def test_distinct_tells_mirror_images_apart() -> None:
     assert _distinct(model, 2) == [0, 1]
 
 
-@needs_data
 def test_a_real_silhouette() -> None:
-    target = Target.read(DATA / "nagata" / "squirrel1_60.dat")
+    target = Target.read(SQUIRREL)
     own = OccupancySettings(iterations=60, turns=8)
     model = fit_occupancy(target, CLASSES["IH5"], own)
     result = best_tiles(target, Fit(model, 16, 0, model.size))[0]

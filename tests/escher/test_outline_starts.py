@@ -14,7 +14,6 @@ from orbiflow.escher.nearest_tile import nearest_tiles
 from orbiflow.escher.outline_starts import (
     mirror_closed,
     outline_starts,
-    resampled,
     template_starts,
 )
 from orbiflow.escher.placements import (
@@ -25,6 +24,7 @@ from orbiflow.escher.placements import (
     edge_lengths,
 )
 from orbiflow.escher.prototiles import Prototiles
+from orbiflow.geometry import resampled
 from orbiflow.silhouette.target import Target
 from orbiflow.symmetry.isometry import Array
 from orbiflow.tilings import CLASSES, Tile, certify
@@ -46,7 +46,7 @@ def exact_tile(name: str, seed: int) -> tuple[Array, Placements]:
         model.log_scale.add_(0.3)
         model.stretch.normal_(std=0.1)
         ring = model(model.boundary(pieces))[0].numpy()
-        turn = float(model.angle) if kind.row.freedom == "rectangular" else 0.0
+        turn = float(model.angle) if kind.stretch_dim == 1 else 0.0
     lengths = np.full((1, len(kind.template())), pieces)
     return ring, Placements(lengths, np.zeros(1, int), np.array([turn]), np.ones(1))
 
@@ -153,7 +153,7 @@ def test_prototiles_are_placed_where_the_tiles_are(name: str, mirrored: bool) ->
     assert np.allclose(np.conj(placed) if mirrored else placed, tiles.vertices, atol=1e-8)
     twice = Prototiles.joined([prototiles, prototiles.take([0])])
     assert len(twice) == len(prototiles) + 1
-    assert np.array_equal(twice.outline[-1], prototiles.outline[0])
+    assert np.array_equal(twice.vertices[-1], prototiles.vertices[0])
 
 
 @pytest.mark.parametrize("name", CLASSES)

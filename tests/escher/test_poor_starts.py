@@ -4,7 +4,7 @@ import numpy as np
 import shapely
 
 from orbiflow.escher import ClassFailure, DescentSettings, escherize_class
-from orbiflow.likeness.overlap import MANY, Overlap, region_of
+from orbiflow.likeness.overlap import MANY, Overlap, prepared_region
 from orbiflow.silhouette import Target
 
 FAST = DescentSettings.for_effort("fast")
@@ -34,8 +34,8 @@ def test_regions_of_many_vertices_are_simplified_for_choosing() -> None:
     t = np.linspace(0, 2 * np.pi, 2 * MANY, endpoint=False)
     radius = 0.56 + 0.002 * np.random.default_rng(0).normal(size=len(t))
     ring = np.stack([radius * np.cos(t), radius * np.sin(t)], axis=-1)
-    simple = region_of(ring)
+    simple = prepared_region(ring)
     assert len(simple.exterior.coords) < MANY
     assert abs(simple.area - shapely.Polygon(ring).area) < 0.01
-    assert len(region_of(ring[::4]).exterior.coords) == len(ring[::4]) + 1
+    assert len(prepared_region(ring[::4]).exterior.coords) == len(ring[::4]) + 1
     assert Overlap(ring[::4]).region.area == shapely.Polygon(ring[::4]).area

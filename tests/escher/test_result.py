@@ -1,15 +1,23 @@
 """The choice among finalists."""
 
+from pathlib import Path
+
+import numpy as np
 import pytest
+import scipy.spatial
 import shapely
 import torch
 
 from orbiflow.errors import CertificationError
+from orbiflow.escher.boundary import DENSE
 from orbiflow.escher.fit import Fit
 from orbiflow.escher.model import TileModel
+from orbiflow.escher.report import tile_json
 from orbiflow.escher.result import TileResult, best_tiles
+from orbiflow.escher.storage import load_saved
 from orbiflow.silhouette.target import Target
 from orbiflow.tilings import CLASSES, certify
+from strategies import random_tensor
 
 KIND = CLASSES["IH21"]
 
@@ -81,3 +89,32 @@ def test_force_prefers_the_certified() -> None:
     assert result.certificate.valid
     assert result.metrics.iou < worse.metrics.iou
     assert result.dropped == 0
+
+
+@pytest.mark.parametrize("name", ["IH4", "IH6", "IH28"])
+@pytest.mark.parametrize("y_down", [False, True])
+def test_a_file_alone_places_the_tile_in_the_input(name: str, y_down: bool, tmp_path: Path) -> None:
+    kind = CLASSES[name]
+    target = Target.from_polygon(30 * kind.template() + 500, y_down=y_down)
+    model = TileModel(kind, torch.tensor([0.3]), max_frequency=2, smoothness=0.0)
+    with torch.no_grad():
+        for parameter in model.flow.parameters():
+            parameter.add_(0.02 * random_tensor(4, *parameter.shape, size=1.0))
+    result = best_tile(target, model, starts=1, seconds=0.0)
+    polygon = np.array(tile_json(result)["polygon"])[:-1]
+    path = tmp_path / "model.safetensors"
+    path.write_bytes(result.model.to_bytes())
+
+    saved = load_saved(path)
+    assert saved.frame is not None
+    loaded = saved.restore()
+    pieces = 2 * -(-DENSE[0] // (2 * len(kind.template())))
+    with torch.no_grad():
+        curve = saved.frame.to_input(loaded(loaded.boundary(pieces)))[0].numpy()
+    # half of the polygon is flowed, the other half its image: the map has both
+    nearest = scipy.spatial.KDTree(curve).query(polygon)[0]
+    assert nearest.max() < 1e-9
+    assert np.abs(curve[::pieces] - polygon[list(result.tile.corners)]).max() < 1e-9
+    back = loaded.inverse(torch.tensor(saved.frame.to_normal(polygon))[None]).detach()
+    on_template = shapely.Polygon(kind.template()).exterior
+    assert shapely.distance(shapely.points(back[0].numpy()), on_template).max() < 1e-6

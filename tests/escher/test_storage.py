@@ -16,8 +16,9 @@ from safetensors.numpy import save
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.escher.boundary import extract_tile
 from orbiflow.escher.model import TileModel
-from orbiflow.escher.storage import FORMAT, MAX_BYTES, SavedModel, load_model
-from orbiflow.tilings import CLASSES
+from orbiflow.escher.storage import FORMAT, MAX_BYTES, SavedModel, load_model, load_saved
+from orbiflow.silhouette import Frame
+from orbiflow.tilings import CLASSES, certify
 from strategies import seeds
 
 
@@ -74,6 +75,34 @@ def test_a_restored_model_gives_the_same_polygon(tmp_path: Path) -> None:
     again, _ = extract_tile(load_model(str(path)))
     assert np.array_equal(tile.polygon, again.polygon)
     assert np.array_equal(tile.group.lattice, again.group.lattice)
+
+
+OLD = Path(__file__).parent / "data" / "tile-1"
+
+
+def test_a_file_of_version_0_1_is_read_as_it_was() -> None:
+    path = OLD.with_suffix(".safetensors")
+    expected = json.loads(OLD.with_suffix(".json").read_text())
+    assert load_saved(path).frame is None
+    model = load_model(path)
+    with torch.no_grad():
+        images = model(torch.tensor(expected["points"], dtype=torch.float64)[None])[0].numpy()
+    assert np.abs(images - expected["images"]).max() < 1e-12
+    tile, _ = extract_tile(model)
+    assert np.abs(tile.polygon[list(tile.corners)] - expected["corners"]).max() < 1e-9
+    assert certify(tile).valid
+
+
+def test_the_frame_is_kept_bit_for_bit(tmp_path: Path) -> None:
+    frame = Frame(np.diag([0.1, -0.1]), np.array([1 / 3, 1e7]), "image", (640, 480))
+    path = tmp_path / "model.safetensors"
+    saved = SavedModel.of(candidate("IH4"), frame)
+    path.write_bytes(saved.to_bytes())
+    loaded = load_saved(path)
+    assert loaded.frame is not None
+    assert loaded.frame.as_dict() == frame.as_dict()
+    assert loaded.settings == saved.settings
+    assert_same(loaded.restore(), saved.restore())
 
 
 def test_single_precision_is_widened() -> None:
@@ -139,10 +168,10 @@ BAD_FILES: dict[str, tuple[Callable[[], bytes], str]] = {
     "unknown class": (with_settings(**{"class": "IH8"}), "unknown isohedral class 'IH8'"),
     "class a number": (with_settings(**{"class": 1e300}), "unknown isohedral class"),
     "other class": (with_settings(**{"class": "IH28"}), "shape"),
-    "frequency huge": (with_settings(max_frequency=10**30), "from 1 to 60, got 1000"),
-    "frequency 61": (with_settings(max_frequency=61), "from 1 to 60, got 61"),
-    "frequency 0": (with_settings(max_frequency=0), "from 1 to 60, got 0"),
-    "frequency 2.5": (with_settings(max_frequency=2.5), "whole number from 1 to 60, got 2.5"),
+    "frequency huge": (with_settings(max_frequency=10**30), "from 0 to 60, got 1000"),
+    "frequency 61": (with_settings(max_frequency=61), "from 0 to 60, got 61"),
+    "frequency -1": (with_settings(max_frequency=-1), "from 0 to 60, got -1"),
+    "frequency 2.5": (with_settings(max_frequency=2.5), "whole number from 0 to 60, got 2.5"),
     "frequency other": (with_settings(max_frequency=3), "should have shape"),
     "segments huge": (with_settings(segments=10**9), "say 1000000000 segments"),
     "segments two": (with_settings(segments=2), "say 2 segments, its arrays hold 1"),
@@ -152,6 +181,14 @@ BAD_FILES: dict[str, tuple[Callable[[], bytes], str]] = {
     "smoothness NaN": (with_settings(smoothness=float("nan")), "smoothness from 0 to 100"),
     "smoothness huge": (with_settings(smoothness=1e308), "smoothness from 0 to 100"),
     "smoothness null": (with_settings(smoothness=None), "settings"),
+    "frame a number": (with_settings(frame=7), "frame is incomplete"),
+    "frame empty": (with_settings(frame={}), "frame is incomplete: 'size'"),
+    "frame flat": (
+        with_settings(
+            frame={**Frame(np.eye(2), np.zeros(2)).as_dict(), "linear": [[1, 1], [1, 1]]}
+        ),
+        "has no inverse",
+    ),
     "angle missing": (with_array("angle", None), "angle should have shape .* found nothing"),
     "angle a vector": (with_array("angle", np.zeros(1)), "angle should have shape"),
     "offset too long": (with_array("offset", np.zeros(3)), r"found shape \(3,\)"),

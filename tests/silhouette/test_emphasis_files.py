@@ -194,7 +194,7 @@ def test_strength(tmp_path: Path, strength: float) -> None:
 
 
 @pytest.mark.parametrize(
-    ("array", "frame"),
+    ("array", "box"),
     [
         (np.zeros(4), (0, 0, 1, 1)),
         (np.zeros((0, 3)), (0, 0, 1, 1)),
@@ -204,6 +204,6 @@ def test_strength(tmp_path: Path, strength: float) -> None:
         (np.eye(2), (0, 0, np.inf, 1)),
     ],
 )
-def test_arrays_that_are_no_mask(array: np.ndarray, frame: Any) -> None:
-    with pytest.raises(OrbiflowError, match=r"^mask: (a mask needs shape|the frame)"):
-        Emphasis(array, frame)
+def test_arrays_that_are_no_mask(array: np.ndarray, box: Any) -> None:
+    with pytest.raises(OrbiflowError, match=r"^mask: (a mask needs shape|the box)"):
+        Emphasis(array, box)

@@ -9,11 +9,11 @@ import pytest
 import torch
 
 from orbiflow.errors import OrbiflowError
+from orbiflow.geometry import signed_area
 from orbiflow.symmetry import Isometry, identity
 from orbiflow.symmetry.isometry import Array
 from orbiflow.tilings import CLASSES, EdgePair, IsohedralClass, Tile, isohedral_class
 from orbiflow.tilings.class_table import EdgeKind
-from orbiflow.tilings.images import shoelace
 from orbiflow.tilings.patch import coset_and_cell
 
 GROUP_ORDERS = {"p1": 1, "p2": 2, "pg": 2, "pgg": 4, "p3": 3, "p4": 4, "p6": 6}
@@ -48,7 +48,7 @@ def test_nine_classes() -> None:
 
 
 def test_group_closes_and_has_the_right_area(kind: IsohedralClass) -> None:
-    group, area = kind.group(), shoelace(kind.template())
+    group, area = kind.group(), signed_area(kind.template())
     assert group.order == GROUP_ORDERS[kind.group_name]
     assert all(group.contains(generator) for generator in kind.generators())
     assert group.order * area == pytest.approx(group.cell_volume, rel=1e-14)
@@ -95,7 +95,7 @@ def test_pentagons_keep_the_lattice_for_every_shape(name: str) -> None:
         vertices = kind.template(shape)
         pairs = set(kind.identified_edges)
         assert pairs <= edges_from_group(kind, vertices)
-        assert shoelace(vertices) * kind.group().order == pytest.approx(kind.group().cell_volume)
+        assert signed_area(vertices) * kind.group().order == pytest.approx(kind.group().cell_volume)
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from orbiflow.escher.occupancy import (
 )
 from orbiflow.escher.result import ClassFailure, TileResult
 from orbiflow.escher.search import Event, escherize, escherize_class
-from orbiflow.escher.storage import SavedModel, load_model
+from orbiflow.escher.storage import SavedModel, load_model, load_saved
 
 __all__ = [
     "ClassFailure",
@@ -29,5 +29,6 @@ __all__ = [
     "fit_descent",
     "fit_occupancy",
     "load_model",
+    "load_saved",
     "occupancy_loss",
 ]

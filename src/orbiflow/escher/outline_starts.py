@@ -11,16 +11,19 @@ import shapely
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
+from orbiflow.arguments import instance, whole
+from orbiflow.cancel import Cancel
+from orbiflow.errors import OrbiflowError
 from orbiflow.escher.nearest_tile import NearestTiles, nearest_tiles
 from orbiflow.escher.placements import Complex, Placements, best_placements
-from orbiflow.escher.prototiles import Prototiles, subdivided
+from orbiflow.escher.prototiles import Prototiles
 from orbiflow.escher.starts import template_symmetries
-from orbiflow.likeness.overlap import boundary_iou, region_of
-from orbiflow.silhouette.rings import reverse
+from orbiflow.geometry import resampled, reverse, subdivided
+from orbiflow.likeness.overlap import boundary_iou, prepared_region
 from orbiflow.silhouette.target import Target
 from orbiflow.symmetry import rotation_matrix
 from orbiflow.symmetry.isometry import Array
-from orbiflow.tilings import IsohedralClass
+from orbiflow.tilings import IsohedralClass, isohedral_class
 from orbiflow.tilings.class_table import EdgePair
 
 APART = 0.025
@@ -42,24 +45,9 @@ class Starts:
     iou: Array
 
 
-def resampled(ring: Array, count: int, phase: float = 0.0) -> Array:
-    """`count` points (count, 2) evenly spaced along the closed `ring` (N, 2).
-
-    `phase` moves them along by that share of their spacing.
-
-    >>> square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
-    >>> resampled(square, 4, phase=0.5).tolist()
-    [[0.5, 0.0], [1.0, 0.5], [0.5, 1.0], [0.0, 0.5]]
-    """
-    closed = np.concatenate([ring, ring[:1]])
-    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(closed, axis=0), axis=1))])
-    at = (np.arange(count) + phase) / count * along[-1]
-    return np.stack([np.interp(at, along, closed[:, i]) for i in (0, 1)], axis=-1)
-
-
 def outline_starts(
     target: Target,
-    kind: IsohedralClass,
+    kind: IsohedralClass | str,
     *,
     count: int,
     resolutions: Sequence[int] = (40, 60, 80),
@@ -67,6 +55,7 @@ def outline_starts(
     measured: int = 200,
     vertices: int = 240,
     phase: float = 0.0,
+    cancel: Cancel | None = None,
 ) -> Starts:
     """The best start tiles of one class for a target, no two of them twins.
 
@@ -80,14 +69,25 @@ def outline_starts(
         measured: of these, the nearest tiles whose overlap is measured.
         vertices: of every start tile.
         phase: of the points along the outline, in spacings; what a seed changes.
+        cancel: looked at before each resolution.
+
+    Raises:
+        Cancelled: if it was told to stop.
     """
+    kind = isohedral_class(kind)
+    instance(target, Target, "the target", "Target.read and Target.from_polygon make one")
+    for points in resolutions:
+        if vertices % whole(points, "a resolution", 24):
+            raise OrbiflowError(f"resolutions must divide vertices = {vertices}, got {points}")
+    cancel = cancel or Cancel()
     parts: list[Prototiles] = []
     scores: list[Array] = []
     places: list[Array] = []
     for mirrored in (False,) if mirror_closed(kind) else (False, True):
         ring = reverse(target.normal * (1.0, -1.0)) if mirrored else target.normal
-        goal = region_of(ring)
+        goal = prepared_region(ring)
         for points in resolutions:
+            cancel.check()
             outline = resampled(ring, points, phase) @ [1, 1j]
             found = best_placements(kind, outline, projected)
             for tiles, placements, score in _simple_tiles(kind, goal, outline, found, measured):
@@ -100,7 +100,12 @@ def outline_starts(
 
 
 def template_starts(
-    kind: IsohedralClass, *, turns: int, stretch: float, vertices: int = 240, phase: float = 0.0
+    kind: IsohedralClass | str,
+    *,
+    turns: int,
+    stretch: float,
+    vertices: int = 240,
+    phase: float = 0.0,
 ) -> Prototiles:
     """The template itself, turned and stretched: starts that know nothing of the target.
 
@@ -112,6 +117,7 @@ def template_starts(
         vertices: of every start tile, a multiple of the template's.
         phase: of the angles, in steps.
     """
+    kind = isohedral_class(kind)
     order, symmetric = template_symmetries(kind)
     stretches = [np.zeros(kind.stretch_dim)]
     for axis, sign in itertools.product(np.eye(kind.stretch_dim), (1.0, -1.0)):

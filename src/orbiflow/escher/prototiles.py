@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orbiflow.escher.nearest_tile import NearestTiles
+from orbiflow.geometry import subdivided
 from orbiflow.symmetry.isometry import Array
 from orbiflow.tilings import IsohedralClass
 
@@ -17,13 +18,13 @@ from orbiflow.tilings import IsohedralClass
 class Prototiles:
     """S tiles of one class with as many vertices, any of which a flow can start from.
 
-    - `outline`: (S, N, 2) vertices in the group's own frame; those of identified edges correspond.
+    - `vertices`: (S, N, 2), in the group's own frame; those of identified edges correspond.
     - `corners`: (S, K) index of the vertex at each of the template's corners, increasing from 0.
     - `angle`, `log_scale`, `offset`, `stretch`, `mirrored`: the pose, as in `TileModel`; (S,), (S,),
       (S, 2), (S, stretch_dim) and (S,).
     """
 
-    outline: Array
+    vertices: Array
     corners: NDArray[np.int64]
     angle: Array
     log_scale: Array
@@ -32,7 +33,7 @@ class Prototiles:
     mirrored: NDArray[np.bool_]
 
     def __len__(self) -> int:
-        return len(self.outline)
+        return len(self.vertices)
 
     def take(self, indices: Sequence[int]) -> Prototiles:
         """Those at `indices`."""
@@ -40,29 +41,29 @@ class Prototiles:
 
     @staticmethod
     def joined(parts: Sequence[Prototiles]) -> Prototiles:
-        """All of `parts` in one; their outlines have as many vertices."""
+        """All of `parts` in one; they have as many vertices."""
         return Prototiles(
             *(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(Prototiles))
         )
 
     @classmethod
     def of(
-        cls, kind: IsohedralClass, tiles: NearestTiles, vertices: int, *, mirrored: bool
+        cls, kind: IsohedralClass, tiles: NearestTiles, count: int, *, mirrored: bool
     ) -> Prototiles:
         """Turn placed polygons into start tiles.
 
         Args:
             kind: their class.
             tiles: whose `linear` keeps orientation.
-            vertices: of each start tile, a multiple of the polygons' own number: each of their sides
-                is divided evenly.
+            count: vertices of each start tile, a multiple of the polygons' own number: each of their
+                sides is divided evenly.
             mirrored: whether the polygons belong to the target's mirror image in the x axis; the
                 start tiles are placed on the target itself.
         """
         placed = np.stack([tiles.vertices.real, tiles.vertices.imag], axis=-1)
         inverse = np.linalg.inv(tiles.linear)
         own = (placed - tiles.offset[:, None]) @ np.swapaxes(inverse, 1, 2)
-        pieces = vertices // placed.shape[1]
+        pieces = count // placed.shape[1]
         angle, log_scale, stretch = _pose(kind, tiles.linear)
         return cls(
             subdivided(own, pieces),
@@ -73,14 +74,6 @@ class Prototiles:
             stretch,
             np.full(len(own), mirrored),
         )
-
-
-def subdivided(rings: Array, pieces: int) -> Array:
-    """Rings (S, N, 2) with every side divided evenly: (S, N pieces, 2)."""
-    count, size, _ = rings.shape
-    t = np.arange(pieces)[:, None] / pieces
-    sides = np.roll(rings, -1, axis=1) - rings
-    return (rings[:, :, None] + t * sides[:, :, None]).reshape(count, size * pieces, 2)
 
 
 def _pose(kind: IsohedralClass, linear: Array) -> tuple[Array, Array, Array]:

@@ -29,7 +29,7 @@ class TileResult:
     - `normal_tile`: in the target's normal form (y up, area 1, centroid 0).
     - `metrics`, `recognisability`: of the certified polygon against the target.
     - `certificate`: of `tile`, in the input's coordinates.
-    - `model`: the diffeomorphism, into the target's normal form.
+    - `model`: the diffeomorphism, into the target's normal form, and the input's frame.
     - `starts`, `dropped`: starts of the fit; those whose boundary crossed itself on the way, or that
       gave no certified tile.
     - `seconds`: of computing, on one core.
@@ -100,7 +100,7 @@ def _result(
     target: Target, model: TileModel, starts: int, seconds: float, *, force: bool
 ) -> TileResult:
     tile, fine = extract_tile(model, force=force)
-    placed = tile.transformed(target.linear, target.offset)
+    placed = tile.transformed(target.frame.linear, target.frame.offset)
     # a forced tile may cross itself: measure the region that it covers
     shape = shapely.Polygon(placed.polygon)
     region = shape if shape.is_valid else shapely.make_valid(shape).buffer(0)
@@ -112,7 +112,7 @@ def _result(
         metrics=compare(region, target.outline),  # pyright: ignore[reportArgumentType]
         recognisability=recogniser(target)(region),  # pyright: ignore[reportArgumentType]
         certificate=certify(placed),
-        model=SavedModel.of(fine),
+        model=SavedModel.of(fine, target.frame),
         starts=starts,
         dropped=0,
         seconds=seconds,

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,17 +14,22 @@ import torch
 from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
+from orbiflow.arguments import instance
+from orbiflow.arguments import path as as_path
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.escher.descent_settings import MAX_SEGMENTS
+from orbiflow.escher.max_frequency import MAX_FREQUENCY
 from orbiflow.escher.model import TileModel
-from orbiflow.escher.occupancy import MAX_FREQUENCY
+from orbiflow.silhouette.frame import Frame
 from orbiflow.symmetry.isometry import Array
 from orbiflow.tilings import isohedral_class
 
 FORMAT = "orbiflow-tile/1"
 MAX_BYTES = 64 * 2**20
 MAX_SIDES = 100_000
-OUTLINE, CORNERS = "prototile.outline", "prototile.corners"
+VERTICES, CORNERS = "prototile.outline", "prototile.corners"
+FRAME = "frame"
+"""Entry of the settings in a file; not in those of version 0.1, which passes over it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,16 +39,22 @@ class SavedModel:
     - `settings`: class, max_frequency, segments, smoothness, steps, method, mirrored.
     - `arrays`: float64 parameters by name, without the candidate axis; and the start tile, if it is
       not the template.
+    - `frame`: where the target's normal form, the model's own coordinates, lies in the input; None if
+      that is not known.
     """
 
     settings: dict[str, Any]
     arrays: dict[str, Array]
+    frame: Frame | None = None
 
     @classmethod
-    def of(cls, model: TileModel) -> SavedModel:
-        """Take a single candidate apart."""
-        if model.size != 1:
-            raise OrbiflowError(f"take one candidate first: this model holds {model.size}")
+    def of(cls, model: TileModel, frame: Frame | None = None) -> SavedModel:
+        """Take a single candidate apart.
+
+        Raises:
+            OrbiflowError: for a model that holds more than one.
+        """
+        instance(model, TileModel, "the model", "load_model and the fits give one").require_single()
         settings = {
             "class": model.isohedral_class.name,
             "max_frequency": model.max_frequency,
@@ -55,10 +68,10 @@ class SavedModel:
             name: parameter.detach().double().cpu().numpy()[0].copy()
             for name, parameter in model.named_parameters()
         }
-        if model.outline is not None and model.corners is not None:
-            arrays[OUTLINE] = model.outline.double().cpu().numpy()[0].copy()
+        if model.vertices is not None and model.corners is not None:
+            arrays[VERTICES] = model.vertices.cpu().numpy()[0].copy()
             arrays[CORNERS] = model.corners.cpu().numpy()[0].copy()
-        return cls(settings, arrays)
+        return cls(settings, arrays, frame)
 
     def restore(self) -> TileModel:
         """The model again, float64, one candidate.
@@ -72,7 +85,7 @@ class SavedModel:
                 isohedral_class(self.settings["class"]),
                 torch.zeros(1, dtype=torch.float64),
                 mirrored=torch.tensor([bool(self.settings["mirrored"])]),
-                max_frequency=_whole(self.settings["max_frequency"], MAX_FREQUENCY),
+                max_frequency=_whole(self.settings["max_frequency"], MAX_FREQUENCY, least=0),
                 segments=_whole(self.settings["segments"], MAX_SEGMENTS),
                 smoothness=_exponent(self.settings["smoothness"]),
                 steps=_whole(self.settings["steps"], 1_000_000),
@@ -92,32 +105,35 @@ class SavedModel:
                 if not np.isfinite(stored).all():
                     raise OrbiflowError(f"the model's {name} has NaN or infinite entries")
                 parameter.copy_(torch.tensor(stored)[None])
-        if OUTLINE in self.arrays or CORNERS in self.arrays:
-            outline, corners = self._prototile(len(model.template()[0]))
-            model.outline, model.corners = torch.tensor(outline)[None], torch.tensor(corners)[None]
+        if VERTICES in self.arrays or CORNERS in self.arrays:
+            vertices, corners = self._prototile(len(model.template()[0]))
+            model.vertices, model.corners = (
+                torch.tensor(vertices)[None],
+                torch.tensor(corners)[None],
+            )
         return model
 
     def _prototile(self, count: int) -> tuple[Array, Array]:
-        outline = np.asarray(self.arrays.get(OUTLINE, np.zeros((0, 2))), dtype=np.float64)
+        vertices = np.asarray(self.arrays.get(VERTICES, np.zeros((0, 2))), dtype=np.float64)
         corners = np.asarray(self.arrays.get(CORNERS, np.zeros(0)))
-        if outline.ndim != 2 or outline.shape[1] != 2 or not count <= len(outline) <= MAX_SIDES:
+        if vertices.ndim != 2 or vertices.shape[1] != 2 or not count <= len(vertices) <= MAX_SIDES:
             raise OrbiflowError(
-                f"the model's {OUTLINE} should have shape (N, 2) with N from {count} to "
-                f"{MAX_SIDES}, found {outline.shape}"
+                f"the model's {VERTICES} should have shape (N, 2) with N from {count} to "
+                f"{MAX_SIDES}, found {vertices.shape}"
             )
-        if not np.isfinite(outline).all():
-            raise OrbiflowError(f"the model's {OUTLINE} has NaN or infinite entries")
+        if not np.isfinite(vertices).all():
+            raise OrbiflowError(f"the model's {VERTICES} has NaN or infinite entries")
         if (
             corners.shape != (count,)
             or corners.dtype.kind != "i"
             or corners[0] != 0
-            or (np.diff(corners, append=len(outline)) < 1).any()
+            or (np.diff(corners, append=len(vertices)) < 1).any()
         ):
             raise OrbiflowError(
                 f"the model's {CORNERS} should be {count} increasing indices from 0, "
-                f"less than {len(outline)}"
+                f"less than {len(vertices)}"
             )
-        return outline, corners.astype(np.int64)
+        return vertices, corners.astype(np.int64)
 
     def _check_segments(self) -> None:
         # before anything is built: each segment takes time and memory
@@ -131,13 +147,37 @@ class SavedModel:
     def to_bytes(self) -> bytes:
         """The contents of a `model.safetensors` file."""
         # one entry: the library writes several in random order, and the same seed gives one file
-        metadata = {FORMAT: json.dumps(self.settings, sort_keys=True)}
+        frame = {} if self.frame is None else {FRAME: self.frame.as_dict()}
+        metadata = {FORMAT: json.dumps({**self.settings, **frame}, sort_keys=True)}
         arrays = {name: np.array(a, order="C") for name, a in self.arrays.items()}  # keeps 0-d
         return save(arrays, metadata=metadata)
 
 
+def load_saved(path: str | Path) -> SavedModel:
+    """Read a `model.safetensors` that `orbiflow escherize` wrote, with the input's frame.
+
+    What the file holds is checked by `SavedModel.restore`, which makes the map; `frame` says where the
+    tile lies in the input, `None` in files of version 0.1.
+
+    Raises:
+        InputFileError: for a file that is missing, too large or not such a model.
+    """
+    path = as_path(path, "the model's file")
+    data = _read(path)
+    with _naming(path):
+        arrays = load(data)
+        header = json.loads(data[8 : 8 + int.from_bytes(data[:8], "little")])
+        metadata = header.get("__metadata__", {})
+        if FORMAT not in metadata:
+            raise OrbiflowError(f"no {FORMAT!r} in its header")
+        settings = dict(json.loads(metadata[FORMAT]))
+        stored = settings.pop(FRAME, None)
+        frame = None if stored is None else Frame.from_dict(stored)
+        return SavedModel(settings, dict(arrays), frame)
+
+
 def load_model(path: str | Path) -> TileModel:
-    """Read a `model.safetensors` that `orbiflow escherize` wrote.
+    """The map alone of `load_saved`.
 
     Returns:
         One candidate, float64, in the target's normal form (y up, area 1, centroid 0).
@@ -145,24 +185,26 @@ def load_model(path: str | Path) -> TileModel:
     Raises:
         InputFileError: for a file that is missing, too large or not such a model.
     """
-    path = Path(path)
+    saved = load_saved(path)
+    with _naming(Path(path)):
+        return saved.restore()
+
+
+def _read(path: Path) -> bytes:
     try:
         size = path.stat().st_size
         if size > MAX_BYTES:
             raise InputFileError(f"{path}: {size:,} bytes is too large for a tile model")
-        data = path.read_bytes()
+        return path.read_bytes()
     except OSError as error:
         raise InputFileError(f"{path}: cannot be read: {error.strerror or error}") from error
+
+
+@contextlib.contextmanager
+def _naming(path: Path) -> Iterator[None]:
+    """Whatever is wrong inside, said with the file's name."""
     try:
-        arrays = load(data)
-        header = json.loads(data[8 : 8 + int.from_bytes(data[:8], "little")])
-        metadata = header.get("__metadata__", {})
-        if FORMAT not in metadata:
-            raise InputFileError(f"{path}: not an orbiflow tile model: no {FORMAT!r} in its header")
-        settings = json.loads(metadata[FORMAT])
-        return SavedModel(dict(settings), dict(arrays)).restore()
-    except InputFileError:
-        raise
+        yield
     except (SafetensorError, ValueError, KeyError, TypeError, RecursionError) as error:
         raise InputFileError(f"{path}: not an orbiflow tile model: {error}") from error
 
@@ -174,7 +216,7 @@ def _exponent(value: Any) -> float:
     return number
 
 
-def _whole(value: Any, most: int) -> int:
-    if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= most:
-        raise OrbiflowError(f"expected a whole number from 1 to {most}, got {value!r}")
+def _whole(value: Any, most: int, least: int = 1) -> int:
+    if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
+        raise OrbiflowError(f"expected a whole number from {least} to {most}, got {value!r}")
     return value

@@ -11,7 +11,7 @@ from orbiflow.likeness.metrics import (
     iou,
     pixel_accuracy,
 )
-from orbiflow.likeness.overlap import Overlap, region_of
+from orbiflow.likeness.overlap import Overlap, prepared_region
 from orbiflow.likeness.ranking import diverse, rank_score, tile_similarity
 from orbiflow.likeness.recognition import Recognisability, Recogniser, recognisability
 
@@ -29,8 +29,8 @@ __all__ = [
     "hausdorff",
     "iou",
     "pixel_accuracy",
+    "prepared_region",
     "rank_score",
     "recognisability",
-    "region_of",
     "tile_similarity",
 ]

@@ -5,19 +5,24 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
-from orbiflow.silhouette.rings import signed_area
+from orbiflow.arguments import numbers
+from orbiflow.errors import OrbiflowError
+from orbiflow.geometry import signed_area
 from orbiflow.symmetry.isometry import Array
 
 MANY, COARSE = 1500, 2e-3
 """Vertices beyond which a region is simplified, and by how much of its size (area 1)."""
 
 
-def region_of(ring: Array) -> shapely.Polygon:
+def prepared_region(ring: Array) -> shapely.Polygon:
     """The region of a ring (N, 2) of area about 1, prepared; simplified if its vertices are many.
 
     For choosing among candidates: intersections with thousands of vertices cost seconds. What is
     reported is measured with the ring itself.
     """
+    ring = numbers(ring, "the region's ring", ("N", 2))
+    if len(ring) < 3:
+        raise OrbiflowError(f"the region's ring needs 3 vertices at least, got {len(ring)}")
     region = shapely.Polygon(ring)
     if len(ring) > MANY:
         simpler = region.simplify(COARSE)
@@ -44,11 +49,11 @@ class Overlap:
     P's boundary inside T; along a side the speed is linear between its ends.
 
     Args:
-        target: (M, 2) ring of the region, simple, in either sense; see `region_of`.
+        target: (M, 2) ring of the region, simple, in either sense; see `prepared_region`.
     """
 
     def __init__(self, target: Array) -> None:
-        self.region = region_of(target)
+        self.region = prepared_region(target)
 
     def iou(self, ring: Array) -> tuple[float, Array]:
         """IoU of a simple ring (N, 2) with the region and its gradient (N, 2).
@@ -58,10 +63,14 @@ class Overlap:
         >>> value, gradient[:, 0].round(12).tolist()
         (0.25, [-0.25, 0.25, 0.25, -0.25])
         """
-        common = float(shapely.Polygon(ring).intersection(self.region).area)
+        ring = numbers(ring, "the ring", ("N", 2))
+        try:
+            common = float(shapely.Polygon(ring).intersection(self.region).area)
+        except (shapely.errors.GEOSException, ValueError) as error:
+            raise OrbiflowError(f"ring or region is not a simple polygon: {error}") from error
         inside = self.area_gradient(ring)
         sign = 1.0 if signed_area(ring) > 0 else -1.0
-        area = abs(signed_area(ring))
+        area = float(abs(signed_area(ring)))
         sides = np.roll(ring, -1, axis=0) - np.roll(ring, 1, axis=0)
         whole = sign * np.stack([sides[:, 1], -sides[:, 0]], axis=-1) / 2
         union = area + self.region.area - common

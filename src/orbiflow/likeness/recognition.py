@@ -21,11 +21,10 @@ import shapely
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial.distance import cdist
-from shapely.geometry import LineString
 from shapely.geometry.polygon import orient
 
+from orbiflow.geometry import points_along, polygons_in, ring_length
 from orbiflow.likeness.metrics import Region, Shape, as_region
-from orbiflow.silhouette.rings import polygons_in
 
 POINTS = 256  # on the target's outline, and as dense on the tile's
 MOST_POINTS = 4 * POINTS  # on a tile's outline, however long it is
@@ -87,7 +86,7 @@ class Recogniser:
         corners = np.concatenate(rings)
         # Outlines are run through from about here, so that the same outline gives the same points.
         self._start = corners[np.argmax((corners**2).sum(axis=1))]
-        self._spacing = sum(_length(ring) for ring in rings) / POINTS
+        self._spacing = sum(ring_length(ring) for ring in rings) / POINTS
         self._target = _features(rings, self._spacing, self._start)
         weights = 1 / (self._target.thickness + THIN)
         self._limb_weights = weights / weights.sum()
@@ -107,10 +106,10 @@ class Recogniser:
         )
 
     def _rings(self, region: Region) -> list[NDArray[np.float64]]:
-        """Closed rings (M, 2) of `region` in units of the target, the inside on their left."""
+        """Rings (M, 2) of `region` in units of the target, the inside on their left."""
         polygons = [orient(polygon) for polygon in polygons_in(region)]
         rings = [ring for part in polygons for ring in (part.exterior, *part.interiors)]
-        return [(shapely.get_coordinates(ring) - self._origin) / self._unit for ring in rings]
+        return [(shapely.get_coordinates(r)[:-1] - self._origin) / self._unit for r in rings]
 
 
 def recognisability(tile: Shape, target: Shape) -> Recognisability:
@@ -157,7 +156,7 @@ def _agreement(goal: _Features, own: _Features) -> NDArray[np.float64]:
 def _features(
     rings: list[NDArray[np.float64]], spacing: float, start: NDArray[np.float64]
 ) -> _Features:
-    spacing = max(spacing, sum(_length(ring) for ring in rings) / MOST_POINTS)
+    spacing = max(spacing, sum(ring_length(ring) for ring in rings) / MOST_POINTS)
     samples = [_sample(ring, spacing, start) for ring in rings]
     points = np.concatenate([xy for xy, _ in samples])
     normals = np.concatenate([normal for _, normal in samples])
@@ -180,24 +179,13 @@ def _sample(
     The normal is the mean of the unit normals within `WINDOW`: shorter than 1 at a bend, so that a
     corner and its rounding are alike.
     """
-    length = _length(ring)
+    length = ring_length(ring)
     count = max(round(length / spacing), FEWEST_POINTS)
-    first = LineString(ring).project(shapely.Point(start))
+    first = shapely.LinearRing(ring).project(shapely.Point(start))
     at = np.linspace(first, first + length, count, endpoint=False) + 0.5 * length / count
     window = min(WINDOW, length / 4)
-    tangent = (_along(ring, at + window) - _along(ring, at - window)) / (2 * window)
-    return _along(ring, at), np.column_stack([tangent[:, 1], -tangent[:, 0]])
-
-
-def _along(ring: NDArray[np.float64], at: NDArray[np.floating]) -> NDArray[np.float64]:
-    """Points (P, 2) of a closed ring at the arc lengths `at` (P,)."""
-    knots = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(ring, axis=0).T))])
-    at = at % knots[-1]
-    return np.column_stack([np.interp(at, knots, ring[:, k]) for k in (0, 1)])
-
-
-def _length(ring: NDArray[np.float64]) -> float:
-    return float(np.hypot(*np.diff(ring, axis=0).T).sum())
+    tangent = (points_along(ring, at + window) - points_along(ring, at - window)) / (2 * window)
+    return points_along(ring, at), np.column_stack([tangent[:, 1], -tangent[:, 0]])
 
 
 def _inscribed_radius(

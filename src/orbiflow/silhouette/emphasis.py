@@ -11,13 +11,10 @@ import shapely
 from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import gaussian_filter, map_coordinates
 
+from orbiflow.arguments import instance, number, numbers
 from orbiflow.errors import InputFileError, OrbiflowError
+from orbiflow.silhouette.outlines import clean_ring, percent
 from orbiflow.silhouette.readers.mask import MaskReading, read_mask
-from orbiflow.silhouette.readers.reading import check_file, read_bytes
-from orbiflow.silhouette.readers.svg import MAX_BYTES as MAX_SVG_BYTES
-from orbiflow.silhouette.readers.svg_shapes import Drawing
-from orbiflow.silhouette.readers.svg_xml import parse_xml
-from orbiflow.silhouette.rings import clean_ring, percent
 from orbiflow.silhouette.target import Target
 
 MAX_STRENGTH = 100.0
@@ -25,7 +22,7 @@ MAX_ASPECT_ERROR = 0.01
 # In the normal form, where the silhouette has area 1: the mask's edges are drawn out over a few
 # points of a tile's boundary, so that the pull on it has no jump.
 SMOOTHING = 0.02  # standard deviation
-FADE = 0.05  # beyond the mask's frame
+FADE = 0.05  # beyond the mask's box
 MAX_SMOOTHING = 32.0  # pixels: a bound of the work
 TOUCH = 0.01  # of full emphasis: what is nowhere above this on the silhouette does not touch it
 GRID = 512  # pixels along a side of the grids that integrals are taken on
@@ -42,13 +39,13 @@ class Emphasis:
     Make one with `Emphasis.read`. All points are in the target's normal form (y up).
 
     - `mask`: m, (H, W), 0 to 1, kept as float32, its first row at the top of the picture; read-only.
-    - `frame`: (xmin, ymin, xmax, ymax), the box in the normal form that the mask's pixels cover.
+    - `box`: (xmin, ymin, xmax, ymax), the box in the normal form that the mask's pixels cover.
     - `strength`: weight of what is wholly emphasised, above 1 and at most 100.
     - `source`: the mask's file name, or what stands in for it.
     - `share`: mean of m over the silhouette, where it is known.
     - `notes`: what was decided for the user, in plain words.
 
-    Raises `OrbiflowError` for a strength out of range and for a mask or a frame of another kind.
+    Raises `OrbiflowError` for a strength out of range and for a mask or a box of another kind.
 
     >>> emphasis = Emphasis(np.array([[1.0, 0.0], [0.0, 0.0]]), (-1, -1, 1, 1), strength=5.0)
     >>> emphasis.weight([[-0.5, 0.5], [0.0, 0.5], [0.5, -0.5], [9.0, 9.0]])
@@ -56,26 +53,23 @@ class Emphasis:
     """
 
     mask: NDArray[np.floating]
-    frame: Box
+    box: Box
     strength: float = 4.0
     source: str = "mask"
     share: float | None = None
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        if not 1 < self.strength <= MAX_STRENGTH:
-            raise OrbiflowError(
-                f"strength of the emphasis must be above 1 and at most {MAX_STRENGTH:g}, got "
-                f"{self.strength}; without emphasis everything has weight 1"
-            )
-        mask = np.array(self.mask, dtype=np.float32)
+        # without emphasis everything has weight 1
+        number(self.strength, "strength of the emphasis", 1, MAX_STRENGTH, above=True)
+        mask = numbers(self.mask, self.source, (...,), finite=False).astype(np.float32)
         if mask.ndim != 2 or not mask.size or not (mask.min() >= 0 and mask.max() <= 1):
             raise OrbiflowError(
                 f"{self.source}: a mask needs shape (H, W) and values from 0 to 1, got {mask.shape}"
             )
-        xmin, ymin, xmax, ymax = self.frame
-        if not (np.isfinite(self.frame).all() and xmin < xmax and ymin < ymax):
-            raise OrbiflowError(f"{self.source}: the frame {self.frame} is not a box with an area")
+        xmin, ymin, xmax, ymax = numbers(self.box, f"{self.source}: the box", (4,), finite=False)
+        if not (np.isfinite(self.box).all() and xmin < xmax and ymin < ymax):
+            raise OrbiflowError(f"{self.source}: the box {self.box} has no area")
         mask.setflags(write=False)
         object.__setattr__(self, "mask", mask)
 
@@ -93,6 +87,7 @@ class Emphasis:
         damaged, a mask of another aspect, one that is all of one level, and one that emphasises no
         part of the silhouette; `OrbiflowError` for a strength that is not above 1 and at most 100.
         """
+        instance(target, Target, "the target", "Target.read and Target.from_polygon make one")
         path = Path(path)
         picture = read_mask(path)
         box, covered = _covered(target)
@@ -100,16 +95,16 @@ class Emphasis:
         levels = picture.levels
         # The last row and column of an averaged mask may reach beyond the picture.
         overhang = np.array(levels.shape[::-1]) * picture.reduced / picture.size
-        frame = _normal_frame(target, box, overhang)
-        plain = cls(_smoothed(levels, frame), frame, strength, str(path))
+        own = _normal_box(target, box, overhang)
+        plain = cls(_smoothed(levels, own), own, strength, str(path))
         share = _share_of(plain, target)
         notes = (*picture.notes, *placed, *_warnings(levels, share, plain.strength))
-        return cls(plain.mask, frame, strength, str(path), share, notes)
+        return cls(plain.mask, own, strength, str(path), share, notes)
 
     def weight(self, points: ArrayLike) -> NDArray[np.float64]:
         """Weights (...) at `points` (..., 2) of the normal form, from 1 to the strength.
 
-        Bilinear between the centres of the mask's pixels; beyond the frame it fades to 1 within
+        Bilinear between the centres of the mask's pixels; beyond the box it fades to 1 within
         0.05. Raises `OrbiflowError` for points of another shape or that are not finite.
         """
         return 1 + (self.strength - 1) * self._level(points)
@@ -140,7 +135,7 @@ class Emphasis:
             raise OrbiflowError(
                 f"points must have shape (..., 2) and finite coordinates, got shape {at.shape}"
             )
-        xmin, ymin, xmax, ymax = self.frame
+        xmin, ymin, xmax, ymax = numbers(self.box, f"{self.source}: the box", (4,), finite=False)
         inside = np.clip(at, [xmin, ymin], [xmax, ymax])
         height, width = self.mask.shape
         column = (inside[..., 0] - xmin) / (xmax - xmin) * width - 0.5
@@ -199,22 +194,9 @@ def _covered(target: Target) -> tuple[Box, str]:
         xmax, ymax = target.outline.max(axis=0)
         return (float(xmin), float(ymin), float(xmax), float(ymax)), _OUTLINE_BOX
     width, height = target.size
-    xmin, ymin = _page_corner(target) if target.kind == "svg" else (0.0, 0.0)
+    xmin, ymin = target.corner
     name = "the drawing's page" if target.kind == "svg" else "the input picture"
     return (xmin, ymin, xmin + width, ymin + height), name
-
-
-def _page_corner(target: Target) -> tuple[float, float]:
-    """Where the page of an SVG drawing begins: read again, since a target keeps its size alone."""
-    path = Path(target.source)
-    check_file(path)
-    box = Drawing(path, parse_xml(path, read_bytes(path, MAX_SVG_BYTES))).box
-    if box is None or (box[2] - box[0], box[3] - box[1]) != target.size:
-        raise InputFileError(
-            f"{path}: the drawing's page is no longer the one that the silhouette was read from; "
-            "read the silhouette again"
-        )
-    return box[0], box[1]
 
 
 def _check_aspect(path: Path, picture: MaskReading, box: Box, covered: str) -> list[str]:
@@ -231,7 +213,7 @@ def _check_aspect(path: Path, picture: MaskReading, box: Box, covered: str) -> l
     return [f"laid the mask ({mask}) over {covered} ({size})"]
 
 
-def _normal_frame(target: Target, box: Box, overhang: NDArray[np.float64]) -> Box:
+def _normal_box(target: Target, box: Box, overhang: NDArray[np.float64]) -> Box:
     """`box` of the input in the normal form, drawn out to the right and downwards by `overhang`."""
     corners = target.to_normal([box[:2], box[2:]])
     xmin, ymin = corners.min(axis=0)
@@ -245,8 +227,8 @@ def _normal_frame(target: Target, box: Box, overhang: NDArray[np.float64]) -> Bo
     )
 
 
-def _smoothed(levels: NDArray[np.float64], frame: Box) -> NDArray[np.float32]:
-    xmin, ymin, xmax, ymax = frame
+def _smoothed(levels: NDArray[np.float64], box: Box) -> NDArray[np.float32]:
+    xmin, ymin, xmax, ymax = box
     pixel = np.array([ymax - ymin, xmax - xmin]) / levels.shape
     sigma = np.minimum(SMOOTHING / pixel, MAX_SMOOTHING)
     smooth = gaussian_filter(levels, tuple(sigma), mode="nearest")

@@ -8,8 +8,10 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from orbiflow.geometry import centroid, orient, signed_area
+from orbiflow.silhouette.frame import Frame
+from orbiflow.silhouette.outlines import clean_ring
 from orbiflow.silhouette.readers import read_outline
-from orbiflow.silhouette.rings import centroid, clean_ring, orient, signed_area
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,7 +27,8 @@ class Target:
     - `notes`: what was decided for the user, in plain words.
     - `source`: the file's name, or what stands in for it.
     - `kind`: "image", "svg", "dat", "json" or "polygon".
-    - `size`: width and height of the picture or drawing, where there is one.
+    - `size`, `corner`: width and height of the picture or drawing, where there is one, and its corner
+      of least coordinates.
 
     >>> target = Target.from_polygon([[0, 0], [2, 0], [2, 2], [0, 2]])
     >>> target.normal.tolist()
@@ -40,6 +43,7 @@ class Target:
     source: str = "polygon"
     kind: str = "polygon"
     size: tuple[float, float] | None = None
+    corner: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
         outline = orient(np.array(self.outline, float), counter_clockwise=not self.y_down)
@@ -59,7 +63,13 @@ class Target:
         """
         reading = read_outline(path, threshold=threshold, invert=invert)
         return cls(
-            reading.outline, reading.y_down, reading.notes, str(path), reading.kind, reading.size
+            reading.outline,
+            reading.y_down,
+            reading.notes,
+            str(path),
+            reading.kind,
+            reading.size,
+            reading.corner,
         )
 
     @classmethod
@@ -78,17 +88,13 @@ class Target:
     @property
     def area(self) -> float:
         """Area of the silhouette in square input units."""
-        return abs(signed_area(self.outline))
+        return float(abs(signed_area(self.outline)))
 
     @cached_property
-    def linear(self) -> NDArray[np.float64]:
-        """Matrix (2, 2) of the frame `input = normal @ linear.T + offset`: a scale, and y's flip."""
-        return _read_only(np.sqrt(self.area) * np.diag([1.0, -1.0 if self.y_down else 1.0]))
-
-    @cached_property
-    def offset(self) -> NDArray[np.float64]:
-        """Translation (2,) of the frame: the silhouette's centroid in input units."""
-        return _read_only(centroid(self.outline))
+    def frame(self) -> Frame:
+        """Where the normal form lies in the input: a scale, y's flip and a translation."""
+        linear = np.sqrt(self.area) * np.diag([1.0, -1.0 if self.y_down else 1.0])
+        return Frame(linear, centroid(self.outline), self.kind, self.size, self.corner)
 
     @cached_property
     def normal(self) -> NDArray[np.float64]:
@@ -96,12 +102,12 @@ class Target:
         return _read_only(self.to_normal(self.outline))
 
     def to_input(self, points: ArrayLike) -> NDArray[np.float64]:
-        """`points` (..., 2) of the normal form in the input's units."""
-        return np.asarray(points, dtype=np.float64) @ self.linear.T + self.offset
+        """`points` (..., 2) of the normal form in the input's units: `frame.to_input`."""
+        return self.frame.to_input(points)
 
     def to_normal(self, points: ArrayLike) -> NDArray[np.float64]:
-        """`points` (..., 2) in the input's units, in the normal form."""
-        return (np.asarray(points, dtype=np.float64) - self.offset) / np.diag(self.linear)
+        """`points` (..., 2) in the input's units, in the normal form: `frame.to_normal`."""
+        return self.frame.to_normal(points)
 
     def report(self) -> dict[str, Any]:
         """What was read and decided, ready for JSON."""

@@ -10,10 +10,11 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 import shapely
 
+from orbiflow.arguments import instance, number
 from orbiflow.errors import CertificationError, OrbiflowError
 from orbiflow.symmetry.isometry import Array
 from orbiflow.tilings.edge_matching import curve_distance, match_segments
-from orbiflow.tilings.images import Surroundings, expected_area, shoelace, surroundings
+from orbiflow.tilings.images import Surroundings, expected_area, surroundings
 from orbiflow.tilings.neighbours import neighbours_among
 from orbiflow.tilings.tile import Tile
 
@@ -110,10 +111,13 @@ def certify(tile: Tile, *, tolerance: float = 1e-9) -> Certificate:
             for the default tolerance in double precision.
         tolerance: relative, see `Certificate`.
 
-    Raises nothing for a bad tile: the certificate says what is wrong.
+    Raises nothing for a bad tile: the certificate says what is wrong. `OrbiflowError` for what is no
+    `Tile`, and for a tolerance that is not a positive number.
     """
+    instance(tile, Tile, "the tile", "Tile(polygon, group) makes one")
+    tolerance = number(tolerance, "tolerance", 0, above=True)
     size = expected_area(tile)
-    area = shoelace(tile.polygon)
+    area = tile.signed_area
     figures = _Figures(area, size, tolerance)
     try:
         around = surroundings(tile, _MARGIN)

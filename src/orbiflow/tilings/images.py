@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orbiflow.errors import OrbiflowError
+from orbiflow.geometry import signed_area
 from orbiflow.symmetry import Isometry
 from orbiflow.symmetry.isometry import Array
 from orbiflow.tilings.tile import Tile
@@ -25,12 +26,6 @@ def expected_area(tile: Tile) -> float:
 def span(tile: Tile) -> float:
     """Radius of the tile over the square root of the expected area: about 0.6 for a hexagon."""
     return tile.radius / math.sqrt(expected_area(tile))
-
-
-def shoelace(ring: Array) -> float:
-    """Signed area of a ring (N, 2), positive when counter-clockwise."""
-    x, y = (ring - ring[0]).T
-    return float(0.5 * np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +66,7 @@ def surroundings(tile: Tile, margin: float) -> Surroundings:
     polygon = _without_repeats(tile.polygon, 1e-12 * scale)
     if len(polygon) < 3:
         raise OrbiflowError("the tile's polygon has fewer than three distinct vertices")
-    if shoelace(polygon) < 0:
+    if signed_area(polygon) < 0:
         polygon = polygon[::-1]
     center = tile.center
     reach = 2 * tile.radius + math.sqrt(2.0) * margin * scale

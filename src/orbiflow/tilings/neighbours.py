@@ -9,6 +9,8 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from orbiflow.arguments import instance, number
+from orbiflow.geometry import subdivided
 from orbiflow.symmetry import Isometry
 from orbiflow.symmetry.isometry import Array
 from orbiflow.tilings.edge_matching import segment_tree
@@ -46,6 +48,8 @@ def neighbours(tile: Tile, *, tolerance: float = 1e-7) -> Neighbours:
     >>> len(found.edge), len(found.point)
     (5, 3)
     """
+    instance(tile, Tile, "the tile", "Tile(polygon, group) makes one")
+    tolerance = number(tolerance, "tolerance", 0)
     return neighbours_among(surroundings(tile, tolerance), tolerance)
 
 
@@ -70,6 +74,4 @@ def neighbours_among(around: Surroundings, tolerance: float) -> Neighbours:
 def _boundary_samples(ring: Array) -> Array:
     """Interior points of the segments, midpoints among them: never the corners."""
     per_segment = 2 * math.ceil(_SAMPLES / (2 * len(ring))) + 1 if len(ring) < _SAMPLES else 1
-    fractions = (np.arange(per_segment) + 0.5) / per_segment
-    step = np.roll(ring, -1, axis=0) - ring
-    return (ring[:, None] + fractions[:, None] * step[:, None]).reshape(-1, 2)
+    return subdivided(ring, per_segment, phase=0.5)

@@ -137,7 +137,7 @@ def _start(
         ridge=settings.ridge,
         generator=generator,
     )
-    return SymmetricDensity(space, Flow(segments, steps=settings.steps), base)
+    return SymmetricDensity(space, Flow(segments, steps=settings.steps, warn=False), base)
 
 
 def max_frequency(space: Space, detail: int) -> int:

@@ -206,7 +206,7 @@ class _Descent:
         self.weights = _even(validation) if weights is None else weights
         self.done, self.best = 0, 0
         self.latest = self.kept = objective.get()
-        self.nll = self._nll(objective.points, objective.weights)
+        self.nll = self._nll(objective.density, objective.points, objective.weights)
         self.trains, self.scores = [self.nll], [self._score()]
         self._scored = 0
 
@@ -237,13 +237,13 @@ class _Descent:
 
     def _score(self) -> float:
         # at doubled steps: what only exploits the integrator gains nothing here
-        flow = self.objective.density.flow
-        with flow.with_steps(2 * flow.steps):
-            return self._nll(self.validation, self.weights)
+        density = self.objective.density
+        finer = density.with_steps(2 * density.flow.steps)
+        return self._nll(finer, self.validation, self.weights)
 
     @torch.no_grad()
-    def _nll(self, points: Tensor, weights: Tensor) -> float:
-        return -float((weights * self.objective.density.log_prob(points)).sum())
+    def _nll(self, density: SymmetricDensity, points: Tensor, weights: Tensor) -> float:
+        return -float((weights * density.log_prob(points)).sum())
 
 
 def _even(points: Tensor) -> Tensor:

@@ -29,7 +29,13 @@ from orbiflow.density.fitting.report import (
 )
 from orbiflow.density.fitting.training import training
 from orbiflow.density.models.bases import Base, UniformBase
-from orbiflow.density.models.neural import MAX_DEPTH, MAX_WAVES, MAX_WIDTH, NeuralField, NeuralFlow
+from orbiflow.density.models.neural import (
+    MAX_DEPTH,
+    MAX_WAVES,
+    MAX_WIDTH,
+    NeuralFlow,
+    NeuralTorusField,
+)
 from orbiflow.density.models.symmetric import SymmetricDensity
 from orbiflow.density.spaces.space import Space
 from orbiflow.errors import OrbiflowError
@@ -62,7 +68,7 @@ class NeuralSettings:
 
     - `base`: "mixture" (of von Mises chains, see `fit_chains`) or "uniform".
     - `components`, `members`: of the mixture, at most.
-    - `width`, `depth`, `waves`: of the network, see `NeuralField`.
+    - `width`, `depth`, `waves`: of the network, see `NeuralTorusField`.
     - `steps`: Runge-Kutta steps; doubled where the integrator has not converged. None for 2 with a
       mixture, 8 without.
     - `matching`: iterations of flow matching; None for 0 with a mixture, 20,000 without.
@@ -162,7 +168,7 @@ def fit_neural(
     points = own_points(space, points)
     train, validation, duplicates = split(points, settings.validation, generator)
     base, mixture = _base(space, train, validation, settings, say)
-    field = NeuralField(
+    field = NeuralTorusField(
         space.dim,
         width=settings.width,
         depth=settings.depth,
@@ -255,7 +261,7 @@ class _Trainer:
         if self.settings.base == "mixture" and not self.settings.matchings and gain < WORTHWHILE:
             self.idle = True
             # a new field is zero, and this one costs next to nothing
-            still = NeuralField(self.density.space.dim, width=1, depth=1, waves=1)
+            still = NeuralTorusField(self.density.space.dim, width=1, depth=1, waves=1)
             self.density.flow = NeuralFlow(still, steps=1)
         return done
 
@@ -277,16 +283,16 @@ class _Trainer:
         return -self.density.log_prob(self._batch()).mean()
 
     @property
-    def _field(self) -> NeuralField:
+    def _field(self) -> NeuralTorusField:
         field = self.density.flow.field
-        assert isinstance(field, NeuralField)  # by construction
+        assert isinstance(field, NeuralTorusField)  # by construction
         return field
 
     @torch.no_grad()
     def _score(self) -> float:
         # at doubled steps: what only exploits the integrator gains nothing here
-        with self.density.flow.with_steps(2 * self.density.flow.steps):
-            return -float(self.density.log_prob(self.validation).mean())
+        finer = self.density.with_steps(2 * self.density.flow.steps)
+        return -float(finer.log_prob(self.validation).mean())
 
     def _descend(
         self,

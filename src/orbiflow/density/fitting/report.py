@@ -97,8 +97,7 @@ def mean_nll(density: SymmetricDensity, points: Tensor) -> float:
 
 def nll_at(density: SymmetricDensity, points: Tensor, steps: int) -> float:
     """`mean_nll` with another number of Runge-Kutta steps a segment."""
-    with density.flow.with_steps(steps):
-        return mean_nll(density, points)
+    return mean_nll(density.with_steps(steps), points)
 
 
 def step_error(density: SymmetricDensity, points: Tensor) -> float:
@@ -117,16 +116,16 @@ def settle(density: SymmetricDensity, points: Tensor, most: int) -> tuple[float,
     Returns:
         By how much the mean log density still changes, and the mass (None in other dimensions).
     """
-    flow, now = density.flow, mean_nll(density, points)
+    now = mean_nll(density, points)
     while True:
-        finer = nll_at(density, points, 2 * flow.steps)
+        finer = nll_at(density, points, 2 * density.flow.steps)
         error = abs(finer - now)
-        last = flow.steps >= most
+        last = density.flow.steps >= most
         if last or error <= MASS_TOLERANCE / 2:
             mass = density.mass() if density.space.dim == 2 else None
             if last or mass is None or abs(mass - 1) <= MASS_TOLERANCE / 2:
                 return error, mass
-        flow.steps, now = 2 * flow.steps, finer
+        density.flow, now = density.flow.with_steps(2 * density.flow.steps), finer
 
 
 def repeats_note(count: int, duplicates: int) -> list[str]:

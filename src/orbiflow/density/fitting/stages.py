@@ -78,12 +78,12 @@ def refine_in_stages(
             _restore(density, before)
             if density.flow.steps >= MOST_STEPS:
                 break
-            density.flow.steps *= 2
+            density.flow = density.flow.with_steps(2 * density.flow.steps)
             continue
         stages.append(stage)
         unconverged = step_error(density, held) > MASS_TOLERANCE
         if unconverged and density.flow.steps < MOST_STEPS:
-            density.flow.steps *= 2
+            density.flow = density.flow.with_steps(2 * density.flow.steps)
         elif number > 1 and stage.best == 0:
             break
     return stages

@@ -4,7 +4,7 @@ from orbiflow.density.models.bases import Base, UniformBase, VonMisesBase
 from orbiflow.density.models.blend import BlendedDensity
 from orbiflow.density.models.chains import VonMisesChains
 from orbiflow.density.models.kernels import AdaptiveKernels
-from orbiflow.density.models.neural import NeuralField, NeuralFlow
+from orbiflow.density.models.neural import NeuralFlow, NeuralTorusField
 from orbiflow.density.models.symmetric import SymmetricDensity, kl_by_quadrature, midpoints
 from orbiflow.density.models.tabulated import TabulatedDensity
 
@@ -12,8 +12,8 @@ __all__ = [
     "AdaptiveKernels",
     "Base",
     "BlendedDensity",
-    "NeuralField",
     "NeuralFlow",
+    "NeuralTorusField",
     "SymmetricDensity",
     "TabulatedDensity",
     "UniformBase",

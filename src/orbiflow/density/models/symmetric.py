@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import copy
 import math
 import numbers
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import torch
 from torch import Tensor
@@ -168,9 +169,14 @@ class SymmetricDensity(Distribution):
     @torch.no_grad()
     def integration_error(self, points: Tensor) -> float:
         """Largest change of the log density at `points` when the steps are doubled."""
-        coarse = self.log_prob(points)
-        with self.flow.with_steps(2 * self.flow.steps):
-            return float((self.log_prob(points) - coarse).abs().max())
+        finer = self.with_steps(2 * self.flow.steps)
+        return float((finer.log_prob(points) - self.log_prob(points)).abs().max())
+
+    def with_steps(self, steps: int) -> Self:
+        """The same density with its flow integrated in other steps: a view, see `Flow.with_steps`."""
+        view = copy.copy(self)
+        view.flow = self.flow.with_steps(steps)
+        return view
 
     def _like(self) -> Tensor:
         return next(iter(self.flow.parameters()), torch.zeros((), dtype=torch.float64))

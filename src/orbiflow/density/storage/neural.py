@@ -8,7 +8,13 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from orbiflow.density.models.neural import MAX_DEPTH, MAX_WAVES, MAX_WIDTH, NeuralField, NeuralFlow
+from orbiflow.density.models.neural import (
+    MAX_DEPTH,
+    MAX_WAVES,
+    MAX_WIDTH,
+    NeuralFlow,
+    NeuralTorusField,
+)
 from orbiflow.density.spaces.space import Space
 from orbiflow.density.storage.checks import checked_integer, checked_tensor
 from orbiflow.errors import OrbiflowError
@@ -60,7 +66,7 @@ def neural_from_header(
         raise OrbiflowError(f"a flow of {header['dim']} angles on a torus of {space.dim}")
     # on the meta device, shapes cost nothing
     with torch.device("meta"):
-        field = NeuralField(space.dim, width=width, depth=depth, waves=waves)
+        field = NeuralTorusField(space.dim, width=width, depth=depth, waves=waves)
     expected = {FLOW + name: value.shape for name, value in field.state_dict().items()}
     found = {name: value for name, value in tensors.items() if name.startswith(FLOW)}
     if expected.keys() != found.keys():

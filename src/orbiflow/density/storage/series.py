@@ -102,6 +102,7 @@ def series_from_header(
         steps=_bounded(header["steps"], MAX_STEPS, "steps"),
         method=str(header["method"]),
         duration=_finite(header["duration"], "duration"),
+        warn=False,  # the fit has settled them and said if it could not
     )
 
 

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 
 from orbiflow.errors import InputFileError
+from orbiflow.silhouette.outlines import MAX_VERTICES, clean_ring
 from orbiflow.silhouette.readers.reading import Reading, read_bytes
-from orbiflow.silhouette.rings import MAX_VERTICES, clean_ring
 
 MAX_BYTES = 16 * 2**20
 POLYGON_KEYS = ("polygon", "tile", "outline")

@@ -19,6 +19,7 @@ class Reading:
     - `kind`: "image", "svg", "dat", "json".
     - `size`: width and height of the picture or drawing, where the file states one.
     - `notes`: what was decided for the user, in plain words.
+    - `corner`: of least coordinates, of that picture or drawing.
     """
 
     outline: NDArray[np.float64]
@@ -26,6 +27,7 @@ class Reading:
     kind: str
     size: tuple[float, float] | None
     notes: tuple[str, ...]
+    corner: tuple[float, float] = (0.0, 0.0)
 
 
 def check_file(path: Path) -> int:

@@ -9,12 +9,7 @@ from shapely.errors import GEOSException
 from shapely.geometry.base import BaseGeometry
 
 from orbiflow.errors import InputFileError
-from orbiflow.silhouette.readers.fill_rule import TooTangled, fill
-from orbiflow.silhouette.readers.reading import Reading, read_bytes
-from orbiflow.silhouette.readers.svg_paths import MAX_POINTS, SubPath, TooManyPoints
-from orbiflow.silhouette.readers.svg_shapes import Drawing
-from orbiflow.silhouette.readers.svg_xml import parse_xml
-from orbiflow.silhouette.rings import (
+from orbiflow.silhouette.outlines import (
     MAX_COORDINATE,
     MAX_VERTICES,
     clean_ring,
@@ -22,6 +17,11 @@ from orbiflow.silhouette.rings import (
     outer_ring,
     simplified,
 )
+from orbiflow.silhouette.readers.fill_rule import TooTangled, fill
+from orbiflow.silhouette.readers.reading import Reading, read_bytes
+from orbiflow.silhouette.readers.svg_paths import MAX_POINTS, SubPath, TooManyPoints
+from orbiflow.silhouette.readers.svg_shapes import Drawing
+from orbiflow.silhouette.readers.svg_xml import parse_xml
 
 MAX_BYTES = 16 * 2**20
 # Flattening error, of the size of each shape, and its floor, of the size of the drawing.
@@ -57,7 +57,8 @@ def read_svg(path: Path) -> Reading:
     outline, cleaned = clean_ring(_thinned(shape, size), str(path), InputFileError)
     box = drawing.box
     page = None if box is None else (box[2] - box[0], box[3] - box[1])
-    return Reading(outline, True, "svg", page, (*notes, *dropped, *kept, *cleaned))
+    corner = (0.0, 0.0) if box is None else (box[0], box[1])
+    return Reading(outline, True, "svg", page, (*notes, *dropped, *kept, *cleaned), corner)
 
 
 def _drawing_size(drawing: Drawing) -> float:

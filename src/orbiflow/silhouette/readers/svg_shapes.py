@@ -80,7 +80,9 @@ class Drawing:
         if box is not None:
             return box[0], box[1], box[0] + box[2], box[1] + box[3]
         width, height = (self._length(self.root, key) for key in ("width", "height"))
-        return None if width is None or height is None else (0.0, 0.0, width, height)
+        if width is None or height is None or not (width > 0 and height > 0):
+            return None
+        return 0.0, 0.0, width, height
 
     def _view_box(self, element: Element) -> tuple[float, float, float, float] | None:
         """The viewBox (x, y, width, height) of `element`."""

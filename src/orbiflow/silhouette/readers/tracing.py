@@ -10,7 +10,8 @@ from shapely.geometry import Polygon, box
 from skimage.measure import find_contours
 
 from orbiflow.errors import InputFileError
-from orbiflow.silhouette.rings import outer_ring, percent, polygons_in, simplified
+from orbiflow.geometry import polygons_in
+from orbiflow.silhouette.outlines import outer_ring, percent, simplified
 
 MIN_AREA = 30.0  # square pixels
 MAX_OUTLINE_VERTICES = 4000

@@ -1,10 +1,6 @@
-"""Closed rings: what a silhouette's outline must satisfy, and the few quantities taken from it.
-
-A ring is an array of shape (N, 2), float64, whose last vertex is not a repeat of the first.
-"""
+"""What a silhouette's outline must satisfy, and how one is taken from a shapely geometry."""
 
 import re
-from collections.abc import Iterable
 
 import numpy as np
 import shapely
@@ -12,7 +8,9 @@ from numpy.typing import ArrayLike, NDArray
 from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
+from orbiflow.arguments import numbers
 from orbiflow.errors import OrbiflowError
+from orbiflow.geometry import polygons_in, signed_area
 
 MAX_VERTICES = 100_000
 MAX_COORDINATE = 1e12
@@ -25,38 +23,6 @@ MIN_RELATIVE_AREA = 1e-9
 CLEARANCE_DIGITS = 12
 
 _POSITION = re.compile(r"\[(\S+) (\S+)\]")
-
-
-def signed_area(ring: NDArray[np.float64]) -> float:
-    """Area enclosed by `ring` (N, 2), positive where it is counter-clockwise with y up.
-
-    >>> signed_area(np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]]))
-    2.0
-    """
-    x, y = (ring - ring[0]).T
-    return 0.5 * float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
-
-
-def centroid(ring: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Centre of mass (2,) of the region that `ring` (N, 2) encloses.
-
-    >>> centroid(np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]]))
-    array([1. , 0.5])
-    """
-    local = ring - ring[0]
-    nxt = np.roll(local, -1, axis=0)
-    cross = local[:, 0] * nxt[:, 1] - nxt[:, 0] * local[:, 1]
-    return ring[0] + ((local + nxt) * cross[:, None]).sum(axis=0) / (3 * cross.sum())
-
-
-def reverse(ring: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The same ring run through the other way, from the same first vertex."""
-    return np.roll(ring[::-1], 1, axis=0)
-
-
-def orient(ring: NDArray[np.float64], *, counter_clockwise: bool = True) -> NDArray[np.float64]:
-    """`ring` (N, 2), reversed if need be so that it runs as asked (as seen with y up)."""
-    return ring if (signed_area(ring) > 0) == counter_clockwise else reverse(ring)
 
 
 def clean_ring(
@@ -91,8 +57,10 @@ def clean_ring(
 
 def _as_points(points: ArrayLike, where: str, error: type[OrbiflowError]) -> NDArray[np.float64]:
     try:
-        ring = np.array(points, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError) as exc:
+        ring: NDArray[np.float64] = np.zeros(0)
+        if np.ndim(points):
+            ring = numbers(points, where, (...,), finite=False)
+    except (TypeError, ValueError) as exc:
         raise error(
             f"{where}: the vertices are not numbers in pairs; give them as [[x, y], ...]"
         ) from exc
@@ -157,14 +125,6 @@ def percent(share: float) -> str:
     if 0 < share < 0.001:
         return "under 0.1%"
     return "over 99.9%" if 0.999 < share < 1 else f"{share:.1%}"
-
-
-def polygons_in(geometry: BaseGeometry) -> list[Polygon]:
-    """The polygons that `geometry` is made of, lines and points left out."""
-    if isinstance(geometry, Polygon):
-        return [] if geometry.is_empty else [geometry]
-    parts: Iterable[BaseGeometry] = getattr(geometry, "geoms", ())
-    return [polygon for part in parts for polygon in polygons_in(part)]
 
 
 def filled(polygon: Polygon) -> Polygon:

@@ -1,0 +1,23 @@
+"""Closed rings and polygons: area, centroid, sense, points by arc length. Imports no other room."""
+
+from orbiflow.geometry.arc_length import (
+    points_along,
+    resampled,
+    resampled_with_corners,
+    ring_length,
+)
+from orbiflow.geometry.polygons import polygons_in
+from orbiflow.geometry.rings import centroid, orient, reverse, signed_area, subdivided
+
+__all__ = [
+    "centroid",
+    "orient",
+    "points_along",
+    "polygons_in",
+    "resampled",
+    "resampled_with_corners",
+    "reverse",
+    "ring_length",
+    "signed_area",
+    "subdivided",
+]
