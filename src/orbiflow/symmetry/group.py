@@ -15,6 +15,7 @@ from orbiflow.symmetry.isometry import (
     Array,
     Isometry,
     Points,
+    cast_like,
     check_dimension,
     identity,
 )
