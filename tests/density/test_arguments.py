@@ -42,7 +42,7 @@ def a_density(space: Any = torus, dtype: torch.dtype = torch.float64) -> Symmetr
     field = SplineField(space.group, 2, dtype=dtype)
     with torch.no_grad():
         field.parameters_.normal_(std=0.02)
-    return SymmetricDensity(space, Flow([field], steps=2))
+    return SymmetricDensity(space, Flow([field], steps=2, warn=False))
 
 
 POINTS = torch.rand(30, 2, dtype=torch.float64)

@@ -120,7 +120,7 @@ def test_every_last_iterate_is_scored(iterations: int) -> None:
     points = cluster("torus").float()
     space = make_space("torus")
     fields = [SplineField(space.group, 2, smoothness=2.0, dtype=torch.float32)]
-    density = SymmetricDensity(space, Flow(fields, steps=2))
+    density = SymmetricDensity(space, Flow(fields, steps=2, warn=False))
     before = fields[0].parameters_.detach().clone()
     done = refine(density, points, points, iterations=iterations)
     assert len(done.validation) == 1 + math.ceil(iterations / EVERY)

@@ -26,7 +26,7 @@ KINDS = ("uniform", "von-mises", "blended", "tabulated")
 
 def density_of(kind: str, space: Space, seed: int) -> SymmetricDensity | TabulatedDensity:
     torch.manual_seed(seed % 2**31)
-    flow = Flow(random_field(space.group, 2, seed, rms=0.05), steps=4)
+    flow = Flow(random_field(space.group, 2, seed, rms=0.05), steps=4, warn=False)
     base = VonMisesBase(space) if kind == "von-mises" else UniformBase(space)
     if kind == "tabulated":
         return TabulatedDensity(SymmetricDensity(space, flow), 16)

@@ -51,7 +51,7 @@ def back(density: SymmetricDensity, folder: Path) -> SymmetricDensity:
 
 
 def plain(*fields: InvariantField, space=None, base=None) -> SymmetricDensity:
-    return SymmetricDensity(space or Torus(2), Flow(fields, steps=2), base)
+    return SymmetricDensity(space or Torus(2), Flow(fields, steps=2, warn=False), base)
 
 
 @given(

@@ -12,7 +12,6 @@ from torch import Tensor
 
 from orbiflow.cancel import Cancel
 from orbiflow.density.models.symmetric import SymmetricDensity
-from orbiflow.density.spaces.flat import KleinBottle, Torus
 from orbiflow.density.spaces.space import Space
 from orbiflow.density.tables import read_table
 from orbiflow.errors import OrbiflowError
@@ -158,7 +157,7 @@ def _page(drawing: _Drawing) -> str:
 
 def _names(space: Space, columns: list[str] | None) -> list[str] | None:
     """The user's names of the angles, if they are known."""
-    angles = isinstance(space, Torus | KleinBottle)
+    angles = space.unit is not None
     return columns if angles and columns and len(columns) == len(space.columns) else None
 
 
@@ -166,7 +165,7 @@ def _center(space: Space, text: str | None) -> list[float] | None:
     """`center` as angles in the space's unit; "pi" stands for half a turn in radians."""
     if text is None:
         return None
-    if not isinstance(space, Torus):
+    if not space.is_torus:
         raise RecordError(f"{{center}} belongs to the torus, not the {space.name}")
     signs = {"pi": math.pi, "-pi": -math.pi}
     try:
