@@ -86,8 +86,8 @@ def run(job: tuple[str, str, str, int, float, int]) -> tuple[float, float, float
     density, report = fit_density(space, points, settings)
     spent = time.perf_counter() - begin
     grid = midpoints(space, 200)
-    with torch.no_grad(), density.flow.with_steps(2 * density.flow.steps):
-        values = density.log_prob(grid)
+    with torch.no_grad():
+        values = density.with_steps(2 * density.flow.steps).log_prob(grid)
     kl = kl_by_quadrature(weighted(label, space, grid, measure), values)
     return kl, report.mass or math.nan, spent, report.validation_nll, report.steps
 

@@ -24,7 +24,7 @@ from density_data import rna, splits
 from density_kde import KernelDensity
 
 from orbiflow.density import Torus
-from orbiflow.density.fitting.chains import fit_mixture
+from orbiflow.density.fitting.chains import fit_chains
 from orbiflow.density.fitting.neural import NeuralSettings, fit_neural
 
 QUERIES = 10_000
@@ -102,7 +102,7 @@ def mixture_row(seed: int, components: int, members: int) -> tuple[float, ...]:
     parts = splits(np.radians(rna()), seed + 1)[seed]
     space = Torus(parts[0].shape[1])
     train, held, test = (space.project(space.to_chart(part)) for part in parts)
-    found = fit_mixture(space, train, held, components=components, members=members, seed=seed)
+    found = fit_chains(space, train, held, components=components, members=members, seed=seed)
     mixture, d = found.mixture, space.dim
     numbers = len(mixture.means) * (d * d + d + mixture.log_weights.shape[1])
     nll = [math.log(space.volume) - float(mixture.log_prob(part).mean()) for part in (held, test)]

@@ -22,7 +22,7 @@ from density_data import Data, splits
 from density_unoriented_data import AXES, KLEIN, known, load
 from density_unoriented_kde import Kernel, UnorientedKernelDensity, tuned
 
-from orbiflow.density import DensityEstimator, MixedDensity, SymmetricDensity
+from orbiflow.density import BlendedDensity, DensityEstimator, SymmetricDensity
 
 QUERIES, KERNEL_QUERIES = 100_000, 5_000
 """Points that evaluation is timed on; kernels are so slow that fewer are taken, and scaled up."""
@@ -64,7 +64,7 @@ def run(name: str, data: Data, seed: int, seconds: float, detail: int) -> Outcom
     flow_fit = time.perf_counter() - begin
     truth = known(name)
     mixture = estimator.density_
-    assert isinstance(mixture, MixedDensity)
+    assert isinstance(mixture, BlendedDensity)
     flow = mixture.flow_density
     with torch.no_grad():
         alone = flow.log_prob(estimator.space_.to_chart(test), measure="natural")

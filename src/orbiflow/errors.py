@@ -35,3 +35,7 @@ class NotDiscreteError(GroupError):
 
 class CertificationError(OrbiflowError):
     """A tile that does not tile the plane within the stated tolerance."""
+
+
+class CoarseStepsWarning(UserWarning):
+    """A flow whose integration steps are too coarse for its fields: its results are not accurate."""

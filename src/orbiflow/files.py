@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import secrets
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from orbiflow.errors import OutputError
@@ -55,3 +56,23 @@ def make_folder(path: Path) -> Path:
             f"cannot write into {path}: {error.strerror or error}; choose another --out"
         ) from error
     return path
+
+
+def write_set(
+    folder: Path, names: Iterable[str], contents: Mapping[str, bytes | str]
+) -> list[Path]:
+    """Write files that belong together, and take away those of `names` that are not among them.
+
+    Raises:
+        OutputError: if the folder does not exist or cannot be written.
+    """
+    for name in names:
+        if name not in contents:
+            try:
+                (folder / name).unlink(missing_ok=True)
+            except OSError as error:
+                raise OutputError(
+                    f"cannot remove {folder / name}: {error.strerror or error}; it belongs to an "
+                    "earlier run"
+                ) from error
+    return [write_atomic(folder / name, content) for name, content in contents.items()]

@@ -53,7 +53,6 @@ def orbiflow_process_fixture() -> Run:
             [sys.executable, "-m", "orbiflow", *map(str, arguments)],
             capture_output=True,
             text=True,
-            timeout=120,
             check=False,
         )
         return Outcome(done.returncode, done.stdout, done.stderr)

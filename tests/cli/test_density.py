@@ -8,13 +8,13 @@ import pytest
 
 from orbiflow.density import read_density
 
-FIT = ["--detail", 2, "--segments", 2, "--seconds", 2]
+FIT = ["--detail", 2, "--segments", 2]
 SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")
 
 
-def table(folder: Path, rows: int = 200, name: str = "data.csv") -> Path:
+def table(folder: Path, rows: int = 100, name: str = "data.csv") -> Path:
     rng = np.random.default_rng(0)
-    values = rng.normal([20.0, 60.0], 15.0, (rows, 2)).clip(-89, 89)
+    values = rng.normal([20.0, 60.0], 25.0, (rows, 2)).clip(-89, 89)
     path = folder / name
     path.write_text("lat,lon\n" + "\n".join(f"{a:.4f},{b:.4f}" for a, b in values) + "\n")
     return path
@@ -27,7 +27,7 @@ def test_fit_score_sample_plot(space: str, tmp_path: Path, orbiflow) -> None:
         "density", "fit", data, "--space", space, "--unit", "degrees", "--out", model, *FIT
     )
     assert fitted.status == 0, fitted.err
-    assert "200 rows: mean log density" in fitted.out
+    assert "100 rows: mean log density" in fitted.out
     report = json.loads((model / "report.json").read_text())
     assert report["columns"] == ["lat", "lon"]
     assert report["report"]["mass"] == pytest.approx(1.0, abs=2e-3)
@@ -104,7 +104,7 @@ def test_plot_of_three_angles_is_of_their_pairs(tmp_path: Path, orbiflow) -> Non
     rows = rng.normal(0, 0.5, (80, 3))
     data.write_text("a,b,c\n" + "\n".join(",".join(f"{v:.4f}" for v in row) for row in rows) + "\n")
     fit = ("density", "fit", data, "--space", "torus", "--detail", 1, "--segments", 1)
-    assert orbiflow(*fit, "--seconds", 1, "--out", model).status == 0
+    assert orbiflow(*fit, "--out", model).status == 0
     plot = ("density", "plot", "--model", model, "--out", out)
     for options in ((), ("--data", data, "--center", "pi,0,-pi")):
         drawn = orbiflow(*plot, *options)
@@ -187,3 +187,53 @@ def test_the_model_is_whole_and_readable(tmp_path: Path, orbiflow) -> None:
     density, extra = read_density(model / "density.safetensors")
     assert extra == {"columns": ["lat", "lon"]}
     assert density.mass(128) == pytest.approx(1.0, abs=2e-3)
+
+
+def test_a_fit_that_the_limit_ended_says_so(tmp_path: Path, orbiflow) -> None:
+    data, model = table(tmp_path), tmp_path / "model"
+    fit = ("density", "fit", data, "--space", "torus", "--unit", "degrees", "--out", model)
+    fitted = orbiflow(*fit, *FIT, "--seconds", 0)
+    said = "stopped by the limit of 0 s: another run may differ"
+    assert said in fitted.out
+    report = json.loads((model / "report.json").read_text())["report"]
+    assert said in report["notes"]
+    assert report["mass"] == pytest.approx(1.0, abs=1e-3)
+
+
+@pytest.mark.usefixtures("small_pictures")
+def test_nothing_of_an_earlier_model_stays(tmp_path: Path, orbiflow) -> None:
+    data, model = table(tmp_path), tmp_path / "model"
+    fit = ("density", "fit", data, "--space", "torus", "--unit", "degrees", *FIT, "--out", model)
+    plot = ("density", "plot", "--model", model, "--out", model)
+    assert orbiflow(*fit).status == 0
+    assert orbiflow(*plot, "--data", data).status == 0
+    names = {"density.png", "flow.png", "samples.png", "surface.html"}
+    assert {path.name for path in model.iterdir()} == names | {"density.safetensors", "report.json"}
+    # without data there is no picture of samples beside them
+    assert orbiflow(*plot).status == 0
+    assert not (model / "samples.png").exists()
+    assert (model / "density.safetensors").exists()
+    assert orbiflow(*fit).status == 0
+    assert {path.name for path in model.iterdir()} == {"density.safetensors", "report.json"}
+
+
+def test_a_fit_does_not_touch_what_it_did_not_write(tmp_path: Path, orbiflow) -> None:
+    data, model = table(tmp_path), tmp_path / "model"
+    model.mkdir()
+    (model / "density.png").write_text("mine")
+    refused = orbiflow("density", "fit", data, "--space", "torus", *FIT, "--out", model)
+    assert refused.status == 2
+    assert "holds density.png, which orbiflow did not write" in refused.err
+    assert (model / "density.png").read_text() == "mine"
+
+
+def test_a_plot_leaves_other_files_alone(tmp_path: Path, orbiflow) -> None:
+    data, model, out = table(tmp_path), tmp_path / "model", tmp_path / "plots"
+    orbiflow("density", "fit", data, "--space", "torus", *FIT, "--out", model)
+    out.mkdir()
+    (out / "notes.txt").write_text("mine")
+    (out / "surface.html").write_text("of an earlier model")
+    wrong = orbiflow("density", "plot", "--model", model, "--center", "0,0,0", "--out", out)
+    assert wrong.status == 2
+    assert (out / "surface.html").read_text() == "of an earlier model"
+    assert (out / "notes.txt").read_text() == "mine"

@@ -49,9 +49,7 @@ def folder_fixture(tmp_path_factory: pytest.TempPathFactory) -> Path:
     image.save(folder / "boot.png")
     command = [sys.executable, "-m", "orbiflow", "escherize", folder / "boot.png"]
     command += ["--out", folder / "new" / "out", "--classes", "IH4,ih6", "--workers", 2, *FEW]
-    done = subprocess.run(
-        [str(c) for c in command], capture_output=True, text=True, timeout=200, check=False
-    )
+    done = subprocess.run([str(c) for c in command], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
     for name in ("IH4", "IH6"):
@@ -161,10 +159,12 @@ def test_a_run_on_a_polygon_with_y_up(tmp_path: Path, orbiflow) -> None:
 def test_no_tile_is_status_one(tmp_path: Path, orbiflow, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "boot.json"
     path.write_text(json.dumps(BOOT))
-    monkeypatch.setattr(methods, "fit_occupancy", lambda *_: crossed())
+    monkeypatch.setattr(methods, "fit_occupancy", lambda *_, **__: crossed())
     options = ["--classes", "IH21", "--workers", 1, *FEW]
-    outcome = orbiflow("escherize", path, "-o", tmp_path / "o", *options)
-    assert outcome.status == 1
+    for _ in range(2):  # the second time there is a run without a tile to replace
+        outcome = orbiflow("escherize", path, "-o", tmp_path / "o", *options)
+        assert outcome.status == 1
+        assert f"no certified tile was found; see {tmp_path / 'o' / 'result.json'}" in outcome.err
     assert "IH21: no tile: IH21: the boundary crosses itself" in outcome.err
     assert {p.name for p in (tmp_path / "o").iterdir()} == {"result.json"}
     document = json.loads((tmp_path / "o" / "result.json").read_text(encoding="utf-8"))
@@ -214,3 +214,36 @@ def test_help_does_not_import_torch() -> None:
         "sys.exit('torch' in sys.modules)"
     )
     assert subprocess.run([sys.executable, "-c", code], capture_output=True).returncode == 0
+
+
+def test_a_second_run_takes_the_place_of_the_first(
+    tmp_path: Path, orbiflow, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, out = tmp_path / "boot.json", tmp_path / "out"
+    path.write_text(json.dumps(BOOT))
+    run = ("escherize", path, "--workers", 1, *FEW)
+    assert orbiflow(*run, "-o", out, "--classes", "IH4,IH6").status == 0
+    assert orbiflow(*run, "-o", out, "--classes", "IH4").status == 0
+    assert {p.name for p in out.iterdir()} == {"IH4", "overview.png", "result.json"}
+    monkeypatch.chdir(out)
+    assert orbiflow(*run, "-o", ".", "--classes", "IH6").status == 0
+    assert {p.name for p in Path().iterdir()} == {"IH6", "overview.png", "result.json"}
+    before = (out / "result.json").read_bytes()
+    monkeypatch.setattr(methods, "fit_occupancy", lambda *_, **__: crossed())
+    none = orbiflow(*run, "-o", out, "--classes", "IH21")
+    assert none.status == 1
+    assert f"{out} still holds the tiles of an earlier run" in none.err
+    assert (out / "result.json").read_bytes() == before
+
+
+def test_a_folder_with_something_else_is_refused(tmp_path: Path, orbiflow) -> None:
+    path = tmp_path / "boot.json"
+    path.write_text(json.dumps(BOOT))
+    refused = orbiflow("escherize", path, "-o", tmp_path, "--classes", "IH4", *FEW)
+    assert refused.status == 2
+    assert (
+        f"{tmp_path} holds boot.json, which orbiflow did not write: choose another --out or move it"
+        in refused.err
+    )
+    assert "fitting" not in refused.out
+    assert [p.name for p in tmp_path.iterdir()] == ["boot.json"]

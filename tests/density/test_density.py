@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from orbiflow.density import (
+    MEASURES,
     KleinBottle,
     ProjectivePlane,
     Sphere,
@@ -37,7 +38,7 @@ def make(space, seed: int = 0, *, base=UniformBase, segments: int = 2, strength:
         noise = torch.randn(field.size, generator=generator, dtype=torch.float64)
         field.parameters_.data.copy_(strength * noise / noise.norm())  # of rms `strength` at most
         fields.append(field)
-    return SymmetricDensity(space, Flow(fields, steps=6), base(space))
+    return SymmetricDensity(space, Flow(fields, steps=6, warn=False), base(space))
 
 
 def square(seed: int, count: int = 40, dim: int = 2) -> torch.Tensor:
@@ -63,8 +64,7 @@ def test_it_integrates_to_one(space, base, seed: int) -> None:
 @settings(max_examples=5)
 @given(seed=seeds)
 def test_the_mass_tells_what_the_integrator_lost(space, seed: int) -> None:
-    density = make(space, seed, strength=0.2)
-    density.flow.steps = 1
+    density = make(space, seed, strength=0.2).with_steps(1)
     plain = on_a_plain_grid(density)
     assert density.mass(128) == pytest.approx(plain, abs=1e-4 + 0.1 * abs(plain - 1))
 
@@ -166,10 +166,26 @@ def test_any_network_serves_as_a_field() -> None:
     assert torch.allclose(space.project(density.flow(start)).detach(), points, atol=1e-4)
 
 
+@every
+@pytest.mark.parametrize("measure", [None, *MEASURES])
+def test_entropy_is_the_mean_of_minus_log_prob(space, measure: str | None) -> None:
+    density, named = make(space, 1), {} if measure is None else {"measure": measure}
+    found = density.entropy(200, generator=torch.Generator().manual_seed(5), **named)
+    with torch.no_grad():
+        drawn = density.sample((200,), torch.Generator().manual_seed(5))
+        assert float(found) == pytest.approx(-float(density.log_prob(drawn, **named).mean()))
+        grid = midpoints(space, 200)
+        square, same = density.log_prob(grid), density.log_prob(grid, **named)
+    exact = -float((square.exp() * same).mean())
+    many = density.entropy(20_000, generator=torch.Generator().manual_seed(6), **named)
+    assert float(many) == pytest.approx(exact, abs=0.05)
+
+
 def test_entropy_and_divergence() -> None:
     flat = SymmetricDensity(Sphere(), make(Sphere(), 0, strength=0.0).flow)
     generator = torch.Generator().manual_seed(0)
-    assert float(flat.entropy(100, generator=generator)) == pytest.approx(math.log(4 * math.pi))
+    natural = flat.entropy(100, measure="natural", generator=generator)
+    assert float(natural) == pytest.approx(math.log(4 * math.pi))
     one, other = make(Torus(2), 1), make(Torus(2), 2)
     grid = midpoints(Torus(2), 150)
     with torch.no_grad():

@@ -1,18 +1,14 @@
 """Fitting: coupling, the closed-form start, likelihood, the estimator, storage."""
 
-import json
 import math
-from typing import Any
 
 import numpy as np
 import pytest
 import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from sklearn.model_selection import GridSearchCV
 
 from orbiflow.density import (
-    DensityEstimator,
     FitSettings,
     KleinBottle,
     ProjectivePlane,
@@ -20,16 +16,14 @@ from orbiflow.density import (
     SymmetricDensity,
     Torus,
     UniformBase,
-    density_to_bytes,
     fit_density,
-    midpoints,
-    read_density,
+    make_space,
 )
 from orbiflow.density.fitting.flow_matching import conjugate_gradients, coupled, match_flow
 from orbiflow.density.fitting.likelihood import Objective
 from orbiflow.density.fitting.merging import LEVELS, merged
 from orbiflow.density.fitting.report import split
-from orbiflow.errors import InputFileError, OrbiflowError
+from orbiflow.errors import OrbiflowError
 from orbiflow.fields import FourierField
 from orbiflow.flows import Flow
 
@@ -86,7 +80,7 @@ def test_matching_recovers_a_field(space) -> None:
 def test_the_gradient_of_the_objective(seed: int) -> None:
     space = Sphere()
     fields = [FourierField(space.group, 3, smoothness=1.0) for _ in range(2)]
-    density = SymmetricDensity(space, Flow(fields, steps=2), UniformBase(space))
+    density = SymmetricDensity(space, Flow(fields, steps=2, warn=False), UniformBase(space))
     objective = Objective(density, blob(space, 30), kinetic=0.1, roughness=1e-3)
     rng = np.random.default_rng(seed)
     at, along = 0.05 * rng.normal(size=(2, len(objective.get())))
@@ -109,6 +103,19 @@ def test_a_fit_is_no_worse_than_its_start_and_normalised(space) -> None:
     with torch.no_grad():
         nll = -float(density.log_prob(held_out).mean())
     assert nll == pytest.approx(report.validation_nll, abs=0.3)
+
+
+@pytest.mark.parametrize("name", ["torus", "klein-bottle"])
+def test_what_only_the_integrators_error_gained_is_undone(name: str) -> None:
+    rng = np.random.default_rng(0)
+    space = make_space(name, unit="degrees")
+    points = space.to_chart(rng.normal([20.0, 60.0], 15.0, (200, 2)).clip(-89, 89))
+    density, report = fit_density(space, points, FitSettings(detail=2, segments=2))
+    # with one step a segment, refinement tore the Klein bottle's flow: 3.7 nats worse than its start
+    assert report.validation_nll < report.start_nll + 0.01
+    assert report.train_nll < -2.5
+    assert report.mass == pytest.approx(1.0, abs=5e-4)
+    assert density.flow.steps <= 16
 
 
 def test_the_same_seed_gives_the_same_density() -> None:
@@ -182,119 +189,3 @@ def test_held_out_scores_are_of_the_points_themselves() -> None:
 def test_settings_out_of_range(changes) -> None:
     with pytest.raises(OrbiflowError, match=next(iter(changes))):
         FitSettings(**changes)
-
-
-def entropy(estimator: DensityEstimator) -> float:
-    """By quadrature, in natural measure."""
-    grid = midpoints(estimator.space_, 160)
-    with torch.no_grad():
-        square, natural = (
-            estimator.density_.log_prob(grid, measure=m) for m in ("square", "natural")
-        )
-    return -float((square.exp() * natural).mean())
-
-
-DATA = {
-    "torus": np.random.default_rng(0).vonmises([0.0, 1.0], 3.0, (300, 2)),
-    "sphere": np.random.default_rng(1).normal(20, 10, (300, 2)),
-    "klein-bottle": np.random.default_rng(2).vonmises([0.5, 0.0], 3.0, (300, 2)),
-    "projective-plane": np.random.default_rng(3).normal([60, 30], 10, (300, 2)).clip(-90, 90),
-}
-
-
-@pytest.mark.parametrize("space", DATA)
-def test_the_estimator(space: str) -> None:
-    estimator = DensityEstimator(space, detail=2, segments=2, iterations=8)
-    with pytest.raises(OrbiflowError, match="not fitted yet"):
-        estimator.sample()
-    assert estimator.fit(DATA[space]) is estimator
-    scores = estimator.score_samples(DATA[space])
-    assert scores.shape == (300,)
-    assert estimator.score(DATA[space]) == pytest.approx(scores.mean())
-    even = -math.log(estimator.space_.volume)
-    assert estimator.score(DATA[space]) > even + 0.3
-    relative = estimator.score_samples(DATA[space], measure="uniform")
-    assert np.allclose(relative, scores - even)
-    draws = estimator.sample(500, random_state=4)
-    assert draws.shape == (500, 2)
-    assert np.array_equal(draws, estimator.sample(500, random_state=4))
-    assert estimator.score(draws) == pytest.approx(-entropy(estimator), abs=0.3)
-
-
-def test_units_change_the_density_by_their_ratio() -> None:
-    small: dict[str, Any] = {"detail": 2, "segments": 2, "iterations": 5}
-    radians = DensityEstimator("torus", **small).fit(DATA["torus"])
-    degrees = DensityEstimator("torus", unit="degrees", **small).fit(np.degrees(DATA["torus"]))
-    shift = radians.score_samples(DATA["torus"]) - degrees.score_samples(np.degrees(DATA["torus"]))
-    assert np.allclose(shift, 2 * math.log(180 / math.pi), atol=1e-3)
-
-
-def test_parameters_of_the_estimator() -> None:
-    estimator = DensityEstimator("sphere", detail=3)
-    assert estimator.get_params()["detail"] == 3
-    assert estimator.set_params(detail=5).detail == 5
-    assert repr(estimator) == "DensityEstimator(space='sphere', detail=5)"
-    with pytest.raises(OrbiflowError, match="no parameter 'depth'"):
-        estimator.set_params(depth=1)
-    with pytest.raises(OrbiflowError, match="unknown space 'moebius'"):
-        DensityEstimator("moebius").fit(DATA["torus"])
-
-
-def test_a_grid_search() -> None:
-    search = GridSearchCV(
-        DensityEstimator("torus", segments=2, iterations=3), {"detail": [1, 2]}, cv=2
-    ).fit(DATA["torus"])
-    assert search.best_params_["detail"] in (1, 2)
-    assert math.isfinite(search.best_score_)
-
-
-@pytest.mark.parametrize("space", DATA)
-def test_saved_and_read(space: str, tmp_path) -> None:
-    estimator = DensityEstimator(space, detail=2, segments=2, iterations=3).fit(DATA[space])
-    path = tmp_path / "density.safetensors"
-    path.write_bytes(density_to_bytes(estimator.density_, columns=["a", "b"]))
-    density, extra = read_density(path)
-    assert extra == {"columns": ["a", "b"]}
-    points = estimator.space_.to_chart(DATA[space])
-    with torch.no_grad():
-        assert torch.equal(density.log_prob(points), estimator.density_.log_prob(points))
-
-
-def test_files_that_are_no_density(tmp_path) -> None:
-    path = tmp_path / "density.safetensors"
-    with pytest.raises(InputFileError, match="cannot read"):
-        read_density(path)
-    estimator = DensityEstimator("torus", detail=1, segments=1, iterations=0).fit(DATA["torus"])
-    good = density_to_bytes(estimator.density_)
-    length = int.from_bytes(good[:8], "little")
-    outer = json.loads(good[8 : 8 + length])
-
-    def changed(edit) -> bytes:
-        header = json.loads(outer["__metadata__"]["orbiflow"])
-        edit(header)
-        text = json.dumps(outer | {"__metadata__": {"orbiflow": json.dumps(header)}}).encode()
-        return len(text).to_bytes(8, "little") + text + good[8 + length :]
-
-    bad = [
-        b"",
-        b"hello world, this is no density",
-        good[:-9],
-        b"\xff" * 100,
-        changed(lambda h: h.update(format="orbiflow-tile/1")),
-        changed(lambda h: h["space"].update(name="moebius")),
-        changed(lambda h: h["space"].update(dim=40)),
-        changed(lambda h: h["flow"].update(max_frequency=10**6)),
-        changed(lambda h: h["flow"].update(max_frequency=2)),
-        changed(lambda h: h["flow"].update(steps=10**9)),
-        changed(lambda h: h["flow"].update(method="magic")),
-        changed(lambda h: h.pop("base")),
-    ]
-    for content in bad:
-        path.write_bytes(content)
-        with pytest.raises(InputFileError, match="not a density saved by orbiflow"):
-            read_density(path)
-
-
-def test_other_flows_are_not_saved() -> None:
-    with pytest.raises(OrbiflowError, match="only flows of Fourier, spline or neural fields"):
-        density_to_bytes(SymmetricDensity(Torus(2), Flow(lambda x: 0 * x)))

@@ -9,18 +9,17 @@ from hypothesis import strategies as st
 
 from orbiflow.density import (
     AdaptiveKernels,
+    BlendedDensity,
     FitSettings,
-    MixedDensity,
     SymmetricDensity,
+    blend_kernels,
     density_to_bytes,
     fit_density,
     make_space,
     midpoints,
-    mix_kernels,
     read_density,
 )
 from orbiflow.density.fitting.kernels import FLOOR, proportions
-from orbiflow.density.models.kernels import is_round
 from orbiflow.errors import OrbiflowError
 from orbiflow.fields import SplineField
 from orbiflow.flows import Flow
@@ -33,7 +32,7 @@ def kernels(name: str, seed: int, low: float = 2.0, high: float = 60.0) -> Adapt
     """Five random kernels."""
     space = make_space(name)
     torch.manual_seed(seed)
-    width = 1 if is_round(space) else 2
+    width = 1 if space.is_round else 2
     return AdaptiveKernels(
         space,
         torch.rand(5, 2, dtype=torch.float64),
@@ -59,7 +58,7 @@ def test_kernels_integrate_to_one_and_are_invariant(name: str, seed: int) -> Non
     assert float(found.log_prob(grid).exp().mean()) == pytest.approx(1, abs=2e-3)
     points = 4 * torch.rand(50, 2, dtype=torch.float64) - 2
     for element in found.space.group.cosets:
-        if is_round(found.space):
+        if found.space.is_round:
             images, points = found.space.project(element(points)), found.space.project(points)
         else:
             images = element(points)
@@ -87,7 +86,7 @@ def test_a_mixture_beats_both_parts_on_clusters(name: str, tmp_path) -> None:
     space, points = make_space(name), clustered(name)
     train, held, test = points[:400], points[400:500], points[500:]
     flow = SymmetricDensity(space, Flow([SplineField(space.group, 2)], steps=1))
-    mixed = mix_kernels(flow, train, held)
+    mixed = blend_kernels(flow, train, held)
     scores = [float(part.log_prob(test).mean().detach()) for part in (mixed, flow, mixed.kernels)]
     assert scores[0] > scores[1] + 1
     assert scores[0] > scores[2] - 0.05
@@ -98,7 +97,7 @@ def test_a_mixture_beats_both_parts_on_clusters(name: str, tmp_path) -> None:
     path = tmp_path / "mixed.safetensors"
     path.write_bytes(density_to_bytes(mixed))
     back, _ = read_density(path)
-    assert isinstance(back, MixedDensity)
+    assert isinstance(back, BlendedDensity)
     with torch.no_grad():
         assert torch.equal(back.log_prob(test), mixed.log_prob(test))
 
@@ -106,10 +105,10 @@ def test_a_mixture_beats_both_parts_on_clusters(name: str, tmp_path) -> None:
 def test_a_fit_with_kernels_says_its_shares() -> None:
     settings_ = FitSettings(detail=2, segments=2, iterations=5, kernels=True)
     density, report = fit_density(make_space("torus"), clustered("torus"), settings_)
-    assert isinstance(density, MixedDensity)
+    assert isinstance(density, BlendedDensity)
     assert report.shares is not None
     assert sum(report.shares) == pytest.approx(1)
-    assert any("mixture" in note for note in report.notes)
+    assert any("blend" in note for note in report.notes)
 
 
 @given(seeds)
@@ -132,7 +131,7 @@ def test_kernels_of_wrong_shape_are_refused() -> None:
     with pytest.raises(OrbiflowError, match="positive widths"):
         AdaptiveKernels(space, torch.rand(4, 2), -torch.ones(4, 1), one)
     with pytest.raises(OrbiflowError, match="proportions"):
-        MixedDensity(
+        BlendedDensity(
             space,
             Flow([SplineField(space.group, 1)]),
             None,  # type: ignore[arg-type]

@@ -6,8 +6,14 @@ import numpy as np
 import pytest
 import torch
 
-from orbiflow.density import DensityEstimator, MixtureBase, density_to_bytes, read_density
-from orbiflow.errors import InputFileError
+from orbiflow.density import (
+    DensityEstimator,
+    Torus,
+    VonMisesChains,
+    density_to_bytes,
+    read_density,
+)
+from orbiflow.errors import InputFileError, OrbiflowError
 
 
 def data(count: int = 400) -> np.ndarray:
@@ -20,8 +26,8 @@ def data(count: int = 400) -> np.ndarray:
 
 def test_five_angles(tmp_path: Path) -> None:
     points = data()
-    estimator = DensityEstimator("torus", unit="degrees", seconds=4.0).fit(points[:300])
-    assert isinstance(estimator.density_.base, MixtureBase)
+    estimator = DensityEstimator("torus", unit="degrees", evaluations=20).fit(points[:300])
+    assert isinstance(estimator.density_.base, VonMisesChains)
     assert estimator.score(points[300:]) > -5 * np.log(360) + 3
     assert estimator.sample(7, random_state=1).shape == (7, 5)
     path = tmp_path / "density.safetensors"
@@ -36,3 +42,18 @@ def test_five_angles(tmp_path: Path) -> None:
     path.write_bytes(bytes(broken))
     with pytest.raises(InputFileError, match="damaged"):
         read_density(path)
+
+
+@pytest.mark.parametrize(
+    ("settings", "named"),
+    [
+        ({"kernels": True}, "kernels would"),
+        ({"base": "von-mises", "detail": 16}, "detail, base would"),
+        ({"iterations": 3}, "iterations would"),
+    ],
+)
+def test_settings_without_a_meaning_are_refused(settings: dict, named: str) -> None:
+    with pytest.raises(OrbiflowError, match=f"{named} have no effect on a torus of 5 angles"):
+        DensityEstimator("torus", unit="degrees", **settings).fit(data(20))
+    with pytest.raises(OrbiflowError, match=named):
+        DensityEstimator(Torus(5), **settings).fit(data(20))

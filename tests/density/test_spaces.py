@@ -175,7 +175,7 @@ def test_data_that_are_not_of_the_space(case: str) -> None:
 
 def test_options_that_are_none() -> None:
     for make, message in (
-        (lambda: Torus(0), "dim must be an integer from 1 to 64"),
+        (lambda: Torus(0), "dim must be from 1 to 64"),
         (lambda: Torus(2, unit="grad"), "unit must be one of radians, degrees, turns"),
         (lambda: Sphere(form="utm"), "form must be one of"),
         (lambda: Sphere(rotation=2 * np.eye(3)), "orthogonal"),

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 
 from orbiflow.errors import OrbiflowError
 from orbiflow.escher.fit import Fit
+from orbiflow.escher.max_frequency import MAX_FREQUENCY
 from orbiflow.escher.model import TileModel
 from orbiflow.escher.occupancy import (
-    MAX_FREQUENCY,
     OccupancySamples,
     OccupancySettings,
     _distinct,
@@ -140,8 +140,8 @@ def test_gradient_matches_differences(name: str, affine: bool) -> None:
 @pytest.mark.parametrize(
     ("setting", "value", "message"),
     [
-        ("max_frequency", 0, "max_frequency must be at least 1, got 0"),
-        ("max_frequency", MAX_FREQUENCY + 1, f"from 1 to {MAX_FREQUENCY}, got {MAX_FREQUENCY + 1}"),
+        ("max_frequency", -1, "max_frequency must be at least 0, got -1"),
+        ("max_frequency", MAX_FREQUENCY + 1, f"from 0 to {MAX_FREQUENCY}, got {MAX_FREQUENCY + 1}"),
         ("turns", 0, "turns must be at least 1, got 0"),
         ("finalists", -3, "finalists must be at least 1, got -3"),
         ("iterations", 0, "iterations must be at least 1, got 0"),

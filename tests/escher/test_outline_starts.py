@@ -46,7 +46,7 @@ def exact_tile(name: str, seed: int) -> tuple[Array, Placements]:
         model.log_scale.add_(0.3)
         model.stretch.normal_(std=0.1)
         ring = model(model.boundary(pieces))[0].numpy()
-        turn = float(model.angle) if kind.row.freedom == "rectangular" else 0.0
+        turn = float(model.angle) if kind.stretch_dim == 1 else 0.0
     lengths = np.full((1, len(kind.template())), pieces)
     return ring, Placements(lengths, np.zeros(1, int), np.array([turn]), np.ones(1))
 

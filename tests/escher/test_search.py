@@ -1,12 +1,15 @@
 """Searches over classes, in this process and in others."""
 
 import math
+import multiprocessing
+import threading
 from dataclasses import replace
 
 import numpy as np
 import pytest
 import torch
 
+from orbiflow.cancel import Cancel, Cancelled
 from orbiflow.errors import OrbiflowError
 from orbiflow.escher import methods
 from orbiflow.escher.model import TileModel
@@ -23,7 +26,7 @@ QUICK = OccupancySettings(
 TARGET = Target.from_polygon(BOOT, y_down=True)
 
 
-def crossed(*_: object) -> TileModel:
+def crossed(*_: object, **__: object) -> TileModel:
     model = TileModel(CLASSES["IH21"], torch.zeros(2), max_frequency=1)
     with torch.no_grad():
         model.shape.add_(2.0)
@@ -90,31 +93,113 @@ def test_a_class_whose_finalists_all_fold(monkeypatch: pytest.MonkeyPatch) -> No
     assert "not simple" in results[0].certificate.reasons[0]
 
 
-def test_an_interrupt_keeps_what_was_finished() -> None:
-    own = replace(QUICK, iterations=2, affine_iterations=1, turns=1)
-
-    def interrupt(event: Event) -> None:
-        if event.name == "IH7":
-            raise KeyboardInterrupt
-
-    results, failures = escherize(TARGET, ["IH2", "IH7", "IH3"], own, watch=interrupt)
-    assert [r.name for r in results] == ["IH2"]
-    assert failures == [ClassFailure("IH7", "interrupted"), ClassFailure("IH3", "interrupted")]
+NAMES = ["IH2", "IH7", "IH3", "IH4"]
+SHORT = replace(QUICK, iterations=2, affine_iterations=1, turns=1)
+both = pytest.mark.parametrize("workers", [1, 2])
 
 
-@pytest.mark.parametrize("workers", [1, 2])
-def test_an_interrupt_while_a_tile_is_announced_keeps_it(workers: int) -> None:
-    own = replace(QUICK, iterations=2, affine_iterations=1, turns=1)
+def checked(events: list[Event], names: list[str]) -> None:
+    """The order that `Event` promises."""
+    previews = [k for k, event in enumerate(events) if event.preview is not None]
+    assert previews in ([], [0])
+    for name in names:
+        own = [event for event in events if event.name == name and event.preview is None]
+        shares = [event.share for event in own]
+        assert shares == sorted(shares)
+        assert [event.outcome is not None for event in own] == [False] * (len(own) - 1) + [True]
+        assert own[-1].outcome is not None
+        assert own[-1].outcome.name == name
 
-    def interrupt(event: Event) -> None:
+
+@both
+def test_events_come_in_order_and_in_this_thread(workers: int) -> None:
+    events: list[Event] = []
+    threads: set[int] = set()
+
+    def watch(event: Event) -> None:
+        events.append(event)
+        threads.add(threading.get_ident())
+
+    escherize(TARGET, NAMES, QUICK, workers=workers, watch=watch)
+    checked(events, NAMES)
+    assert threads == {threading.get_ident()}
+    assert {event.share for event in events if event.outcome is not None} == {1.0}
+    assert len(events) > 2 * len(NAMES)
+
+
+@both
+@pytest.mark.parametrize("error", [ZeroDivisionError, KeyboardInterrupt])
+@pytest.mark.parametrize("with_outcome", [False, True])
+def test_what_watch_raises_ends_the_search(
+    workers: int, error: type[BaseException], with_outcome: bool
+) -> None:
+    told: list[Event] = []
+
+    def watch(event: Event) -> None:
+        told.append(event)
+        if (event.outcome is not None) == with_outcome:
+            raise error
+
+    with pytest.raises(error):
+        escherize(TARGET, NAMES, QUICK, workers=workers, watch=watch)
+    assert sum((event.outcome is not None) == with_outcome for event in told) == 1
+    assert multiprocessing.active_children() == []
+
+
+@both
+def test_cancelling_keeps_what_was_finished(workers: int) -> None:
+    cancel, events = Cancel(), []
+
+    def watch(event: Event) -> None:
+        events.append(event)
         if event.outcome is not None:
-            raise KeyboardInterrupt
+            cancel.cancel()
 
-    names = ["IH2", "IH7", "IH3", "IH4"]
-    results, failures = escherize(TARGET, names, own, workers=workers, watch=interrupt)
-    assert len(results) == 1
+    results, failures = escherize(TARGET, NAMES, SHORT, workers=workers, watch=watch, cancel=cancel)
+    checked(events, NAMES)
+    # what workers had in hand when they were told may have been finished, too
+    assert 1 <= len(results) < len(NAMES)
     assert {f.reason for f in failures} == {"interrupted"}
-    assert sorted([results[0].name, *(f.name for f in failures)]) == sorted(names)
+    assert sorted([r.name for r in results] + [f.name for f in failures]) == sorted(NAMES)
+
+
+@both
+def test_a_fit_is_left_between_two_steps(workers: int) -> None:
+    """A million steps would take hours."""
+    cancel, events = Cancel(), []
+
+    def watch(event: Event) -> None:
+        events.append(event)
+        cancel.cancel()
+
+    endless = replace(QUICK, iterations=10**6, affine_iterations=1, turns=1)
+    results, failures = escherize(
+        TARGET, NAMES, endless, workers=workers, watch=watch, cancel=cancel
+    )
+    assert results == []
+    assert failures == [ClassFailure(name, "interrupted") for name in NAMES]
+    checked(events, NAMES)
+    assert multiprocessing.active_children() == []
+
+
+@both
+def test_a_search_may_be_cancelled_before_it_begins(workers: int) -> None:
+    cancel = Cancel()
+    cancel.cancel()
+    events: list[Event] = []
+    results, failures = escherize(
+        TARGET, NAMES, QUICK, workers=workers, watch=events.append, cancel=cancel
+    )
+    assert results == []
+    assert [f.name for f in failures] == NAMES
+    assert len(events) == len(NAMES)
+
+
+def test_one_class_alone_is_cancelled_by_an_exception() -> None:
+    cancel = Cancel()
+    endless = replace(QUICK, iterations=10**6, affine_iterations=1, turns=1)
+    with pytest.raises(Cancelled):
+        escherize_class(TARGET, "IH2", endless, watch=lambda _: cancel.cancel(), cancel=cancel)
 
 
 def test_arguments_are_checked() -> None:

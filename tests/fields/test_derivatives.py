@@ -5,7 +5,7 @@ import torch
 from hypothesis import given
 
 from orbiflow.fields import divergence, jacobian, neural_field
-from orbiflow.fields.derivatives import with_divergence
+from orbiflow.fields.derivatives import prepared_with_divergence
 from orbiflow.symmetry import wallpaper_group
 from strategies import central_difference, random_field, random_tensor, seeds
 
@@ -47,7 +47,7 @@ def test_a_closed_form_is_used_where_there_is_one():
 
 def test_values_and_divergence_come_together():
     points = random_tensor(0, 5, 2)
-    values, found = with_divergence(curl_and_stretch)(points)
+    values, found = prepared_with_divergence(curl_and_stretch)(points)
     assert torch.equal(values, curl_and_stretch(points))
     assert torch.equal(found, divergence(curl_and_stretch, points))
 

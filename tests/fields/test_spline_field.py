@@ -8,7 +8,9 @@ from hypothesis import strategies as st
 from orbiflow.errors import OrbiflowError
 from orbiflow.fields import FourierField, SplineField, jacobian
 from orbiflow.fields.splines import cubic_weights, padded, spline_sum, spline_sum_with_divergence
+from orbiflow.flows import Flow
 from orbiflow.symmetry import CrystallographicGroup, identification_group, wallpaper_group
+from strategies import central_difference
 
 SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")
 names = st.sampled_from(SPACES)
@@ -81,6 +83,51 @@ def test_derivatives_of_the_sum_against_numerical_ones(dim: int) -> None:
     )
 
 
+@pytest.mark.parametrize("dim", [1, 2, 3])
+def test_second_derivatives_of_the_sum_against_numerical_ones(dim: int) -> None:
+    torch.manual_seed(dim)
+    table = torch.randn(dim, *(6, 8, 5)[:dim], dtype=torch.float64, requires_grad=True)
+    u = (20 * torch.rand(dim, 3, dtype=torch.float64) - 5).requires_grad_()
+    rates = (1.5, 0.7, 2.0)[:dim]
+    assert torch.autograd.gradgradcheck(lambda t, x: spline_sum(padded(t), x), (table, u))
+    assert torch.autograd.gradgradcheck(
+        lambda t, x: spline_sum_with_divergence(padded(t), x, rates), (table, u)
+    )
+
+
+@given(names, seeds)
+@settings(max_examples=10, deadline=None)
+def test_a_jacobian_can_be_penalised(name: str, seed: int) -> None:
+    spline, _, points = pair(name, seed)
+    slopes = jacobian(spline, points)
+    assert slopes.requires_grad
+    (found,) = torch.autograd.grad(slopes.square().sum(), spline.parameters_)
+    # linear in the parameters, so the square's gradient points at them: Euler
+    expected = 2 * slopes.square().sum()
+    torch.testing.assert_close(found @ spline.parameters_, expected, rtol=1e-9, atol=1e-9)
+    assert float(found.norm()) > 0
+
+
+def test_a_log_density_of_splines_has_its_hessian() -> None:
+    spline, _, _ = pair("torus", 0, 4)
+    with torch.no_grad():
+        spline.parameters_.mul_(0.05)
+    flow = Flow(spline, steps=2)
+    at = torch.tensor([0.31, 0.62], dtype=torch.float64)
+
+    def log_det(point: torch.Tensor) -> torch.Tensor:
+        return flow.log_abs_det_jacobian(point)
+
+    def gradient(point: torch.Tensor) -> torch.Tensor:
+        point = point.clone().requires_grad_()
+        return torch.autograd.grad(log_det(point), point)[0]
+
+    found = torch.autograd.functional.hessian(log_det, at)
+    expected = central_difference(gradient, at, 1e-5)
+    assert float(expected.abs().max()) > 1
+    torch.testing.assert_close(found, expected, rtol=1e-6, atol=1e-6)
+
+
 @given(seeds)
 @settings(max_examples=20, deadline=None)
 def test_weights_are_a_partition_of_unity(seed: int) -> None:
@@ -113,3 +160,14 @@ def test_other_groups_are_refused(group: CrystallographicGroup) -> None:
 def test_points_of_another_dimension_are_refused() -> None:
     with pytest.raises(OrbiflowError, match="expected points"):
         SplineField(identification_group("torus"), 2)(torch.zeros(3, 3, dtype=torch.float64))
+
+
+@given(names, seeds)
+@settings(max_examples=20, deadline=None)
+def test_no_sampled_slope_exceeds_its_lipschitz_bound(name: str, seed: int) -> None:
+    spline, _, _ = pair(name, seed)
+    with torch.no_grad():
+        slopes = jacobian(spline, 6 * torch.rand(500, 2, dtype=torch.float64) - 3)
+    steepest = float(torch.linalg.matrix_norm(slopes, ord=2).max())
+    bound = float(spline.lipschitz_bound())
+    assert 0.3 * bound < steepest <= bound

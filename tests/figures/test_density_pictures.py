@@ -11,9 +11,9 @@ import torch
 from PIL import Image
 
 from orbiflow.density.models.bases import UniformBase
-from orbiflow.density.models.blend import MixedDensity
-from orbiflow.density.models.kernels import AdaptiveKernels, is_round
-from orbiflow.density.models.neural import NeuralField, NeuralFlow
+from orbiflow.density.models.blend import BlendedDensity
+from orbiflow.density.models.kernels import AdaptiveKernels
+from orbiflow.density.models.neural import NeuralFlow, NeuralTorusField
 from orbiflow.density.models.symmetric import SymmetricDensity
 from orbiflow.density.spaces.flat import KleinBottle, Torus
 from orbiflow.density.spaces.round import ProjectivePlane, Sphere, to_vectors
@@ -217,11 +217,11 @@ def peaked(space, kappa, at=(0.3, 0.4), flow=0.01):
     kernels = AdaptiveKernels(
         space,
         torch.tensor([at], dtype=torch.float64),
-        torch.full((1, 1 if is_round(space) else 2), kappa, dtype=torch.float64),
+        torch.full((1, 1 if space.is_round else 2), kappa, dtype=torch.float64),
         torch.ones(1, dtype=torch.float64),
     )
     shares = torch.tensor([flow, 0.99 - flow, 0.01], dtype=torch.float64)
-    return MixedDensity(space, example(space).flow, UniformBase(space), kernels, shares)
+    return BlendedDensity(space, example(space).flow, UniformBase(space), kernels, shares)
 
 
 @every_space
@@ -264,13 +264,15 @@ def test_a_flow_in_few_colours_is_small():
 
 
 def test_a_field_that_changes_with_time_is_drawn():
-    density = SymmetricDensity(SPACES[0], NeuralFlow(NeuralField(2, width=8)))
+    density = SymmetricDensity(SPACES[0], NeuralFlow(NeuralTorusField(2, width=8)))
     assert flow_png(density, cells=1, width_px=200)
 
 
 @pytest.mark.parametrize("dim", [1, 2, 3, 5])
 def test_pairs_of_angles(dim):
-    density = SymmetricDensity(Torus(dim, unit="degrees"), NeuralFlow(NeuralField(dim, width=4)))
+    density = SymmetricDensity(
+        Torus(dim, unit="degrees"), NeuralFlow(NeuralTorusField(dim, width=4))
+    )
     data = torch.tensor(np.random.default_rng(0).random((40, dim)))
     names = [f"${k}_" for k in range(dim)]
     both = corner_png(density, data, data[:9], names=names, width_px=400)

@@ -126,7 +126,7 @@ def test_a_linear_field_gives_the_truncated_exponential(name, steps):
     # up to order 4 with as many stages, a step is the Taylor polynomial of exp(h M)
     matrix = random_tensor(0, 2, 2, size=0.5)
     points = random_tensor(1, 4, 2)
-    moved = Flow(lambda p: p @ matrix.mT, steps=steps, method=name)(points)
+    moved = Flow(lambda p: p @ matrix.mT, steps=steps, method=name, warn=False)(points)
     h = matrix / steps
     order = METHODS[name].order
     step = sum(torch.linalg.matrix_power(h, k) / math.factorial(k) for k in range(order + 1))
@@ -182,7 +182,7 @@ def test_log_determinants_forth_and_back_cancel(group, seed, segments):
 
 @given(plane_groups, seeds, names)
 def test_points_move_alike_with_and_without_the_log_determinant(group, seed, method):
-    flow = Flow(several(group, seed), steps=2, method=method)
+    flow = Flow(several(group, seed), steps=2, method=method, warn=False)
     points = random_tensor(seed, 5, 2)
     with torch.no_grad():
         moved, log_det = flow.forward_and_log_det(points)
@@ -241,8 +241,7 @@ def test_the_error_estimate_falls_at_the_order_of_the_method(name, inverse):
     flow = Flow(gentle_field(wallpaper_group("p3"), 2, 0, slope=2.0), steps=16, method=name)
     points = random_tensor(0, 50, 2)
     first = flow.error_estimate(points, inverse=inverse)
-    flow.steps = 32
-    second = flow.error_estimate(points, inverse=inverse)
+    second = flow.with_steps(32).error_estimate(points, inverse=inverse)
     assert math.log2(first / second) == pytest.approx(METHODS[name].order, abs=0.3)
 
 
@@ -250,9 +249,8 @@ def test_the_error_estimate_falls_at_the_order_of_the_method(name, inverse):
 def test_the_error_estimate_predicts_the_error(name):
     flow = Flow(gentle_field(wallpaper_group("p3"), 2, 0, slope=2.0), steps=16, method=name)
     points = random_tensor(0, 50, 2)
-    with torch.no_grad(), flow.with_steps(512):
-        exact = flow(points)
     with torch.no_grad():
+        exact = flow.with_steps(512)(points)
         error = float((flow(points) - exact).norm(dim=-1).max())
     power = 2 ** METHODS[name].order
     assert flow.error_estimate(points) * power / (power - 1) == pytest.approx(error, rel=0.2)
@@ -320,21 +318,6 @@ def test_shapes_of_points_are_kept(shape):
     moved, log_det = flow.forward_and_log_det(points)
     assert moved.shape == shape
     assert log_det.shape == shape[:-1]
-
-
-def test_with_steps_sets_and_restores():
-    flow = Flow(torch.sin, steps=4)
-    with flow.with_steps(9) as same:
-        assert same is flow
-        assert flow.steps == 9
-    assert flow.steps == 4
-
-
-def test_with_steps_restores_after_an_error():
-    flow = Flow(torch.sin, steps=4)
-    with pytest.raises(RuntimeError, match="inside"), flow.with_steps(9):
-        raise RuntimeError("inside")
-    assert flow.steps == 4
 
 
 @pytest.mark.parametrize("bad", [0, -3, 2.5, True])

@@ -25,7 +25,7 @@ from strategies import (
 def test_equivariance_holds_to_rounding_at_any_step_count(name, method, steps):
     group = TABLED[name]
     fields = [random_field(group, 5, seed) for seed in range(2)]
-    flow = Flow(fields, method=method, steps=steps, duration=0.1)
+    flow = Flow(fields, method=method, steps=steps, duration=0.1, warn=False)
     assert map_equivariance_error(flow, group, random_tensor(0, 20, 2)) < 1e-11
     assert map_equivariance_error(flow.inverse, group, random_tensor(1, 20, 2)) < 1e-11
 
@@ -33,7 +33,7 @@ def test_equivariance_holds_to_rounding_at_any_step_count(name, method, steps):
 @settings(max_examples=20)
 @given(groups, seeds, st.sampled_from(sorted(METHODS)), st.integers(1, 4))
 def test_equivariance_holds_to_rounding_for_any_group(group, seed, method, steps):
-    flow = Flow(random_field(group, 1, seed), method=method, steps=steps, duration=0.1)
+    flow = Flow(random_field(group, 1, seed), method=method, steps=steps, duration=0.1, warn=False)
     assert map_equivariance_error(flow, group, random_tensor(seed, 8, group.dim)) < 1e-11
 
 
@@ -57,7 +57,7 @@ def test_a_similarity_composed_with_a_flow_commutes_with_the_conjugate_group(
     group = CLASSES[name].group()
     matrix, offset = scale * rotation_matrix(angle), np.array([0.3, -1.2])
     a, v = torch.tensor(matrix), torch.tensor(offset)
-    flow = Flow(random_field(group, 3, seed), steps=1, method="euler", duration=0.2)
+    flow = Flow(random_field(group, 3, seed), steps=1, method="euler", duration=0.2, warn=False)
 
     def moved(z):
         return flow((z - v) @ torch.linalg.inv(a).mT) @ a.mT + v

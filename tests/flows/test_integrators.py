@@ -77,3 +77,21 @@ def test_convergence_has_the_order_of_the_method(name):
 def test_an_unknown_method_is_refused_with_the_known_ones():
     with pytest.raises(OrbiflowError, match="unknown integrator 'leapfrog'; choose from euler"):
         method("leapfrog")
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    # 1 + z/2 and the truncated exponential of rk4, times z, reach 1 there
+    [("euler", 1.0), ("midpoint", 3**0.5 - 1), ("rk4", 0.693948), ("rk3", 0.62889)],
+)
+def test_the_longest_step_that_is_surely_injective(name, expected):
+    assert METHODS[name].injective_below == pytest.approx(expected, abs=1e-4)
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_steps_below_the_bound_do_not_fold(name):
+    # slopes from -1 to 1
+    points = torch.linspace(-3, 3, 2001, dtype=torch.float64)[:, None]
+    longest = METHODS[name].injective_below
+    flow = Flow(lambda x: -x.sin(), steps=1, method=name, duration=longest, warn=False)
+    assert bool((flow(points).diff(dim=0) > 0).all())

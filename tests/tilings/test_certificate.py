@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import cProfile
 import json
-import time
+import tracemalloc
 from typing import Any
 
 import numpy as np
@@ -196,12 +197,24 @@ def test_area_far_from_the_origin() -> None:
     assert signed_area(ring) == pytest.approx(1.0, abs=1e-12)
 
 
-def test_two_thousand_vertices_are_fast(make_tile: Any) -> None:
-    tile = make_tile(isohedral_class("IH6"), per_edge=330)
+def test_work_does_not_grow_with_the_square_of_the_vertices(make_tile: Any) -> None:
+    """Calls and memory, not seconds: those depend on who else is at work."""
+    calls, memory = zip(*(cost(make_tile, per_edge) for per_edge in (33, 330)), strict=True)
+    assert calls[1] < 1.5 * calls[0]
+    assert memory[1] < 20 * memory[0]
+
+
+def cost(make_tile: Any, per_edge: int) -> tuple[int, int]:
+    """Calls of functions, and bytes at most, of a certificate."""
+    tile = make_tile(isohedral_class("IH6"), per_edge=per_edge)
+    certify(tile)  # caches are full now
+    profile = cProfile.Profile()
+    assert profile.runcall(certify, tile).valid
+    tracemalloc.start()
     certify(tile)
-    start = time.perf_counter()
-    assert certify(tile).valid
-    assert time.perf_counter() - start < 1.0  # 0.1 s measured; room for a busy machine
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    return sum(entry.callcount for entry in profile.getstats()), peak
 
 
 @pytest.mark.parametrize("angle", np.linspace(-3.0, 3.0, 61))

@@ -14,6 +14,7 @@ from orbiflow.cli.console import errors
 from orbiflow.cli.density import density
 from orbiflow.cli.escherize import escherize
 from orbiflow.errors import OrbiflowError
+from orbiflow.jobs import RecordError
 
 app = typer.Typer(
     name="orbiflow",
@@ -43,12 +44,18 @@ def _global(
         typer.echo(context.get_help())
 
 
+def _option(field: str) -> str:
+    """What a field of a request is called here."""
+    return {"count": "-n"}.get(field, "--" + field.replace("_", "-"))
+
+
 def main() -> None:
     """Run the command line: exit status 0, 1 (no tile found), 2 (a user's mistake) or 130 (Ctrl-C)."""
     try:
         app()
     except OrbiflowError as error:
-        errors.print(f"[bold red]error:[/] {escape(str(error))}", soft_wrap=True, highlight=False)
+        text = error.named(_option) if isinstance(error, RecordError) else str(error)
+        errors.print(f"[bold red]error:[/] {escape(text)}", soft_wrap=True, highlight=False)
         sys.exit(2)
     except KeyboardInterrupt:
         errors.print("interrupted")

@@ -1,4 +1,4 @@
-"""`orbiflow density`: options of its commands. The work is imported when it runs: --help is quick."""
+"""`orbiflow density`: options of its commands."""
 
 from __future__ import annotations
 
@@ -7,8 +7,24 @@ from typing import Annotated
 
 import typer
 
-from orbiflow.cli.density_options import Columns, Data, Measure, Model, Scale, Space, Unit
+from orbiflow.cli.density_options import (
+    Columns,
+    Data,
+    Measure,
+    Model,
+    Scale,
+    Space,
+    Unit,
+    named_columns,
+)
 from orbiflow.cli.density_patches import patches
+from orbiflow.cli.work import do
+from orbiflow.jobs import (
+    DensityFitRequest,
+    DensityPlotRequest,
+    DensitySampleRequest,
+    DensityScoreRequest,
+)
 
 density = typer.Typer(
     name="density",
@@ -49,13 +65,11 @@ def fit(
 
     Writes density.safetensors and report.json into the folder.
     """
-    from orbiflow.cli.density_run import run_fit
-
-    run_fit(
-        data,
-        out,
+    request = DensityFitRequest(
+        data=data,
         space=space.value,
-        columns=columns,
+        out=out,
+        columns=named_columns(columns),
         unit=unit.value,
         detail=detail,
         segments=segments,
@@ -63,6 +77,7 @@ def fit(
         seconds=seconds,
         seed=seed,
     )
+    do(request)
 
 
 @density.command()
@@ -79,9 +94,14 @@ def score(
     ] = Measure.NATURAL,
 ) -> None:
     """Add a column log_prob, in nats, to a table."""
-    from orbiflow.cli.density_run import run_score
-
-    run_score(data, model, out, columns=columns, measure=measure.value)
+    request = DensityScoreRequest(
+        data=data,
+        model=model,
+        out=out,
+        columns=named_columns(columns),
+        measure=measure.value,
+    )
+    do(request)
 
 
 @density.command()
@@ -94,9 +114,7 @@ def sample(
     seed: Annotated[int, typer.Option(help="Same seed, same machine: same samples.")] = 0,
 ) -> None:
     """Draw samples in the units of the data."""
-    from orbiflow.cli.density_run import run_sample
-
-    run_sample(model, out, count=n, seed=seed)
+    do(DensitySampleRequest(model=model, out=out, count=n, seed=seed))
 
 
 @density.command()
@@ -145,16 +163,19 @@ def plot(
 
     Of a torus of more or fewer than two angles: samples.png alone, all pairs of angles.
     """
-    from orbiflow.cli.density_plot import Style, run_plot
-
-    run_plot(
-        model,
-        out,
+    request = DensityPlotRequest(
+        model=model,
+        out=out,
         data=data,
-        columns=columns,
-        style=Style(measure.value, scale.value, dots, center, coastlines),
+        columns=named_columns(columns),
+        coastlines=coastlines,
+        measure=measure.value,
+        scale=scale.value,
+        center=center,
+        dots=dots,
         seed=seed,
     )
+    do(request)
 
 
 density.command()(patches)

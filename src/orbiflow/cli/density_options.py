@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
@@ -43,6 +44,17 @@ class Scale(StrEnum):
 
 
 Data = Annotated[Path, typer.Argument(help="CSV, TSV, NPY or Parquet.", show_default=False)]
+
+
+def named_columns(text: str | None) -> tuple[str, ...] | None:
+    """`--columns` as a request takes it.
+
+    >>> named_columns(" lat , lon ")
+    ('lat', 'lon')
+    """
+    return None if text is None else tuple(filter(None, re.split(r"\s*,\s*", text.strip())))
+
+
 Columns = Annotated[
     str | None,
     typer.Option(help="Names or numbers of the columns, such as lat,lon.", show_default=False),

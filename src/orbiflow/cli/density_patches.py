@@ -7,7 +7,9 @@ from typing import Annotated
 
 import typer
 
-from orbiflow.cli.density_options import Unit
+from orbiflow.cli.density_options import Unit, named_columns
+from orbiflow.cli.work import do
+from orbiflow.jobs import PatchesRequest
 
 
 def patches(
@@ -38,30 +40,7 @@ def patches(
 
     The distance is between patches of mean 0 and contrast 1.
     """
-    import numpy as np
-
-    from orbiflow.cli.density_run import read_data, say
-    from orbiflow.density.spaces.patches import to_klein
-    from orbiflow.density.tables import to_csv
-    from orbiflow.errors import OrbiflowError
-    from orbiflow.files import write_atomic
-
-    if farthest is not None and not farthest >= 0:
-        raise OrbiflowError(f"--farthest must be at least 0, got {farthest:g}")
-    table = read_data(data, columns, None)
-    angles, distances = to_klein(table.values, unit=unit.value)
-    near = distances <= (np.inf if farthest is None else farthest)
-    if not near.any():
-        raise OrbiflowError(
-            f"none of {len(near)} patches is within {farthest:g} of the Klein bottle; the nearest "
-            f"is {distances.min():.3f} away"
-            if len(near)
-            else f"{data}: no patches"
-        )
-    found = np.column_stack([angles, distances])[near]
-    write_atomic(out, to_csv(("theta", "phi", "distance"), found))
-    left = "" if near.all() else f", {(~near).sum()} farther ones left out"
-    say(
-        f"{near.sum()} patches, half of them within {np.median(found[:, 2]):.3f} of the Klein "
-        f"bottle{left}; written to {out}"
+    request = PatchesRequest(
+        data=data, out=out, columns=named_columns(columns), unit=unit.value, farthest=farthest
     )
+    do(request)

@@ -1,12 +1,16 @@
-"""`orbiflow escherize`: the command's options. The work is imported when it runs: --help is quick."""
+"""`orbiflow escherize`: the command's options."""
 
 from __future__ import annotations
 
+import re
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
 import typer
+
+from orbiflow.cli.work import do
+from orbiflow.jobs import EscherizeRequest
 
 
 class Method(StrEnum):
@@ -103,25 +107,23 @@ def escherize(
     Writes result.json and overview.png into the folder, and for each class a folder with tile.svg,
     tiling.svg, tiling.png, overlay.png, field.png and model.safetensors.
     """
-    from orbiflow.cli.escherize_run import Request, run
-
-    run(
-        Request(
-            image=image,
-            out=out,
-            classes=classes,
-            method=method.value,
-            effort=effort.value if effort else None,
-            emphasis=emphasis,
-            strength=strength,
-            per_class=per_class,
-            max_frequency=max_frequency,
-            seed=seed,
-            turns=turns,
-            iterations=iterations,
-            workers=workers,
-            threshold=threshold,
-            invert=invert,
-            force=force,
-        )
+    names = None if classes.strip().lower() == "all" else re.split(r"[,\s]+", classes)
+    request = EscherizeRequest(
+        image=image,
+        out=out,
+        classes=None if names is None else tuple(filter(None, names)),
+        method=method.value,
+        effort=effort.value if effort else None,
+        emphasis=emphasis,
+        strength=strength,
+        per_class=per_class,
+        max_frequency=max_frequency,
+        seed=seed,
+        turns=turns,
+        iterations=iterations,
+        workers=workers,
+        threshold=threshold,
+        invert=invert,
+        force=force,
     )
+    do(request)

@@ -1,43 +1,58 @@
 """Densities on the torus, the sphere, the Klein bottle and the projective plane."""
 
-from orbiflow.density.estimator import SPACES, DensityEstimator, make_space
-from orbiflow.density.fitting.flow import FitSettings, fit_density
-from orbiflow.density.fitting.kernels import mix_kernels
-from orbiflow.density.fitting.neural import NeuralSettings, fit_neural
-from orbiflow.density.fitting.report import FitReport
-from orbiflow.density.models.bases import Base, UniformBase, VonMisesBase
-from orbiflow.density.models.blend import MixedDensity
-from orbiflow.density.models.chains import MixtureBase
-from orbiflow.density.models.kernels import AdaptiveKernels
-from orbiflow.density.models.neural import NeuralField, NeuralFlow
-from orbiflow.density.models.symmetric import SymmetricDensity, kl_by_quadrature, midpoints
-from orbiflow.density.models.tabulated import TabulatedDensity
-from orbiflow.density.spaces.flat import KleinBottle, Torus
-from orbiflow.density.spaces.patches import from_klein, to_klein
-from orbiflow.density.spaces.round import (
+from orbiflow.density.estimator import DensityEstimator
+from orbiflow.density.fitting import (
+    FitReport,
+    FitSettings,
+    NeuralSettings,
+    blend_kernels,
+    fit_density,
+    fit_neural,
+)
+from orbiflow.density.models import (
+    AdaptiveKernels,
+    Base,
+    BlendedDensity,
+    NeuralFlow,
+    NeuralTorusField,
+    SymmetricDensity,
+    TabulatedDensity,
+    UniformBase,
+    VonMisesBase,
+    VonMisesChains,
+    kl_by_quadrature,
+    midpoints,
+)
+from orbiflow.density.spaces import (
+    MEASURES,
+    SPACES,
+    KleinBottle,
     ProjectivePlane,
+    Space,
     Sphere,
+    Torus,
     clear_rotation,
+    from_klein,
+    make_space,
+    to_klein,
     to_latlon,
     to_vectors,
 )
-from orbiflow.density.spaces.space import MEASURES, Space
-from orbiflow.density.storage.files import density_to_bytes, read_density
+from orbiflow.density.storage import density_to_bytes, read_density
 
 __all__ = [
     "MEASURES",
     "SPACES",
     "AdaptiveKernels",
     "Base",
+    "BlendedDensity",
     "DensityEstimator",
     "FitReport",
     "FitSettings",
     "KleinBottle",
-    "MixedDensity",
-    "MixtureBase",
-    "NeuralField",
     "NeuralFlow",
     "NeuralSettings",
+    "NeuralTorusField",
     "ProjectivePlane",
     "Space",
     "Sphere",
@@ -46,6 +61,8 @@ __all__ = [
     "Torus",
     "UniformBase",
     "VonMisesBase",
+    "VonMisesChains",
+    "blend_kernels",
     "clear_rotation",
     "density_to_bytes",
     "fit_density",
@@ -54,7 +71,6 @@ __all__ = [
     "kl_by_quadrature",
     "make_space",
     "midpoints",
-    "mix_kernels",
     "read_density",
     "to_klein",
     "to_latlon",

@@ -3,45 +3,31 @@
 from __future__ import annotations
 
 import inspect
-from typing import Any
+import numbers
+from typing import Any, TypeAlias
 
 import numpy as np
 import torch
 from numpy.typing import ArrayLike
 
-from orbiflow.density.fitting.flow import FitSettings, fit_density
+from orbiflow.density.fitting.flow import MOST_DIM, fit_density
 from orbiflow.density.fitting.neural import NeuralSettings, fit_neural
 from orbiflow.density.fitting.report import FitReport, Progress
+from orbiflow.density.fitting.settings import FitSettings
 from orbiflow.density.models.symmetric import SymmetricDensity
-from orbiflow.density.spaces.flat import KleinBottle, Torus
-from orbiflow.density.spaces.round import ProjectivePlane, Sphere, clear_rotation
+from orbiflow.density.spaces.catalogue import space_class
 from orbiflow.density.spaces.space import Space
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry.isometry import Array
 
-MOST_SPLINE_DIM = 3
-"""Dimensions of spline flows; beyond, grids are too large."""
+ONLY_SPLINES = (
+    "detail", "segments", "smoothness", "ridge", "roughness", "kinetic", "iterations", "base",
+    "kernels",
+)  # fmt: skip
+"""Parameters without a meaning for neural flows."""
 
-SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")
-
-
-def make_space(name: str, **options: Any) -> Space:
-    """A space by its name; `options` are those of its class.
-
-    Raises:
-        OrbiflowError: for an unknown name or an option that the space does not have.
-
-    >>> make_space("torus", dim=2, unit="degrees")
-    Torus(dim=2, unit='degrees')
-    """
-    classes = {kind.name: kind for kind in (Torus, Sphere, KleinBottle, ProjectivePlane)}
-    if name not in classes:
-        raise OrbiflowError(f"unknown space {name!r}; the four are {', '.join(SPACES)}")
-    kind = classes[name]
-    wrong = [key for key in options if key not in inspect.signature(kind).parameters]
-    if wrong:
-        raise OrbiflowError(f"the {name} has no option {', '.join(wrong)}")
-    return kind(**options)
+RandomState: TypeAlias = int | np.integer | np.random.RandomState | np.random.Generator | None
+"""As scikit-learn has it, and NumPy's newer generators."""
 
 
 class DensityEstimator:
@@ -54,11 +40,12 @@ class DensityEstimator:
         unit: of angles on torus and Klein bottle: "radians", "degrees" or "turns".
         detail: largest wave number of the flow, in waves along a side of the square.
         segments: stationary pieces of the flow.
-        smoothness, ridge, roughness, kinetic, iterations, validation, base, kernels, seconds, seed:
-            see `FitSettings`.
+        smoothness, ridge, roughness, kinetic, iterations, evaluations, validation, base, kernels,
+            seconds, seed: see `FitSettings`.
 
     On tori of four or more angles the density is a neural flow on a mixture of von Mises chains
-    (`fit_neural`), and of these only `validation`, `seconds` and `seed` count.
+    (`fit_neural`): there only `evaluations`, `validation`, `seconds` and `seed` have a meaning, and the
+    others must be left at their defaults.
 
     After `fit`: `space_`, `density_` (a `SymmetricDensity`), `report_` (a `FitReport`),
     `n_features_in_`.
@@ -82,6 +69,7 @@ class DensityEstimator:
         roughness: tuple[float, ...] = (1e-3, 1e-3, 1e-4),
         kinetic: float = 0.0,
         iterations: int = 100,
+        evaluations: int = 1000,
         validation: float = 0.1,
         base: str = "uniform",
         kernels: bool = False,
@@ -97,6 +85,7 @@ class DensityEstimator:
         self.roughness = roughness
         self.kinetic = kinetic
         self.iterations = iterations
+        self.evaluations = evaluations
         self.validation = validation
         self.base = base
         self.kernels = kernels
@@ -109,8 +98,8 @@ class DensityEstimator:
         """Fit to data (N, k) in the space's own units; `y` is ignored.
 
         Raises:
-            OrbiflowError: for data that are not of the space, too few points, or a setting out of
-                range.
+            OrbiflowError: for data that are not of the space, too few points, a setting out of range,
+                or one that has no meaning on a torus of so many angles.
         """
         del y
         settings = FitSettings(
@@ -125,8 +114,14 @@ class DensityEstimator:
         points = self.space_.to_chart(data)
         self.density_: SymmetricDensity
         self.report_: FitReport
-        if self.space_.dim > MOST_SPLINE_DIM:
-            many = NeuralSettings(validation=self.validation, seconds=self.seconds, seed=self.seed)
+        if self.space_.dim > MOST_DIM:
+            self._refuse_settings_of_splines()
+            many = NeuralSettings(
+                refinement=min(NeuralSettings.refinement, self.evaluations),
+                validation=self.validation,
+                seconds=self.seconds,
+                seed=self.seed,
+            )
             found = fit_neural(self.space_, points, many, progress=progress)
         else:
             found = fit_density(self.space_, points, settings, progress=progress)
@@ -146,13 +141,22 @@ class DensityEstimator:
         del y
         return float(self.score_samples(X).mean())
 
-    def sample(self, n_samples: int = 1, random_state: int = 0) -> Array:
-        """New data (n_samples, k), the same for the same `random_state`."""
+    def sample(self, n_samples: int = 1, random_state: RandomState = None) -> Array:
+        """New data (n_samples, k) in the space's own units.
+
+        Args:
+            random_state: as scikit-learn has it. None: other points at every call, from NumPy's
+                global state, which `np.random.seed` sets. An integer: always the same points. A
+                NumPy `RandomState` or `Generator`: the next ones from it.
+
+        Raises:
+            OrbiflowError: before `fit`, for fewer than one sample, or another random state.
+        """
         density = self._fitted()
-        if n_samples < 1:
-            raise OrbiflowError(f"n_samples must be at least 1, got {n_samples}")
-        generator = torch.Generator().manual_seed(random_state)
-        return self.space_.from_chart(density.sample((n_samples,), generator))
+        if not isinstance(n_samples, numbers.Integral) or n_samples < 1:
+            raise OrbiflowError(f"n_samples must be an integer of at least 1, got {n_samples!r}")
+        generator = torch.Generator().manual_seed(_seed_of(random_state))
+        return self.space_.from_chart(density.sample((int(n_samples),), generator))
 
     def get_params(self, deep: bool = True) -> dict[str, Any]:
         """The constructor's arguments, by name."""
@@ -201,21 +205,34 @@ class DensityEstimator:
             return self.space
         if data.ndim != 2:
             raise OrbiflowError(f"expected data of shape (N, k), got {data.shape}")
-        match self.space:
-            case "torus":
-                return make_space("torus", dim=data.shape[1], unit=self.unit)
-            case "sphere" | "projective-plane":
-                form = "vector" if data.shape[1] == 3 else "latlon"
-                space = make_space(self.space, form=form)
-                assert isinstance(space, Sphere | ProjectivePlane)
-                turn = clear_rotation(space, data, seed=self.seed)
-                return make_space(self.space, form=form, rotation=turn)
-            case "klein-bottle":
-                return make_space("klein-bottle", unit=self.unit)
-            case _:
-                return make_space(str(self.space))
+        return space_class(self.space).for_data(data, unit=self.unit, seed=self.seed)
+
+    def _refuse_settings_of_splines(self) -> None:
+        defaults = inspect.signature(type(self)).parameters
+        set_ = [name for name in ONLY_SPLINES if getattr(self, name) != defaults[name].default]
+        if set_:
+            raise OrbiflowError(
+                f"{', '.join(set_)} would have no effect on a torus of {self.space_.dim} angles, where "
+                f"the flow is neural: leave {'it' if len(set_) == 1 else 'them'} out, or call "
+                "`fit_neural` with `NeuralSettings`"
+            )
 
     def _fitted(self) -> SymmetricDensity:
         if not hasattr(self, "density_"):
             raise OrbiflowError("this estimator is not fitted yet: call fit first")
         return self.density_
+
+
+def _seed_of(random_state: RandomState) -> int:
+    if random_state is None:
+        return int(np.random.randint(2**31))  # noqa: NPY002  scikit-learn's convention
+    if isinstance(random_state, np.random.RandomState):
+        return int(random_state.randint(2**31))
+    if isinstance(random_state, np.random.Generator):
+        return int(random_state.integers(2**31))
+    if isinstance(random_state, numbers.Integral) and not isinstance(random_state, bool):
+        return int(random_state) % 2**63
+    raise OrbiflowError(
+        "random_state must be None, an integer, a NumPy RandomState or Generator, got "
+        f"{random_state!r}"
+    )

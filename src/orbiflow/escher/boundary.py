@@ -9,11 +9,11 @@ import numpy as np
 import shapely
 import torch
 
+from orbiflow.arguments import instance
 from orbiflow.errors import CertificationError
 from orbiflow.escher.model import TileModel
 from orbiflow.symmetry.isometry import Array
 from orbiflow.tilings import IsohedralClass, Tile
-from orbiflow.tilings.class_table import EdgePair
 
 DENSE = (960, 4320)
 """Least number of samples around the tile from which vertices are chosen; the second if need be."""
@@ -48,12 +48,12 @@ def converge(
     """
     coarse = model.flow(points)
     while True:
-        with model.flow.with_steps(2 * model.flow.steps):
-            fine = model.flow(points)
+        finer = model.flow.with_steps(2 * model.flow.steps)
+        fine = finer(points)
         error = float((fine - coarse).abs().max())
         if not math.isfinite(error):
             raise CertificationError("the flow has no finite values: lower the learning rate")
-        model.flow.steps *= 2
+        model.flow = finer
         if error <= tolerance or (force and model.flow.steps >= MAX_STEPS):
             return fine, error
         if model.flow.steps >= MAX_STEPS:
@@ -79,12 +79,15 @@ def extract_tile(model: TileModel, *, force: bool = False) -> tuple[Tile, TileMo
         The tile, and the float64 model with the integration steps that made it.
 
     Raises:
+        OrbiflowError: if the model holds more than one candidate.
         CertificationError: if no sampling gives a simple polygon: the candidate has folded. With
             `force`, only if coordinates are not finite.
     """
+    instance(model, TileModel, "the model", "SavedModel.restore and the fits give one")
+    model.require_single()
     kind = model.isohedral_class
     model = model.take([0]).double()
-    model.flow.method, model.flow.steps = "rk4", max(1, 8 // model.segments)
+    model.flow = model.flow.with_steps(max(1, 8 // model.segments), method="rk4")
     sides = model.prototile()[0].shape[1]
     tile = None
     for count in DENSE:
@@ -114,14 +117,14 @@ def _flowed_edges(model: TileModel, pieces: int, force: bool) -> list[Array]:
     spans = {}
     for pair in kind.identified_edges:
         start, end = first[pair.first], first[pair.first + 1]
-        spans[pair] = slice(start, (start + end) // 2 + 1 if _turns_over(pair) else end + 1)
+        spans[pair] = slice(start, (start + end) // 2 + 1 if pair.folded else end + 1)
     points = torch.cat([closed[span] for span in spans.values()])[None]
     flowed = converge(model, points, force=force)[0][0].numpy()
     ends = np.cumsum([span.stop - span.start for span in spans.values()])
     edges: dict[int, Array] = {}
     for pair, own in zip(spans, np.split(flowed, ends[:-1]), strict=True):
         image = kind.edge_isometry(pair)(own)
-        if _turns_over(pair):
+        if pair.folded:
             edges[pair.first] = np.concatenate([own, image[-2::-1]])
         else:
             edges[pair.first] = own
@@ -132,10 +135,6 @@ def _flowed_edges(model: TileModel, pieces: int, force: bool) -> list[Array]:
 def _placement(model: TileModel) -> Callable[[Array], Array]:
     linear, offset = (t.detach().numpy()[0] for t in (model.linear(), model.offset))
     return lambda points: points @ linear.T + offset
-
-
-def _turns_over(pair: EdgePair) -> bool:
-    return pair.first == pair.second  # a 2-fold centre at the midpoint
 
 
 def _polygons(kind: IsohedralClass, edges: list[Array]) -> Iterator[tuple[Array, tuple[int, ...]]]:
@@ -151,7 +150,7 @@ def _chosen_samples(kind: IsohedralClass, closed: list[Array], tolerance: float)
     masks: dict[int, Array] = {}
     for pair in kind.identified_edges:
         curve = closed[pair.first]
-        if _turns_over(pair):
+        if pair.folded:
             half = _simplified(curve[: len(curve) // 2 + 1], tolerance)
             masks[pair.first] = np.concatenate([half, half[-2::-1]])
             continue

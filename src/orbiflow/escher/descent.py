@@ -9,7 +9,6 @@ the flow that is the result. No backpropagation through an equation, all starts 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import torch
@@ -18,12 +17,20 @@ from torch import Tensor
 from orbiflow.escher.descent_settings import DescentSettings
 from orbiflow.escher.model import TileModel
 from orbiflow.escher.prototiles import Prototiles
+from orbiflow.fields import FourierField
+from orbiflow.fields.lipschitz import group_factor, steepness
+from orbiflow.flows import METHODS
 from orbiflow.silhouette.soft_target import SoftTarget
 from orbiflow.symmetry.isometry import Array
 from orbiflow.tilings import IsohedralClass
 
 CALM = 0.4
-"""Bound on step length times the field's Lipschitz bound: below log 2 every step is injective."""
+"""Step length times the field's steepness, at most; less where `calm` finds it too bold."""
+
+
+def calm(field: FourierField) -> float:
+    """`CALM`, or as much less as makes every midpoint step injective whatever the field's group."""
+    return min(CALM, METHODS["midpoint"].injective_below / group_factor(field.group, field.basis))
 
 
 class Descent:
@@ -61,7 +68,7 @@ class Descent:
         self.model = model
         self.field = model.fourier_fields()[0]
         magnitude = torch.tensor(self.field.basis.magnitude, dtype=torch.float32)
-        self.magnitude, self.steepness = magnitude, 2 * math.pi * magnitude
+        self.magnitude, self.calm = magnitude, calm(self.field)
 
     def _pose(self) -> dict[str, torch.nn.Parameter]:
         names = ["angle", "offset", "log_scale"] + ["stretch"] * self.settings.lattice
@@ -110,10 +117,9 @@ class Descent:
         velocity = self.field.bound()
         slope = velocity(self.points)
         size = slope.square().sum(dim=-1).amax(dim=1).sqrt() * self.model.log_scale.exp()
-        # |a cos + b sin| summed over an orthonormal basis: a bound of the Jacobian, up to sqrt 2
-        steep = math.sqrt(2.0) * (self.momentum.abs() * self.steepness).sum(dim=1)
+        steep = steepness(self.momentum, self.magnitude)
         tiny = torch.finfo(size.dtype).tiny
-        time = torch.minimum(reach / size.clamp_min(tiny), CALM / steep.clamp_min(tiny))
+        time = torch.minimum(reach / size.clamp_min(tiny), self.calm / steep.clamp_min(tiny))
         h = time[:, None, None]
         self.points = self.points + h * velocity(self.points + h / 2 * slope)
         self.record.append(time[:, None] * self.momentum)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
 
+from orbiflow.arguments import number, numbers, whole
 from orbiflow.errors import OrbiflowError
-from orbiflow.escher.occupancy import MAX_FREQUENCY
+from orbiflow.escher.max_frequency import check_max_frequency
 
 MAX_SEGMENTS = 2000
 """Of a flow; the descent adds one a step."""
@@ -25,7 +26,7 @@ MOST_TIMES = 6.0
 class DescentSettings:
     """Knobs of the descent; the defaults are effort "normal", measured on the paper's goals.
 
-    - `max_frequency`: Omega, at least 1.
+    - `max_frequency`: Omega; 0 moves pose and lattice alone, and IH1 to IH3 along their glides.
     - `starts`: "outline" (tiles that are near the target's outline already) or "template" (the
       template turned and stretched; also what is left when no outline start is simple).
     - `candidates`: outline starts that the descent begins with.
@@ -65,39 +66,35 @@ class DescentSettings:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        for name in (
-            "max_frequency",
-            "candidates",
-            "projected",
-            "measured",
-            "turns",
-            "finalists",
-        ):
-            if getattr(self, name) < 1:
-                raise OrbiflowError(f"{name} must be at least 1, got {getattr(self, name)}")
-        if self.max_frequency > MAX_FREQUENCY:
-            raise OrbiflowError(
-                f"max_frequency must be from 1 to {MAX_FREQUENCY}, got {self.max_frequency}: "
-                "10 is plenty for most silhouettes"
-            )
+        for name in ("candidates", "projected", "measured", "turns", "finalists"):
+            whole(getattr(self, name), name, 1)
+        check_max_frequency(self.max_frequency)
         if self.starts not in ("outline", "template"):
             raise OrbiflowError(f'starts must be "outline" or "template", got {self.starts!r}')
-        if self.boundary < 60 or self.boundary % 30:
+        if whole(self.boundary, "boundary", 0) < 60 or self.boundary % 30:
             raise OrbiflowError(f"boundary must be a multiple of 30 from 60, got {self.boundary}")
-        for points in self.resolutions:
+        for points in numbers(self.resolutions, "resolutions", ("n",)):
             if points < 24 or self.boundary % points:
                 raise OrbiflowError(
                     f"resolutions must be at least 24 and divide boundary = {self.boundary}, "
-                    f"got {points}"
+                    f"got {points:g}"
                 )
-        if not self.stages or any(steps < 1 or kept < 1 for steps, kept in self.stages):
+        self._check_stages()
+        for name in ("smoothness", "reach", "blur"):
+            for value in numbers(getattr(self, name), name, (2,)):
+                number(value, f"{name}, first and last,", 0, above=name != "smoothness")
+        number(self.momentum, "momentum", 0, 1)
+        number(self.stretch, "stretch", 0)
+        whole(self.polish, "polish", 0, 1000)
+        whole(self.seed, "seed", 0, 2**32 - 1)
+
+    def _check_stages(self) -> None:
+        stages = numbers(self.stages, "stages", (...,))
+        pairs = stages.ndim == 2 and stages.shape[1] == 2
+        if not pairs or (stages < 1).any() or (stages % 1).any():
             raise OrbiflowError(f"stages need steps and survivors of at least 1: {self.stages}")
         if self.iterations >= MAX_SEGMENTS:
             raise OrbiflowError(f"stages must have less than {MAX_SEGMENTS} steps in all")
-        if not 0 <= self.polish <= 1000:
-            raise OrbiflowError(f"polish must be from 0 to 1000, got {self.polish}")
-        if not 0 <= self.seed < 2**32:
-            raise OrbiflowError(f"seed must be from 0 to 2^32 - 1, got {self.seed}")
 
     @property
     def iterations(self) -> int:

@@ -6,6 +6,8 @@ import numpy as np
 import shapely
 import torch
 
+from orbiflow.arguments import instance
+from orbiflow.cancel import Cancel
 from orbiflow.escher.descent import Descent
 from orbiflow.escher.descent_settings import DescentSettings
 from orbiflow.escher.fit import Fit, Progress
@@ -19,7 +21,7 @@ from orbiflow.likeness.recognition import Recogniser
 from orbiflow.silhouette.soft_target import SoftTarget
 from orbiflow.silhouette.target import Target
 from orbiflow.symmetry.isometry import Array
-from orbiflow.tilings import IsohedralClass
+from orbiflow.tilings import IsohedralClass, isohedral_class
 
 FEW, POOR = 8, 0.4
 """Starts from the outline, and IoU of the best of them, below which the template's join them."""
@@ -30,26 +32,35 @@ NEAR = 0.01
 
 def fit_descent(
     target: Target,
-    kind: IsohedralClass,
+    kind: IsohedralClass | str,
     settings: DescentSettings | None = None,
     *,
     soft: SoftTarget | None = None,
     progress: Progress | None = None,
+    cancel: Cancel | None = None,
 ) -> Fit:
     """Fit tiles of one class to a target by Sobolev descent, all starts side by side.
 
     Args:
         target: the silhouette.
-        kind: the class.
+        kind: the class, or its name.
         settings: of the descent; default effort "normal".
         soft: of the target, if it is at hand already.
         progress: told 1 - IoU of the best so far as the loss.
+        cancel: looked at before each step.
+
+    Raises:
+        Cancelled: if it was told to stop.
     """
+    kind = isohedral_class(kind)
+    instance(target, Target, "the target", "Target.read and Target.from_polygon make one")
+    settings = instance(settings or DescentSettings(), DescentSettings, "settings")
     outline = shapely.Polygon(target.normal).exterior
-    settings = (settings or DescentSettings()).for_outline(outline.length)
+    settings = settings.for_outline(outline.length)
     soft = soft or SoftTarget(target)
     report = progress or (lambda _share, _loss: None)
-    starts = _starts(target, kind, settings)
+    cancel = cancel or Cancel()
+    starts = _starts(target, kind, settings, cancel)
     prototiles = starts.prototiles
     report(0.1, float("nan"))
     descent = Descent(kind, prototiles, settings)
@@ -58,6 +69,7 @@ def fit_descent(
     best = 0.0
     for steps, survivors in settings.stages:
         for k in range(steps):
+            cancel.check()
             descent.step(soft)
             if k % 8 == 7:
                 report(0.1 + 0.8 * descent.done / settings.iterations, 1 - best)
@@ -73,7 +85,7 @@ def fit_descent(
         model = _with_start(model, prototiles.take([int(starts.iou.argmax())]))
     if settings.polish and soft.weights is None:  # the exact overlap knows no emphasis
         report(0.92, 1 - best)
-        model = _polished(target, model, settings)
+        model = _polished(target, model, settings, cancel)
     return Fit(model, len(prototiles), crossed, 1)
 
 
@@ -92,13 +104,15 @@ def _with_start(model: TileModel, prototile: Prototiles) -> TileModel:
     return TileModel.joined([still.with_fields([zero] * model.segments), model])
 
 
-def _polished(target: Target, model: TileModel, settings: DescentSettings) -> TileModel:
+def _polished(
+    target: Target, model: TileModel, settings: DescentSettings, cancel: Cancel
+) -> TileModel:
     """The same candidates, each with one segment more."""
     polished = []
     for index in range(model.size):
         single = model.take([index])
         if index < settings.finalists:
-            single = polish(single, target, settings.polish)
+            single = polish(single, target, settings.polish, cancel=cancel)
         if single.segments == model.segments:  # nothing gained
             fields = [field.parameters_.detach() for field in single.fourier_fields()]
             single = single.with_fields([*fields, torch.zeros_like(fields[0])])
@@ -137,7 +151,9 @@ def _best_first(target: Target, goal: shapely.Polygon, soft: SoftTarget, descent
     return float(iou[order[0]])
 
 
-def _starts(target: Target, kind: IsohedralClass, settings: DescentSettings) -> Starts:
+def _starts(
+    target: Target, kind: IsohedralClass, settings: DescentSettings, cancel: Cancel
+) -> Starts:
     phase = float(np.random.default_rng(settings.seed).random()) if settings.seed else 0.0
     found: Starts | None = None
     if settings.starts == "outline":
@@ -150,6 +166,7 @@ def _starts(target: Target, kind: IsohedralClass, settings: DescentSettings) -> 
             measured=settings.measured,
             vertices=settings.boundary,
             phase=phase,
+            cancel=cancel,
         )
         if len(found.prototiles) >= FEW and found.iou.max() >= POOR:
             return found

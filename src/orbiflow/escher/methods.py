@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import lru_cache
 
+from orbiflow.cancel import Cancel
 from orbiflow.escher.descent_settings import DescentSettings
 from orbiflow.escher.fit import Fit, Progress
 from orbiflow.escher.fit_descent import fit_descent
@@ -31,6 +32,7 @@ def fit(
     emphasis: Emphasis | None = None,
     per_class: int = 1,
     progress: Progress | None = None,
+    cancel: Cancel | None = None,
 ) -> Fit:
     """Fit tiles of one class by the method that the settings belong to.
 
@@ -41,15 +43,19 @@ def fit(
         emphasis: what must survive; the descent alone takes notice.
         per_class: certified tiles that are wanted.
         progress: told how far it is.
+        cancel: looked at before each step.
+
+    Raises:
+        Cancelled: if it was told to stop.
     """
     if isinstance(settings, DescentSettings):
         soft = _soft_target(target, emphasis)
         settings = settings.with_survivors(2 * per_class)
-        found = fit_descent(target, kind, settings, soft=soft, progress=progress)
+        found = fit_descent(target, kind, settings, soft=soft, progress=progress, cancel=cancel)
         return found._replace(enough=1 if per_class == 1 else 2 * per_class)
     number = list(CLASSES).index(kind.name)
     own = replace(settings, seed=(settings.seed * 1009 + number) % 2**32)
-    model = fit_occupancy(target, kind, own, progress)
+    model = fit_occupancy(target, kind, own, progress, cancel=cancel)
     return Fit(model, len(initial_poses(kind, settings.turns)[0]), 0, model.size)
 
 

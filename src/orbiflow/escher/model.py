@@ -8,8 +8,10 @@ from typing import Self
 
 import numpy as np
 import torch
+from numpy.typing import ArrayLike
 from torch import Tensor, nn
 
+from orbiflow.arguments import instance, number, numbers, whole
 from orbiflow.errors import OrbiflowError
 from orbiflow.escher.prototiles import Prototiles
 from orbiflow.fields import FourierField
@@ -18,6 +20,7 @@ from orbiflow.geometry import subdivided
 from orbiflow.symmetry import CrystallographicGroup
 from orbiflow.symmetry.isometry import Array
 from orbiflow.tilings import IsohedralClass
+from orbiflow.tilings import isohedral_class as class_of
 
 
 class TileModel(nn.Module):
@@ -32,8 +35,8 @@ class TileModel(nn.Module):
     whatever is asked, and the group's pose and the polygon (`extract_tile`) are computed in float64.
 
     Args:
-        isohedral_class: of all S tiles.
-        angles: (S,) turn of each start, in radians.
+        isohedral_class: of all S tiles, or its name.
+        angles: (S,) turn of each start, in radians; a number is one.
         mirrored: (S,) whether A reverses orientation; default no.
         max_frequency: Omega of the fields.
         segments: stationary pieces of the flow.
@@ -44,7 +47,10 @@ class TileModel(nn.Module):
             are then taken from them.
 
     Shapes:
-        points (S, N, 2) throughout.
+        points (S, N, 2) throughout; arrays and lists are taken as tensors of the model's dtype.
+
+    Raises:
+        OrbiflowError: for arguments that cannot be used, by name.
     """
 
     mirror: Tensor
@@ -53,10 +59,10 @@ class TileModel(nn.Module):
 
     def __init__(
         self,
-        isohedral_class: IsohedralClass,
-        angles: Tensor | None = None,
+        isohedral_class: IsohedralClass | str | int,
+        angles: Tensor | ArrayLike | None = None,
         *,
-        mirrored: Tensor | None = None,
+        mirrored: Tensor | ArrayLike | None = None,
         max_frequency: int = 10,
         segments: int = 1,
         smoothness: float = 1.0,
@@ -66,27 +72,39 @@ class TileModel(nn.Module):
         prototiles: Prototiles | None = None,
     ) -> None:
         super().__init__()
+        isohedral_class = class_of(isohedral_class)
+        if not (isinstance(dtype, torch.dtype) and dtype.is_floating_point):
+            raise OrbiflowError(
+                f"dtype must be a floating-point type such as torch.float64, got {dtype}"
+            )
+        number(smoothness, "smoothness", 0)
+        whole(segments, "segments", 1)
         if prototiles is not None:
-            angles = torch.as_tensor(prototiles.angle)
-            mirrored = torch.as_tensor(prototiles.mirrored)
+            instance(prototiles, Prototiles, "prototiles")
+            angles, mirrored = prototiles.angle, prototiles.mirrored
         if angles is None:
             raise OrbiflowError("a tile model needs angles or prototiles")
-        size = len(angles)
+        turns = torch.as_tensor(np.atleast_1d(numbers(angles, "angles", (...,))))
+        if turns.ndim != 1 or not len(turns):
+            raise OrbiflowError(
+                f"angles: expected shape (S,), S at least 1, got {tuple(turns.shape)}"
+            )
+        size = len(turns)
         self.isohedral_class = isohedral_class
         self.group: CrystallographicGroup = isohedral_class.group()
         area = self.group.cell_volume / self.group.order
-        self.angle = nn.Parameter(angles.to(dtype).clone())
+        self.angle = nn.Parameter(turns.to(dtype))
         self.log_scale = nn.Parameter(torch.full((size,), -0.5 * math.log(area), dtype=dtype))
         self.offset = nn.Parameter(torch.zeros(size, 2, dtype=dtype))
         self.shape = nn.Parameter(torch.zeros(size, isohedral_class.shape_dim, dtype=dtype))
         self.stretch = nn.Parameter(torch.zeros(size, isohedral_class.stretch_dim, dtype=dtype))
-        flips = torch.zeros(size, dtype=torch.bool) if mirrored is None else mirrored.clone()
-        self.register_buffer("mirror", flips)
+        flips = np.zeros(size) if mirrored is None else numbers(mirrored, "mirrored", (size,))
+        self.register_buffer("mirror", torch.as_tensor(flips != 0))
         fields = [
             FourierField(self.group, max_frequency, batch=size, smoothness=smoothness, dtype=dtype)
             for _ in range(segments)
         ]
-        self.flow = Flow(fields, steps=steps, method=method)
+        self.flow = Flow(fields, steps=steps, method=method, warn=False)
         self.max_frequency = max_frequency
         self.segments = segments
         self.smoothness = smoothness
@@ -99,6 +117,10 @@ class TileModel(nn.Module):
             self.register_buffer("corners", None)
             self.recentre()
             return
+        kind = self.isohedral_class
+        own = prototiles.corners.shape[-1], prototiles.stretch.shape[-1]
+        if own != (len(kind.template()), kind.stretch_dim):
+            raise OrbiflowError(f"the prototiles are not of class {kind.name}")
         self.register_buffer("vertices", torch.tensor(prototiles.vertices, dtype=torch.float64))
         self.register_buffer("corners", torch.tensor(prototiles.corners))
         for name in ("log_scale", "offset", "stretch"):
@@ -134,19 +156,36 @@ class TileModel(nn.Module):
 
     def place(self, points: Tensor) -> Tensor:
         """A o L at points (S, N, 2) of the group's frame."""
-        return points @ self.linear().mT + self.offset[:, None, :]
+        return self._points(points) @ self.linear().mT + self.offset[:, None, :]
 
     def unplace(self, points: Tensor) -> Tensor:
         """(A o L)^-1 at points (N, 2) or (S, N, 2) of the target's normal form."""
-        return (points - self.offset[:, None, :]) @ torch.linalg.inv(self.linear()).mT
+        return (self._points(points) - self.offset[:, None, :]) @ torch.linalg.inv(self.linear()).mT
 
     def forward(self, points: Tensor) -> Tensor:
         """D at points (S, N, 2) of the group's frame."""
-        return self.place(self.flow(points))
+        return self.place(self.flow(self._points(points)))
 
     def inverse(self, points: Tensor) -> Tensor:
         """D^-1 at points (N, 2) or (S, N, 2) of the target's normal form."""
         return self.flow.inverse(self.unplace(points))
+
+    def _points(self, points: Tensor) -> Tensor:
+        """`points` if they suit the model; arrays and lists become tensors of its dtype."""
+        if not isinstance(points, Tensor):
+            return torch.as_tensor(
+                numbers(points, "points", (..., "N", 2), finite=False),
+                dtype=self.angle.dtype,
+                device=self.angle.device,
+            )
+        if points.dtype != self.angle.dtype:
+            raise OrbiflowError(
+                f"points are {points.dtype}, the model is {self.angle.dtype}: give points.to(...) or "
+                "convert the model"
+            )
+        if points.ndim < 2 or points.shape[-1] != 2:
+            raise OrbiflowError(f"points: expected shape (S, N, 2), got {tuple(points.shape)}")
+        return points
 
     def prototile(self) -> tuple[Tensor, Tensor]:
         """What the flow starts from: vertices (S, N, 2) and the corners' indices (S, K)."""
@@ -161,18 +200,38 @@ class TileModel(nn.Module):
 
         Identified edges have as many sides each, so their samples correspond.
         """
+        whole(pieces, "pieces", 1)
         vertices, _ = self.prototile()
         return subdivided(vertices, pieces)
 
-    def take(self, indices: list[int]) -> TileModel:
-        """A new model with the candidates at `indices` only, at the same parameters."""
-        fields = [field.parameters_.detach()[indices] for field in self.fourier_fields()]
-        return self.with_fields(fields, indices)
+    def take(self, indices: Sequence[int] | int) -> TileModel:
+        """A new model with the candidates at `indices` only, at the same parameters.
+
+        Raises:
+            OrbiflowError: for indices that are not candidates, and for none.
+        """
+        chosen = self._chosen(indices)
+        fields = [field.parameters_.detach()[chosen] for field in self.fourier_fields()]
+        return self.with_fields(fields, chosen)
+
+    def _chosen(self, indices: Sequence[int] | int) -> list[int]:
+        several = indices if isinstance(indices, Sequence | np.ndarray) else [indices]
+        chosen = [whole(i, "a candidate's index", 0, self.size - 1) for i in several]
+        if not chosen:
+            raise OrbiflowError(f"choose at least one of the {self.size} candidates")
+        return chosen
 
     @staticmethod
     @torch.no_grad()
     def joined(models: Sequence[TileModel]) -> TileModel:
-        """The candidates of models that differ in their parameters alone, as one stack."""
+        """The candidates of models that differ in their parameters alone, as one stack.
+
+        Raises:
+            OrbiflowError: for no models, and for models of several classes.
+        """
+        names = {model.isohedral_class.name for model in models}
+        if len(names) != 1:
+            raise OrbiflowError(f"models of one class can be joined, got {sorted(names) or 'none'}")
         first = models[0]
         stack = first.take([0] * sum(model.size for model in models))
         parts = [dict(model.named_parameters()) for model in models]
@@ -199,7 +258,7 @@ class TileModel(nn.Module):
         chosen = list(range(self.size)) if indices is None else indices
         model = TileModel(
             self.isohedral_class,
-            self.angle.detach()[chosen],
+            np.zeros(len(chosen)),  # a fit that ran away has angles that none may begin with
             mirrored=self.mirror[chosen],
             max_frequency=self.max_frequency,
             segments=len(fields),
@@ -208,7 +267,7 @@ class TileModel(nn.Module):
             method=self.flow.method,
             dtype=self.angle.dtype,
         ).to(self.angle.device)
-        for name in ("log_scale", "offset", "shape", "stretch"):
+        for name in ("angle", "log_scale", "offset", "shape", "stretch"):
             getattr(model, name).copy_(getattr(self, name)[chosen])
         if self.vertices is not None and self.corners is not None:
             model.vertices = self.vertices[chosen].clone()
@@ -217,14 +276,22 @@ class TileModel(nn.Module):
             own.parameters_.copy_(parameters)
         return model
 
+    def require_single(self) -> None:
+        """Do nothing if the model holds one candidate.
+
+        Raises:
+            OrbiflowError: if it holds more.
+        """
+        if self.size != 1:
+            raise OrbiflowError(f"take one candidate first: this model holds {self.size}")
+
     def placed_group(self) -> CrystallographicGroup:
         """The group of a single candidate's tile, in the target's normal form.
 
         Raises:
             OrbiflowError: if the model holds more than one candidate.
         """
-        if self.size != 1:
-            raise OrbiflowError(f"take one candidate first: this model holds {self.size}")
+        self.require_single()
         linear: Array = self._linear(torch.float64).detach().cpu().numpy()[0]
         offset: Array = self.offset.detach().double().cpu().numpy()[0]
         return self.group.conjugate(linear, np.asarray(offset))

@@ -11,16 +11,16 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor
 
-from orbiflow.errors import OrbiflowError
+from orbiflow.arguments import instance, number, numbers, whole
+from orbiflow.cancel import Cancel
 from orbiflow.escher.fit import Progress
+from orbiflow.escher.max_frequency import check_max_frequency
 from orbiflow.escher.model import TileModel
 from orbiflow.escher.starts import initial_poses, template_symmetries
+from orbiflow.flows.integrators import method as integrator
 from orbiflow.silhouette.signed_distance import signed_distance
 from orbiflow.silhouette.target import Target
-from orbiflow.tilings import IsohedralClass
-
-MAX_FREQUENCY = 60
-"""Largest Omega that a fit takes on; time and memory grow with its square."""
+from orbiflow.tilings import IsohedralClass, isohedral_class
 
 SHAPE_PENALTY = 0.02
 """Factor of the squared displacement of a pentagon's free vertex: keeps the template simple."""
@@ -30,7 +30,7 @@ SHAPE_PENALTY = 0.02
 class OccupancySettings:
     """Knobs of the occupancy method; the defaults were measured on the paper's goals.
 
-    - `max_frequency`: Omega, at least 1.
+    - `max_frequency`: Omega; 0 leaves the flow the translations that commute with the group.
     - `turns`: starting rotations of the template.
     - `finalists`: starts that survive the affine phase; a third of the flow phase later the better
       half of them goes on.
@@ -63,23 +63,17 @@ class OccupancySettings:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        for name in ("max_frequency", "turns", "finalists", "iterations", "points", "segments"):
-            if getattr(self, name) < 1:
-                raise OrbiflowError(f"{name} must be at least 1, got {getattr(self, name)}")
-        for name in ("affine_iterations", "smoothness"):
-            if not getattr(self, name) >= 0:
-                raise OrbiflowError(f"{name} must not be negative, got {getattr(self, name)}")
-        for name in ("hardness", "penalty", "learning_rate"):
-            values = getattr(self, name)
-            if not all(value > 0 for value in np.ravel(values)):
-                raise OrbiflowError(f"{name} must be positive, got {values}")
-        if self.max_frequency > MAX_FREQUENCY:
-            raise OrbiflowError(
-                f"max_frequency must be from 1 to {MAX_FREQUENCY}, got {self.max_frequency}: "
-                "10 is plenty for most silhouettes"
-            )
-        if not 0 <= self.seed < 2**32:
-            raise OrbiflowError(f"seed must be from 0 to 2^32 - 1, got {self.seed}")
+        for name in ("turns", "finalists", "iterations", "points", "segments", "steps"):
+            whole(getattr(self, name), name, 1)
+        check_max_frequency(self.max_frequency)
+        integrator(instance(self.method, str, "method"))
+        whole(self.affine_iterations, "affine_iterations", 0)
+        number(self.smoothness, "smoothness", 0)
+        number(self.learning_rate, "learning_rate", 0, above=True)
+        for name in ("hardness", "penalty"):
+            for value in numbers(getattr(self, name), name, (2,)):
+                number(value, f"{name}, first and last,", 0, above=True)
+        whole(self.seed, "seed", 0, 2**32 - 1)
 
 
 class OccupancySamples:
@@ -92,6 +86,8 @@ class OccupancySamples:
     def __init__(
         self, target: Target, count: int, *, seed: int, dtype: torch.dtype = torch.float32
     ) -> None:
+        instance(target, Target, "the target", "Target.read and Target.from_polygon make one")
+        whole(count, "count", 1)
         rng = np.random.default_rng(seed)
         region = shapely.Polygon(target.normal)
         uniform = count // 3
@@ -129,27 +125,40 @@ def occupancy_loss(
     """
     pulled = model.unplace(points) if affine else model.inverse(points)
     phi = signed_distance(pulled, model.template()) * model.log_scale.exp()[:, None]
-    goal = inside.expand_as(phi)
+    goal = torch.as_tensor(inside, dtype=phi.dtype).expand_as(phi)
     return F.binary_cross_entropy_with_logits(hardness * phi, goal, reduction="none").mean(dim=-1)
 
 
 def fit_occupancy(
     target: Target,
-    isohedral_class: IsohedralClass,
+    kind: IsohedralClass | str,
     settings: OccupancySettings | None = None,
     progress: Progress | None = None,
+    *,
+    cancel: Cancel | None = None,
 ) -> TileModel:
     """Fit tiles of one class to a target by the paper's method, all starts side by side.
 
     Returns:
         The surviving candidates, best loss first. They are not certified yet.
+
+    Raises:
+        Cancelled: if `cancel`, which is looked at before each step, says so.
     """
-    settings = settings or OccupancySettings()
+    kind = isohedral_class(kind)
+    instance(target, Target, "the target", "Target.read and Target.from_polygon make one")
+    settings = instance(settings or OccupancySettings(), OccupancySettings, "settings")
     # the mean over the candidates is all that couples them: separate fits, one tensor
     samples = OccupancySamples(target, 16384, seed=settings.seed)
-    model = _affine_phase(_start(isohedral_class, settings), samples, settings)
+    cancel = cancel or Cancel()
+    model = _affine_phase(_start(kind, settings), samples, settings, cancel)
     first = replace(settings, iterations=max(1, settings.iterations // 3))
-    report = progress or _silent
+    told = progress or _silent
+
+    def report(share: float, loss: float) -> None:
+        told(share, loss)
+        cancel.check()
+
     model = _flow_phase(model, samples, settings, 0, first.iterations, report)
     if model.size > 1:
         model = _ranked(model, samples, settings.hardness[1], keep=(model.size + 1) // 2)
@@ -181,10 +190,11 @@ def _pose(model: TileModel) -> list[torch.nn.Parameter]:
 
 
 def _affine_phase(
-    model: TileModel, samples: OccupancySamples, settings: OccupancySettings
+    model: TileModel, samples: OccupancySamples, settings: OccupancySettings, cancel: Cancel
 ) -> TileModel:
     optimizer = torch.optim.Adam(_pose(model), lr=0.03)
     for _ in range(settings.affine_iterations):
+        cancel.check()
         points, inside = samples.draw(512)
         optimizer.zero_grad()
         loss = occupancy_loss(model, points, inside, 15.0, affine=True)

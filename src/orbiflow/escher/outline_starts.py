@@ -11,6 +11,9 @@ import shapely
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
+from orbiflow.arguments import instance, whole
+from orbiflow.cancel import Cancel
+from orbiflow.errors import OrbiflowError
 from orbiflow.escher.nearest_tile import nearest_tiles
 from orbiflow.escher.placements import Complex, Placements, best_placements
 from orbiflow.escher.prototiles import Prototiles
@@ -21,7 +24,7 @@ from orbiflow.likeness.overlap import boundary_iou, prepared_region
 from orbiflow.silhouette.target import Target
 from orbiflow.symmetry import rotation_matrix
 from orbiflow.symmetry.isometry import Array
-from orbiflow.tilings import IsohedralClass
+from orbiflow.tilings import IsohedralClass, isohedral_class
 from orbiflow.tilings.class_table import EdgePair
 
 APART = 0.025
@@ -45,7 +48,7 @@ class Starts:
 
 def outline_starts(
     target: Target,
-    kind: IsohedralClass,
+    kind: IsohedralClass | str,
     *,
     count: int,
     resolutions: Sequence[int] = (40, 60, 80),
@@ -53,6 +56,7 @@ def outline_starts(
     measured: int = 200,
     vertices: int = 240,
     phase: float = 0.0,
+    cancel: Cancel | None = None,
 ) -> Starts:
     """The best start tiles of one class for a target, no two of them twins.
 
@@ -66,7 +70,17 @@ def outline_starts(
         measured: of these, the nearest tiles whose overlap is measured.
         vertices: of every start tile.
         phase: of the points along the outline, in spacings; what a seed changes.
+        cancel: looked at before each resolution.
+
+    Raises:
+        Cancelled: if it was told to stop.
     """
+    kind = isohedral_class(kind)
+    instance(target, Target, "the target", "Target.read and Target.from_polygon make one")
+    for points in resolutions:
+        if vertices % whole(points, "a resolution", 24):
+            raise OrbiflowError(f"resolutions must divide vertices = {vertices}, got {points}")
+    cancel = cancel or Cancel()
     parts: list[Prototiles] = []
     scores: list[Array] = []
     places: list[Array] = []
@@ -74,6 +88,7 @@ def outline_starts(
         ring = reverse(target.normal * (1.0, -1.0)) if mirrored else target.normal
         goal = prepared_region(ring)
         for points in resolutions:
+            cancel.check()
             outline = resampled(ring, points, phase) @ [1, 1j]
             found = best_placements(kind, outline, projected)
             for tiles, placements, score in _simple_tiles(kind, goal, outline, found, measured):
@@ -86,7 +101,12 @@ def outline_starts(
 
 
 def template_starts(
-    kind: IsohedralClass, *, turns: int, stretch: float, vertices: int = 240, phase: float = 0.0
+    kind: IsohedralClass | str,
+    *,
+    turns: int,
+    stretch: float,
+    vertices: int = 240,
+    phase: float = 0.0,
 ) -> Prototiles:
     """The template itself, turned and stretched: starts that know nothing of the target.
 
@@ -98,6 +118,7 @@ def template_starts(
         vertices: of every start tile, a multiple of the template's.
         phase: of the angles, in steps.
     """
+    kind = isohedral_class(kind)
     order, symmetric = template_symmetries(kind)
     stretches = [np.zeros(kind.stretch_dim)]
     for axis, sign in itertools.product(np.eye(kind.stretch_dim), (1.0, -1.0)):

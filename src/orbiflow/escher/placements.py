@@ -80,7 +80,7 @@ def _unit(kind: IsohedralClass, n: int) -> int:
 
 
 def _multiplicities(kind: IsohedralClass) -> list[int]:
-    return [1 if pair.first == pair.second else 2 for pair in kind.identified_edges]
+    return [1 if pair.folded else 2 for pair in kind.identified_edges]
 
 
 def _count(multiplicities: Sequence[int], total: int) -> int:
@@ -136,7 +136,7 @@ def _gains(
         a = (first[:, pair.first][:, None] + starts) % n
         b = (first[:, pair.second][:, None] + starts) % n
         if pair.reversed:  # the mate runs backwards, turned by `factor`
-            share = 0.5 if pair.first == pair.second else 1.0
+            share = 0.5 if pair.folded else 1.0
             table = -share * (np.conj(factor) * turned).real
             gains += table[length, a, (b + length - 1) % n]
         else:

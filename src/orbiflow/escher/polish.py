@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import math
 
 import numpy as np
 import scipy.optimize
@@ -11,9 +10,11 @@ import shapely
 import torch
 from torch import Tensor
 
-from orbiflow.escher.descent import CALM
+from orbiflow.cancel import Cancel
+from orbiflow.escher.descent import calm
 from orbiflow.escher.model import TileModel
 from orbiflow.fields import FourierField
+from orbiflow.fields.lipschitz import steepness
 from orbiflow.flows import Flow
 from orbiflow.likeness.overlap import Overlap
 from orbiflow.silhouette.target import Target
@@ -29,24 +30,36 @@ STALL = 2e-5
 """Polishing stops when ten iterations together gain less IoU than this."""
 
 
-def polish(model: TileModel, target: Target, iterations: int) -> TileModel:
+def polish(
+    model: TileModel, target: Target, iterations: int, *, cancel: Cancel | None = None
+) -> TileModel:
     """Improve a single candidate: a last stationary segment and its pose, by exact gradients.
 
     Args:
         model: one candidate, float32 or float64; left as it is.
         target: the silhouette.
         iterations: of L-BFGS at most; it stops early where the IoU stalls.
+        cancel: looked at before each evaluation.
 
     Returns:
         A float64 model with one segment more, or as many if nothing was gained. Its sampled
         boundary is simple and its IoU no smaller.
+
+    Raises:
+        Cancelled: if it was told to stop.
     """
+    cancel = cancel or Cancel()
     work = _Polish(model, target)
     if work.best_iou == 0.0:  # crosses itself already
         return model
+
+    def loss(x: Array) -> tuple[float, Array]:
+        cancel.check()
+        return work.loss(x)
+
     with contextlib.suppress(StopIteration):  # older SciPy lets it through
         scipy.optimize.minimize(
-            work.loss,
+            loss,
             np.zeros(work.size),
             jac=True,
             method="L-BFGS-B",
@@ -64,10 +77,10 @@ class _Polish:
         self.field = FourierField(
             model.group, model.max_frequency, batch=1, smoothness=0.0, dtype=torch.float64
         )
-        self.flow = Flow([self.field], steps=STEPS, method="midpoint")
+        self.flow = Flow([self.field], steps=STEPS, method="midpoint", warn=False)
         magnitude = torch.tensor(self.field.basis.magnitude, dtype=torch.float64)
         self.scale = (1 + magnitude**2) ** (-SMOOTHNESS / 2)
-        self.steepness = math.sqrt(2.0) * 2 * math.pi * magnitude
+        self.magnitude, self.limit = magnitude, calm(self.field) * STEPS
         pose = (self.model.angle, self.model.log_scale, self.model.offset, self.model.stretch)
         self.pose = [parameter for parameter in pose if parameter.numel()]
         self.start = [p.detach().clone() for p in self.pose]
@@ -127,5 +140,4 @@ class _Polish:
         return [self.field.parameters_, *self.pose]
 
     def _calm(self) -> bool:
-        steep = float((self.field.parameters_.detach().abs() * self.steepness).sum())
-        return steep <= CALM * STEPS
+        return float(steepness(self.field.parameters_.detach(), self.magnitude)) <= self.limit

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import torch
 
+from orbiflow.cancel import Cancel
 from orbiflow.errors import CertificationError
 from orbiflow.escher.fit import Fit
 from orbiflow.escher.model import TileModel
@@ -20,14 +21,19 @@ PREFERRED = ("IH6", "IH5", "IH4", "IH2", "IH3", "IH7", "IH21", "IH28", "IH1")
 POINTS = 60
 
 
-def quick_tile(target: Target, names: Sequence[str]) -> TileResult | None:
+def quick_tile(
+    target: Target, names: Sequence[str], *, cancel: Cancel | None = None
+) -> TileResult | None:
     """The nearest tile of the first of the preferred classes among `names`, certified.
 
     None if no nearest tile is simple.
+
+    Raises:
+        Cancelled: if it was told to stop.
     """
     kind = isohedral_class(next(name for name in PREFERRED if name in names))
     found = outline_starts(
-        target, kind, count=3, resolutions=(POINTS,), measured=40, vertices=POINTS
+        target, kind, count=3, resolutions=(POINTS,), measured=40, vertices=POINTS, cancel=cancel
     )
     if not len(found.prototiles):
         return None

@@ -3,30 +3,27 @@
 from __future__ import annotations
 
 import contextlib
-import queue
-import threading
+import functools
 import time
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
+from collections.abc import Callable, Generator, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-import torch
-
+from orbiflow.cancel import Cancel, Cancelled
 from orbiflow.errors import CertificationError, OrbiflowError
 from orbiflow.escher.descent_settings import DescentSettings
 from orbiflow.escher.methods import Settings, fit, prepare
 from orbiflow.escher.preview import quick_tile
-from orbiflow.escher.processes import process_context, quiet_fork
+from orbiflow.escher.processes import process_context, work
 from orbiflow.escher.result import ClassFailure, TileResult, best_tiles
 from orbiflow.likeness.ranking import diverse, tile_similarity
 from orbiflow.silhouette.emphasis import Emphasis
 from orbiflow.silhouette.target import Target
+from orbiflow.threads import one_thread
 from orbiflow.tilings import CLASSES, isohedral_class
 
 INTERRUPTED = "interrupted"
-"""The reason given for a class that Ctrl-C left undone."""
+"""The reason given for a class that was left undone."""
 
 Watcher = Callable[["Event"], None]
 Outcome = TileResult | ClassFailure
@@ -34,12 +31,18 @@ Outcome = TileResult | ClassFailure
 
 @dataclass(frozen=True)
 class Event:
-    """News from a search.
+    """News from a search, told in the thread that called `escherize`, in this order:
+
+    1. at most one event with a `preview`;
+    2. of each class, any number of events whose `share` never falls, then exactly one with its
+       `outcome`; those of several classes come as they happen, in any mixture.
+
+    Classes that a `Cancel` left undone have their outcome last, in the order asked for.
 
     - `name`: of the class.
-    - `share`: of the class's work that is done.
+    - `share`: of the class's work that is done; 1 at its end, unless it was interrupted.
     - `loss`: best so far in the method's own measure; for the descent 1 - IoU.
-    - `outcome`: what the class gave, once it is there.
+    - `outcome`: what the class gave.
     - `preview`: a first certified tile, which the search is going to improve on.
     """
 
@@ -71,6 +74,7 @@ def escherize(
     workers: int = 1,
     force: bool = False,
     watch: Watcher | None = None,
+    cancel: Cancel | None = None,
 ) -> tuple[list[TileResult], list[ClassFailure]]:
     """Fit a tile of each class to the target.
 
@@ -84,12 +88,15 @@ def escherize(
         workers: processes; 1 stays in this process. A script that asks for more must do its work
             under `if __name__ == "__main__":`, as always with multiprocessing.
         force: return tiles that are not certified, too; their certificates say why.
-        watch: called in this process with every `Event`.
+        watch: called in this thread with every `Event`, in the order that `Event` states. What it
+            raises ends the search and comes out of this function; so does `KeyboardInterrupt`.
+        cancel: ends the search early, from another thread, a signal handler or `watch`; looked at
+            before each step of every fit.
 
     Returns:
         Certified tiles, best first (`TileResult.score`), and the classes that gave none. The same
-        seed gives the same tiles, whatever the number of workers. After Ctrl-C: what was found by
-        then.
+        seed gives the same tiles, whatever the number of workers. If it was cancelled: what was
+        found by then, and the other classes as failures with the reason `INTERRUPTED`.
 
     Raises:
         OrbiflowError: for an unknown class, a setting out of range, or workers that die.
@@ -101,32 +108,21 @@ def escherize(
         if number < 1:
             raise OrbiflowError(f"{what} must be at least 1, got {number}")
     task = Task(target, settings or DescentSettings(), emphasis, per_class, force)
+    cancel = cancel or Cancel()
+    teller = _Teller(watch)
     count = min(workers, len(names))
-    watch = watch or _ignore
-    run = _run_here if count == 1 else _run_pool
-    outcomes: list[Outcome] = []
-    previews: list[TileResult] = []
-
-    def note(event: Event) -> None:
-        if event.preview is not None:
-            previews.append(event.preview)
-        watch(event)
-
-    with (
-        contextlib.suppress(KeyboardInterrupt),
-        contextlib.closing(run(task, names, count, note)) as found,
-    ):
-        for outcome in found:
-            outcomes.append(outcome)  # before it is told: an interrupt must not lose it
-            watch(Event(outcome.name, 1.0, float("nan"), outcome))
-    missing = [name for name in names if name not in {outcome.name for outcome in outcomes}]
-    outcomes += [preview for preview in previews if preview.name in missing]
-    results = [o for best in outcomes if isinstance(best, TileResult) for o in best.family()]
-    failures = [outcome for outcome in outcomes if isinstance(outcome, ClassFailure)]
-    failures += [ClassFailure(name, INTERRUPTED) for name in missing]
-    # ties are broken by the order in which the classes were asked for
-    results.sort(key=lambda r: (-r.score, names.index(r.name)))
-    return results, failures
+    # asked before torch is limited here: a limit makes no fork safe
+    context = process_context() if count > 1 else None
+    with contextlib.suppress(Cancelled):
+        _preview(task, names, teller.tell, cancel)
+        if context is None:
+            _run_here(task, names, teller.tell, cancel)
+        else:
+            with contextlib.closing(_run_pool(task, names, count, context, cancel)) as found:
+                for event in found:
+                    teller.tell(event)
+    teller.interrupted(names)
+    return teller.sorted(names)
 
 
 def escherize_class(
@@ -138,15 +134,56 @@ def escherize_class(
     per_class: int = 1,
     force: bool = False,
     watch: Watcher | None = None,
+    cancel: Cancel | None = None,
 ) -> Outcome:
-    """Fit and certify one class in this process, on one thread; arguments as in `escherize`."""
-    return _work_on(Task(target, settings, emphasis, per_class, force), name, watch or _ignore)
+    """Fit and certify one class in this process, on one thread; arguments as in `escherize`.
+
+    Raises:
+        Cancelled: if it was told to stop.
+    """
+    task = Task(target, settings, emphasis, per_class, force)
+    return _work_on(task, name, watch or _ignore, cancel or Cancel())
 
 
-def _work_on(task: Task, name: str, watch: Watcher) -> Outcome:
+class _Teller:
+    """Keeps what was found, and the order of events."""
+
+    def __init__(self, watch: Watcher | None) -> None:
+        self.watch = watch or _ignore
+        self.shares: dict[str, float] = {}
+        self.outcomes: dict[str, Outcome] = {}
+        self.preview: TileResult | None = None
+
+    def tell(self, event: Event) -> None:
+        share = max(event.share, self.shares.get(event.name, 0.0))
+        self.shares[event.name] = share
+        if event.outcome is not None:  # kept before it is told
+            self.outcomes[event.name] = event.outcome
+        self.preview = event.preview or self.preview
+        self.watch(event if share == event.share else replace(event, share=share))
+
+    def interrupted(self, names: Sequence[str]) -> None:
+        """Outcomes for classes that have none."""
+        for name in names:
+            if name not in self.outcomes:
+                failure = ClassFailure(name, INTERRUPTED)
+                self.tell(Event(name, self.shares.get(name, 0.0), float("nan"), failure))
+
+    def sorted(self, names: Sequence[str]) -> tuple[list[TileResult], list[ClassFailure]]:
+        """Tiles, best first, and failures; ties in the order in which classes were asked for."""
+        failures = [o for o in self.outcomes.values() if isinstance(o, ClassFailure)]
+        best = [o for o in self.outcomes.values() if isinstance(o, TileResult)]
+        if self.preview and ClassFailure(self.preview.name, INTERRUPTED) in failures:
+            best.append(self.preview)
+        results = [tile for first in best for tile in first.family()]
+        results.sort(key=lambda r: (-r.score, names.index(r.name)))
+        return results, failures
+
+
+def _work_on(task: Task, name: str, watch: Watcher, cancel: Cancel) -> Outcome:
     kind = isohedral_class(name)
     begin = time.perf_counter()
-    with _one_thread():
+    with one_thread():
         found = fit(
             task.target,
             kind,
@@ -154,6 +191,7 @@ def _work_on(task: Task, name: str, watch: Watcher) -> Outcome:
             emphasis=task.emphasis,
             per_class=task.per_class,
             progress=lambda share, loss: watch(Event(kind.name, share, loss)),
+            cancel=cancel,
         )
         try:
             tiles = best_tiles(task.target, found, force=task.force)
@@ -173,11 +211,11 @@ def _without_twins(tiles: Sequence[TileResult], count: int) -> list[int]:
     return [sound[k] for k in diverse([tiles[k].score for k in sound], count, alike)] or [0]
 
 
-def _preview(task: Task, names: Sequence[str], watch: Watcher) -> None:
+def _preview(task: Task, names: Sequence[str], watch: Watcher, cancel: Cancel) -> None:
     """A first tile to look at, while the others are on their way."""
     if isinstance(task.settings, DescentSettings) and task.settings.starts == "outline":
-        with _one_thread():
-            tile = quick_tile(task.target, names)
+        with one_thread():
+            tile = quick_tile(task.target, names, cancel=cancel)
         if tile is not None:
             watch(Event(tile.name, 0.0, 1 - tile.metrics.iou, preview=tile))
 
@@ -186,87 +224,28 @@ def _ignore(_event: Event) -> None:
     """Nobody watches."""
 
 
-@contextlib.contextmanager
-def _one_thread() -> Iterator[None]:
-    # many small operations: threads cost far more than they bring
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(before)
+def _finished(outcome: Outcome) -> Event:
+    return Event(outcome.name, 1.0, float("nan"), outcome)
 
 
-def _run_here(
-    task: Task, names: Sequence[str], _count: int, watch: Watcher
-) -> Generator[Outcome, None, None]:
-    _preview(task, names, watch)
+def _run_here(task: Task, names: Sequence[str], watch: Watcher, cancel: Cancel) -> None:
     for name in names:
-        yield _work_on(task, name, watch)
-
-
-_events: Any = None  # the queue of a worker process
-
-
-def _set_up_worker(events: Any) -> None:
-    global _events
-    _events = events
-
-
-def _work(task: Task, name: str) -> Outcome:
-    return _work_on(task, name, _events.put)
+        cancel.check()
+        watch(_finished(_work_on(task, name, watch, cancel)))
 
 
 def _run_pool(
-    task: Task, names: Sequence[str], count: int, watch: Watcher
-) -> Generator[Outcome, None, None]:
-    context = process_context()
-    events = context.Queue()
-    _preview(task, names, watch)
+    task: Task, names: Sequence[str], count: int, context: Any, cancel: Cancel
+) -> Generator[Event, None, None]:
+    cancel.check()
     if context.get_start_method() == "fork":
-        prepare(task.target, task.settings, task.emphasis)  # once, for all workers
-    with ProcessPoolExecutor(count, context, _set_up_worker, (events,)) as pool:
-        try:
-            with quiet_fork():
-                pending = {pool.submit(_work, task, name) for name in _longest_first(names)}
-            with _relayed(events, watch):  # a thread: not before the fork
-                while pending:
-                    done, pending = wait(pending, return_when=FIRST_COMPLETED)
-                    yield from _in_order(done)
-        except BrokenProcessPool as error:
-            raise OrbiflowError(
-                "a worker process died: was memory short, or is the script that called this "
-                'without `if __name__ == "__main__":`? Try workers=1'
-            ) from error
-        except (KeyboardInterrupt, GeneratorExit):  # here, or in the caller's loop
-            for process in list((pool._processes or {}).values()):
-                process.terminate()
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
-
-
-def _longest_first(names: Sequence[str]) -> list[str]:
-    return sorted(names, key=lambda name: -isohedral_class(name).stretch_dim)
-
-
-def _in_order(done: Iterable[Future[Outcome]]) -> list[Outcome]:
-    return sorted((future.result() for future in done), key=lambda outcome: outcome.name)
-
-
-@contextlib.contextmanager
-def _relayed(events: Any, watch: Watcher) -> Iterator[None]:
-    """Hand a worker's events on to `watch`, from a thread of this process."""
-    stop = threading.Event()
-
-    def relay() -> None:
-        while not stop.is_set():
-            with contextlib.suppress(queue.Empty):
-                watch(events.get(timeout=0.1))
-
-    thread = threading.Thread(target=relay, daemon=True)
-    thread.start()
-    try:
-        yield
-    finally:
-        stop.set()
-        thread.join()
+        with one_thread():
+            prepare(task.target, task.settings, task.emphasis)  # once, for all workers
+    # classes with more lattice freedom take longer
+    order = sorted(names, key=lambda name: -isohedral_class(name).stretch_dim)
+    function = functools.partial(_work_on, task)
+    with contextlib.closing(
+        work(function, order, count, context=context, cancel=cancel)
+    ) as all_news:
+        for news in all_news:
+            yield _finished(news.value) if news.done else news.value

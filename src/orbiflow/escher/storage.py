@@ -14,10 +14,12 @@ import torch
 from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
+from orbiflow.arguments import instance
+from orbiflow.arguments import path as as_path
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.escher.descent_settings import MAX_SEGMENTS
+from orbiflow.escher.max_frequency import MAX_FREQUENCY
 from orbiflow.escher.model import TileModel
-from orbiflow.escher.occupancy import MAX_FREQUENCY
 from orbiflow.silhouette.frame import Frame
 from orbiflow.symmetry.isometry import Array
 from orbiflow.tilings import isohedral_class
@@ -52,8 +54,7 @@ class SavedModel:
         Raises:
             OrbiflowError: for a model that holds more than one.
         """
-        if model.size != 1:
-            raise OrbiflowError(f"take one candidate first: this model holds {model.size}")
+        instance(model, TileModel, "the model", "load_model and the fits give one").require_single()
         settings = {
             "class": model.isohedral_class.name,
             "max_frequency": model.max_frequency,
@@ -84,7 +85,7 @@ class SavedModel:
                 isohedral_class(self.settings["class"]),
                 torch.zeros(1, dtype=torch.float64),
                 mirrored=torch.tensor([bool(self.settings["mirrored"])]),
-                max_frequency=_whole(self.settings["max_frequency"], MAX_FREQUENCY),
+                max_frequency=_whole(self.settings["max_frequency"], MAX_FREQUENCY, least=0),
                 segments=_whole(self.settings["segments"], MAX_SEGMENTS),
                 smoothness=_exponent(self.settings["smoothness"]),
                 steps=_whole(self.settings["steps"], 1_000_000),
@@ -161,7 +162,7 @@ def load_saved(path: str | Path) -> SavedModel:
     Raises:
         InputFileError: for a file that is missing, too large or not such a model.
     """
-    path = Path(path)
+    path = as_path(path, "the model's file")
     data = _read(path)
     with _naming(path):
         arrays = load(data)
@@ -215,7 +216,7 @@ def _exponent(value: Any) -> float:
     return number
 
 
-def _whole(value: Any, most: int) -> int:
-    if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= most:
-        raise OrbiflowError(f"expected a whole number from 1 to {most}, got {value!r}")
+def _whole(value: Any, most: int, least: int = 1) -> int:
+    if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
+        raise OrbiflowError(f"expected a whole number from {least} to {most}, got {value!r}")
     return value

@@ -241,7 +241,7 @@ class _Orbits:
             other = self.corners[:, [pair.second]]
             length = lengths[:, [pair.first]]
             j = np.arange(1, int(length.max(initial=1)))
-            if pair.first == pair.second:
+            if pair.folded:
                 self._map((j < length) & (2 * j > length), own + j, own + length - j, element)
                 rows = np.flatnonzero(length[:, 0] % 2 == 0)
                 self._fix(rows, (own + length // 2)[rows, 0], middle)
@@ -274,12 +274,12 @@ def _columns(kind: IsohedralClass, orbits: _Orbits, factor: Complex, turn: Compl
         np.where(orbits.fixed, z * one, z * one - _turn(factor, orbits.flips, z * one))
         for z in (1, 1j)
     ]
-    match kind.row.freedom:
-        case "general":
+    match kind.stretch_dim:
+        case 2:
             columns += [shift, 1j * shift, np.conj(shift), 1j * np.conj(shift)]
-        case "rectangular":
+        case 1:  # along the glides, which are the axes of the group's own frame
             columns += [turn * np.real(shift), 1j * turn * np.imag(shift)]
-        case "none":
+        case _:
             columns += [shift, 1j * shift]
     return np.stack(columns, axis=-1)
 
@@ -287,14 +287,14 @@ def _columns(kind: IsohedralClass, orbits: _Orbits, factor: Complex, turn: Compl
 def _linear(kind: IsohedralClass, solution: Array, turns: Array) -> Array:
     """(C, 2, 2) from the coefficients of `_columns`."""
     cos, sin = np.cos(turns), np.sin(turns)
-    match kind.row.freedom:
-        case "general":
+    match kind.stretch_dim:
+        case 2:
             a, b, c, d = solution.T
             rows = [a + c, d - b, b + d, a - c]
-        case "rectangular":
+        case 1:  # along the glides, which are the axes of the group's own frame
             p, q = solution.T
             rows = [cos * p, -sin * q, sin * p, cos * q]
-        case "none":
+        case _:
             a, b = solution.T
             rows = [a, -b, b, a]
     return np.stack(rows, axis=-1).reshape(-1, 2, 2)

@@ -14,9 +14,18 @@ from orbiflow.files import make_folder, write_atomic
 from orbiflow.silhouette.target import Target
 from orbiflow.tilings import colouring
 
+TILE_FILES = (
+    "tile.svg",
+    "tiling.svg",
+    "tiling.png",
+    "overlay.png",
+    "field.png",
+    "model.safetensors",
+)
+
 
 def write_tile_folder(result: TileResult, target: Target, folder: Path) -> list[Path]:
-    """Write tile.svg, tiling.svg, tiling.png, overlay.png, field.png and model.safetensors.
+    """Write the `TILE_FILES`.
 
     Raises:
         OutputError: if a file cannot be written.
@@ -38,4 +47,4 @@ def write_tile_folder(result: TileResult, target: Target, folder: Path) -> list[
         ),
         "model.safetensors": result.model.to_bytes,
     }
-    return [write_atomic(folder / name, make()) for name, make in contents.items()]
+    return [write_atomic(folder / name, contents[name]()) for name in TILE_FILES]

@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
+import contextlib
+import functools
 import io
+import json
 from collections import Counter
-from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-import torch
 from PIL import Image, ImageDraw, ImageFont
 
-from orbiflow.escher.processes import process_context, quiet_fork
+from orbiflow.escher.processes import work
 from orbiflow.escher.result import TileResult
-from orbiflow.export.folder import write_tile_folder
+from orbiflow.export.folder import TILE_FILES, write_tile_folder
 from orbiflow.figures.tilings import overlay_png, tiling_png
 from orbiflow.files import write_atomic
 from orbiflow.silhouette.target import Target
 
+RESULT, OVERVIEW = "result.json", "overview.png"
 _PANEL, _HEADER = 560, 60  # pixels
 
 
@@ -29,34 +31,62 @@ def write_gallery(
     Raises:
         OutputError: if a file cannot be written.
     """
-    folders = [out / name for name in folder_names(results)]
-    targets = [target] * len(results)
-    if workers == 1:
-        for result, folder in zip(results, folders, strict=True):
-            write_tile_folder(result, target, folder)
+    folders = [out / name for name in folder_names([result.name for result in results])]
+    draw = functools.partial(_draw, results, target, folders)
+    if workers == 1 or len(results) == 1:
+        for k in range(len(results)):
+            draw(k)
     else:
-        context = process_context()
-        with ProcessPoolExecutor(workers, context, torch.set_num_threads, (1,)) as pool:
-            with quiet_fork():
-                done = pool.map(write_tile_folder, results, targets, folders)
-            for _ in done:
+        with contextlib.closing(work(draw, range(len(results)), workers)) as news:
+            for _ in news:
                 pass
     pictures = [
         tuple((folder / name).read_bytes() for name in ("overlay.png", "tiling.png"))
         for folder in folders
     ]
-    write_atomic(out / "overview.png", overview_png(results, target, pictures))
+    write_atomic(out / OVERVIEW, overview_png(results, target, pictures))
 
 
-def folder_names(results: Sequence[TileResult]) -> list[str]:
-    """The class of each result; further tiles of a class are IH4-2, IH4-3 and so on."""
+def _draw(
+    results: Sequence[TileResult],
+    target: Target,
+    folders: Sequence[Path],
+    index: int,
+    *_: object,
+) -> None:
+    """The folder of one result; in a worker process, too."""
+    write_tile_folder(results[index], target, folders[index])
+
+
+def folder_names(classes: Iterable[str]) -> list[str]:
+    """Of results of these classes; further tiles of a class are IH4-2, IH4-3 and so on.
+
+    >>> folder_names(["IH4", "IH6", "IH4"])
+    ['IH4', 'IH6', 'IH4-2']
+    """
     seen: Counter[str] = Counter()
     names = []
-    for result in results:
-        seen[result.name] += 1
-        number = seen[result.name]
-        names.append(result.name if number == 1 else f"{result.name}-{number}")
+    for name in classes:
+        seen[name] += 1
+        names.append(name if seen[name] == 1 else f"{name}-{seen[name]}")
     return names
+
+
+def written_files(folder: Path) -> set[str]:
+    """Paths of the files that an earlier search wrote into `folder`, by its result.json.
+
+    Relative, with slashes; none if there is no such run.
+    """
+    try:
+        document = json.loads((folder / RESULT).read_text(encoding="utf-8"))
+        classes = [str(entry["class"]) for entry in document["tiles"]]
+        ours = isinstance(document["schema_version"], int)
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        ours, classes = False, []
+    if not ours:
+        return set()
+    inside = {f"{name}/{file}" for name in folder_names(classes) for file in TILE_FILES}
+    return {RESULT, OVERVIEW} | inside
 
 
 def overview_png(

@@ -4,10 +4,10 @@ from orbiflow.fields.derivatives import divergence, jacobian
 from orbiflow.fields.fourier import FourierField
 from orbiflow.fields.invariant_field import InvariantField
 from orbiflow.fields.neural import PeriodicFeatures, neural_field
+from orbiflow.fields.protocol import TimeDependentField, VectorField, time_dependent
 from orbiflow.fields.spline_field import SplineField
 from orbiflow.fields.symmetrize import (
     Symmetrized,
-    VectorField,
     periodic_operator,
     rotation_operator,
     symmetrize,
@@ -20,6 +20,7 @@ __all__ = [
     "PeriodicFeatures",
     "SplineField",
     "Symmetrized",
+    "TimeDependentField",
     "VectorField",
     "divergence",
     "jacobian",
@@ -27,5 +28,6 @@ __all__ = [
     "periodic_operator",
     "rotation_operator",
     "symmetrize",
+    "time_dependent",
     "transflection_operator",
 ]

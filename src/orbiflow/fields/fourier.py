@@ -10,9 +10,9 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from orbiflow.errors import OrbiflowError
 from orbiflow.fields.invariant_field import InvariantField, sobolev_weights
 from orbiflow.fields.invariants import InvariantBasis, invariant_basis
+from orbiflow.fields.lipschitz import coefficient_bound
 from orbiflow.fields.series import differentiate, evaluate, weight_cotangent
 from orbiflow.symmetry import CrystallographicGroup
 
@@ -144,25 +144,14 @@ class FourierField(InvariantField):
         return values.reshape(*values.shape[:-1], d, d)
 
     def lipschitz_bound(self) -> Tensor:
-        """An upper bound of the Jacobian's spectral norm anywhere: 2 pi sum |kappa| |z_kappa|.
+        """An upper bound of the Jacobian's spectral norm anywhere, () or (S,): `coefficient_bound`.
 
-        Shape () or (S,). Rigorous but pessimistic; a step h with h * bound < log 2 keeps every
-        explicit Runge-Kutta step of order up to 4 injective (design point 5).
+        Rigorous but pessimistic; a Runge-Kutta step h with h * bound below the method's
+        `RungeKutta.injective_below` is injective (design point 5).
         """
         flat = self._stacked(self.parameters_.detach()) * self.scale
-        d = self.group.dim
-        count = len(self.basis.frequencies)
-        z = flat.new_zeros(flat.shape[0], 2 * d * count)
-        entries = torch.as_tensor(self.basis.values, dtype=flat.dtype, device=flat.device)
-        columns = torch.as_tensor(self.basis.columns, device=flat.device)
-        rows = torch.as_tensor(self.basis.rows, device=flat.device)
-        z.index_add_(1, rows, flat[:, columns] * entries)
-        norms = np.linalg.norm(self.basis.frequencies @ self.group.inverse_lattice, axis=1)
-        kappa = torch.as_tensor(norms, dtype=flat.dtype, device=flat.device)
-        # |a cos + b sin| has amplitude at most |(a, b)|, here with the factor sqrt 2 of the basis
-        amplitude = z.reshape(-1, count, 2 * d).norm(dim=-1)
-        total = 2 * math.pi * math.sqrt(2.0) * amplitude @ kappa
-        return total[0] if self.parameters_.dim() == 1 else total
+        bound = coefficient_bound(self.group, self.basis, flat)
+        return bound[0] if self.parameters_.dim() == 1 else bound
 
     def _divergence_weights(self, weights: Tensor) -> Tensor:
         d = self.group.dim
@@ -172,10 +161,7 @@ class FourierField(InvariantField):
 
     def _values(self, weights: Tensor, points: Tensor) -> Tensor:
         d = self.group.dim
-        single = self.parameters_.dim() == 1
-        if points.shape[-1] != d or (not single and points.shape[0] != weights.shape[0]):
-            expected = f"(..., {d})" if single else f"({weights.shape[0]}, ..., {d})"
-            raise OrbiflowError(f"expected points of shape {expected}, got {tuple(points.shape)}")
+        self._check_points(points)
         lead = points.shape[:-1]
         flat = points.reshape(weights.shape[0], -1, d)
         # for a single field a plain product: the batched one is slower
@@ -189,6 +175,7 @@ def _orders(basis: InvariantBasis) -> tuple[int, ...]:
 
 
 @lru_cache(maxsize=64)  # the segments of a flow share them
+@torch.inference_mode(False)  # what the first caller may not train, no other could
 def _constants(
     group: CrystallographicGroup,
     max_frequency: int,

@@ -10,8 +10,10 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
+from orbiflow.errors import OrbiflowError
 from orbiflow.fields.invariants import InvariantBasis, invariant_basis
 from orbiflow.symmetry import CrystallographicGroup
+from orbiflow.symmetry.group import checked_group
 
 
 class InvariantField(nn.Module, ABC):
@@ -41,13 +43,14 @@ class InvariantField(nn.Module, ABC):
         device: torch.device | str | None,
     ) -> None:
         super().__init__()
-        self.group = group
+        self.group = checked_group(group)
         self.smoothness = smoothness
         self.basis: InvariantBasis = invariant_basis(group, max_frequency)
         self.max_frequency = int(max_frequency)
         self.size = self.basis.size
         shape = (self.size,) if batch is None else (batch, self.size)
-        self.parameters_ = nn.Parameter(torch.zeros(shape, dtype=dtype, device=device))
+        with torch.inference_mode(False):
+            self.parameters_ = nn.Parameter(torch.zeros(shape, dtype=dtype, device=device))
 
     @abstractmethod
     def _constants(self, dtype: torch.dtype, device: torch.device) -> dict[str, Tensor]:
@@ -56,6 +59,21 @@ class InvariantField(nn.Module, ABC):
     @abstractmethod
     def adjoint(self, points: Tensor, forces: Tensor) -> Tensor:
         """Gradient (P,) of sum forces . V(points) in the parameters; points, forces (N, d)."""
+
+    def _check_points(self, points: Tensor) -> None:
+        """Raise OrbiflowError for points that the field cannot be evaluated at."""
+        d, own = self.group.dim, self.parameters_
+        stack = len(own) if own.dim() == 2 else None
+        if points.shape[-1:] != (d,) or (
+            stack is not None and (points.dim() < 2 or len(points) != stack)
+        ):
+            expected = f"(..., {d})" if stack is None else f"({stack}, ..., {d})"
+            raise OrbiflowError(f"expected points of shape {expected}, got {tuple(points.shape)}")
+        if points.dtype != own.dtype:
+            raise OrbiflowError(
+                f"expected points of the field's dtype, {own.dtype}, got {points.dtype}: convert the "
+                f"points with .to({own.dtype}) or the field with .to({points.dtype})"
+            )
 
     def _fill_buffers(self) -> None:
         like = self.parameters_

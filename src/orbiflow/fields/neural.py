@@ -12,6 +12,7 @@ from torch import Tensor, nn
 from orbiflow.errors import OrbiflowError
 from orbiflow.fields.symmetrize import Symmetrized
 from orbiflow.symmetry import CrystallographicGroup
+from orbiflow.symmetry.group import checked_group
 
 
 class PeriodicFeatures(nn.Module):
@@ -23,7 +24,7 @@ class PeriodicFeatures(nn.Module):
             only the multiples 1..max of each axis.
 
     Raises:
-        OrbiflowError: if `max_frequency` < 1.
+        OrbiflowError: if `max_frequency` < 1 or `group` is no group.
     """
 
     frequencies: Tensor
@@ -32,15 +33,15 @@ class PeriodicFeatures(nn.Module):
         super().__init__()
         if max_frequency < 1:
             raise OrbiflowError(f"max_frequency must be at least 1, got {max_frequency}")
-        d = group.dim
+        d = checked_group(group).dim
         if d <= 3:
             box = itertools.product(range(-max_frequency, max_frequency + 1), repeat=d)
             k = np.array([v for v in box if v > (0,) * d], dtype=np.float64)
         else:
             k = np.concatenate([m * np.eye(d) for m in range(1, max_frequency + 1)])
-        self.register_buffer(
-            "frequencies", torch.tensor(k @ group.inverse_lattice), persistent=False
-        )
+        with torch.inference_mode(False):  # or no derivative could be taken through it, ever
+            waves = torch.tensor(k @ group.inverse_lattice)
+        self.register_buffer("frequencies", waves, persistent=False)
 
     @property
     def size(self) -> int:
@@ -53,6 +54,7 @@ class PeriodicFeatures(nn.Module):
         return torch.cat([phase.cos(), phase.sin()], dim=-1)
 
 
+@torch.inference_mode(False)  # its divergence is taken by autograd
 def neural_field(
     group: CrystallographicGroup,
     *,

@@ -98,6 +98,21 @@ class SplineField(InvariantField):
         """Trace of the Jacobian, (...,), exact."""
         return self.bound_with_divergence()(points)[1]
 
+    @torch.no_grad()
+    def lipschitz_bound(self) -> Tensor:
+        """An upper bound of the Jacobian's spectral norm anywhere, ().
+
+        The derivative of a spline along an axis is a convex combination of the differences of
+        neighbouring coefficients, per cell; the norm of the Jacobian is at most that of its columns'
+        lengths.
+        """
+        table = self.table()
+        steepest = [
+            rate * (table.roll(-1, axis) - table).norm(dim=0).max()
+            for axis, rate in enumerate(self._per_length, start=1)
+        ]
+        return torch.stack(steepest).norm()
+
     def adjoint(self, points: Tensor, forces: Tensor) -> Tensor:
         """Gradient (P,) of sum forces . V(points) in the parameters; points, forces (N, d)."""
         with torch.enable_grad():
@@ -106,8 +121,7 @@ class SplineField(InvariantField):
 
     def _cells(self, points: Tensor) -> Tensor:
         d = self.group.dim
-        if points.shape[-1] != d:
-            raise OrbiflowError(f"expected points of shape (..., {d}), got {tuple(points.shape)}")
+        self._check_points(points)
         rates = torch.tensor(self._per_length, dtype=points.dtype, device=points.device)
         return points.reshape(-1, d).mT * rates[:, None]
 
@@ -140,6 +154,7 @@ def grid_sides(group: CrystallographicGroup, basis: InvariantBasis) -> tuple[int
 
 
 @lru_cache(maxsize=64)  # the segments of a flow share them
+@torch.inference_mode(False)  # what the first caller may not train, no other could
 def _constants(
     group: CrystallographicGroup,
     max_frequency: int,

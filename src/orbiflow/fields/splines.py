@@ -2,7 +2,8 @@
 
 A point meets 4^d coefficients whatever the grid's size, so a fine field costs what a coarse one does.
 Points lie last inside: `u` is (d, N), in cells of the grid. The backward pass needs second derivatives,
-because the divergence is a value of its own; cubic splines have them everywhere.
+because the divergence is a value of its own; cubic splines have them everywhere. Derivatives of the
+backward pass itself are left to autograd.
 """
 
 from __future__ import annotations
@@ -98,57 +99,105 @@ class _Near:
         return self.kept[orders]
 
 
+def _near(table: Tensor, flat: Tensor) -> list[Tensor]:
+    """The coefficients (4, ..., 4, N) of each channel that the points meet."""
+    shape = (*(TAPS,) * (table.dim() - 1), -1)
+    return [c.reshape(-1).index_select(0, flat.reshape(-1)).reshape(shape) for c in table]
+
+
+def _sums(
+    near: list[Tensor], fraction: Tensor, rates: tuple[float, ...] | None
+) -> tuple[Tensor, Tensor]:
+    """Values (C, N) and divergence (N,), zero without rates; autograd may differentiate them."""
+    d = len(fraction)
+    weights = cubic_weights(fraction, 1 if rates is None else 2)
+    sums = [_Near(c, weights) for c in near]
+    values = torch.stack([part.sum(*_unit(d)) for part in sums])
+    divergence = fraction.new_zeros(fraction.shape[1])
+    for axis, rate in enumerate(rates or ()):
+        divergence = divergence.add(sums[axis].sum(*_unit(d, axis)), alpha=rate)
+    return values, divergence
+
+
 class _SplineSum(torch.autograd.Function):
     """Values (C, N) at grid coordinates and, if asked, sum_c rate_c d value_c / du_c (N,)."""
 
     @staticmethod
     def forward(ctx: Any, table: Tensor, u: Tensor, rates: tuple[float, ...] | None) -> Any:
-        sides = tuple(table.shape[1:])
-        d = len(sides)
-        flat, fraction = _cells(sides, u)
-        shape = (*(TAPS,) * d, -1)
-        near = [c.reshape(-1).index_select(0, flat.reshape(-1)).reshape(shape) for c in table]
-        weights = cubic_weights(fraction, 1 if rates is None else 2)
-        sums = [_Near(c, weights) for c in near]
-        values = torch.stack([part.sum(*_unit(d)) for part in sums])
-        divergence = u.new_zeros(u.shape[1])
-        if rates is not None:
-            for axis, rate in enumerate(rates):
-                divergence = divergence.add(sums[axis].sum(*_unit(d, axis)), alpha=rate)
-        ctx.save_for_backward(flat, fraction, *near)
-        ctx.sides, ctx.rates = sides, rates
-        return values, divergence
+        flat, fraction = _cells(tuple(table.shape[1:]), u)
+        near = _near(table, flat)
+        ctx.save_for_backward(table, u, flat, fraction, *near)
+        ctx.rates = rates
+        return _sums(near, fraction, rates)
 
     @staticmethod
     def backward(ctx: Any, *gradients: Any) -> Any:
-        by_value, by_divergence = gradients
-        flat, fraction, *near = ctx.saved_tensors
-        d, rates = len(ctx.sides), ctx.rates
+        table, u, flat, fraction, *near = ctx.saved_tensors
+        if torch.is_grad_enabled():  # second derivatives were asked for: let autograd have them
+            return *_differentiable_gradients(ctx, table, u, gradients), None
         weights = cubic_weights(fraction, 3)
         on_table = on_u = None
         if ctx.needs_input_grad[1]:
-            on_u = torch.zeros_like(fraction)
-            for c, values in enumerate(near):
-                part = _Near(values, weights)
-                for j in range(d):
-                    on_u[j].addcmul_(by_value[c], part.sum(*_unit(d, j)))
-                    if rates is not None:
-                        on_u[j].addcmul_(by_divergence, part.sum(*_unit(d, c, j)), value=rates[c])
+            on_u = _on_points(near, weights, gradients, ctx.rates)
         if ctx.needs_input_grad[0]:
-            plain = [w[0] for w in weights]
-            channels = []
-            for c in range(len(near)):
-                factors = list(plain)
-                if rates is None:
-                    factors[0] = factors[0] * by_value[c]
-                else:
-                    slope = weights[c][1] * (rates[c] * by_divergence)
-                    factors[c] = (plain[c] * by_value[c]).add_(slope)
-                spread = _outer(factors).reshape(-1)
-                zeros = spread.new_zeros(math.prod(ctx.sides))
-                channels.append(zeros.scatter_add_(0, flat.reshape(-1), spread))
-            on_table = torch.stack(channels).reshape(-1, *ctx.sides)
+            on_table = _on_table(table.shape, flat, weights, gradients, ctx.rates)
         return on_table, on_u, None
+
+
+def _differentiable_gradients(
+    ctx: Any, table: Tensor, u: Tensor, gradients: tuple[Tensor, Tensor]
+) -> list[Tensor | None]:
+    # views: were u to depend on the table, a gradient with respect to the table itself would also
+    # follow that path, which the outer pass follows as well
+    inputs = table.view_as(table), u.view_as(u)
+    wanted = [t for t, need in zip(inputs, ctx.needs_input_grad, strict=False) if need]
+    flat, fraction = _cells(tuple(table.shape[1:]), inputs[1])
+    # the divergence is a constant where no rates are given
+    count = 1 if ctx.rates is None else 2
+    plain = _sums(_near(inputs[0], flat), fraction, ctx.rates)[:count]
+    found = iter(torch.autograd.grad(plain, wanted, gradients[:count], create_graph=True))
+    return [next(found) if need else None for need in ctx.needs_input_grad[:2]]
+
+
+def _on_points(
+    near: list[Tensor],
+    weights: Tensor,
+    gradients: tuple[Tensor, Tensor],
+    rates: tuple[float, ...] | None,
+) -> Tensor:
+    by_value, by_divergence = gradients
+    d = len(weights)
+    on_u = by_divergence.new_zeros(d, len(by_divergence))
+    for c, values in enumerate(near):
+        part = _Near(values, weights)
+        for j in range(d):
+            on_u[j].addcmul_(by_value[c], part.sum(*_unit(d, j)))
+            if rates is not None:
+                on_u[j].addcmul_(by_divergence, part.sum(*_unit(d, c, j)), value=rates[c])
+    return on_u
+
+
+def _on_table(
+    shape: torch.Size,
+    flat: Tensor,
+    weights: Tensor,
+    gradients: tuple[Tensor, Tensor],
+    rates: tuple[float, ...] | None,
+) -> Tensor:
+    by_value, by_divergence = gradients
+    plain = [w[0] for w in weights]
+    channels = []
+    for c in range(shape[0]):
+        factors = list(plain)
+        if rates is None:
+            factors[0] = factors[0] * by_value[c]
+        else:
+            slope = weights[c][1] * (rates[c] * by_divergence)
+            factors[c] = (plain[c] * by_value[c]).add_(slope)
+        spread = _outer(factors).reshape(-1)
+        zeros = spread.new_zeros(math.prod(shape[1:]))
+        channels.append(zeros.scatter_add_(0, flat.reshape(-1), spread))
+    return torch.stack(channels).reshape(shape)
 
 
 def _unit(d: int, *axes: int) -> tuple[int, ...]:
@@ -172,7 +221,8 @@ def spline_sum(table: Tensor, u: Tensor) -> Tensor:
     Args:
         table: coefficients, `padded`.
 
-    Differentiable once in both.
+    Differentiable in both: the first derivatives in closed form, higher ones by ordinary autograd.
+    A cubic spline's third derivatives are constant in each cell.
     """
     return _SplineSum.apply(table, u, None)[0]  # type: ignore[index]
 

@@ -93,7 +93,7 @@ def _draw_template(
         arrow = _arrow(kind, pair)
         for ring in (arrow, element(arrow)):
             axes.fill(*ring.T, facecolor=colour, edgecolor=colour, linewidth=0.5, zorder=3)
-        if pair.first == pair.second:
+        if pair.folded:
             middle = vertices[[pair.first, (pair.first + 1) % len(vertices)]].mean(axis=0)
             sign = middle + center_sign(2, 0.09)
             axes.fill(*sign.T, facecolor=colour, edgecolor="#ffffff", linewidth=0.8, zorder=4)
@@ -106,7 +106,7 @@ def _arrow(kind: IsohedralClass, pair: EdgePair) -> Array:
     start, end = vertices[pair.first], vertices[(pair.first + 1) % len(vertices)]
     along = (end - start) / np.linalg.norm(end - start)
     inward = np.array([-along[1], along[0]])  # templates are counter-clockwise
-    share = 0.8 if pair.first == pair.second else 0.5
+    share = 0.8 if pair.folded else 0.5
     tip = start + share * (end - start) + 0.12 * along
     back = tip - 0.26 * along
     other = back if pair.kind == "glide" else back - 0.11 * inward

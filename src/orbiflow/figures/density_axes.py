@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -11,7 +11,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from orbiflow.density.spaces.flat import KleinBottle, Torus
+from orbiflow.density.spaces.flat import whole_turn
 from orbiflow.density.spaces.space import Space
 from orbiflow.errors import OrbiflowError
 from orbiflow.figures.immersions import edge_pairs
@@ -84,11 +84,13 @@ def view_of(
     names = tuple(space.columns if names is None else names)
     if len(names) != len(space.columns):
         raise OrbiflowError(f"expected {len(space.columns)} names of columns, got {list(names)}")
-    if not isinstance(space, Torus):
+    if not space.is_torus:
         if center is not None:
             raise OrbiflowError(f"the window is centred on the torus, not on the {space.name}")
         return View(space, names, np.zeros(space.dim))
-    turns = np.zeros(space.dim) if center is None else np.array(center, dtype=float) / space.period
+    turns = np.zeros(space.dim)
+    if center is not None:
+        turns = np.array(center, dtype=float) / whole_turn(unit_of(space))
     if turns.shape != (space.dim,) or not np.isfinite(turns).all():
         raise OrbiflowError(f"the centre needs {space.dim} finite angles, got {center!r}")
     # 3.14 radians are meant as pi: the ticks would be cut off beside the window's edge
@@ -100,10 +102,16 @@ def view_of(
 def space_title(space: Space) -> str:
     """The space's name in a sentence.
 
-    >>> space_title(KleinBottle())
+    >>> from orbiflow.density.spaces.catalogue import make_space
+    >>> space_title(make_space("klein-bottle"))
     'Klein bottle'
     """
     return space.name.replace("-", " ").replace("klein", "Klein")
+
+
+def unit_of(space: Space) -> str:
+    """The unit of a space's angles, "" where it has none."""
+    return space.unit or ""
 
 
 def column_name(view: View, column: int) -> str:
@@ -114,22 +122,34 @@ def column_name(view: View, column: int) -> str:
 
 def axis_label(view: View, column: int) -> str:
     """Name and unit of an angle."""
-    return f"{column_name(view, column)} ({getattr(view.space, 'unit', '')})"
+    return f"{column_name(view, column)} ({unit_of(view.space)})"
 
 
 def angle_axis(view: View, axis: int) -> tuple[str, list[float], list[str]]:
-    """Label, places and texts of the ticks of one axis of a torus' or Klein bottle's window."""
-    space = view.space
-    assert isinstance(space, Torus | KleinBottle)
-    if isinstance(space, KleinBottle):
-        # the first column, theta, goes up: half a turn; phi starts a quarter before 0
-        turns = [k / 4 - 0.25 for k in range(5)] if axis == 0 else [k / 8 for k in range(5)]
-        texts = [angle_text(t, space.unit) for t in turns]
-        return axis_label(view, 1 - axis), [k / 4 for k in range(5)], texts
+    """Label, places and texts of the ticks of one axis, for a space that `ANGLE_AXES` has."""
+    return ANGLE_AXES[view.space.name](view, axis)
+
+
+def _torus_axis(view: View, axis: int) -> tuple[str, list[float], list[str]]:
     low = float(view.low[axis])
     quarters = range(math.ceil(4 * low - 1e-9), math.floor(4 * low + 4 + 1e-9) + 1)
     places = [k / 4 - low for k in quarters]
-    return axis_label(view, axis), places, [angle_text(k / 4, space.unit) for k in quarters]
+    texts = [angle_text(k / 4, unit_of(view.space)) for k in quarters]
+    return axis_label(view, axis), places, texts
+
+
+def _klein_axis(view: View, axis: int) -> tuple[str, list[float], list[str]]:
+    # the first column, theta, goes up: half a turn; phi starts a quarter before 0
+    turns = [k / 4 - 0.25 for k in range(5)] if axis == 0 else [k / 8 for k in range(5)]
+    texts = [angle_text(t, unit_of(view.space)) for t in turns]
+    return axis_label(view, 1 - axis), [k / 4 for k in range(5)], texts
+
+
+ANGLE_AXES: dict[str, Callable[[View, int], tuple[str, list[float], list[str]]]] = {
+    "torus": _torus_axis,
+    "klein-bottle": _klein_axis,
+}
+"""By the name of the space: those whose chart is a plain rescaling of angles."""
 
 
 def angle_text(turns: float, unit: str) -> str:
@@ -159,7 +179,7 @@ def dress(axes: Axes, view: View, size: float, *, places: bool = True) -> None:
     axes.tick_params(labelsize=0.9 * size, length=0.3 * size, pad=0.5 * size)
     axes.set_xticks([])
     axes.set_yticks([])
-    if isinstance(space, Torus | KleinBottle):
+    if space.name in ANGLE_AXES:
         label, at, texts = angle_axis(view, 0)
         axes.set_xticks(at, texts)
         axes.set_xlabel(label, fontsize=size, color=INK, parse_math=False)
@@ -200,7 +220,7 @@ def legend(
     if dots:
         style = {"markerfacecolor": "#ffffff", "markeredgecolor": INK, "linestyle": "none"}
         entries.append(Line2D([], [], marker="o", label="points", **style))
-    if hasattr(space, "cone_vectors"):
+    if space.is_round:
         note = "dots crowd where the square shrinks areas"
         notes = [*([note] if dots else []), *notes]
     entries += [Line2D([], [], linestyle="none", label=note) for note in notes]

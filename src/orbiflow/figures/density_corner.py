@@ -10,7 +10,6 @@ import torch
 from torch import Tensor
 
 from orbiflow.density.models.symmetric import SymmetricDensity
-from orbiflow.density.spaces.flat import Torus
 from orbiflow.errors import OrbiflowError
 from orbiflow.figures.canvas import blank_figure, png_bytes
 from orbiflow.figures.density_axes import INK, View, angle_axis, font, view_of
@@ -52,7 +51,7 @@ def corner_png(
             that do not fit, or a size that cannot be made.
     """
     space = density.space
-    if not isinstance(space, Torus) or space.dim > MOST_COLUMNS:
+    if not space.is_torus or space.dim > MOST_COLUMNS:
         raise OrbiflowError(f"pairs are drawn of 1 to {MOST_COLUMNS} angles, not of {space!r}")
     view, dim = view_of(space, names, center), space.dim
     above = view.places(drawn)

@@ -11,7 +11,7 @@ import torch
 from PIL import Image
 from torch import Tensor
 
-from orbiflow.density.models.blend import MixedDensity
+from orbiflow.density.models.blend import BlendedDensity
 from orbiflow.density.models.neural import NeuralFlow
 from orbiflow.density.models.symmetric import SymmetricDensity
 from orbiflow.errors import OrbiflowError
@@ -80,7 +80,7 @@ def flow_png(
 
 def _subject(density: SymmetricDensity) -> str:
     name = f"the {space_title(density.space)}"
-    if isinstance(density, MixedDensity):
+    if isinstance(density, BlendedDensity):
         return f"Flow, {100 * float(density.shares[0]):.0f} % of the density on {name}"
     return f"Flow on {name}"
 

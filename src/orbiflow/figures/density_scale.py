@@ -94,8 +94,8 @@ def measure_label(space: Space, measure: str, power: int = 0) -> str:
         return f"density, {times}times that of the uniform distribution"
     if measure == "square":
         return f"density, {times}per area of the canonical square"
-    unit = getattr(space, "unit", "steradian").removesuffix("s")
-    raised = {1: "", 2: "²", 3: "³"}.get(space.dim, "ᵈ") if hasattr(space, "unit") else ""
+    unit = (space.unit or "steradian").removesuffix("s")
+    raised = {1: "", 2: "²", 3: "³"}.get(space.dim, "ᵈ") if space.unit else ""
     return f"density, {times}per {unit}{raised}"
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from orbiflow.density.models.blend import MixedDensity
+from orbiflow.density.models.blend import BlendedDensity
 from orbiflow.density.models.symmetric import SymmetricDensity, midpoints
 from orbiflow.figures.canvas import blank_figure, png_bytes
 from orbiflow.figures.density_axes import (
@@ -65,7 +65,7 @@ def density_png(
         OrbiflowError: for a space of another dimension, an unknown measure or scale, samples of
             another shape, names or a centre that do not fit, or a size that cannot be made.
     """
-    space, count = density.space, _FINE_GRID if isinstance(density, MixedDensity) else _GRID
+    space, count = density.space, _FINE_GRID if isinstance(density, BlendedDensity) else _GRID
     check_plane(space)
     view = view_of(space, names, center)
     middles = (torch.arange(count, dtype=torch.float64) + 0.5) / count

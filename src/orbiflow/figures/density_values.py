@@ -8,8 +8,8 @@ import torch
 from torch import Tensor
 
 from orbiflow.density.models.bases import UniformBase
-from orbiflow.density.models.blend import MixedDensity
-from orbiflow.density.models.kernels import AdaptiveKernels, features, is_round, kernel_rows
+from orbiflow.density.models.blend import BlendedDensity
+from orbiflow.density.models.kernels import AdaptiveKernels, kernel_rows
 from orbiflow.density.models.symmetric import SymmetricDensity, midpoints
 from orbiflow.density.spaces.space import rectangle
 from orbiflow.errors import OrbiflowError
@@ -31,7 +31,7 @@ def density_at(density: SymmetricDensity, points: Tensor, measure: str) -> Array
     Raises:
         OrbiflowError: for an unknown measure.
     """
-    if hasattr(density.space, "cone_vectors"):
+    if density.space.is_round:
         points = off_cones(points)
     like = next(iter(density.flow.parameters()), points)
     return density.log_prob(points.to(like), measure=measure).double().cpu().exp().numpy()
@@ -55,15 +55,15 @@ def density_on_grid(
     """
     space, shape = density.space, (len(x), len(y))
     points = torch.stack(torch.meshgrid(x, y, indexing="ij"), dim=-1).reshape(-1, 2)
-    if not isinstance(density, MixedDensity):
+    if not isinstance(density, BlendedDensity):
         return density_at(density, points, measure).reshape(shape)
     flow, kernels, floor = density.shares.tolist()
     values = flow * density_at(density.flow_density, points, "square")
-    if is_round(space):
+    if space.is_round:
         points = off_cones(points)
     values = values + floor * UniformBase(space).log_prob(points).exp().numpy()
     kappa = _widened(density.kernels, pixel or float(x[1] - x[0]))
-    sums = _round_sums if is_round(space) else _flat_sums
+    sums = _round_sums if space.is_round else _flat_sums
     values = values.reshape(shape) + kernels * sums(density.kernels, kappa, x, y).numpy()
     return values * space.log_density_factor(points, measure).exp().numpy().reshape(shape)
 
@@ -87,7 +87,7 @@ def takes_logarithms(density: SymmetricDensity, measure: str, scale: str) -> boo
 
 def is_sharp(density: SymmetricDensity, pixel: float) -> bool:
     """Whether peaks of the density may be narrower than pixels of that side show."""
-    if not isinstance(density, MixedDensity):
+    if not isinstance(density, BlendedDensity):
         return False
     deviations = density.kernels.concentrations**-0.5
     return bool((deviations < 2 * _half_pixels(density.kernels, pixel)).any())
@@ -100,7 +100,7 @@ def _widened(kernels: AdaptiveKernels, pixel: float) -> Tensor:
 
 def _half_pixels(kernels: AdaptiveKernels, pixel: float) -> Tensor:
     """Half a pixel's side in the kernels' angles, (d,), or, on round spaces, (N, 1)."""
-    if is_round(kernels.space):
+    if kernels.space.is_round:
         # the chart is conformal: a small square stays a square
         area = kernels.space.log_area(off_cones(kernels.centers)).exp()
         return pixel / 2 * area.sqrt()[:, None]
@@ -130,14 +130,14 @@ def _round_sums(kernels: AdaptiveKernels, kappa: Tensor, x: Tensor, y: Tensor) -
     space = kernels.space
     points = torch.stack(torch.meshgrid(x, y, indexing="ij"), dim=-1).reshape(-1, 2)
     points = off_cones(points)
-    rows, offsets = kernel_rows(space, features(space, kernels.centers)[0], kappa)
+    rows, offsets = kernel_rows(space, space.features(kernels.centers)[0], kappa)
     # exponents are at most the peaks' logarithms: plain sums, in single precision for their speed
     rows, offsets = rows.mT.float(), (offsets + kernels.weights.log()).float()
     block = max(1, _BLOCK // len(offsets))
     # the clamp, far below anything drawn, keeps exp() from its slow path, fifty times slower
     sums = [
         sum(torch.addmm(offsets, end, rows).clamp_(-80).exp_().sum(dim=1) for end in ends)
-        for ends in features(space, points).float().split(block, dim=1)
+        for ends in space.features(points).float().split(block, dim=1)
     ]
     square = torch.cat([torch.as_tensor(part) for part in sums]).double()
     return (square * space.log_area(points).exp()).reshape(len(x), len(y))

@@ -9,14 +9,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 import torch
 from torch import Tensor
 
-from orbiflow.density.spaces.flat import KleinBottle, Torus
-from orbiflow.density.spaces.round import ProjectivePlane, Sphere
+from orbiflow.density.spaces.round import RoundSpace
 from orbiflow.density.spaces.space import Space
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import CrystallographicGroup
@@ -98,15 +97,27 @@ def immersion(space: Space) -> Callable[[Tensor], Array]:
     Raises:
         OrbiflowError: for a space that has no surface here.
     """
-    if isinstance(space, Sphere):
-        return space.vectors
-    if isinstance(space, ProjectivePlane):
-        return lambda points: boy_surface(space.vectors(points))
-    if isinstance(space, KleinBottle):
-        return klein_figure_eight
-    if isinstance(space, Torus) and space.dim == 2:
-        return torus_ring
-    raise OrbiflowError(f"only spaces of two dimensions have a surface, not {space!r}")
+    if space.name not in _IMMERSIONS or space.dim != 2:
+        raise OrbiflowError(f"only spaces of two dimensions have a surface, not {space!r}")
+    return _IMMERSIONS[space.name](space)
+
+
+def of_vectors(space: Space) -> Callable[[Array], Array]:
+    """The surface of a round space as a function of unit vectors (N, 3) in the data's frame."""
+    return boy_surface if space.name == "projective-plane" else np.asarray
+
+
+def _of_round(space: Space) -> Callable[[Tensor], Array]:
+    vectors, surface = cast(RoundSpace, space).vectors, of_vectors(space)
+    return lambda points: surface(vectors(points))
+
+
+_IMMERSIONS: dict[str, Callable[[Space], Callable[[Tensor], Array]]] = {
+    "torus": lambda _: torus_ring,
+    "klein-bottle": lambda _: klein_figure_eight,
+    "sphere": _of_round,
+    "projective-plane": _of_round,
+}
 
 
 def mesh(space: Space, resolution: int) -> Mesh:
@@ -173,7 +184,7 @@ def normals(space: Space, points: Tensor) -> Array:
     Continuous over the square, and up to the sign over its edges.
     """
     surface, step = immersion(space), 1e-4
-    if isinstance(space, Sphere | ProjectivePlane):
+    if space.is_round:
         points = off_cones(points, 4e-3)
     first, second = (
         surface(points + step * axis) - surface(points - step * axis)

@@ -9,6 +9,7 @@ import shapely
 from numpy.typing import ArrayLike
 from shapely.geometry.base import BaseGeometry
 
+from orbiflow.arguments import instance, numbers
 from orbiflow.errors import OrbiflowError
 from orbiflow.figures.canvas import blank_figure, fill_geometry, fill_rings, plane_axes, png_bytes
 from orbiflow.figures.palette import DEFAULT_PALETTE, Palette, palette
@@ -47,6 +48,7 @@ def tiling_png(
         OrbiflowError: for an unknown palette, a size that cannot be made, or a window that is
             empty or holds too many tiles.
     """
+    instance(tile, Tile, "the tile", "Tile(polygon, group) makes one")
     chosen = palette(palette_name)
     colours = colours or colouring(tile)
     window = window or default_window(tile)
@@ -120,7 +122,7 @@ def _legend(figure: Figure, share: float, text: str) -> None:
 
 def _target(target: ArrayLike | BaseGeometry) -> BaseGeometry:
     if not isinstance(target, BaseGeometry):
-        outline = np.asarray(target, dtype=float)
+        outline = numbers(target, "the target's outline", (...,))
         if outline.ndim != 2 or outline.shape[1] != 2 or len(outline) < 3:
             raise OrbiflowError(f"a target's outline is (M >= 3, 2) numbers, got {outline.shape}")
         target = shapely.Polygon(outline)

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 from torch import Tensor
 
-from orbiflow.density.spaces.flat import KleinBottle, Torus
-from orbiflow.density.spaces.round import Sphere
 from orbiflow.density.spaces.space import Space
 from orbiflow.figures.immersions import immersion, mesh, normals
 from orbiflow.symmetry.isometry import Array
@@ -75,14 +74,32 @@ def viewpoint(space: Space, place: Tensor) -> Viewpoint:
 def _candidates(space: Space, spot: Array) -> Array:
     """(M, 2) angles: all round, and heights at which the surface is recognised."""
     yaw = np.arctan2(spot[1], spot[0]) + np.linspace(0, 2 * np.pi, 36, endpoint=False)
-    if isinstance(space, Torus | KleinBottle):
-        pitch = np.concatenate([s * np.linspace(0.4, 1.2, 9) for s in (1, -1)])
-    elif isinstance(space, Sphere):
-        own = float(np.arctan2(spot[2], np.hypot(spot[0], spot[1])))
-        pitch = np.clip([own], -0.9, 0.9)
-    else:
-        pitch = np.linspace(-1.2, 1.2, 17)
+    pitch = _HEIGHTS[space.name](spot)
     return np.stack(np.meshgrid(yaw, pitch, indexing="ij"), axis=-1).reshape(-1, 2)
+
+
+def _ring(spot: Array) -> Array:
+    del spot
+    return np.concatenate([s * np.linspace(0.4, 1.2, 9) for s in (1, -1)])
+
+
+def _globe(spot: Array) -> Array:
+    own = float(np.arctan2(spot[2], np.hypot(spot[0], spot[1])))
+    return np.clip([own], -0.9, 0.9)
+
+
+def _any(spot: Array) -> Array:
+    del spot
+    return np.linspace(-1.2, 1.2, 17)
+
+
+_HEIGHTS: dict[str, Callable[[Array], Array]] = {
+    "torus": _ring,
+    "klein-bottle": _ring,
+    "sphere": _globe,
+    "projective-plane": _any,
+}
+"""Pitches that are tried for a place on the surface, by the name of the space."""
 
 
 def _directions(angles: Array) -> Array:

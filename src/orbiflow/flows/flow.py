@@ -2,43 +2,62 @@
 
 from __future__ import annotations
 
+import contextlib
+import copy
 from collections.abc import Callable, Iterable, Iterator
+from typing import Any, Self
 
 import torch
 from torch import Tensor, nn
 
 from orbiflow.errors import OrbiflowError
-from orbiflow.fields.derivatives import with_divergence
-from orbiflow.fields.symmetrize import VectorField
-from orbiflow.flows.integrators import RungeKutta, method
+from orbiflow.fields.derivatives import prepared, prepared_with_divergence
+from orbiflow.fields.protocol import TimeDependentField, VectorField, is_time_dependent
+from orbiflow.flows.coarseness import Watch
+from orbiflow.flows.integrators import RungeKutta
+from orbiflow.flows.integrators import method as find_method
+from orbiflow.threads import one_thread
+
+AnyField = VectorField | TimeDependentField
+State = tuple[Tensor, ...]
+
+MANY = 2**17
+"""Coordinates from which several threads can be worth their waiting for each other."""
 
 
 class _Plain(nn.Module):
     """Holds a plain callable in a module list."""
 
-    def __init__(self, field: VectorField) -> None:
+    def __init__(self, field: AnyField) -> None:
         super().__init__()
         self.field = field
 
-    def forward(self, points: Tensor) -> Tensor:
-        return self.field(points)
+    def forward(self, points: Tensor, *time: Tensor) -> Tensor:
+        return self.field(points, *time)
 
 
 class Flow(nn.Module):
-    """The time-one map of dx/dt = V(x), or of several fields one after another.
+    """The time-one map of dx/dt = V(x, t), or of several fields one after another.
 
-    Each segment is stationary and lasts `duration`; one segment is the paper's model (section 2.1),
-    more are more expressive (design point 5). If every field commutes with a group, so does the flow,
-    to rounding, at any number of steps.
+    One stationary segment is the paper's model (section 2.1), more are more expressive (design point
+    5); a field may depend on time, see `orbiflow.fields.protocol`. Each segment lasts `duration`, and
+    its own clock begins at 0. If every field commutes with a group, so does the flow, to rounding, at
+    any number of steps. Small clouds of points are carried on one thread; put training, whose backward
+    passes torch runs by itself, into a block of `orbiflow.threads.one_thread`.
 
     Args:
         fields: vector fields, one a segment: points (..., d) to vectors (..., d).
         steps: Runge-Kutta steps in each segment.
         method: "euler", "midpoint", "rk3", "rk4" or "rk5".
         duration: length of time of each segment.
+        warn: whether to look, where parameters are new, if the steps are fine enough.
 
     Raises:
-        OrbiflowError: for no field, `steps` < 1 or an unknown method.
+        OrbiflowError: for no field, `steps` < 1 or an unknown method; when called, for points of
+            another dtype or shape than the fields take, or a field whose values have another shape.
+
+    Warns:
+        CoarseStepsWarning: once, when called, if the steps are too coarse for the fields.
 
     >>> from orbiflow.fields import FourierField
     >>> from orbiflow.symmetry import wallpaper_group
@@ -50,52 +69,93 @@ class Flow(nn.Module):
 
     def __init__(
         self,
-        fields: VectorField | Iterable[VectorField],
+        fields: AnyField | Iterable[AnyField],
         *,
         steps: int = 16,
         method: str = "rk4",
         duration: float = 1.0,
+        warn: bool = True,
     ) -> None:
         super().__init__()
         if isinstance(fields, nn.ModuleList) or not callable(fields):
-            listed = list(fields)
+            listed: list[Any] = list(fields)
         else:
             listed = [fields]
         if not listed:
             raise OrbiflowError("a flow needs at least one vector field")
+        for field in listed:
+            if not callable(field):
+                raise OrbiflowError(
+                    f"a field is a callable from points to vectors, got {field!r}: see "
+                    "orbiflow.fields"
+                )
         self.segments = nn.ModuleList(f if isinstance(f, nn.Module) else _Plain(f) for f in listed)
-        self.duration = float(duration)
-        self.steps = steps
-        self.method = method
+        self._duration = float(duration)
+        self._steps = _checked_steps(steps)
+        self._method: RungeKutta = find_method(method)
+        self._watch = Watch() if warn else None
 
     @property
     def steps(self) -> int:
-        """Runge-Kutta steps in each segment; may be changed at any time."""
+        """Runge-Kutta steps in each segment; see `with_steps`."""
         return self._steps
-
-    @steps.setter
-    def steps(self, value: int) -> None:
-        if isinstance(value, bool) or int(value) != value or value < 1:
-            raise OrbiflowError(f"steps must be an integer of at least 1, got {value!r}")
-        self._steps = int(value)
 
     @property
     def method(self) -> str:
         """Name of the integrator."""
         return self._method.name
 
-    @method.setter
-    def method(self, name: str) -> None:
-        self._method: RungeKutta = method(name)
+    @property
+    def integrator(self) -> RungeKutta:
+        """The integrator."""
+        return self._method
+
+    @property
+    def duration(self) -> float:
+        """Length of time of each segment."""
+        return self._duration
+
+    def fields(self) -> list[Any]:
+        """The vector fields, one a segment, as they were given."""
+        return [s.field if isinstance(s, _Plain) else s for s in self.segments]
+
+    def with_steps(self, steps: int, *, method: str | None = None) -> Self:
+        """The same flow integrated otherwise: a view that shares fields and parameters.
+
+        This flow stays as it is, so others that hold it notice nothing. A view has the same
+        `state_dict`; training it trains this flow.
+
+        Args:
+            steps: Runge-Kutta steps in each segment.
+            method: as in the constructor; default this flow's.
+
+        Raises:
+            OrbiflowError: for `steps` < 1 or an unknown method.
+
+        >>> flow = Flow(torch.sin, steps=8)
+        >>> flow.with_steps(2 * flow.steps).steps, flow.steps
+        (16, 8)
+        """
+        view = copy.copy(self)  # shallow: of modules and parameters it holds the very same
+        view._steps = _checked_steps(steps)
+        if method is not None:
+            view._method = find_method(method)
+        view._watch = None if self._watch is None else Watch()
+        return view
 
     def forward(self, points: Tensor) -> Tensor:
         """Where points (..., d) are carried."""
-        return self._last(self._walk((points,), _slopes(self.segments), self.duration))[0]
+        self._look(points)
+        return self.carried(points)
 
     def inverse(self, points: Tensor) -> Tensor:
         """Where points (..., d) come from: the same equation backwards, to the integrator's order."""
-        reverse = _slopes(reversed(self.segments))
-        return self._last(self._walk((points,), reverse, -self.duration))[0]
+        self._look(points, inverse=True)
+        return self.carried(points, inverse=True)
+
+    def carried(self, points: Tensor, *, inverse: bool = False) -> Tensor:
+        """`forward` or `inverse`, without a look at whether the steps are fine enough."""
+        return self._last(points, (points,), inverse=inverse)[0]
 
     def forward_and_log_det(self, points: Tensor) -> tuple[Tensor, Tensor]:
         """`forward` and the log-determinant of its Jacobian, from one integration.
@@ -103,11 +163,13 @@ class Flow(nn.Module):
         The second is the integral of the divergence along the path (instantaneous change of
         variables; paper, section 5.2), shape (...,).
         """
-        return self._with_log_det(points, self.segments, self.duration)
+        self._look(points)
+        return self._with_log_det(points, inverse=False)
 
     def inverse_and_log_det(self, points: Tensor) -> tuple[Tensor, Tensor]:
         """`inverse` and the log-determinant of the inverse's Jacobian."""
-        return self._with_log_det(points, reversed(self.segments), -self.duration)
+        self._look(points, inverse=True)
+        return self._with_log_det(points, inverse=True)
 
     def log_abs_det_jacobian(self, points: Tensor) -> Tensor:
         """log |det D forward| at points (..., d), as (...,)."""
@@ -115,8 +177,10 @@ class Flow(nn.Module):
 
     def trajectories(self, points: Tensor) -> Tensor:
         """The paths: (T + 1, ..., d) with T = segments x steps, the points themselves first."""
-        states = self._walk((points,), _slopes(self.segments), self.duration)
-        return torch.stack([points, *(state[0] for state in states)])
+        self._look(points)
+        with _calmly(points):
+            states = self._walk((points,), inverse=False)
+            return torch.stack([points, *(state[0] for state in states)])
 
     @torch.no_grad()
     def error_estimate(self, points: Tensor, *, inverse: bool = False) -> float:
@@ -124,68 +188,97 @@ class Flow(nn.Module):
 
         For a method of order p the error at `steps` is about 2^p / (2^p - 1) times this.
         """
-        apply = self.inverse if inverse else self.forward
-        coarse = apply(points)
-        with self.with_steps(2 * self.steps):
-            fine = apply(points)
-        return float((coarse - fine).norm(dim=-1).max())
+        fine = self.with_steps(2 * self.steps).carried(points, inverse=inverse)
+        return float((self.carried(points, inverse=inverse) - fine).norm(dim=-1).max())
 
-    def with_steps(self, steps: int) -> _StepsSet:
-        """Context manager: another number of steps inside a `with` block."""
-        return _StepsSet(self, steps)
+    def _look(self, points: Tensor, *, inverse: bool = False) -> None:
+        _check_points(points)
+        if self._watch is not None:
+            self._watch.look(self, points, inverse=inverse)
 
-    def _with_log_det(
-        self, points: Tensor, segments: Iterable[nn.Module], duration: float
-    ) -> tuple[Tensor, Tensor]:
+    def _with_log_det(self, points: Tensor, *, inverse: bool) -> tuple[Tensor, Tensor]:
         start = (points, points.new_zeros(points.shape[:-1]))
-        slopes = (_joint_slope(field) for field in segments)
-        moved, log_det = self._last(self._walk(start, slopes, duration))
+        moved, log_det = self._last(points, start, inverse=inverse)
         return moved, log_det
 
-    def _walk(
-        self,
-        state: tuple[Tensor, ...],
-        slopes: Iterable[Callable[[tuple[Tensor, ...]], tuple[Tensor, ...]]],
-        duration: float,
-    ) -> Iterator[tuple[Tensor, ...]]:
-        for slope in slopes:
-            for _ in range(self.steps):
-                state = self._method.step(slope, state, duration / self.steps)
-                yield state
-
-    @staticmethod
-    def _last(states: Iterator[tuple[Tensor, ...]]) -> tuple[Tensor, ...]:
-        last: tuple[Tensor, ...] = ()
-        for state in states:
-            last = state
+    def _last(self, points: Tensor, start: State, *, inverse: bool) -> State:
+        last = start
+        with _calmly(points):
+            try:
+                for state in self._walk(start, inverse=inverse):
+                    last = state
+            except RuntimeError as error:
+                self._explain(points, error)
+                raise
         return last
+
+    def _walk(self, state: State, *, inverse: bool) -> Iterator[State]:
+        """The states after every step: points (..., d) and, if begun with one, the log-determinant."""
+        size = len(state)
+        h = (-self.duration if inverse else self.duration) / self.steps
+        fields = self.fields()
+        for field in reversed(fields) if inverse else fields:
+            slope = _slope(field, size == 2)
+            if is_time_dependent(field):
+                # time is a part of the state, so that the tables for autonomous equations serve
+                one = state[0].new_ones(())
+                state = (*state, one * (self.duration if inverse else 0.0))
+            for _ in range(self.steps):
+                state = self._method.step(slope, state, h)
+                yield state[:size]
+            state = state[:size]
+
+    def _explain(self, points: Tensor, error: RuntimeError) -> None:
+        """Raise in torch's place if the dtypes of points and parameters differ."""
+        for name, parameter in self.named_parameters():
+            if parameter.is_floating_point() and parameter.dtype != points.dtype:
+                raise OrbiflowError(
+                    f"points of dtype {points.dtype}, but {name} has {parameter.dtype}: convert the "
+                    f"points with .to({parameter.dtype}) or the flow with .to({points.dtype})"
+                ) from error
 
     def extra_repr(self) -> str:
         return f"steps={self.steps}, method={self.method}, duration={self.duration}"
 
 
-class _StepsSet:
-    def __init__(self, flow: Flow, steps: int) -> None:
-        self._flow, self._steps, self._before = flow, steps, flow.steps
-
-    def __enter__(self) -> Flow:
-        self._flow.steps = self._steps
-        return self._flow
-
-    def __exit__(self, *_: object) -> None:
-        self._flow.steps = self._before
+def _checked_steps(value: int) -> int:
+    if isinstance(value, bool) or int(value) != value or value < 1:
+        raise OrbiflowError(f"steps must be an integer of at least 1, got {value!r}")
+    return int(value)
 
 
-def _slopes(
-    segments: Iterable[nn.Module],
-) -> Iterator[Callable[[tuple[Tensor, ...]], tuple[Tensor, ...]]]:
-    for field in segments:
-        # fields that prepare weights do so once a segment, not once a stage
-        bound = field.bound() if hasattr(field, "bound") else field  # type: ignore[operator]
-        yield lambda state, bound=bound: (bound(state[0]),)
+def _check_points(points: Tensor) -> None:
+    if not isinstance(points, Tensor):
+        raise OrbiflowError(
+            f"expected points as a torch tensor (..., d), got a {type(points).__name__}: "
+            "torch.as_tensor makes one"
+        )
+    if not points.is_floating_point() or points.dim() == 0:
+        raise OrbiflowError(
+            f"expected points (..., d) of a floating-point dtype, got {points.dtype} of shape "
+            f"{tuple(points.shape)}"
+        )
 
 
-def _joint_slope(field: nn.Module) -> Callable[[tuple[Tensor, ...]], tuple[Tensor, ...]]:
-    inner = field.field if isinstance(field, _Plain) else field
-    both = with_divergence(inner)  # type: ignore[arg-type]
-    return lambda state: both(state[0])
+def _calmly(points: Tensor) -> contextlib.AbstractContextManager[None]:
+    small = points.device.type == "cpu" and points.numel() < MANY
+    return one_thread() if small else contextlib.nullcontext()
+
+
+def _slope(field: Callable[..., Tensor], with_log_det: bool) -> Callable[[State], State]:
+    # fields that prepare weights do so once a segment, not once a stage
+    timed = is_time_dependent(field)
+    both = prepared_with_divergence(field) if with_log_det else None
+    plain = None if with_log_det else prepared(field)
+
+    def slope(state: State) -> State:
+        points, *time = (state[0], state[-1]) if timed else (state[0],)
+        found: State = both(points, *time) if both is not None else (plain(points, *time),)  # type: ignore[misc]
+        if found[0].shape != points.shape:
+            raise OrbiflowError(
+                "a field must give vectors of its points' shape: expected "
+                f"{tuple(points.shape)}, got {tuple(found[0].shape)}"
+            )
+        return (*found, torch.ones_like(state[-1])) if timed else found
+
+    return slope

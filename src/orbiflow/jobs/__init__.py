@@ -1,1 +1,65 @@
-"""Jobs: what the commands, a batch and a web page call alike."""
+"""Jobs: what the commands, a batch and a web page call alike.
+
+A request says what is to be done, `run` does it in this process and `start` in one of its own; both
+tell the same events. Importing this is quick: numerical libraries come with the work.
+
+>>> request = EscherizeRequest(image="cat.png", out="cat", classes=("IH4", "IH6"))
+>>> request_from_json(request.to_json()) == request
+True
+"""
+
+from orbiflow.cancel import Cancel
+from orbiflow.jobs.events import (
+    ClassFailed,
+    Event,
+    Failed,
+    Finished,
+    Note,
+    Preview,
+    Progress,
+    Started,
+    TileFound,
+    Written,
+    event_from_json,
+)
+from orbiflow.jobs.process import Job, start
+from orbiflow.jobs.records import RecordError
+from orbiflow.jobs.requests import (
+    DensityFitRequest,
+    DensityPlotRequest,
+    DensitySampleRequest,
+    DensityScoreRequest,
+    EscherizeRequest,
+    PatchesRequest,
+    Request,
+    request_from_json,
+)
+from orbiflow.jobs.run import Sink, run
+
+__all__ = [
+    "Cancel",
+    "ClassFailed",
+    "DensityFitRequest",
+    "DensityPlotRequest",
+    "DensitySampleRequest",
+    "DensityScoreRequest",
+    "EscherizeRequest",
+    "Event",
+    "Failed",
+    "Finished",
+    "Job",
+    "Note",
+    "PatchesRequest",
+    "Preview",
+    "Progress",
+    "RecordError",
+    "Request",
+    "Sink",
+    "Started",
+    "TileFound",
+    "Written",
+    "event_from_json",
+    "request_from_json",
+    "run",
+    "start",
+]

@@ -11,6 +11,7 @@ import shapely
 from numpy.typing import ArrayLike, NDArray
 from shapely.geometry import MultiPolygon, Polygon, box
 
+from orbiflow.arguments import numbers
 from orbiflow.errors import OrbiflowError
 from orbiflow.likeness.hausdorff import TOLERANCE, hausdorff_distance
 
@@ -190,8 +191,8 @@ def as_region(shape: Shape, name: str) -> Region:
 
 def _ring_polygon(ring: ArrayLike, name: str) -> Polygon:
     try:
-        points = np.asarray(ring, dtype=np.float64)
-    except (TypeError, ValueError) as exc:
+        points = numbers(ring, name, (...,), finite=False)
+    except OrbiflowError as exc:
         raise OrbiflowError(f"{name}: not a polygon; give an array of shape (N, 2)") from exc
     if points.ndim != 2 or points.shape[1] != 2 or len(points) < 3:
         raise OrbiflowError(f"{name}: needs shape (N, 2) with N at least 3, got {points.shape}")

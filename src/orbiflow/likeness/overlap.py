@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
+from orbiflow.arguments import numbers
+from orbiflow.errors import OrbiflowError
 from orbiflow.geometry import signed_area
 from orbiflow.symmetry.isometry import Array
 
@@ -18,6 +20,9 @@ def prepared_region(ring: Array) -> shapely.Polygon:
     For choosing among candidates: intersections with thousands of vertices cost seconds. What is
     reported is measured with the ring itself.
     """
+    ring = numbers(ring, "the region's ring", ("N", 2))
+    if len(ring) < 3:
+        raise OrbiflowError(f"the region's ring needs 3 vertices at least, got {len(ring)}")
     region = shapely.Polygon(ring)
     if len(ring) > MANY:
         simpler = region.simplify(COARSE)
@@ -58,7 +63,11 @@ class Overlap:
         >>> value, gradient[:, 0].round(12).tolist()
         (0.25, [-0.25, 0.25, 0.25, -0.25])
         """
-        common = float(shapely.Polygon(ring).intersection(self.region).area)
+        ring = numbers(ring, "the ring", ("N", 2))
+        try:
+            common = float(shapely.Polygon(ring).intersection(self.region).area)
+        except (shapely.errors.GEOSException, ValueError) as error:
+            raise OrbiflowError(f"ring or region is not a simple polygon: {error}") from error
         inside = self.area_gradient(ring)
         sign = 1.0 if signed_area(ring) > 0 else -1.0
         area = float(abs(signed_area(ring)))

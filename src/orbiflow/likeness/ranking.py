@@ -6,6 +6,7 @@ import numpy as np
 import shapely
 from numpy.typing import ArrayLike, NDArray
 
+from orbiflow.arguments import number, whole
 from orbiflow.errors import OrbiflowError
 from orbiflow.likeness.metrics import Shape, as_region
 
@@ -32,8 +33,7 @@ def rank_score(iou: float, recognisability: float) -> float:
     True
     """
     for name, value in (("iou", iou), ("recognisability", recognisability)):
-        if not 0 <= value <= 1:
-            raise OrbiflowError(f"{name} must be from 0 to 1, got {value}")
+        number(value, name, 0, 1)
     return float(iou**IOU_WEIGHT * recognisability ** (1 - IOU_WEIGHT))
 
 
@@ -121,10 +121,7 @@ def _check(scores: ArrayLike, count: int, twin: float, variety: float) -> NDArra
         raise OrbiflowError("scores: give a list of numbers") from exc
     if values.ndim != 1 or not np.isfinite(values).all():
         raise OrbiflowError(f"scores: needs (n,) finite numbers, got shape {values.shape}")
-    if count < 1:
-        raise OrbiflowError(f"count must be at least 1, got {count}")
-    if not 0 <= twin <= 1:
-        raise OrbiflowError(f"twin must be from 0 to 1, got {twin}")
-    if not 0 <= variety < np.inf:
-        raise OrbiflowError(f"variety must be at least 0, got {variety}")
+    whole(count, "count", 1)
+    number(twin, "twin", 0, 1)
+    number(variety, "variety", 0)
     return values

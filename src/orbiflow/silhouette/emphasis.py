@@ -11,6 +11,7 @@ import shapely
 from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import gaussian_filter, map_coordinates
 
+from orbiflow.arguments import instance, number, numbers
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.silhouette.outlines import clean_ring, percent
 from orbiflow.silhouette.readers.mask import MaskReading, read_mask
@@ -59,17 +60,14 @@ class Emphasis:
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        if not 1 < self.strength <= MAX_STRENGTH:
-            raise OrbiflowError(
-                f"strength of the emphasis must be above 1 and at most {MAX_STRENGTH:g}, got "
-                f"{self.strength}; without emphasis everything has weight 1"
-            )
-        mask = np.array(self.mask, dtype=np.float32)
+        # without emphasis everything has weight 1
+        number(self.strength, "strength of the emphasis", 1, MAX_STRENGTH, above=True)
+        mask = numbers(self.mask, self.source, (...,), finite=False).astype(np.float32)
         if mask.ndim != 2 or not mask.size or not (mask.min() >= 0 and mask.max() <= 1):
             raise OrbiflowError(
                 f"{self.source}: a mask needs shape (H, W) and values from 0 to 1, got {mask.shape}"
             )
-        xmin, ymin, xmax, ymax = self.box
+        xmin, ymin, xmax, ymax = numbers(self.box, f"{self.source}: the box", (4,), finite=False)
         if not (np.isfinite(self.box).all() and xmin < xmax and ymin < ymax):
             raise OrbiflowError(f"{self.source}: the box {self.box} has no area")
         mask.setflags(write=False)
@@ -89,6 +87,7 @@ class Emphasis:
         damaged, a mask of another aspect, one that is all of one level, and one that emphasises no
         part of the silhouette; `OrbiflowError` for a strength that is not above 1 and at most 100.
         """
+        instance(target, Target, "the target", "Target.read and Target.from_polygon make one")
         path = Path(path)
         picture = read_mask(path)
         box, covered = _covered(target)
@@ -136,7 +135,7 @@ class Emphasis:
             raise OrbiflowError(
                 f"points must have shape (..., 2) and finite coordinates, got shape {at.shape}"
             )
-        xmin, ymin, xmax, ymax = self.box
+        xmin, ymin, xmax, ymax = numbers(self.box, f"{self.source}: the box", (4,), finite=False)
         inside = np.clip(at, [xmin, ymin], [xmax, ymax])
         height, width = self.mask.shape
         column = (inside[..., 0] - xmin) / (xmax - xmin) * width - 0.5

@@ -10,6 +10,7 @@ import numpy as np
 import torch
 from numpy.typing import ArrayLike
 
+from orbiflow.arguments import numbers
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry.isometry import Array
 
@@ -72,8 +73,9 @@ class Frame:
     def to_input(self, points: torch.Tensor | ArrayLike) -> torch.Tensor | Array:
         """Points (..., 2) of the normal form in the input's units; arrays, lists or tensors."""
         if isinstance(points, torch.Tensor):
+            points = _tensor(points)
             return points @ points.new_tensor(self.linear).T + points.new_tensor(self.offset)
-        return np.asarray(points, dtype=np.float64) @ self.linear.T + self.offset
+        return numbers(points, "points", (..., 2), finite=False) @ self.linear.T + self.offset
 
     @overload
     def to_normal(self, points: torch.Tensor) -> torch.Tensor: ...
@@ -82,8 +84,13 @@ class Frame:
     def to_normal(self, points: torch.Tensor | ArrayLike) -> torch.Tensor | Array:
         """Points (..., 2) in the input's units, in the normal form; arrays, lists or tensors."""
         if isinstance(points, torch.Tensor):
+            points = _tensor(points)
             return (points - points.new_tensor(self.offset)) @ points.new_tensor(self.inverse).T
-        return (np.asarray(points, dtype=np.float64) - self.offset) @ self.inverse.T
+        local = numbers(points, "points", (..., 2), finite=False) - self.offset
+        scale = np.diag(self.linear)
+        if np.array_equal(self.linear, np.diag(scale)):
+            return local / scale  # rounded once
+        return local @ self.inverse.T
 
     def as_dict(self) -> dict[str, Any]:
         """Everything, ready for JSON; `from_dict` undoes it bit for bit."""
@@ -117,6 +124,12 @@ class Frame:
         if y_down is not frame.y_down:
             raise OrbiflowError(f"the frame's y_down is {y_down!r}, its linear part says otherwise")
         return frame
+
+
+def _tensor(points: torch.Tensor) -> torch.Tensor:
+    if points.ndim == 0 or points.shape[-1] != 2:
+        raise OrbiflowError(f"points: expected shape (..., 2), got {tuple(points.shape)}")
+    return points if points.is_floating_point() else points.double()
 
 
 def _numbers(values: Any, shape: tuple[int, ...], name: str) -> Array:

@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
+from orbiflow.arguments import numbers
 from orbiflow.errors import OrbiflowError
 from orbiflow.geometry import polygons_in, signed_area
 
@@ -56,8 +57,10 @@ def clean_ring(
 
 def _as_points(points: ArrayLike, where: str, error: type[OrbiflowError]) -> NDArray[np.float64]:
     try:
-        ring = np.array(points, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError) as exc:
+        ring: NDArray[np.float64] = np.zeros(0)
+        if np.ndim(points):
+            ring = numbers(points, where, (...,), finite=False)
+    except (TypeError, ValueError) as exc:
         raise error(
             f"{where}: the vertices are not numbers in pairs; give them as [[x, y], ...]"
         ) from exc

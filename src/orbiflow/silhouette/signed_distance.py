@@ -5,6 +5,9 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
+from orbiflow.arguments import instance
+from orbiflow.errors import OrbiflowError
+
 
 def signed_distance(points: Tensor, vertices: Tensor) -> Tensor:
     """True distance to the boundary, positive inside (paper, equation of phi).
@@ -21,6 +24,13 @@ def signed_distance(points: Tensor, vertices: Tensor) -> Tensor:
     >>> signed_distance(torch.tensor([[1.0, 0.5], [3.0, 3.0]]), square).tolist()
     [0.5, -1.4142135381698608]
     """
+    for name, tensor in (("points", points), ("vertices", vertices)):
+        instance(tensor, Tensor, name, "torch.as_tensor makes one of an array")
+        if not tensor.is_floating_point() or tensor.ndim < 2 or tensor.shape[-1] != 2:
+            raise OrbiflowError(
+                f"{name} must be floating-point numbers of shape (..., N, 2), got "
+                f"{tensor.dtype} of shape {tuple(tensor.shape)}"
+            )
     start = vertices.unsqueeze(-3)  # (..., 1, K, 2)
     edge = vertices.roll(-1, dims=-2).unsqueeze(-3) - start
     offset = points.unsqueeze(-2) - start  # (..., N, K, 2)

@@ -9,6 +9,7 @@ import torch.nn.functional as F
 from scipy.ndimage import distance_transform_edt
 from torch import Tensor
 
+from orbiflow.arguments import instance, number, whole
 from orbiflow.silhouette.emphasis import Emphasis
 from orbiflow.silhouette.target import Target
 
@@ -36,6 +37,9 @@ class SoftTarget:
         emphasis: Emphasis | None = None,
         dtype: torch.dtype = torch.float32,
     ) -> None:
+        instance(target, Target, "the target", "Target.read and Target.from_polygon make one")
+        resolution = whole(resolution, "resolution", 2)
+        margin = number(margin, "margin", 0)
         low, high = target.normal.min(axis=0) - margin, target.normal.max(axis=0) + margin
         center, self.reach = (low + high) / 2, float((high - low).max() / 2)
         axis = self.reach * ((np.arange(resolution) + 0.5) / resolution * 2 - 1)
@@ -60,6 +64,7 @@ class SoftTarget:
 
     def occupancy(self, points: Tensor, blur: float) -> Tensor:
         """Soft occupancy in [0, 1] at points (..., 2): a sigmoid of the distance over `blur`."""
+        blur = number(blur, "blur", 0, above=True)
         return torch.sigmoid(self._sample(self.image, points) * (1.7 / blur))
 
     def weight(self, points: Tensor) -> Tensor:
@@ -97,6 +102,7 @@ class SoftTarget:
         return whole, common, float(inside.double().sum()) * pixel**2
 
     def _sample(self, image: Tensor, points: Tensor) -> Tensor:
+        points = torch.as_tensor(points, dtype=image.dtype)
         grid = ((points - self.center) / self.reach).reshape(1, 1, -1, 2)
         values = F.grid_sample(image, grid, align_corners=False, padding_mode="border")
         return values.reshape(points.shape[:-1])

@@ -8,6 +8,7 @@ from orbiflow.symmetry.catalogue import (
     wallpaper_group,
 )
 from orbiflow.symmetry.dirichlet import DirichletDomain
+from orbiflow.symmetry.equivariance import EquivarianceError, assert_equivariant
 from orbiflow.symmetry.group import CrystallographicGroup
 from orbiflow.symmetry.isometry import Isometry, identity, translation
 from orbiflow.symmetry.plane import Line, reflection, rotation, rotation_matrix, transflection
@@ -18,8 +19,10 @@ __all__ = [
     "WALLPAPER_GROUPS",
     "CrystallographicGroup",
     "DirichletDomain",
+    "EquivarianceError",
     "Isometry",
     "Line",
+    "assert_equivariant",
     "identification_group",
     "identity",
     "reflection",

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from orbiflow.errors import GroupError
 from orbiflow.symmetry.group import CrystallographicGroup
-from orbiflow.symmetry.isometry import Array, Isometry, Points, matching
+from orbiflow.symmetry.isometry import Array, Isometry, Points, cast_like
 
 
 class DirichletDomain:
@@ -67,6 +67,6 @@ class DirichletDomain:
         wrapped, nearest = self.locate(points)
         linear = np.stack([g.linear for g in self._candidates])[nearest]
         shift = np.stack([g.translation for g in self._candidates])[nearest]
-        offset = wrapped - matching(shift, wrapped)
+        offset = wrapped - cast_like(shift, wrapped)
         # inverse of an isometry: transpose of the linear part
-        return (offset[..., None, :] @ matching(linear, wrapped))[..., 0, :]
+        return (offset[..., None, :] @ cast_like(linear, wrapped))[..., 0, :]

@@ -10,7 +10,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from orbiflow.errors import GroupError, LatticeMismatchError, NotDiscreteError
-from orbiflow.symmetry.isometry import TOLERANCE, Array, Isometry, Points, identity, matching
+from orbiflow.symmetry.isometry import (
+    TOLERANCE,
+    Array,
+    Isometry,
+    Points,
+    cast_like,
+    check_dimension,
+    identity,
+)
 
 
 def checked_lattice(lattice: ArrayLike) -> Array:
@@ -115,17 +123,27 @@ class CrystallographicGroup:
         return bool((same_linear & (np.abs(offset).max(axis=1) <= tolerance)).any())
 
     def wrap(self, points: Points) -> Points:
-        """Move points, shape (..., d), by lattice vectors into the cell B [0, 1)^d."""
-        fractional = points @ matching(self.inverse_lattice, points).T
+        """Move points, shape (..., d), by lattice vectors into the cell B [0, 1)^d.
+
+        Raises:
+            GroupError: for points of another dimension.
+        """
+        check_dimension(points, self.dim)
+        fractional = points @ cast_like(self.inverse_lattice, points).T
         if isinstance(fractional, np.ndarray):
             floor = np.floor(fractional)
         else:
             floor = fractional.detach().floor()
-        return points - floor @ matching(self.lattice, points).T
+        return points - floor @ cast_like(self.lattice, points).T
 
     def images(self, points: Points) -> Points:
-        """Images under the coset representatives, shape (|G|, ..., d)."""
-        linear, shift = (matching(a, points) for a in (self.linear_parts, self.translations))
+        """Images of points (..., d) under the coset representatives, shape (|G|, ..., d).
+
+        Raises:
+            GroupError: for points of another dimension.
+        """
+        check_dimension(points, self.dim)
+        linear, shift = (cast_like(a, points) for a in (self.linear_parts, self.translations))
         flat = points.reshape(1, -1, self.dim)
         moved = flat @ linear.swapaxes(-1, -2) + shift[:, None, :]
         return moved.reshape(self.order, *points.shape)
@@ -194,6 +212,22 @@ class CrystallographicGroup:
         label = f"{self.name}, " if self.name else ""
         basis = (self.lattice.round(6) + 0.0).tolist()
         return f"CrystallographicGroup({label}order {self.order}, lattice {basis})"
+
+
+def checked_group(group: object) -> CrystallographicGroup:
+    """`group` itself.
+
+    Raises:
+        GroupError: if it is anything else, such as a group's name.
+    """
+    if isinstance(group, CrystallographicGroup):
+        return group
+    hint = "see orbiflow.symmetry for groups"
+    if isinstance(group, str):
+        hint = f"wallpaper_group({group!r}) or identification_group({group!r}) makes one by name"
+    raise GroupError(
+        f"expected a CrystallographicGroup, got {group!r} of type {type(group).__name__}: {hint}"
+    )
 
 
 def _check_maps_lattice(basis: Array, generator: Isometry, number: int) -> None:

@@ -18,7 +18,7 @@ TOLERANCE = 1e-9
 """Largest deviation from orthogonality, or from a lattice vector, that is read as rounding."""
 
 
-def matching(array: Array, like: Points) -> Points:
+def cast_like(array: Array, like: Points) -> Points:
     """A float64 array as it is for NumPy, as a tensor of the dtype and device of `like` for torch.
 
     Raises:
@@ -29,6 +29,13 @@ def matching(array: Array, like: Points) -> Points:
             raise GroupError(f"expected points of a floating-point dtype, got {like.dtype}")
         return torch.tensor(array, dtype=like.dtype, device=like.device)
     return cast(Points, array)
+
+
+def check_dimension(points: Points, dim: int) -> None:
+    """Raise GroupError for points that are not of shape (..., dim)."""
+    shape = tuple(np.shape(points))
+    if not shape or shape[-1] != dim:
+        raise GroupError(f"expected points of shape (..., {dim}), got {shape}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,13 +90,23 @@ class Isometry:
         return 1 if np.linalg.det(self.linear) > 0 else -1
 
     def __call__(self, points: Points) -> Points:
-        """Image of points, shape (..., d), NumPy or torch."""
-        linear, translation = (matching(a, points) for a in (self.linear, self.translation))
+        """Image of points, shape (..., d), NumPy or torch.
+
+        Raises:
+            GroupError: for points of another dimension.
+        """
+        check_dimension(points, self.dim)
+        linear, translation = (cast_like(a, points) for a in (self.linear, self.translation))
         return points @ linear.T + translation
 
     def push(self, vectors: Points) -> Points:
-        """Push-forward of tangent vectors, shape (..., d): the linear part alone."""
-        return vectors @ matching(self.linear, vectors).T
+        """Push-forward of tangent vectors, shape (..., d): the linear part alone.
+
+        Raises:
+            GroupError: for vectors of another dimension.
+        """
+        check_dimension(vectors, self.dim)
+        return vectors @ cast_like(self.linear, vectors).T
 
     def __matmul__(self, other: Isometry) -> Isometry:
         """Composition: `(g @ h)(p) == g(h(p))`."""

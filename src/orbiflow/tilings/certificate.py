@@ -10,6 +10,7 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 import shapely
 
+from orbiflow.arguments import instance, number
 from orbiflow.errors import CertificationError, OrbiflowError
 from orbiflow.symmetry.isometry import Array
 from orbiflow.tilings.edge_matching import curve_distance, match_segments
@@ -110,8 +111,11 @@ def certify(tile: Tile, *, tolerance: float = 1e-9) -> Certificate:
             for the default tolerance in double precision.
         tolerance: relative, see `Certificate`.
 
-    Raises nothing for a bad tile: the certificate says what is wrong.
+    Raises nothing for a bad tile: the certificate says what is wrong. `OrbiflowError` for what is no
+    `Tile`, and for a tolerance that is not a positive number.
     """
+    instance(tile, Tile, "the tile", "Tile(polygon, group) makes one")
+    tolerance = number(tolerance, "tolerance", 0, above=True)
     size = expected_area(tile)
     area = tile.signed_area
     figures = _Figures(area, size, tolerance)

@@ -15,7 +15,6 @@ from typing import Literal, NamedTuple, TypeAlias
 
 Coefficients: TypeAlias = Mapping[int, float]
 TemplateKind: TypeAlias = Literal["hexagon", "floret", "cairo"]
-LatticeFreedom: TypeAlias = Literal["general", "rectangular", "none"]
 EdgeKind: TypeAlias = Literal["translation", "rotation", "glide"]
 
 
@@ -47,12 +46,17 @@ OperatorRow: TypeAlias = RotationRow | TransflectionRow
 class EdgePair(NamedTuple):
     """Edge `first` is mapped onto edge `second` by an element of the group.
 
-    `first == second` means a 2-fold centre at the edge's midpoint.
+    `first == second` means a 2-fold centre at the edge's midpoint: the edge is `folded`.
     """
 
     first: int
     second: int
     kind: EdgeKind
+
+    @property
+    def folded(self) -> bool:
+        """Whether the edge is its own partner, turned over about its midpoint."""
+        return self.first == self.second
 
     @property
     def reversed(self) -> bool:
@@ -68,7 +72,6 @@ class ClassRow(NamedTuple):
     lattice: tuple[LatticeVector, LatticeVector]
     operators: tuple[OperatorRow, ...]
     edges: tuple[EdgePair, ...]
-    freedom: LatticeFreedom
 
 
 _HEXAGON_CELL = LatticeVector({0: 3}), LatticeVector({1: 1, 2: 1})
@@ -84,7 +87,6 @@ CLASS_TABLE: dict[str, ClassRow] = {
             EdgePair(1, 4, "translation"),
             EdgePair(2, 5, "translation"),
         ),
-        freedom="general",
     ),
     "IH2": ClassRow(
         group="pg",
@@ -99,7 +101,6 @@ CLASS_TABLE: dict[str, ClassRow] = {
             EdgePair(1, 4, "translation"),
             EdgePair(2, 3, "glide"),
         ),
-        freedom="rectangular",
     ),
     "IH3": ClassRow(
         group="pg",
@@ -114,7 +115,6 @@ CLASS_TABLE: dict[str, ClassRow] = {
             EdgePair(1, 4, "translation"),
             EdgePair(3, 5, "glide"),
         ),
-        freedom="rectangular",
     ),
     "IH4": ClassRow(
         group="p2",
@@ -133,7 +133,6 @@ CLASS_TABLE: dict[str, ClassRow] = {
             EdgePair(3, 3, "rotation"),
             EdgePair(5, 5, "rotation"),
         ),
-        freedom="general",
     ),
     "IH5": ClassRow(
         group="pgg",
@@ -151,7 +150,6 @@ CLASS_TABLE: dict[str, ClassRow] = {
             EdgePair(2, 2, "rotation"),
             EdgePair(3, 3, "rotation"),
         ),
-        freedom="rectangular",
     ),
     "IH6": ClassRow(
         group="pgg",
@@ -169,7 +167,6 @@ CLASS_TABLE: dict[str, ClassRow] = {
             EdgePair(3, 3, "rotation"),
             EdgePair(5, 5, "rotation"),
         ),
-        freedom="rectangular",
     ),
     "IH7": ClassRow(
         group="p3",
@@ -181,7 +178,6 @@ CLASS_TABLE: dict[str, ClassRow] = {
             EdgePair(1, 2, "rotation"),
             EdgePair(3, 4, "rotation"),
         ),
-        freedom="none",
     ),
     "IH21": ClassRow(
         group="p6",
@@ -193,7 +189,6 @@ CLASS_TABLE: dict[str, ClassRow] = {
             EdgePair(1, 2, "rotation"),
             EdgePair(3, 3, "rotation"),
         ),
-        freedom="none",
     ),
     "IH28": ClassRow(
         group="p4",
@@ -205,7 +200,6 @@ CLASS_TABLE: dict[str, ClassRow] = {
             EdgePair(1, 2, "rotation"),
             EdgePair(3, 3, "rotation"),
         ),
-        freedom="none",
     ),
 }
 """Source: the paper, table "The Symmetrization for the nine isohedral classes"."""

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 import torch
 
+from orbiflow.arguments import described, instance, numbers, whole
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import (
     CrystallographicGroup,
@@ -30,7 +31,7 @@ from orbiflow.tilings.class_table import (
     OperatorRow,
     RotationRow,
 )
-from orbiflow.tilings.lattice_freedom import STRETCH_DIM, stretch_matrix
+from orbiflow.tilings.lattice_freedom import commutant, stretch_matrix
 from orbiflow.tilings.templates import template_vertices
 
 
@@ -77,8 +78,8 @@ class IsohedralClass:
 
     @property
     def stretch_dim(self) -> int:
-        """Number of parameters of the lattice freedom: 2, 1 or 0."""
-        return STRETCH_DIM[self.row.freedom]
+        """Number of parameters of the lattice freedom: 2, 1 or 0 (`commutant` of the point group)."""
+        return len(self._freedom)
 
     def template(self, shape: Points | None = None) -> Points:
         """Vertices (..., K, 2) of the template, counter-clockwise.
@@ -105,7 +106,7 @@ class IsohedralClass:
             OrbiflowError: if the last axis of `parameters` is not `stretch_dim` long.
         """
         tensor = self._parameters(parameters, self.stretch_dim, "stretch")
-        return _same_kind(stretch_matrix(self.row.freedom, tensor), parameters)
+        return _same_kind(stretch_matrix(self._freedom, tensor), parameters)
 
     def group(self) -> CrystallographicGroup:
         """The group of the template; the same for all shape parameters."""
@@ -122,6 +123,9 @@ class IsohedralClass:
     def edge_isometry(self, pair: EdgePair) -> Isometry:
         """The element of the group that maps edge `pair.first` onto edge `pair.second`."""
         vertices = self._default
+        instance(pair, EdgePair, "an edge pair", "see identified_edges")
+        for edge in (pair.first, pair.second):
+            whole(edge, "an edge of the template", 0, len(vertices) - 1)
         start, end = vertices[pair.first], vertices[(pair.first + 1) % len(vertices)]
         goal, goal_end = vertices[pair.second], vertices[(pair.second + 1) % len(vertices)]
         if pair.reversed:
@@ -147,6 +151,10 @@ class IsohedralClass:
         basis = reduced_basis(np.stack(columns, axis=1))
         return CrystallographicGroup.generate(basis, self.generators(), name=self.row.group)
 
+    @cached_property
+    def _freedom(self) -> Array:
+        return commutant(self._group.linear_parts)
+
     def _point(self, coefficients: Coefficients) -> Array:
         terms = [c * self._default[k] for k, c in coefficients.items()]
         return np.sum(terms, axis=0) if terms else np.zeros(2)
@@ -160,7 +168,9 @@ class IsohedralClass:
     def _parameters(self, values: Array | torch.Tensor, size: int, what: str) -> torch.Tensor:
         tensor = values
         if not isinstance(tensor, torch.Tensor):
-            tensor = torch.as_tensor(np.asarray(tensor, dtype=np.float64))
+            tensor = torch.as_tensor(numbers(tensor, f"{what} parameters", (...,)))
+        elif not tensor.is_floating_point():
+            tensor = tensor.double()
         if tensor.ndim == 0 or tensor.shape[-1] != size:
             raise OrbiflowError(
                 f"{self.name} has {size} {what} parameters: expected shape (..., {size}), "
@@ -184,8 +194,8 @@ CLASSES: dict[str, IsohedralClass] = {
 """The nine classes by name."""
 
 
-def isohedral_class(name: str | int) -> IsohedralClass:
-    """The class called `name`: "IH4", "ih4", "IH04", "4" and 4 are the same.
+def isohedral_class(name: str | int | IsohedralClass) -> IsohedralClass:
+    """The class called `name`: "IH4", "ih4", "IH04", "4" and 4 are the same; a class is itself.
 
     Raises:
         OrbiflowError: for anything but the nine.
@@ -193,11 +203,13 @@ def isohedral_class(name: str | int) -> IsohedralClass:
     >>> isohedral_class("ih04")
     IsohedralClass(IH4, p2)
     """
+    if isinstance(name, IsohedralClass):
+        return name
     match = re.fullmatch(r"(?:IH[\s_-]?)?0*(\d+)", str(name).strip(), flags=re.IGNORECASE)
     key = f"IH{match[1]}" if match else ""
     if key not in CLASSES:
         raise OrbiflowError(
-            f"unknown isohedral class {name!r}; the nine are {', '.join(CLASSES)}: "
+            f"unknown isohedral class {described(name)}; the nine are {', '.join(CLASSES)}: "
             "every tile shape of an isohedral tiling occurs in one of them"
         )
     return CLASSES[key]

@@ -9,6 +9,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from orbiflow.arguments import instance
 from orbiflow.symmetry import Isometry
 from orbiflow.tilings.graph_colouring import Graph, colour_graph
 from orbiflow.tilings.neighbours import neighbours
@@ -64,6 +65,7 @@ def colouring(tile: Tile) -> Colouring:
     >>> colouring(Tile(hexagons.template(), hexagons.group())).count
     3
     """
+    instance(tile, Tile, "the tile", "Tile(polygon, group) makes one")
     links = _links(tile)
     graphs = _loop_free_quotients(links)
     most = max(len(near) for _, graph in graphs for near in graph) + 1

@@ -1,33 +1,58 @@
 """Linear maps that commute with a point group, modulo similarity (design point 7).
 
-A periodic flow cannot change its lattice; these maps do, and keep the group a group of isometries.
+A periodic flow cannot change its lattice; these maps do, and keep the group a group of isometries. Each
+is a similarity times the exponential of a symmetric matrix of trace zero that commutes with the point
+group; such matrices [[a, b], [b, -a]] form a space of dimension 2 (p1, p2), 1 (groups with mirrors or
+glides, but no rotation of order 3 or more) or 0 (all others).
 """
 
 from __future__ import annotations
 
+import numpy as np
 import torch
 
-from orbiflow.tilings.class_table import LatticeFreedom
+from orbiflow.symmetry.isometry import Array
 
-STRETCH_DIM: dict[LatticeFreedom, int] = {"general": 2, "rectangular": 1, "none": 0}
-"""Number of parameters of each family."""
+_ROUNDING = 1e-9
 
 
-def stretch_matrix(freedom: LatticeFreedom, parameters: torch.Tensor) -> torch.Tensor:
-    """Unimodular symmetric maps (..., 2, 2) for parameters (..., n), n = `STRETCH_DIM[freedom]`.
+def commutant(linear_parts: Array) -> Array:
+    """Orthonormal basis (m, 2) of the (a, b) whose [[a, b], [b, -a]] commutes with a point group.
 
-    general (p1, p2): exp [[a, b], [b, -a]]. rectangular (pg, pgg): diag(e^a, e^-a), in the frame of
-    the glide axes. none (p3, p4, p6): the identity. Differentiable, at zero too.
+    The mean over the group projects on them: R X R^T turns (a, b) as R turns directions, twice as far.
+    The basis is made by Gram-Schmidt in the order a, b, so that it depends on nothing but the group;
+    saved parameters are coordinates in it.
+
+    Args:
+        linear_parts: (n, 2, 2), of every coset.
+
+    >>> commutant(np.array([np.eye(2), np.diag([1.0, -1.0])])).tolist()
+    [[1.0, 0.0]]
     """
-    batch = parameters.shape[:-1]
-    if freedom == "none":
-        eye = torch.eye(2, dtype=parameters.dtype, device=parameters.device)
-        return eye.expand(*batch, 2, 2)
-    a = parameters[..., 0]
-    b = parameters[..., 1] if freedom == "general" else torch.zeros_like(a)
+    units = np.array([[[1.0, 0.0], [0.0, -1.0]], [[0.0, 1.0], [1.0, 0.0]]])
+    turned = np.einsum("gij,kjl,gml->kim", linear_parts, units, linear_parts) / len(linear_parts)
+    basis: list[Array] = []
+    for a, b in turned[:, 0]:
+        rest = np.array([a, b])
+        for known in basis:
+            rest = rest - (rest @ known) * known
+        if np.linalg.norm(rest) > _ROUNDING:
+            rest = rest / np.linalg.norm(rest)
+            # a group in the frame of its axes has just these: not a rounding beside them
+            near = np.round(rest)
+            basis.append(near if np.abs(rest - near).max() < _ROUNDING else rest)
+    return np.array(basis).reshape(-1, 2)
+
+
+def stretch_matrix(basis: Array, parameters: torch.Tensor) -> torch.Tensor:
+    """Unimodular symmetric maps (..., 2, 2) for parameters (..., m) over a basis of `commutant`.
+
+    exp [[a, b], [b, -a]], where (a, b) = parameters @ basis. Differentiable, at zero too.
+    """
+    a, b = (parameters @ parameters.new_tensor(basis)).unbind(dim=-1)
     cosh, sinhc = _cosh_sinhc(a * a + b * b)
     rows = [cosh + sinhc * a, sinhc * b, sinhc * b, cosh - sinhc * a]
-    return torch.stack(rows, dim=-1).reshape(*batch, 2, 2)
+    return torch.stack(rows, dim=-1).reshape(*parameters.shape[:-1], 2, 2)
 
 
 def _cosh_sinhc(square: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:

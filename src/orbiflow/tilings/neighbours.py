@@ -9,6 +9,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from orbiflow.arguments import instance, number
 from orbiflow.geometry import subdivided
 from orbiflow.symmetry import Isometry
 from orbiflow.symmetry.isometry import Array
@@ -47,6 +48,8 @@ def neighbours(tile: Tile, *, tolerance: float = 1e-7) -> Neighbours:
     >>> len(found.edge), len(found.point)
     (5, 3)
     """
+    instance(tile, Tile, "the tile", "Tile(polygon, group) makes one")
+    tolerance = number(tolerance, "tolerance", 0)
     return neighbours_among(surroundings(tile, tolerance), tolerance)
 
 

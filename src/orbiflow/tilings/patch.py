@@ -10,6 +10,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from orbiflow.arguments import instance, numbers
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import Isometry
 from orbiflow.symmetry.isometry import Array
@@ -41,6 +42,7 @@ def patch(tile: Tile, window: Sequence[float]) -> list[Isometry]:
     >>> len(patch(Tile(ih1.template(), ih1.group()), (-0.1, -0.1, 0.1, 0.1)))
     1
     """
+    instance(tile, Tile, "the tile", "Tile(polygon, group) makes one")
     xmin, ymin, xmax, ymax = _checked_window(window)
     low, high = np.array([xmin, ymin]), np.array([xmax, ymax])
     reach = float(np.linalg.norm(high - low)) / 2 + tile.radius
@@ -74,6 +76,7 @@ def coset_and_cell(tile: Tile, element: Isometry) -> tuple[int, Cell]:
         OrbiflowError: for an isometry that is not in the tile's group.
     """
     group = tile.group
+    instance(element, Isometry, "an element of the group")
     steps = (element.translation - group.translations) @ group.inverse_lattice.T
     error = np.abs(steps - np.round(steps)).max(axis=1)
     error += np.abs(group.linear_parts - element.linear).max(axis=(1, 2))
@@ -85,9 +88,11 @@ def coset_and_cell(tile: Tile, element: Isometry) -> tuple[int, Cell]:
 
 
 def _checked_window(window: Sequence[float]) -> Window:
-    values = [float(value) for value in window]
-    ordered = len(values) == 4 and values[0] < values[2] and values[1] < values[3]
-    if not (ordered and all(math.isfinite(value) for value in values)):
+    try:
+        values = numbers(window, "window", (4,)).tolist()
+    except OrbiflowError:
+        values = [0.0] * 4
+    if not (values[0] < values[2] and values[1] < values[3]):
         raise OrbiflowError(
             f"a window is (xmin, ymin, xmax, ymax) with xmin < xmax and ymin < ymax, got {window!r}"
         )

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import torch
 
 from orbiflow.symmetry import rotation_matrix
-from orbiflow.symmetry.isometry import matching
+from orbiflow.symmetry.isometry import cast_like
 from orbiflow.tilings.class_table import TemplateKind
 
 
@@ -69,7 +69,7 @@ def pentagon(gauge: PentagonGauge, shape: torch.Tensor) -> torch.Tensor:
     """
 
     def turn(degrees: float, vector: torch.Tensor) -> torch.Tensor:
-        return vector @ matching(rotation_matrix(math.radians(degrees)), shape).T
+        return vector @ cast_like(rotation_matrix(math.radians(degrees)), shape).T
 
     p1 = shape + shape.new_tensor(gauge.default)
     p0 = torch.zeros_like(p1)

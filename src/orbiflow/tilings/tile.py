@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from orbiflow.arguments import instance, numbers, whole
 from orbiflow.errors import OrbiflowError
 from orbiflow.geometry import signed_area
 from orbiflow.symmetry import CrystallographicGroup
@@ -34,17 +35,23 @@ class Tile:
     corners: tuple[int, ...] = field(default=())
 
     def __post_init__(self) -> None:
-        polygon = np.array(self.polygon, dtype=np.float64)
-        if polygon.ndim != 2 or polygon.shape[1] != 2 or len(polygon) < 3:
-            raise OrbiflowError(f"a tile's polygon is (N >= 3, 2) numbers, got {polygon.shape}")
-        if not np.isfinite(polygon).all():
-            raise OrbiflowError("the tile's polygon has NaN or infinite coordinates")
+        polygon = numbers(self.polygon, "the tile's polygon", ("N", 2))
+        if len(polygon) < 3:
+            raise OrbiflowError(f"the tile's polygon needs 3 vertices at least, got {len(polygon)}")
+        how = "isohedral_class(name).group() and wallpaper_group(name) make one"
+        instance(self.group, CrystallographicGroup, "the tile's group", how)
+        instance(self.isohedral_class, str, "the tile's isohedral class", 'give its name, "IH4"')
+        corners = tuple(
+            whole(k, "a tile's corner, an index of its vertices,", 0, len(polygon) - 1)
+            for k in self.corners
+        )
         if self.group.dim != 2:
             raise OrbiflowError(
                 f"a tile needs a group of the plane, got dimension {self.group.dim}"
             )
         polygon.setflags(write=False)
         object.__setattr__(self, "polygon", polygon)
+        object.__setattr__(self, "corners", corners)
 
     @property
     def signed_area(self) -> float:

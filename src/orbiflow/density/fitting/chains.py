@@ -10,7 +10,9 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from orbiflow.density.models.chains import SCALES, MixtureBase, averaged, chained, waves
+from orbiflow.density.fitting.budget import Budget
+from orbiflow.density.fitting.training import training
+from orbiflow.density.models.chains import SCALES, VonMisesChains, averaged, chained, waves
 from orbiflow.density.models.log_sum import shares_of
 from orbiflow.density.spaces.space import Space
 from orbiflow.errors import OrbiflowError
@@ -41,17 +43,18 @@ Watch = Callable[[float, str], None]
 
 
 @dataclass(frozen=True)
-class MixtureFit:
+class ChainsFit:
     """What a fit found: the mixture, components of each member, members; whether time ran out."""
 
-    mixture: MixtureBase
+    mixture: VonMisesChains
     components: int
     members: int
     late: bool
     seconds: float
 
 
-def fit_mixture(
+@training()
+def fit_chains(
     space: Space,
     train: Tensor,
     validation: Tensor,
@@ -62,7 +65,7 @@ def fit_mixture(
     seconds: float = math.inf,
     seed: int = 0,
     watch: Watch | None = None,
-) -> MixtureFit:
+) -> ChainsFit:
     """Mixtures of 8, 16, ... components while validation improves, then the mean of several starts.
 
     EM ends in another optimum from every start; the mean of their densities is better on new points
@@ -76,7 +79,8 @@ def fit_mixture(
         components: at most, in each member.
         members: starts that are averaged; those that do not help on `validation` are left out.
         iterations: of EM, at most.
-        seconds: after which no further EM begins.
+        seconds: after which no further iteration of EM begins; the first mixture has its start at
+            least.
         seed: of the starts.
         watch: told how far it is.
 
@@ -85,20 +89,20 @@ def fit_mixture(
     """
     if len(train) < 2 or not len(validation):
         raise OrbiflowError(f"a mixture needs 2 training points or more, got {len(train)}")
-    began = time.monotonic()
+    began, budget = time.monotonic(), Budget(seconds=seconds)
     most = max(1, min(components, len(train) // PER_POINT))
     generator = torch.Generator().manual_seed(seed)
-    size, late = min(SMALLEST, most), False
+    size = min(SMALLEST, most)
 
-    def start(count: int, order: Tensor) -> MixtureBase:
+    def start(count: int, order: Tensor) -> VonMisesChains:
         return _expectation_maximization(
-            space, train, validation, count, order, iterations, generator
+            space, train, validation, count, order, iterations, generator, budget
         )
 
     natural = torch.arange(space.dim)
     best = start(size, natural)
     while size < most:
-        if late := time.monotonic() - began > seconds:
+        if budget.is_spent:
             break
         larger = min(2 * size, most)
         if watch is not None:
@@ -109,7 +113,7 @@ def fit_mixture(
         size, best = larger, found
     kept, score = [best], best.log_prob(validation)
     for number in range(1, members):
-        if late := time.monotonic() - began > seconds:
+        if budget.is_spent:
             break
         if watch is not None:
             watch(number / members, f"mixture of {size} components, start {number + 1}")
@@ -117,14 +121,14 @@ def fit_mixture(
         joint = torch.logaddexp(score, found.log_prob(validation))
         if _mean(joint, len(kept) + 1) > _mean(score, len(kept)):
             kept, score = [*kept, found], joint
-    return MixtureFit(averaged(kept), size, len(kept), late, time.monotonic() - began)
+    return ChainsFit(averaged(kept), size, len(kept), budget.is_late, time.monotonic() - began)
 
 
 def _mean(log_sum: Tensor, count: int) -> float:
     return float(log_sum.mean()) - math.log(count)
 
 
-def _nll(mixture: MixtureBase, points: Tensor) -> float:
+def _nll(mixture: VonMisesChains, points: Tensor) -> float:
     return -float(mixture.log_prob(points).mean())
 
 
@@ -137,14 +141,17 @@ def _expectation_maximization(
     order: Tensor,
     iterations: int,
     generator: torch.Generator,
-) -> MixtureBase:
+    budget: Budget,
+) -> VonMisesChains:
     """EM from seeds that are spread out; the iterate that was best on `validation`."""
     step = _Maximization(train, order)
     mixture = _started(space, step.angle, count, order, generator)
     best, least, idle = mixture, _nll(mixture, validation), 0
     for iteration in range(1, iterations + 1):
-        mixture = step(mixture, bent=iteration > STRAIGHT)
-        if iteration % EVERY == 0 or iteration == iterations:
+        late = budget.is_spent
+        if not late:
+            mixture = step(mixture, bent=iteration > STRAIGHT)
+        if iteration % EVERY == 0 or iteration == iterations or late:
             score = _nll(mixture, validation)
             if score < least:
                 best, least, idle = mixture, score, 0
@@ -152,12 +159,14 @@ def _expectation_maximization(
                 idle += 1
                 if idle > PATIENCE:
                     break
+        if late:
+            break
     return best
 
 
 def _started(
     space: Space, angle: Tensor, count: int, order: Tensor, generator: torch.Generator
-) -> MixtureBase:
+) -> VonMisesChains:
     """A uniform component and `count` round ones at points far from each other (k-means++)."""
     chosen = [int(torch.randint(len(angle), (), generator=generator))]
     far = (1 - (angle - angle[chosen[0]]).cos()).sum(dim=1)
@@ -170,7 +179,7 @@ def _started(
     concentrations = angle.new_full((count + 1, d), 5.0)
     concentrations[0] = 0.0
     weights = angle.new_full((count + 1, len(SCALES)), 1.0 / (count + 1) / len(SCALES))
-    return MixtureBase(space, weights.log(), means, concentrations, order.repeat(count + 1, 1))
+    return VonMisesChains(space, weights.log(), means, concentrations, order.repeat(count + 1, 1))
 
 
 class _Maximization:
@@ -183,7 +192,7 @@ class _Maximization:
         self.products = (self.waves[:, :, None] * self.waves[:, None, :]).flatten(1)
         self.scale = points.new_tensor(SCALES)
 
-    def __call__(self, mixture: MixtureBase, *, bent: bool) -> MixtureBase:
+    def __call__(self, mixture: VonMisesChains, *, bent: bool) -> VonMisesChains:
         joint = mixture.joint(self.points)
         share = shares_of(joint.flatten(1)).reshape(joint.shape)  # (N, L, K)
         weight = share[..., 1:].sum(dim=1)  # (N, K) of each component
@@ -196,12 +205,12 @@ class _Maximization:
             means[1:] = 0.0
             means[1:, :, 0] = center
         weights = self._weights(share)
-        moved = MixtureBase(mixture.space, weights, means, mixture.concentrations, mixture.order)
+        moved = VonMisesChains(mixture.space, weights, means, mixture.concentrations, mixture.order)
         loss = 1 - moved.residuals(self.points)[:, 1:].cos()
         spread = torch.einsum("nk,nkd->kd", precise, loss) + PRIOR * (1 - PRIOR_RESULTANT)
         concentrations = mixture.concentrations.clone()
         concentrations[1:] = concentration(1 - spread / (weight.sum(dim=0)[:, None] + PRIOR))
-        return MixtureBase(mixture.space, weights, means, concentrations, mixture.order)
+        return VonMisesChains(mixture.space, weights, means, concentrations, mixture.order)
 
     def _weights(self, share: Tensor) -> Tensor:
         count = share.sum(dim=0).mT
@@ -211,7 +220,7 @@ class _Maximization:
         total = count.sum(dim=1, keepdim=True) + 0.1
         return (drawn * total / total.sum()).log()
 
-    def _regressed(self, mixture: MixtureBase, precise: Tensor, center: Tensor) -> Tensor:
+    def _regressed(self, mixture: VonMisesChains, precise: Tensor, center: Tensor) -> Tensor:
         """One Fisher scoring step of all circular regressions, their slopes held by a ridge."""
         count, d = center.shape
         kappa = mixture.concentrations[1:]

@@ -10,11 +10,14 @@ import torch
 from scipy.spatial import KDTree
 from torch import Tensor
 
+from orbiflow.density.arguments import check_kind, points_tensor
+from orbiflow.density.fitting.training import training
 from orbiflow.density.models.bases import UniformBase
-from orbiflow.density.models.blend import MixedDensity
-from orbiflow.density.models.kernels import AdaptiveKernels, features, is_round
+from orbiflow.density.models.blend import BlendedDensity
+from orbiflow.density.models.kernels import AdaptiveKernels
 from orbiflow.density.models.symmetric import SymmetricDensity
 from orbiflow.density.spaces.space import Space
+from orbiflow.errors import OrbiflowError
 
 MOST_KERNELS, MOST_HELD = 20_000, 2_000
 """Centers at most, and held-out points that choose the widths."""
@@ -29,8 +32,9 @@ FLOOR = 1e-3
 """Least share of the uniform density: no observation is impossible."""
 
 
-def mix_kernels(density: SymmetricDensity, train: Tensor, held: Tensor) -> MixedDensity:
-    """A fitted density mixed with adaptive kernels about the training points and a uniform floor.
+@training()
+def blend_kernels(density: SymmetricDensity, train: Tensor, held: Tensor) -> BlendedDensity:
+    """A fitted density blended with adaptive kernels about the training points and a uniform floor.
 
     Each kernel's variance is a share of the mean square distance to its nearest neighbours (Breiman,
     Meisel, Purcell, 1977), on tori axis by axis. The share, the number of neighbours and the
@@ -38,13 +42,24 @@ def mix_kernels(density: SymmetricDensity, train: Tensor, held: Tensor) -> Mixed
 
     Args:
         density: a flow's.
-        train, held: canonical points (N, d), float64.
+        train, held: canonical points (N, d).
+
+    Raises:
+        OrbiflowError: for points of another shape, fewer than three different ones to train on, or none
+            held out.
     """
-    space = density.space
+    space = check_kind(density, SymmetricDensity, "density").space
+    train = points_tensor(train, space.dim, "training points", flat=True).double()
+    held = points_tensor(held, space.dim, "held points", flat=True).double()
     centers, counts = torch.unique(train, dim=0, return_counts=True)
     if len(centers) > MOST_KERNELS:
         chosen = torch.randperm(len(centers), generator=torch.Generator().manual_seed(0))
         centers, counts = centers[chosen[:MOST_KERNELS]], counts[chosen[:MOST_KERNELS]]
+    if len(centers) <= min(NEIGHBOURS) or not len(held):
+        raise OrbiflowError(
+            f"kernels need {min(NEIGHBOURS) + 1} different points or more and some held out, got "
+            f"{len(centers)} and {len(held)}"
+        )
     weights = counts.double() / counts.sum()
     held = held[:MOST_HELD]
     spreads = _spreads(space, centers, [m for m in NEIGHBOURS if m < len(centers)])
@@ -52,7 +67,7 @@ def mix_kernels(density: SymmetricDensity, train: Tensor, held: Tensor) -> Mixed
     with torch.no_grad():
         flow = density.log_prob(held)
     best, found = -math.inf, None
-    shrinkage = (1.0,) if is_round(space) or space.dim == 1 else ISOTROPY
+    shrinkage = (1.0,) if space.is_round or space.dim == 1 else ISOTROPY
     for spread, scale, share in itertools.product(spreads, SCALES, shrinkage):
         mean = spread.mean(dim=1, keepdim=True)
         kappa = 1 / (scale * ((1 - share) * spread + share * mean))
@@ -60,13 +75,13 @@ def mix_kernels(density: SymmetricDensity, train: Tensor, held: Tensor) -> Mixed
         parts = torch.stack([flow, kernels.log_prob(held), uniform])
         shares, score = proportions(parts)
         if score > best:
-            best, found = score, MixedDensity(space, density.flow, density.base, kernels, shares)
+            best, found = score, BlendedDensity(space, density.flow, density.base, kernels, shares)
     assert found is not None
     return found
 
 
 def proportions(parts: Tensor, *, iterations: int = 60) -> tuple[Tensor, float]:
-    """Mixing proportions (3,) that suit log densities `parts` (3, N) best, by EM; and their score.
+    """Proportions (3,) that suit log densities `parts` (3, N) best, by EM; and their score.
 
     The last is kept at `FLOOR` or more.
     """
@@ -81,13 +96,13 @@ def proportions(parts: Tensor, *, iterations: int = 60) -> tuple[Tensor, float]:
 
 def _spreads(space: Space, centers: Tensor, neighbours: list[int]) -> list[Tensor]:
     """Mean squares of the distance to the nearest neighbours, per axis: (N, 1) or (N, d) each."""
-    images = features(space, centers)
+    images = space.features(centers)
     count = images.shape[1]
     tree = KDTree(images.reshape(-1, images.shape[-1]).numpy())
     _, nearest = tree.query(images[0].numpy(), k=neighbours[-1] + 1)
     near = images.reshape(-1, images.shape[-1])[torch.as_tensor(np.asarray(nearest)[:, 1:])]
     square = (near - images[0][:, None]) ** 2
-    if is_round(space):
+    if space.is_round:
         square = square.sum(dim=-1, keepdim=True) / 2
     else:  # a chord's square is nearly the angle's
         square = square[..., : space.dim] + square[..., space.dim :]

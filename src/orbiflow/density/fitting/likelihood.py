@@ -12,6 +12,7 @@ import scipy.optimize
 import torch
 from torch import Tensor
 
+from orbiflow.density.fitting.budget import Budget, Spent
 from orbiflow.density.models.symmetric import SymmetricDensity
 from orbiflow.fields import InvariantField
 from orbiflow.symmetry.isometry import Array
@@ -25,6 +26,9 @@ EVERY = 3
 PATIENCE = 12
 """Iterations without a better validation score after which refinement ends."""
 
+MOST_EVALUATIONS = 10**9
+"""For SciPy, whose own bound is 15,000: `Budget` counts them."""
+
 Watch = Callable[[int, float, float], None]
 """Told the iteration, the training and the validation negative log-likelihood, in nats."""
 
@@ -33,10 +37,10 @@ Watch = Callable[[int, float, float], None]
 class Refinement:
     """What became of it.
 
-    - `train`, `validation`: mean negative log density with respect to the square, at the start and
-      every `EVERY` iterations.
+    - `train`, `validation`: mean negative log density with respect to the square, at the start,
+      every `EVERY` iterations and at the end.
     - `best`: the entry whose parameters were kept.
-    - `stopped`: "iterations", "validation", "converged" or "time".
+    - `stopped`: "iterations", "validation", "converged", "evaluations" or "time".
     - `seconds`: that it took.
     """
 
@@ -47,9 +51,10 @@ class Refinement:
     seconds: float
 
 
-class _Stop(Exception):
-    def __init__(self, reason: str) -> None:
-        self.reason = reason
+class _Idle(Exception):
+    """Validation has not improved for `PATIENCE` iterations."""
+
+    reason = "validation"
 
 
 class Objective:
@@ -136,7 +141,7 @@ def refine(
     iterations: int = 100,
     kinetic: float = 0.0,
     roughness: float = 0.0,
-    seconds: float = math.inf,
+    budget: Budget | None = None,
     watch: Watch | None = None,
 ) -> Refinement:
     """Descend on the negative log-likelihood; the parameters best on `validation` are left in place.
@@ -147,56 +152,98 @@ def refine(
         weights, held_weights: of the two, (N,) of sum 1; default equal.
         iterations: at most; it stops where validation has not improved for `PATIENCE` of them.
         kinetic, roughness: see `Objective`.
-        seconds: after which it stops, at the best so far.
+        budget: of evaluations and time; where it is spent, the best so far is left.
         watch: called with every score.
     """
     weights = _even(train) if weights is None else weights
-    held_weights = _even(validation) if held_weights is None else held_weights
-    objective = Objective(density, train, weights, kinetic=kinetic, roughness=roughness)
+    budget = Budget() if budget is None else budget
     began = time.monotonic()
+    objective = Objective(density, train, weights, kinetic=kinetic, roughness=roughness)
+    descent = _Descent(objective, validation, held_weights, watch)
 
-    def score() -> float:
-        # at doubled steps: what only exploits the integrator gains nothing here
-        with torch.no_grad(), density.flow.with_steps(2 * density.flow.steps):
-            return -float((held_weights * density.log_prob(validation)).sum())
-
-    with torch.no_grad():
-        trains = [-float((weights * density.log_prob(train)).sum())]
-    scores = [score()]
-    best, kept, done = 0, objective.get(), 0
-
-    def after(values: Array) -> None:
-        nonlocal best, kept, done
-        done += 1
-        if done % EVERY == 0:
-            objective.set(values)
-            trains.append(objective.last)
-            scores.append(score())
-            if watch is not None:
-                watch(done, trains[-1], scores[-1])
-            if scores[-1] < scores[best] or not math.isfinite(scores[best]):
-                best, kept = len(scores) - 1, np.array(values)
-            if EVERY * (len(scores) - 1 - best) >= PATIENCE:
-                raise _Stop("validation")
-        if time.monotonic() - began > seconds:
-            raise _Stop("time")
+    def loss(values: Array) -> tuple[float, Array]:
+        budget.spend()
+        return objective(values)
 
     stopped = "iterations"
     try:
-        found = scipy.optimize.minimize(
-            objective,
-            kept,
-            jac=True,
-            method="L-BFGS-B",
-            callback=after,
-            options={"maxiter": iterations, "maxcor": 20, "maxls": 20, "ftol": 1e-9, "gtol": 1e-7},
-        )
-        if found.nit < iterations:
-            stopped = "converged"
-    except _Stop as stop:
+        if iterations:  # SciPy does one at least
+            found = scipy.optimize.minimize(
+                loss,
+                objective.get(),
+                jac=True,
+                method="L-BFGS-B",
+                callback=descent.after,
+                options={
+                    "maxiter": iterations,
+                    "maxfun": MOST_EVALUATIONS,
+                    "maxcor": 20,
+                    "maxls": 20,
+                    "ftol": 1e-9,
+                    "gtol": 1e-7,
+                },
+            )
+            if found.nit < iterations:
+                stopped = "converged"
+    except (Spent, _Idle) as stop:
         stopped = stop.reason
-    objective.set(kept)
-    return Refinement(tuple(trains), tuple(scores), best, stopped, time.monotonic() - began)
+    descent.finish()
+    spent = time.monotonic() - began
+    return Refinement(tuple(descent.trains), tuple(descent.scores), descent.best, stopped, spent)
+
+
+class _Descent:
+    """The iterates of a descent: every `EVERY`-th is scored, and so is the last."""
+
+    def __init__(
+        self,
+        objective: Objective,
+        validation: Tensor,
+        weights: Tensor | None,
+        watch: Watch | None,
+    ) -> None:
+        self.objective, self.validation, self.watch = objective, validation, watch
+        self.weights = _even(validation) if weights is None else weights
+        self.done, self.best = 0, 0
+        self.latest = self.kept = objective.get()
+        self.nll = self._nll(objective.density, objective.points, objective.weights)
+        self.trains, self.scores = [self.nll], [self._score()]
+        self._scored = 0
+
+    def after(self, values: Array) -> None:
+        """Take an iterate."""
+        self.done += 1
+        self.latest, self.nll = np.array(values), self.objective.last
+        if self.done % EVERY == 0:
+            self._look()
+            if EVERY * (len(self.scores) - 1 - self.best) >= PATIENCE:
+                raise _Idle
+
+    def finish(self) -> None:
+        """Leave the best iterate in place."""
+        if self._scored < self.done:
+            self._look()
+        self.objective.set(self.kept)
+
+    def _look(self) -> None:
+        self.objective.set(self.latest)
+        self.trains.append(self.nll)
+        self.scores.append(self._score())
+        self._scored = self.done
+        if self.watch is not None:
+            self.watch(self.done, self.trains[-1], self.scores[-1])
+        if self.scores[-1] < self.scores[self.best] or not math.isfinite(self.scores[self.best]):
+            self.best, self.kept = len(self.scores) - 1, self.latest
+
+    def _score(self) -> float:
+        # at doubled steps: what only exploits the integrator gains nothing here
+        density = self.objective.density
+        finer = density.with_steps(2 * density.flow.steps)
+        return self._nll(finer, self.validation, self.weights)
+
+    @torch.no_grad()
+    def _nll(self, density: SymmetricDensity, points: Tensor, weights: Tensor) -> float:
+        return -float((weights * density.log_prob(points)).sum())
 
 
 def _even(points: Tensor) -> Tensor:

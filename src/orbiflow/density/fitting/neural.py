@@ -11,22 +11,32 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from orbiflow.density.fitting.chains import MixtureFit, fit_mixture
+from orbiflow.density.arguments import check_kind, check_ranges, check_share
+from orbiflow.density.fitting.budget import Budget
+from orbiflow.density.fitting.chains import ChainsFit, fit_chains
 from orbiflow.density.fitting.flow_matching import coupled
 from orbiflow.density.fitting.likelihood import Refinement
 from orbiflow.density.fitting.report import (
+    MOST_REPORTED,
     FitReport,
     Progress,
     mean_nll,
+    own_points,
     repeats_note,
     settle,
     split,
     steps_note,
 )
+from orbiflow.density.fitting.training import training
 from orbiflow.density.models.bases import Base, UniformBase
-from orbiflow.density.models.neural import MAX_DEPTH, MAX_WAVES, MAX_WIDTH, NeuralField, NeuralFlow
+from orbiflow.density.models.neural import (
+    MAX_DEPTH,
+    MAX_WAVES,
+    MAX_WIDTH,
+    NeuralFlow,
+    NeuralTorusField,
+)
 from orbiflow.density.models.symmetric import SymmetricDensity
-from orbiflow.density.spaces.flat import Torus
 from orbiflow.density.spaces.space import Space
 from orbiflow.errors import OrbiflowError
 
@@ -56,9 +66,9 @@ WARM = 50
 class NeuralSettings:
     """Knobs of `fit_neural`; the defaults are measured on RNA torsions (benchmarks/density_rna.py).
 
-    - `base`: "mixture" (of von Mises chains, see `fit_mixture`) or "uniform".
+    - `base`: "mixture" (of von Mises chains, see `fit_chains`) or "uniform".
     - `components`, `members`: of the mixture, at most.
-    - `width`, `depth`, `waves`: of the network, see `NeuralField`.
+    - `width`, `depth`, `waves`: of the network, see `NeuralTorusField`.
     - `steps`: Runge-Kutta steps; doubled where the integrator has not converged. None for 2 with a
       mixture, 8 without.
     - `matching`: iterations of flow matching; None for 0 with a mixture, 20,000 without.
@@ -67,8 +77,8 @@ class NeuralSettings:
     - `paired`: optimal transport within batches, for flow matching.
     - `matching_rate`, `refinement_rate`: of Adam, at their largest.
     - `validation`: share of the points held out to choose among iterates and mixtures.
-    - `seconds`: of training at most, half of it for the mixture; a fit that is cut short depends on
-      the machine's speed.
+    - `seconds`: of training at most, half of it for the mixture, looked at between iterations. A fit
+      that it ends depends on the machine's speed, and its report says so.
     - `seed`: of the split, the starts, the network and the batches.
     """
 
@@ -90,25 +100,22 @@ class NeuralSettings:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        for name, low, high in (
+        whole = [
             ("components", 1, 4096),
             ("members", 1, 64),
             ("width", 1, MAX_WIDTH),
             ("depth", 1, MAX_DEPTH),
             ("waves", 1, MAX_WAVES),
-            ("steps", 1, MOST_STEPS),
-            ("matching", 0, 10_000_000),
             ("refinement", 0, 1_000_000),
             ("batch", 1, 65536),
-            ("matching_rate", 0, 1),
-            ("refinement_rate", 0, 1),
-            ("seconds", 0, math.inf),
-        ):
-            value = getattr(self, name)
-            if value is not None and not low <= value <= high:
-                raise OrbiflowError(f"{name} must be from {low:g} to {high:g}, got {value!r}")
-        if not 0 < self.validation < 1:
-            raise OrbiflowError(f"validation must be between 0 and 1, got {self.validation!r}")
+            ("seed", -(2**63), 2**64 - 1),
+        ]
+        chosen = (("steps", 1, MOST_STEPS), ("matching", 0, 10_000_000))
+        whole += [row for row in chosen if getattr(self, row[0]) is not None]
+        real = (("matching_rate", 0, 1), ("refinement_rate", 0, 1), ("seconds", 0, math.inf))
+        check_ranges(self, whole, integer=True)
+        check_ranges(self, real)
+        check_share(self.validation)
         if self.base not in ("mixture", "uniform"):
             raise OrbiflowError(f'base must be "mixture" or "uniform", got {self.base!r}')
 
@@ -125,6 +132,7 @@ class NeuralSettings:
         return 0 if self.base == "mixture" else 20_000
 
 
+@training()
 def fit_neural(
     space: Space,
     points: Tensor,
@@ -150,16 +158,17 @@ def fit_neural(
     Raises:
         OrbiflowError: for a space that is not a torus, or too few points.
     """
-    settings = settings or NeuralSettings()
-    if not isinstance(space, Torus):
+    settings = NeuralSettings() if settings is None else settings
+    check_kind(settings, NeuralSettings, "settings")
+    if not check_kind(space, Space, "space", "see `make_space`").is_torus:
         raise OrbiflowError(f"neural flows are for tori, not for the {space.name}")
     say = progress or (lambda _share, _what: None)
-    began = time.monotonic()
+    budget = Budget(seconds=settings.seconds)
     generator = torch.Generator().manual_seed(settings.seed)
-    points = space.project(points.double())
+    points = own_points(space, points)
     train, validation, duplicates = split(points, settings.validation, generator)
     base, mixture = _base(space, train, validation, settings, say)
-    field = NeuralField(
+    field = NeuralTorusField(
         space.dim,
         width=settings.width,
         depth=settings.depth,
@@ -168,11 +177,11 @@ def fit_neural(
         dtype=torch.float32,
     )
     density = SymmetricDensity(space, NeuralFlow(field, steps=settings.first_steps), base)
-    trainer = _Trainer(density, train, validation[:HELD], settings, generator, say, began)
+    trainer = _Trainer(density, train, validation[:HELD], settings, generator, say, budget)
     start_nll = trainer.match()
     stages = [trainer.refine()] if settings.refinement else []
     density.flow.double()
-    error, mass = settle(density, validation, MOST_STEPS)
+    error, mass = settle(density, validation[:HELD], MOST_STEPS)
     notes = [
         *repeats_note(len(points), duplicates),
         *_notes(mixture, trainer),
@@ -184,8 +193,8 @@ def fit_neural(
         train=len(train),
         validation=len(validation),
         start_nll=start_nll,
-        train_nll=mean_nll(density, train),
-        validation_nll=mean_nll(density, validation),
+        train_nll=mean_nll(density, train[:MOST_REPORTED]),
+        validation_nll=mean_nll(density, validation[:MOST_REPORTED]),
         stages=tuple(stages),
         steps=density.flow.steps,
         mass=mass,
@@ -197,10 +206,10 @@ def fit_neural(
 
 def _base(
     space: Space, train: Tensor, validation: Tensor, settings: NeuralSettings, say: Progress
-) -> tuple[Base, MixtureFit | None]:
+) -> tuple[Base, ChainsFit | None]:
     if settings.base == "uniform":
         return UniformBase(space), None
-    found = fit_mixture(
+    found = fit_chains(
         space,
         train,
         validation,
@@ -224,13 +233,13 @@ class _Trainer:
         settings: NeuralSettings,
         generator: torch.Generator,
         say: Progress,
-        began: float,
+        budget: Budget,
     ) -> None:
         self.density, self.settings, self.say = density, settings, say
         self.train, self.validation = train.float(), validation.float()
         self.generator = generator
-        self.deadline = began + settings.seconds
-        self.late = self.idle = False
+        self.budget = budget
+        self.idle = self.late = False
 
     def match(self) -> float:
         """Flow matching; the validation NLL after it."""
@@ -238,21 +247,21 @@ class _Trainer:
         if not count:
             return self._score()
         # half of what is left; the likelihood costs more but gains more
-        left = (self.deadline - time.monotonic()) / 2
-        until = time.monotonic() + left
+        half = Budget(seconds=self.budget.seconds_left / 2)
         rate = self.settings.matching_rate
-        done = self._descend(self._matching_loss, count, rate, until, "matching", keep=0.999)
+        done = self._descend(self._matching_loss, count, rate, half, "matching", keep=0.999)
+        self.late = half.is_late
         return done.validation[done.best]
 
     def refine(self) -> Refinement:
         """Descent on the exact negative log-likelihood; what gains too little is undone."""
         count, rate = self.settings.refinement, self.settings.refinement_rate
-        done = self._descend(self._nll, count, rate, self.deadline, "likelihood", keep=0.98)
+        done = self._descend(self._nll, count, rate, self.budget, "likelihood", keep=0.98)
         gain = done.validation[0] - done.validation[done.best]
         if self.settings.base == "mixture" and not self.settings.matchings and gain < WORTHWHILE:
             self.idle = True
             # a new field is zero, and this one costs next to nothing
-            still = NeuralField(self.density.space.dim, width=1, depth=1, waves=1)
+            still = NeuralTorusField(self.density.space.dim, width=1, depth=1, waves=1)
             self.density.flow = NeuralFlow(still, steps=1)
         return done
 
@@ -274,23 +283,23 @@ class _Trainer:
         return -self.density.log_prob(self._batch()).mean()
 
     @property
-    def _field(self) -> NeuralField:
+    def _field(self) -> NeuralTorusField:
         field = self.density.flow.field
-        assert isinstance(field, NeuralField)  # by construction
+        assert isinstance(field, NeuralTorusField)  # by construction
         return field
 
     @torch.no_grad()
     def _score(self) -> float:
         # at doubled steps: what only exploits the integrator gains nothing here
-        with self.density.flow.with_steps(2 * self.density.flow.steps):
-            return -float(self.density.log_prob(self.validation).mean())
+        finer = self.density.with_steps(2 * self.density.flow.steps)
+        return -float(finer.log_prob(self.validation).mean())
 
     def _descend(
         self,
         loss: Callable[[], Tensor],
         count: int,
         rate: float,
-        until: float,
+        budget: Budget,
         what: str,
         *,
         keep: float,
@@ -299,27 +308,30 @@ class _Trainer:
         field, began = self._field, time.monotonic()
         adam = torch.optim.Adam(field.parameters(), lr=rate, betas=(0.9, 0.99))
         mean = copy.deepcopy(field.state_dict())
-        trains, scores, best, kept = [math.nan], [self._score()], 0, copy.deepcopy(mean)
+        last = math.nan
+        trains, scores, best, kept = [last], [self._score()], 0, copy.deepcopy(mean)
         stopped = "iterations"
         for iteration in range(count):
-            late = time.monotonic() > until
-            _set_rate(adam, rate, iteration, count)
-            value = loss()
-            adam.zero_grad()
-            value.backward()
-            torch.nn.utils.clip_grad_norm_(field.parameters(), CLIP)
-            adam.step()
-            # early on, an average over all so far
-            _average(mean, field.state_dict(), min(keep, (1 + iteration) / (10 + iteration)))
-            if not late and (iteration + 1) % max(1, count // LOOKS) and iteration + 1 < count:
-                continue
-            trains.append(float(value.detach()))
+            late = budget.is_spent
+            if not late:
+                _set_rate(adam, rate, iteration, count)
+                value = loss()
+                adam.zero_grad()
+                value.backward()
+                torch.nn.utils.clip_grad_norm_(field.parameters(), CLIP)
+                adam.step()
+                # early on, an average over all so far
+                _average(mean, field.state_dict(), min(keep, (1 + iteration) / (10 + iteration)))
+                last = float(value.detach())
+                if (iteration + 1) % max(1, count // LOOKS) and iteration + 1 < count:
+                    continue
+            trains.append(last)
             scores.append(self._score_of(mean))
             if scores[-1] < scores[best] or not math.isfinite(scores[best]):
                 best, kept = len(scores) - 1, copy.deepcopy(mean)
             self.say((iteration + 1) / count, f"{what}: validation {scores[-1]:.4f}")
             if late:
-                stopped, self.late = "time", True
+                stopped = "time"
                 break
             if len(scores) - 1 - best >= PATIENCE:
                 stopped = "validation"
@@ -348,7 +360,7 @@ def _average(mean: dict[str, Tensor], now: dict[str, Tensor], keep: float) -> No
         mean[name].lerp_(value, 1 - keep)
 
 
-def _notes(mixture: MixtureFit | None, trainer: _Trainer) -> list[str]:
+def _notes(mixture: ChainsFit | None, trainer: _Trainer) -> list[str]:
     notes = []
     if mixture is not None:
         notes.append(
@@ -359,8 +371,8 @@ def _notes(mixture: MixtureFit | None, trainer: _Trainer) -> list[str]:
             f"the flow gained less than {WORTHWHILE} nats over its base on the validation points and "
             "was left at the identity"
         )
-    if trainer.late or (mixture is not None and mixture.late):
-        notes.append(
-            "training was cut short by `seconds`: the result depends on the machine's speed"
-        )
+    struck = mixture is not None and mixture.late
+    if struck or trainer.late or trainer.budget.is_late:
+        seconds = trainer.settings.seconds
+        notes.append(f"stopped by the limit of {seconds:g} s: another run may differ")
     return notes

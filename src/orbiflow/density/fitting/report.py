@@ -4,16 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 import torch
 from torch import Tensor
 
+from orbiflow.density.arguments import check_kind, points_tensor
 from orbiflow.density.fitting.likelihood import Refinement
 from orbiflow.density.models.symmetric import SymmetricDensity
+from orbiflow.density.spaces.space import Space
 from orbiflow.errors import OrbiflowError
 
 MASS_TOLERANCE = 1e-3
 """Of the integral over the square, and of the log-likelihood at doubled steps."""
+
+MOST_REPORTED = 20_000
+"""Points over which the report's mean log densities are taken; after the shuffle the first are as good
+as any."""
 
 Progress = Callable[[float, str], None]
 """Told the share of the work done and what is being done."""
@@ -25,9 +32,10 @@ class FitReport:
 
     - `points`, `duplicates`: data points, and those that equal an earlier one.
     - `train`, `validation`: points of each.
-    - `train_nll`, `validation_nll`: mean negative log density at the end, of 20,000 points at most.
+    - `train_nll`, `validation_nll`: mean negative log density at the end, of `MOST_REPORTED` points
+      at most.
     - `start_nll`: on the validation points, of the closed-form start.
-    - `stages`: one for each roughness.
+    - `stages`: one for each roughness, without those that were undone.
     - `steps`: RK4 steps a segment, in the end.
     - `mass`: integral over the square, see `SymmetricDensity.mass`; None above two dimensions.
     - `integration_error`: change of the flow's mean validation log density at doubled steps.
@@ -48,6 +56,16 @@ class FitReport:
     integration_error: float
     shares: tuple[float, ...] | None = None
     notes: tuple[str, ...] = field(default=())
+
+
+def own_points(space: Space, points: Any) -> Tensor:
+    """Canonical points (N, d), float64: a copy, for those of `torch.inference_mode` cannot be used.
+
+    Raises:
+        OrbiflowError: for another shape or values that are not finite, or what is no `Space`.
+    """
+    check_kind(space, Space, "space", "see `make_space`")
+    return space.project(points_tensor(points, space.dim, flat=True).detach().double().clone())
 
 
 def split(points: Tensor, share: float, generator: torch.Generator) -> tuple[Tensor, Tensor, int]:
@@ -77,9 +95,14 @@ def mean_nll(density: SymmetricDensity, points: Tensor) -> float:
     return -float(density.log_prob(points).mean())
 
 
+def nll_at(density: SymmetricDensity, points: Tensor, steps: int) -> float:
+    """`mean_nll` with another number of Runge-Kutta steps a segment."""
+    return mean_nll(density.with_steps(steps), points)
+
+
 def step_error(density: SymmetricDensity, points: Tensor) -> float:
     """Change of the mean log density at `points` when the steps are doubled."""
-    return abs(_finer(density, points) - mean_nll(density, points))
+    return abs(nll_at(density, points, 2 * density.flow.steps) - mean_nll(density, points))
 
 
 def settle(density: SymmetricDensity, points: Tensor, most: int) -> tuple[float, float | None]:
@@ -93,21 +116,16 @@ def settle(density: SymmetricDensity, points: Tensor, most: int) -> tuple[float,
     Returns:
         By how much the mean log density still changes, and the mass (None in other dimensions).
     """
-    flow, now = density.flow, mean_nll(density, points)
+    now = mean_nll(density, points)
     while True:
-        finer = _finer(density, points)
+        finer = nll_at(density, points, 2 * density.flow.steps)
         error = abs(finer - now)
-        last = flow.steps >= most
+        last = density.flow.steps >= most
         if last or error <= MASS_TOLERANCE / 2:
             mass = density.mass() if density.space.dim == 2 else None
             if last or mass is None or abs(mass - 1) <= MASS_TOLERANCE / 2:
                 return error, mass
-        flow.steps, now = 2 * flow.steps, finer
-
-
-def _finer(density: SymmetricDensity, points: Tensor) -> float:
-    with density.flow.with_steps(2 * density.flow.steps):
-        return mean_nll(density, points)
+        density.flow, now = density.flow.with_steps(2 * density.flow.steps), finer
 
 
 def repeats_note(count: int, duplicates: int) -> list[str]:

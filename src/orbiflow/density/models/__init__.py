@@ -1,1 +1,24 @@
 """Densities: push-forwards of a base, kernels, chains and their blends."""
+
+from orbiflow.density.models.bases import Base, UniformBase, VonMisesBase
+from orbiflow.density.models.blend import BlendedDensity
+from orbiflow.density.models.chains import VonMisesChains
+from orbiflow.density.models.kernels import AdaptiveKernels
+from orbiflow.density.models.neural import NeuralFlow, NeuralTorusField
+from orbiflow.density.models.symmetric import SymmetricDensity, kl_by_quadrature, midpoints
+from orbiflow.density.models.tabulated import TabulatedDensity
+
+__all__ = [
+    "AdaptiveKernels",
+    "Base",
+    "BlendedDensity",
+    "NeuralFlow",
+    "NeuralTorusField",
+    "SymmetricDensity",
+    "TabulatedDensity",
+    "UniformBase",
+    "VonMisesBase",
+    "VonMisesChains",
+    "kl_by_quadrature",
+    "midpoints",
+]

@@ -9,6 +9,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from orbiflow.density.arguments import check_kind
 from orbiflow.density.spaces.space import Space, rectangle
 from orbiflow.errors import OrbiflowError
 
@@ -17,7 +18,7 @@ class Base(ABC):
     """A distribution on a space that needs no fit, invariant under the space's group."""
 
     def __init__(self, space: Space) -> None:
-        self.space = space
+        self.space = check_kind(space, Space, "space", "see `make_space`")
 
     @abstractmethod
     def log_prob(self, points: Tensor) -> Tensor:
@@ -55,8 +56,9 @@ class VonMisesBase(Base):
 
     def __init__(self, space: Space, concentration: float = 1.0) -> None:
         super().__init__(space)
-        if not concentration > 0 or not math.isfinite(concentration):
-            raise OrbiflowError(f"concentration must be positive, got {concentration}")
+        real = isinstance(concentration, int | float)
+        if not real or not concentration > 0 or not math.isfinite(concentration):
+            raise OrbiflowError(f"concentration must be positive, got {concentration!r}")
         self.concentration = float(concentration)
         self.periods = rectangle(space)
 

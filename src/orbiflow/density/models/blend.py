@@ -7,15 +7,17 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from orbiflow.density.arguments import check_kind, float_tensor
 from orbiflow.density.models.bases import Base, UniformBase
 from orbiflow.density.models.kernels import AdaptiveKernels
-from orbiflow.density.models.symmetric import SymmetricDensity
+from orbiflow.density.models.symmetric import SymmetricDensity, shape_of
 from orbiflow.density.spaces.space import Space
 from orbiflow.errors import OrbiflowError
 from orbiflow.flows import Flow
+from orbiflow.threads import one_thread
 
 
-class MixedDensity(SymmetricDensity):
+class BlendedDensity(SymmetricDensity):
     """shares_0 flow + shares_1 kernels + shares_2 uniform: exact, normalised, invariant.
 
     The flow gives the broad shape, the kernels what is sharper than its waves, the floor keeps a
@@ -34,6 +36,8 @@ class MixedDensity(SymmetricDensity):
         self, space: Space, flow: Flow, base: Base, kernels: AdaptiveKernels, shares: Tensor
     ) -> None:
         super().__init__(space, flow, base)
+        check_kind(kernels, AdaptiveKernels, "kernels")
+        shares = float_tensor(shares, "shares")
         if (
             shares.shape != (3,)
             or not bool((shares > 0).all())
@@ -56,12 +60,13 @@ class MixedDensity(SymmetricDensity):
             self._uniform.log_prob(value),
         ]
         weighted = [part + s.log() for part, s in zip(parts, self.shares.to(value), strict=True)]
-        mixed = torch.stack(weighted).logsumexp(dim=0)
-        return mixed + self.space.log_density_factor(value, measure)
+        blended = torch.stack(weighted).logsumexp(dim=0)
+        return blended + self.space.log_density_factor(value, measure)
 
+    @one_thread()
     def rsample(self, sample_shape: Any = (), generator: torch.Generator | None = None) -> Tensor:
         """As `sample`, differentiable in the flow's parameters."""
-        shape = torch.Size(sample_shape)
+        shape = shape_of(sample_shape)
         source = generator or torch.default_generator
         part = torch.multinomial(self.shares, shape.numel(), replacement=True, generator=source)
         counts = torch.bincount(part, minlength=3).tolist()
@@ -82,13 +87,13 @@ class MixedDensity(SymmetricDensity):
 
         A grid would miss the narrowest kernels.
         """
-        return self.mixed_mass(self.flow_density.mass(resolution))
+        return self.mass_with(self.flow_density.mass(resolution))
 
-    def mixed_mass(self, flow_mass: float) -> float:
-        """The mixture's integral, given that of the flow's part."""
+    def mass_with(self, flow_mass: float) -> float:
+        """The blend's integral, given that of the flow's part."""
         share = float(self.shares[0])
         return share * flow_mass + 1 - share
 
     def __repr__(self) -> str:
         flow, kernels, floor = (f"{100 * s:.1f}%" for s in self.shares.tolist())
-        return f"MixedDensity({self.space!r}, flow {flow}, kernels {kernels}, uniform {floor})"
+        return f"BlendedDensity({self.space!r}, flow {flow}, kernels {kernels}, uniform {floor})"

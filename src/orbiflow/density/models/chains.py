@@ -8,9 +8,9 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from orbiflow.density.arguments import float_tensor
 from orbiflow.density.models.bases import Base
 from orbiflow.density.models.log_sum import log_sum_exp
-from orbiflow.density.spaces.flat import Torus
 from orbiflow.density.spaces.space import Space
 from orbiflow.errors import OrbiflowError
 
@@ -21,7 +21,7 @@ BLOCK = 256
 """Points at a time: few enough for the cache."""
 
 
-class MixtureBase(Base):
+class VonMisesChains(Base):
     """A mixture of chains of von Mises distributions, exact and normalised on the torus.
 
     In a component, angle i is von Mises about a trigonometric polynomial of the angles before it,
@@ -50,9 +50,17 @@ class MixtureBase(Base):
         order: Tensor | None = None,
     ) -> None:
         super().__init__(space)
-        if not isinstance(space, Torus):
-            raise OrbiflowError(f"a mixture base needs a torus, got the {space.name}")
+        if not space.is_torus:
+            raise OrbiflowError(f"von Mises chains need a torus, got the {space.name}")
         d = space.dim
+        log_weights, means, concentrations = (
+            float_tensor(value, name)
+            for value, name in (
+                (log_weights, "log_weights"),
+                (means, "means"),
+                (concentrations, "concentrations"),
+            )
+        )
         count = concentrations.shape[0] if concentrations.dim() == 2 else 0
         if order is None:
             order = torch.arange(d).repeat(count, 1)
@@ -135,10 +143,10 @@ def waves(angle: Tensor) -> Tensor:
     return torch.cat([torch.ones_like(angle[:, :1]), angle.sin(), angle.cos()], dim=1)
 
 
-def averaged(mixtures: list[MixtureBase]) -> MixtureBase:
+def averaged(mixtures: list[VonMisesChains]) -> VonMisesChains:
     """The mean of the densities, again a mixture."""
     first = mixtures[0]
-    return MixtureBase(
+    return VonMisesChains(
         first.space,
         torch.cat([m.log_weights for m in mixtures]) - math.log(len(mixtures)),
         torch.cat([m.means for m in mixtures]),

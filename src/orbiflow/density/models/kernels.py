@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
+from typing import cast
 
 import numpy as np
 import torch
 from torch import Tensor
 
+from orbiflow.density.arguments import float_tensor
 from orbiflow.density.models.bases import Base
 from orbiflow.density.models.log_sum import log_sum_exp
-from orbiflow.density.spaces.round import ProjectivePlane, Sphere
+from orbiflow.density.spaces.round import RoundSpace
 from orbiflow.density.spaces.space import Space, rectangle
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry.isometry import Array
@@ -40,9 +42,17 @@ class AdaptiveKernels(Base):
         self, space: Space, centers: Tensor, concentrations: Tensor, weights: Tensor
     ) -> None:
         super().__init__(space)
-        width = 1 if is_round(space) else space.dim
+        centers, concentrations, weights = (
+            float_tensor(value, name)
+            for name, value in (
+                ("centers", centers),
+                ("concentrations", concentrations),
+                ("weights", weights),
+            )
+        )
+        width = 1 if space.is_round else space.dim
         shapes = [tuple(t.shape) for t in (centers, concentrations, weights)]
-        count = len(centers)
+        count = len(centers) if centers.dim() else 0
         if shapes != [(count, space.dim), (count, width), (count,)] or not count:
             raise OrbiflowError(f"kernels of shapes {shapes} do not fit a {space.name}")
         if not (
@@ -56,24 +66,20 @@ class AdaptiveKernels(Base):
         self.centers, self.concentrations, self.weights = (
             t.double() for t in (centers, concentrations, weights)
         )
-        self._center_features = features(space, self.centers)[0]
+        self._center_features = space.features(self.centers)[0]
 
     def log_prob(self, points: Tensor) -> Tensor:
         flat = points.reshape(-1, self.space.dim).double()
         rows, offsets = kernel_rows(self.space, self._center_features, self.concentrations)
         rows, offsets = rows.mT.contiguous(), offsets + self.weights.log()
         block = max(1, BLOCK_ENTRIES // len(self.centers))
-        parts = [self._log_sum(part, rows, offsets) for part in flat.split(block)]
-        values = torch.cat(parts) if parts else flat.new_zeros(0)
-        if is_round(self.space):
+        # features of all at once: block by block they would cost more than the kernels
+        images = self.space.features(flat)
+        parts = [_log_sum(part, rows, offsets) for part in images.split(block, dim=1)]
+        values = torch.cat(parts)
+        if self.space.is_round:
             values = values + self.space.log_area(flat)
         return values.reshape(points.shape[:-1]).to(points.dtype)
-
-    def _log_sum(self, points: Tensor, rows: Tensor, offsets: Tensor) -> Tensor:
-        images = [
-            log_sum_exp(torch.addmm(offsets, image, rows)) for image in features(self.space, points)
-        ]
-        return torch.stack(images).logsumexp(dim=0)
 
     def sample(self, count: int, generator: torch.Generator) -> Tensor:
         seed = int(torch.randint(2**31, (), generator=generator))
@@ -81,41 +87,27 @@ class AdaptiveKernels(Base):
         weights = self.weights.numpy()
         chosen = rng.choice(len(weights), count, p=weights / weights.sum())
         kappa = self.concentrations.numpy()[chosen]
-        if is_round(self.space):
-            assert isinstance(self.space, Sphere | ProjectivePlane)
+        if self.space.is_round:
             vectors = _von_mises_fisher(self._center_features.numpy()[chosen], kappa[:, 0], rng)
-            return self.space.vectors_to_chart(vectors)
+            return cast(RoundSpace, self.space).vectors_to_chart(vectors)
         angle = torch.tensor(rng.vonmises(0.0, kappa))
         return self.space.project(
             self.centers[chosen] + angle / (2 * math.pi) * rectangle(self.space)
         )
 
 
-def is_round(space: Space) -> bool:
-    """Whether the space has the round area."""
-    return isinstance(space, Sphere | ProjectivePlane)
-
-
-def features(space: Space, points: Tensor) -> Tensor:
-    """(E, N, m): all that a kernel sees of points (N, d) and their images, its own image first.
-
-    Unit vectors on round spaces, cosines and sines of the lattice's angles on flat ones.
-    """
-    if isinstance(space, Sphere | ProjectivePlane):
-        vectors = torch.tensor(space.vectors(points))
-        ends = [vectors, -vectors] if isinstance(space, ProjectivePlane) else [vectors]
-        return torch.stack(ends)
-    images = space.group.images(points)
-    angles = 2 * math.pi * images / rectangle(space).to(points)
-    return torch.cat([angles.cos(), angles.sin()], dim=-1)
+def _log_sum(images: Tensor, rows: Tensor, offsets: Tensor) -> Tensor:
+    """(N,) of features (E, N, m): over kernels and images."""
+    sums = [log_sum_exp(torch.addmm(offsets, image, rows)) for image in images]
+    return torch.stack(sums).logsumexp(dim=0)
 
 
 def kernel_rows(space: Space, centers: Tensor, kappa: Tensor) -> tuple[Tensor, Tensor]:
-    """Log kernels as linear functions of `features`: rows (N, m) and offsets (N,).
+    """Log kernels as linear functions of the space's `features`: rows (N, m) and offsets (N,).
 
     With respect to the chart's area on flat spaces and to the round area on round ones.
     """
-    if is_round(space):
+    if space.is_round:
         k = kappa[:, 0]
         offsets = (k / (2 * math.pi)).log() - torch.log1p(-torch.exp(-2 * k)) - k
         return kappa * centers, offsets

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
 
 import torch
 from torch import Tensor, nn
@@ -13,7 +12,7 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.flows import Flow
 
 MAX_WIDTH, MAX_DEPTH, MAX_WAVES = 1024, 8, 16
-"""Bounds of `NeuralField`, for settings and for files."""
+"""Bounds of `NeuralTorusField`, for settings and for files."""
 
 MAX_DIM = 64
 """Angles at most, as of `Torus`."""
@@ -23,8 +22,6 @@ CLOCK = 4
 
 REMAINING = 0.02
 """Share of the way left when matching's clock stops; see `way`."""
-
-Slope = Callable[[Tensor, Tensor], tuple[Tensor, ...]]
 
 
 def way(time: Tensor) -> Tensor:
@@ -43,7 +40,7 @@ def speed(time: Tensor) -> Tensor:
     return rate * (1 + REMAINING) * (-rate * time).exp()
 
 
-class NeuralField(nn.Module):
+class NeuralTorusField(nn.Module):
     """A time-dependent vector field V(x, t) on T^d, of period 1 in each coordinate.
 
     A residual multilayer perceptron (SiLU) of cos and sin(2 pi k x_i), k = 1..waves, and of
@@ -62,6 +59,8 @@ class NeuralField(nn.Module):
     Raises:
         OrbiflowError: for a size out of range.
     """
+
+    time_dependent = True
 
     def __init__(
         self,
@@ -148,10 +147,10 @@ def _silu(x: Tensor) -> tuple[Tensor, Tensor]:
 
 
 class NeuralFlow(Flow):
-    """The time-one map of dx/dt = V(x, t), V a `NeuralField`: a diffeomorphism of the torus.
+    """The time-one map of dx/dt = V(x, t), V a `NeuralTorusField`: a diffeomorphism of the torus.
 
-    A `Flow` of a single segment whose field changes with time. Being periodic, it commutes with
-    integer shifts at any number of steps.
+    A `Flow` of a single time-dependent segment. Being periodic, it commutes with integer shifts at any
+    number of steps.
 
     Args:
         field: of the motion.
@@ -161,56 +160,19 @@ class NeuralFlow(Flow):
     Raises:
         OrbiflowError: for `steps` < 1 or an unknown method.
 
-    >>> flow = NeuralFlow(NeuralField(7))
+    >>> flow = NeuralFlow(NeuralTorusField(7))
     >>> points = torch.rand(5, 7, dtype=torch.float64)
     >>> bool(torch.equal(flow(points), points))  # a new field is zero
     True
     """
 
-    def __init__(self, field: NeuralField, *, steps: int = 8, method: str = "rk4") -> None:
-        super().__init__(field, steps=steps, method=method)
+    def __init__(self, field: NeuralTorusField, *, steps: int = 8, method: str = "rk4") -> None:
+        # whoever fits one settles its steps
+        super().__init__(field, steps=steps, method=method, warn=False)
 
     @property
-    def field(self) -> NeuralField:
+    def field(self) -> NeuralTorusField:
         """The vector field."""
         field = self.segments[0]
-        assert isinstance(field, NeuralField)  # by construction
+        assert isinstance(field, NeuralTorusField)  # by construction
         return field
-
-    def forward(self, points: Tensor) -> Tensor:
-        return self._last(self._states((points,), self._plain, 0.0))[0]
-
-    def inverse(self, points: Tensor) -> Tensor:
-        return self._last(self._states((points,), self._plain, 1.0))[0]
-
-    def forward_and_log_det(self, points: Tensor) -> tuple[Tensor, Tensor]:
-        return self._moved(points, 0.0)
-
-    def inverse_and_log_det(self, points: Tensor) -> tuple[Tensor, Tensor]:
-        return self._moved(points, 1.0)
-
-    def trajectories(self, points: Tensor) -> Tensor:
-        states = self._states((points,), self._plain, 0.0)
-        return torch.stack([points, *(state[0] for state in states)])
-
-    def _plain(self, points: Tensor, time: Tensor) -> tuple[Tensor, ...]:
-        return (self.field(points, time),)
-
-    def _moved(self, points: Tensor, begin: float) -> tuple[Tensor, Tensor]:
-        state = (points, points.new_zeros(points.shape[:-1]))
-        moved, log_det, _ = self._last(self._states(state, self.field.with_divergence, begin))
-        return moved, log_det
-
-    def _states(
-        self, state: tuple[Tensor, ...], slope_of: Slope, begin: float
-    ) -> Iterator[tuple[Tensor, ...]]:
-        # time is a part of the state, so that the tables for autonomous equations serve
-        one = state[0].new_ones(())
-        joined = (*state, one * begin)
-
-        def slope(now: tuple[Tensor, ...]) -> tuple[Tensor, ...]:
-            return (*slope_of(now[0], now[-1]), one)
-
-        for _ in range(self.steps):
-            joined = self._method.step(slope, joined, (1.0 - 2.0 * begin) / self.steps)
-            yield joined

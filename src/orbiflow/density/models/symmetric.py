@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import copy
 import math
-from typing import Any, ClassVar
+import numbers
+from typing import Any, ClassVar, Self
 
 import torch
 from torch import Tensor
 from torch.distributions import Distribution, constraints
 
+from orbiflow.density.arguments import check_kind, check_range, float_tensor, points_tensor
 from orbiflow.density.models.bases import Base, UniformBase
-from orbiflow.density.spaces.space import Space
+from orbiflow.density.spaces.space import CHART, Space
 from orbiflow.errors import OrbiflowError
 from orbiflow.flows import Flow
+from orbiflow.threads import one_thread
 
 BLOCK = 65536
 """Points integrated at a time where no gradient is asked for: bounds the memory."""
@@ -38,8 +42,9 @@ class SymmetricDensity(Distribution):
     has_rsample = True
 
     def __init__(self, space: Space, flow: Flow, base: Base | None = None) -> None:
-        self.space, self.flow = space, flow
-        self.base = UniformBase(space) if base is None else base
+        self.space = check_kind(space, Space, "space", "see `make_space`")
+        self.flow = check_kind(flow, Flow, "flow")
+        self.base = UniformBase(space) if base is None else check_kind(base, Base, "base")
         super().__init__(event_shape=torch.Size([space.dim]), validate_args=False)
 
     @property
@@ -47,21 +52,23 @@ class SymmetricDensity(Distribution):
         """All of R^d: every point stands for its orbit."""
         return constraints.independent(constraints.real, 1)
 
-    def log_prob(self, value: Tensor, *, measure: str = "square") -> Tensor:
-        """Log density (...,) at chart points (..., d).
+    @one_thread()
+    def log_prob(self, value: Tensor, *, measure: str = CHART) -> Tensor:
+        """Log density (...,) at chart points (..., d), with respect to `measure`.
+
+        Evaluated in the dtype of the flow, returned in that of the points.
 
         Raises:
-            OrbiflowError: for points of another dimension, or an unknown measure.
+            OrbiflowError: for points of another dimension, points that are not finite, or an unknown
+                measure.
         """
-        if value.shape[-1] != self.space.dim:
-            raise OrbiflowError(
-                f"expected points (..., {self.space.dim}), got {tuple(value.shape)}"
-            )
-        if torch.is_grad_enabled() or value[..., 0].numel() <= BLOCK:
-            return self._log_prob(value, measure)
-        flat = value.reshape(-1, self.space.dim)
+        points = points_tensor(value, self.space.dim)
+        own = points.to(self._like().dtype)
+        if torch.is_grad_enabled() or own[..., 0].numel() <= BLOCK:
+            return self._log_prob(own, measure).to(points.dtype)
+        flat = own.reshape(-1, self.space.dim)
         parts = [self._log_prob(block, measure) for block in flat.split(BLOCK)]
-        return torch.cat(parts).reshape(value.shape[:-1])
+        return torch.cat(parts).reshape(points.shape[:-1]).to(points.dtype)
 
     def _log_prob(self, value: Tensor, measure: str) -> Tensor:
         # flow, base and area are invariant: no need to project
@@ -72,15 +79,22 @@ class SymmetricDensity(Distribution):
     def sample(  # pyright: ignore[reportIncompatibleMethodOverride]
         self, sample_shape: Any = (), generator: torch.Generator | None = None
     ) -> Tensor:
-        """Canonical points (*sample_shape, d), float64; the same generator state, the same points."""
+        """Canonical points (*sample_shape, d) in the flow's dtype, of a shape or a number of points.
+
+        The same generator state, the same points; default torch's own generator.
+
+        Raises:
+            OrbiflowError: for what is no shape.
+        """
         with torch.no_grad():
             return self.rsample(sample_shape, generator)
 
+    @one_thread()
     def rsample(  # pyright: ignore[reportIncompatibleMethodOverride]
         self, sample_shape: Any = (), generator: torch.Generator | None = None
     ) -> Tensor:
         """As `sample`, differentiable in the flow's parameters."""
-        shape = torch.Size(sample_shape)
+        shape = shape_of(sample_shape)
         source = generator or torch.default_generator
         start = self.base.sample(shape.numel(), source).to(self._like())
         if torch.is_grad_enabled():
@@ -89,23 +103,31 @@ class SymmetricDensity(Distribution):
             moved = torch.cat([self.flow(block) for block in start.split(BLOCK)])
         return self.space.project(moved).reshape(*shape, self.space.dim)
 
+    @one_thread()
     def to_base(self, points: Tensor) -> Tensor:
         """Where data points (..., d) come from: canonical points distributed as the base."""
-        return self.space.project(self.flow.inverse(self.space.project(points)))
+        own = points_tensor(points, self.space.dim).to(self._like().dtype)
+        return self.space.project(self.flow.inverse(self.space.project(own)))
 
+    @one_thread()
     def from_base(self, points: Tensor) -> Tensor:
         """Where base points (..., d) are carried, canonical."""
-        return self.space.project(self.flow(points))
+        own = points_tensor(points, self.space.dim).to(self._like().dtype)
+        return self.space.project(self.flow(own))
 
     @torch.no_grad()
     def entropy(
         self,
         count: int = 16384,
         *,
-        measure: str = "natural",
+        measure: str = CHART,
         generator: torch.Generator | None = None,
     ) -> Tensor:
-        """Monte Carlo estimate of -E[log p], in nats, from `count` samples."""
+        """Monte Carlo estimate of -E[log p], in nats, from `count` samples.
+
+        With respect to `measure`, by default that of `log_prob`; "natural" for the entropy in the
+        user's units or per steradian.
+        """
         return -self.log_prob(self.sample((count,), generator), measure=measure).mean()
 
     @torch.no_grad()
@@ -116,6 +138,7 @@ class SymmetricDensity(Distribution):
         points = self.sample((count,), generator)
         return (self.log_prob(points) - other.log_prob(points)).mean()
 
+    @one_thread()
     def mass(self, resolution: int = 64) -> float:
         """The density's integral over the square, by the midpoint rule on resolution^2 points.
 
@@ -141,14 +164,19 @@ class SymmetricDensity(Distribution):
         with torch.no_grad():
             # signed: a map that folds still covers the square once
             area = torch.linalg.det(torch.stack(rows, dim=1))
-            return self.log_prob(end.detach()).exp() * area
+            return self._log_prob(end.detach(), CHART).exp() * area
 
     @torch.no_grad()
     def integration_error(self, points: Tensor) -> float:
         """Largest change of the log density at `points` when the steps are doubled."""
-        coarse = self.log_prob(points)
-        with self.flow.with_steps(2 * self.flow.steps):
-            return float((self.log_prob(points) - coarse).abs().max())
+        finer = self.with_steps(2 * self.flow.steps)
+        return float((finer.log_prob(points) - self.log_prob(points)).abs().max())
+
+    def with_steps(self, steps: int) -> Self:
+        """The same density with its flow integrated in other steps: a view, see `Flow.with_steps`."""
+        view = copy.copy(self)
+        view.flow = self.flow.with_steps(steps)
+        return view
 
     def _like(self) -> Tensor:
         return next(iter(self.flow.parameters()), torch.zeros((), dtype=torch.float64))
@@ -157,12 +185,29 @@ class SymmetricDensity(Distribution):
         return f"SymmetricDensity({self.space!r}, {type(self.base).__name__}, {self.flow})"
 
 
+def shape_of(sample_shape: Any) -> torch.Size:
+    """A number of samples, or the shape in which they are wanted.
+
+    Raises:
+        OrbiflowError: for another thing, or a negative number.
+    """
+    sizes = (int(sample_shape),) if isinstance(sample_shape, numbers.Integral) else sample_shape
+    try:
+        shape = torch.Size(sizes)
+    except TypeError as error:
+        raise OrbiflowError(f"expected a number or shape of samples: {error}") from error
+    if any(size < 0 for size in shape):
+        raise OrbiflowError(f"expected a number or shape of samples, got {tuple(shape)}")
+    return shape
+
+
 def midpoints(space: Space, resolution: int) -> Tensor:
     """Midpoints (resolution^2, 2) of a grid on the canonical square, float64.
 
     Raises:
-        OrbiflowError: if the space has another dimension than two.
+        OrbiflowError: if the space has another dimension than two, or for a resolution below 1.
     """
+    check_range("resolution", resolution, 1, 1e6, integer=True)
     if space.dim != 2:
         raise OrbiflowError(f"a grid needs two dimensions, this {space.name} has {space.dim}")
     t = (torch.arange(resolution, dtype=torch.float64) + 0.5) / resolution
@@ -175,7 +220,15 @@ def kl_by_quadrature(target: Tensor, log_density: Tensor) -> float:
     Args:
         target: p >= 0 (N,), density on the square.
         log_density: log p_hat (N,).
+
+    Raises:
+        OrbiflowError: for other shapes.
     """
+    target, log_density = float_tensor(target, "target"), float_tensor(log_density, "log_density")
+    if target.dim() != 1 or target.shape != log_density.shape:
+        raise OrbiflowError(
+            f"expected two tables (N,), got {tuple(target.shape)} and {tuple(log_density.shape)}"
+        )
     weight = target / target.sum()
     live = weight > 0
     log_target = (weight[live] * len(weight)).log()

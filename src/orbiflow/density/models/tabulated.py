@@ -7,10 +7,12 @@ import math
 import torch
 from torch import Tensor
 
+from orbiflow.density.arguments import check_kind, check_range, points_tensor
 from orbiflow.density.models.symmetric import SymmetricDensity, midpoints
-from orbiflow.density.spaces.space import rectangle
+from orbiflow.density.spaces.space import CHART, rectangle
 from orbiflow.errors import OrbiflowError
 from orbiflow.fields.splines import padded, spline_sum, symbol
+from orbiflow.threads import one_thread
 
 CHECKED = 4096
 """Random points at which the table is compared with the density."""
@@ -37,12 +39,12 @@ class TabulatedDensity:
         OrbiflowError: for another dimension or a resolution out of range.
     """
 
+    @one_thread()
     def __init__(self, density: SymmetricDensity, resolution: int = 512, seed: int = 0) -> None:
-        space = density.space
+        space = check_kind(density, SymmetricDensity, "density").space
         if space.dim != 2:
             raise OrbiflowError(f"a table needs two dimensions, this {space.name} has {space.dim}")
-        if not 8 <= resolution <= 4096:
-            raise OrbiflowError(f"resolution must be from 8 to 4096, got {resolution}")
+        check_range("resolution", resolution, 8, 4096, integer=True)
         self.space, self.resolution = space, resolution
         self._table = padded(self._coefficients(density)[None])
         generator = torch.Generator().manual_seed(seed)
@@ -67,13 +69,16 @@ class TabulatedDensity:
         spectrum = torch.fft.fft2(whole) / (along[:, None] * across[None, :])
         return torch.fft.ifft2(spectrum).real.contiguous()
 
-    @torch.no_grad()
-    def log_prob(self, points: Tensor, *, measure: str = "square") -> Tensor:
+    @one_thread()
+    def log_prob(self, points: Tensor, *, measure: str = CHART) -> Tensor:
         """Log densities (...,) at chart points (..., 2), interpolated; see `error`.
 
+        Differentiable once in the points.
+
         Raises:
-            OrbiflowError: for an unknown measure.
+            OrbiflowError: for points of another shape or that are not finite, or an unknown measure.
         """
+        points = points_tensor(points, 2)
         flat = points.reshape(-1, 2).double()
         cells = flat.mT * self.resolution - 0.5
         parts = [spline_sum(self._table, block)[0] for block in cells.split(BLOCK, dim=1)]

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import torch
 from numpy.typing import ArrayLike
 from torch import Tensor
 
+from orbiflow.density.arguments import check_range
 from orbiflow.density.spaces.space import Space, checked_table
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import CrystallographicGroup, identification_group
@@ -28,7 +29,7 @@ def whole_turn(unit: str) -> float:
     Raises:
         OrbiflowError: for an unknown unit.
     """
-    if unit not in TURN:
+    if not isinstance(unit, str) or unit not in TURN:
         raise OrbiflowError(f"unit must be one of {', '.join(TURN)}, got {unit!r}")
     return TURN[unit]
 
@@ -60,12 +61,16 @@ class Torus(Space):
     name = "torus"
 
     def __init__(self, dim: int = 2, *, unit: str = "radians") -> None:
-        if isinstance(dim, bool) or int(dim) != dim or not 1 <= dim <= MAX_DIM:
-            raise OrbiflowError(f"dim must be an integer from 1 to {MAX_DIM}, got {dim!r}")
+        check_range("dim", dim, 1, MAX_DIM, integer=True)
         self.period = whole_turn(unit)
         self.unit = unit
         self.group = _integer_lattice(int(dim))
         self.columns = tuple(f"angle{k + 1}" for k in range(int(dim)))
+
+    @classmethod
+    def for_data(cls, data: Array, *, unit: str = "radians", seed: int = 0) -> Self:
+        del seed
+        return cls(data.shape[1], unit=unit)
 
     @property
     def volume(self) -> float:
@@ -77,10 +82,11 @@ class Torus(Space):
 
     def from_chart(self, points: Tensor) -> Array:
         """Angles (N, dim) in [-1/2, 1/2) turns."""
-        x = points.detach().double().cpu().numpy()
+        x = self._checked(points).detach().double().cpu().numpy()
         return (x - np.floor(x + 0.5)) * self.period
 
     def project(self, points: Tensor) -> Tensor:
+        points = self._checked(points)
         return points - points.detach().floor()
 
     def displacement(self, start: Tensor, end: Tensor) -> Tensor:
@@ -119,6 +125,11 @@ class KleinBottle(Space):
         self.period = whole_turn(unit)
         self.unit = unit
         self.group = _klein_group()
+
+    @classmethod
+    def for_data(cls, data: Array, *, unit: str = "radians", seed: int = 0) -> Self:
+        del data, seed
+        return cls(unit=unit)
 
     @property
     def volume(self) -> float:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import torch
 from numpy.typing import ArrayLike, NDArray
 from torch import Tensor
 
+from orbiflow.density.arguments import check_kind
 from orbiflow.density.spaces import uniformization
 from orbiflow.density.spaces.space import Space, checked_table
 from orbiflow.errors import OrbiflowError
@@ -72,8 +73,8 @@ def _refuse(wrong: NDArray[np.bool_], message: Any) -> None:
         raise OrbiflowError(f"row {rows[0] + 1}: {message(rows[0])}{more}")
 
 
-class _RoundSpace(Space):
-    """A quotient of the square with the area of the unit sphere.
+class RoundSpace(Space):
+    """A quotient of the square with the area of the unit sphere: `Sphere` and `ProjectivePlane`.
 
     Args:
         form: "latlon" (degrees) or "vector": how `from_chart` writes directions; `to_chart` takes
@@ -84,11 +85,18 @@ class _RoundSpace(Space):
     """
 
     power: int
+    is_round = True
+
+    @classmethod
+    def for_data(cls, data: Array, *, unit: str = "radians", seed: int = 0) -> Self:
+        del unit  # angles of directions are in degrees
+        form = "vector" if data.shape[1] == 3 else "latlon"
+        return cls(form=form, rotation=clear_rotation(cls(form=form), data, seed=seed))
 
     def __init__(self, *, form: str = "latlon", rotation: ArrayLike | None = None) -> None:
-        if form not in FORMS:
+        if not isinstance(form, str) or form not in FORMS:
             raise OrbiflowError(f"form must be one of {', '.join(FORMS)}, got {form!r}")
-        turn = np.eye(3) if rotation is None else np.array(rotation, dtype=np.float64)
+        turn = np.eye(3) if rotation is None else checked_table(rotation, (3,), "rotation")
         if turn.shape != (3, 3) or not np.allclose(turn @ turn.T, np.eye(3), atol=1e-9):
             raise OrbiflowError("rotation must be an orthogonal (3, 3) matrix")
         self.form, self.columns = form, FORMS[form]
@@ -103,10 +111,17 @@ class _RoundSpace(Space):
         turned = np.asarray(vectors) @ self.rotation.T
         return self.project(torch.tensor(uniformization.from_sphere(turned, self.power)))
 
+    def unit_vectors(self, points: Tensor) -> Tensor:
+        """Chart points (..., 2) to unit vectors (..., 3), of an axis one of the two; differentiable."""
+        turned = uniformization.to_sphere(self.project(points), self.power)
+        return turned @ torch.as_tensor(self.rotation).to(turned)
+
     def vectors(self, points: Tensor) -> Array:
-        """Chart points (N, 2) to unit vectors (N, 3); of an axis, one of the two."""
-        turned = uniformization.to_sphere(self.project(points.detach().double().cpu()), self.power)
-        return turned.numpy() @ self.rotation
+        """As `unit_vectors`, float64 for NumPy."""
+        return self.unit_vectors(self._checked(points).detach().double().cpu()).numpy()
+
+    def features(self, points: Tensor) -> Tensor:
+        return self.unit_vectors(points)[None]
 
     def to_chart(self, data: ArrayLike) -> Tensor:
         return self.vectors_to_chart(to_vectors(data))
@@ -141,7 +156,7 @@ class _RoundSpace(Space):
         return angle if self.power == 4 else torch.minimum(angle, math.pi - angle)
 
 
-class Sphere(_RoundSpace):
+class Sphere(RoundSpace):
     """The unit sphere of directions; densities are per steradian.
 
     >>> space = Sphere()
@@ -157,7 +172,7 @@ class Sphere(_RoundSpace):
         return 4 * math.pi
 
 
-class ProjectivePlane(_RoundSpace):
+class ProjectivePlane(RoundSpace):
     """The projective plane of axes, which are directions without a sense; densities per steradian.
 
     Of the two ends of an axis, `from_chart` gives that in the northern hemisphere.
@@ -174,18 +189,23 @@ class ProjectivePlane(_RoundSpace):
     def volume(self) -> float:
         return 2 * math.pi
 
+    def features(self, points: Tensor) -> Tensor:
+        vectors = self.unit_vectors(points)
+        return torch.stack([vectors, -vectors])
+
     def _representatives(self, vectors: Array) -> Array:
         return np.where(vectors[:, 2:] < 0, -1.0, 1.0) * vectors
 
 
 def clear_rotation(
-    space: Sphere | ProjectivePlane, data: ArrayLike, *, trials: int = 400, seed: int = 0
+    space: RoundSpace, data: ArrayLike, *, trials: int = 400, seed: int = 0
 ) -> Array:
     """A rotation (3, 3) for `space` that puts the cone points where the data is thin.
 
     Of `trials` random ones, that of least von Mises-Fisher kernel density (concentration 30) at the
     cone points.
     """
+    check_kind(space, RoundSpace, "space")
     vectors = to_vectors(data)
     rng = np.random.default_rng(seed)
     if len(vectors) > 5000:

@@ -5,20 +5,28 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar, Self
 
 import numpy as np
 import torch
 from numpy.typing import ArrayLike
 from torch import Tensor
 
+from orbiflow.density.arguments import float_tensor
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import CrystallographicGroup, DirichletDomain
 from orbiflow.symmetry.isometry import Array
 
 MEASURES = ("natural", "square", "uniform")
 """Natural: the user's units, or round area in steradians. Square: area of the canonical square.
-Uniform: the uniform distribution, so that a density of 1 is that of no structure at all."""
+Uniform: the uniform distribution, so that a density of 1 is that of no structure at all.
+
+Whatever takes chart points (`log_prob`, `entropy`) is with respect to the square by default, as torch
+wants of a distribution over them; whatever takes data in the user's units (`DensityEstimator`, the
+commands) and whatever people look at (pictures) is in natural measure."""
+
+CHART = "square"
+"""The default of all that takes chart points."""
 
 
 class Space(ABC):
@@ -30,16 +38,34 @@ class Space(ABC):
     - `name`: such as "klein-bottle".
     - `group`: acts on R^d; densities are invariant under it.
     - `columns`: names of the data's columns.
+    - `unit`: of angles, None where the natural measure is in steradians.
+    - `is_round`: whether the natural measure is the area of the unit sphere.
     """
 
     name: str
     group: CrystallographicGroup
     columns: tuple[str, ...]
+    unit: str | None = None
+    is_round: ClassVar[bool] = False
+
+    @classmethod
+    @abstractmethod
+    def for_data(cls, data: Array, *, unit: str = "radians", seed: int = 0) -> Self:
+        """The space that suits data (N, k): of its number of columns, its unit, its best rotation.
+
+        Raises:
+            OrbiflowError: for data or a unit that are not of the space.
+        """
 
     @property
     def dim(self) -> int:
         """Dimension d of the space."""
         return self.group.dim
+
+    @property
+    def is_torus(self) -> bool:
+        """Whether the group is that of the integer translations alone."""
+        return self.group.order == 1 and np.array_equal(self.group.lattice, np.eye(self.dim))
 
     @cached_property
     def domain(self) -> DirichletDomain:
@@ -47,8 +73,18 @@ class Space(ABC):
         return DirichletDomain(self.group, np.full(self.dim, 0.5))
 
     def project(self, points: Tensor) -> Tensor:
-        """Canonical representatives in [0, 1]^d of points (..., d); differentiable almost anywhere."""
-        return self.domain.project(points)
+        """Canonical representatives in [0, 1]^d of points (..., d); differentiable almost anywhere.
+
+        Raises:
+            OrbiflowError: for points of another dimension.
+        """
+        return self.domain.project(self._checked(points))
+
+    def _checked(self, points: Tensor) -> Tensor:
+        points = float_tensor(points, "points")
+        if not points.dim() or points.shape[-1] != self.dim:
+            raise OrbiflowError(f"expected points (..., {self.dim}), got {tuple(points.shape)}")
+        return points
 
     def log_area(self, points: Tensor) -> Tensor:
         """log of natural area over chart area (...,) at points (..., d)."""
@@ -81,7 +117,7 @@ class Space(ABC):
         Raises:
             OrbiflowError: for a measure that is not one of `MEASURES`.
         """
-        if measure not in MEASURES:
+        if not isinstance(measure, str) or measure not in MEASURES:
             raise OrbiflowError(f"measure must be one of {', '.join(MEASURES)}, got {measure!r}")
         if measure == "square":
             return torch.zeros_like(points[..., 0])
@@ -105,13 +141,21 @@ class Space(ABC):
         square = (images**2).sum(dim=-1, keepdim=True) - 2 * dot
         return (square.amin(dim=0).mT + (start**2).sum(dim=-1, keepdim=True)).clamp_min(0.0)
 
+    def features(self, points: Tensor) -> Tensor:
+        """(E, N, m): what kernels see of points (N, d) and of their E images, its own image first.
+
+        Cosines and sines of the lattice's angles; unit vectors on round spaces. Differentiable.
+        """
+        angles = 2 * math.pi * self.group.images(points) / rectangle(self).to(points)
+        return torch.cat([angles.cos(), angles.sin()], dim=-1)
+
     def uniform(self, count: int, generator: torch.Generator) -> Tensor:
         """`count` chart points, uniform in natural measure."""
         return torch.rand(count, self.dim, dtype=torch.float64, generator=generator)
 
     @cached_property
     def _near(self) -> tuple[Array, Array]:
-        # an image of one point is within a diagonal of any other, and both of their cube.s centre
+        # an image of one point is within a diagonal of any other, and both of their cube's centre
         diagonal = math.sqrt(self.dim)
         center = np.full(self.dim, 0.5)
         elements = self.group.elements_near(center, 2 * diagonal, source=center)

@@ -9,97 +9,145 @@ from typing import Any
 import torch
 from safetensors import SafetensorError
 from safetensors.torch import load, save
+from torch import Tensor
 
-from orbiflow.density.estimator import make_space
 from orbiflow.density.models.bases import Base, UniformBase, VonMisesBase
-from orbiflow.density.models.blend import MixedDensity
-from orbiflow.density.models.chains import MixtureBase
+from orbiflow.density.models.blend import BlendedDensity
+from orbiflow.density.models.chains import VonMisesChains
 from orbiflow.density.models.kernels import AdaptiveKernels
 from orbiflow.density.models.neural import NeuralFlow
 from orbiflow.density.models.symmetric import SymmetricDensity
+from orbiflow.density.spaces.catalogue import make_space
 from orbiflow.density.spaces.space import Space
-from orbiflow.density.storage.neural import (
-    mixture_from_header,
-    mixture_header,
-    mixture_tensors,
-    neural_from_header,
-    neural_header,
-    neural_tensors,
-)
+from orbiflow.density.storage.chains import chains_from_header, chains_header, chains_tensors
+from orbiflow.density.storage.groups import check_group, group_header, is_same_group
+from orbiflow.density.storage.neural import neural_from_header, neural_header, neural_tensors
+from orbiflow.density.storage.series import series_from_header, series_parts
 from orbiflow.errors import InputFileError, OrbiflowError
-from orbiflow.fields import FourierField, InvariantField, SplineField
-from orbiflow.flows import Flow
 
-FORMAT = "orbiflow-density/1"
-MAX_BYTES = 256 * 2**20
-MAX_SEGMENTS, MAX_FREQUENCY, MAX_STEPS, MAX_KERNELS = 256, 128, 4096, 1_000_000
-FIELDS: dict[str, type[FourierField | SplineField]] = {
-    "fourier": FourierField,
-    "spline": SplineField,
-}
+FORMAT, FORMAT_1 = "orbiflow-density/2", "orbiflow-density/1"
+"""Written, and read as well: the first had one smoothness for all segments, and no group."""
+
+MAX_BYTES, MAX_HEADER, MAX_KERNELS = 256 * 2**20, 2**20, 1_000_000
 
 
 def density_to_bytes(density: SymmetricDensity, **extra: Any) -> bytes:
-    """A density whose flow has Fourier, spline or neural fields, with `extra` JSON for the reader.
+    """A density as bytes that `read_density` makes the same again, with `extra` JSON for the reader.
+
+    Saved are flows of Fourier, spline and neural fields on the space's own group, uniform, von Mises
+    and chain bases, and kernels. Parameters are written in float64.
 
     Raises:
-        OrbiflowError: for other fields.
+        OrbiflowError: naming the part that cannot be saved, rather than save another density.
     """
-    flow, tensors = _flow_parts(density.flow)
-    base: dict[str, Any] = {"kind": "uniform"}
-    if isinstance(density.base, VonMisesBase):
-        base = {"kind": "von-mises", "concentration": density.base.concentration}
-    elif isinstance(density.base, MixtureBase):
-        base = mixture_header(density.base)
-        tensors |= mixture_tensors(density.base)
+    if type(density) not in (SymmetricDensity, BlendedDensity):
+        raise OrbiflowError(
+            f"the density is a {type(density).__name__}, which a file does not hold: save the "
+            "SymmetricDensity or BlendedDensity that it is made of"
+        )
+    space = _checked_space(density.space)
+    base, tensors = _base_parts(density)
+    flow, more = _flow_parts(density)
+    tensors |= more
+    if isinstance(density, BlendedDensity):
+        tensors |= _kernel_tensors(density)
     header = {
         "format": FORMAT,
-        "space": {"name": density.space.name, **density.space.settings()},
+        "space": {"name": space.name, **space.settings()},
+        "group": group_header(space.group),
         "base": base,
         "flow": flow,
         "extra": extra,
     }
-    if isinstance(density, MixedDensity):
-        kernels = density.kernels
-        tensors |= {
-            "kernel_centers": kernels.centers,
-            "kernel_concentrations": kernels.concentrations,
-            "kernel_weights": kernels.weights,
-            "shares": density.shares,
-        }
-    tensors = {name: tensor.contiguous() for name, tensor in tensors.items()}
-    return save(tensors, metadata={"orbiflow": json.dumps(header, allow_nan=False)})
+    try:
+        text = json.dumps(header, allow_nan=False)
+    except (TypeError, ValueError) as error:
+        raise OrbiflowError(f"what is saved beside a density must be JSON: {error}") from error
+    data = save({name: t.contiguous() for name, t in tensors.items()}, metadata={"orbiflow": text})
+    if int.from_bytes(data[:8], "little") > MAX_HEADER or len(data) > MAX_BYTES:
+        raise OrbiflowError(
+            f"the file would have {len(data) / 2**20:.1f} MB, {len(text) / 2**20:.1f} MB of them "
+            f"header; at most {MAX_BYTES / 2**20:g} and {MAX_HEADER / 2**20:g} are read again"
+        )
+    return data
 
 
-def _flow_parts(flow: Flow) -> tuple[dict[str, Any], dict[str, torch.Tensor]]:
+def _checked_space(space: Space) -> Space:
+    """The space, known to be made again by its name and settings."""
+    try:
+        again = make_space(space.name, **space.settings())
+    except OrbiflowError:
+        again = None
+    if (
+        again is None
+        or type(again) is not type(space)
+        or not is_same_group(again.group, space.group)
+    ):
+        raise OrbiflowError(
+            f"the space is a {type(space).__name__}, which `make_space` does not make: save densities "
+            "on the four spaces as they are"
+        )
+    return space
+
+
+def _check_shared_space(density: SymmetricDensity, part: Base, name: str) -> None:
+    one, other = ((s.name, s.settings()) for s in (density.space, part.space))
+    if one != other:
+        raise OrbiflowError(
+            f"the {name} is on {part.space!r}, the density on {density.space!r}: make both on one"
+        )
+
+
+def _base_parts(density: SymmetricDensity) -> tuple[dict[str, Any], dict[str, Tensor]]:
+    """Header and tensors of a base."""
+    base = density.base
+    _check_shared_space(density, base, "base")
+    if type(base) is UniformBase:
+        return {"kind": "uniform"}, {}
+    if type(base) is VonMisesBase:
+        return {"kind": "von-mises", "concentration": base.concentration}, {}
+    if type(base) is VonMisesChains:
+        return chains_header(base), chains_tensors(base)
+    raise OrbiflowError(
+        f"the base is a {type(base).__name__}: only UniformBase, VonMisesBase and VonMisesChains are "
+        "saved; save its parameters yourself"
+    )
+
+
+def _flow_parts(density: SymmetricDensity) -> tuple[dict[str, Any], dict[str, Tensor]]:
     """Header and tensors of a flow."""
-    if isinstance(flow, NeuralFlow):
+    flow = density.flow
+    if type(flow) is NeuralFlow:
         return neural_header(flow), neural_tensors(flow)
-    fields = list(flow.segments)
-    names = [name for name, kind in FIELDS.items() if all(type(f) is kind for f in fields)]
-    if not names or any(f.parameters_.dim() != 1 for f in fields):  # type: ignore[union-attr]
-        raise OrbiflowError("only flows of Fourier, spline or neural fields are saved")
-    first = fields[0]
-    assert isinstance(first, InvariantField)
-    header = {
-        "kind": names[0],
-        "max_frequency": first.max_frequency,
-        "smoothness": first.smoothness,
-        "steps": flow.steps,
-        "method": flow.method,
-        "duration": flow.duration,
+    return series_parts(flow, density.space)
+
+
+def _kernel_tensors(density: BlendedDensity) -> dict[str, Tensor]:
+    kernels = density.kernels
+    _check_shared_space(density, kernels, "mixture of kernels")
+    if type(kernels) is not AdaptiveKernels or len(kernels.centers) > MAX_KERNELS:
+        raise OrbiflowError(
+            f"the kernels are {len(kernels.centers)} of {type(kernels).__name__}: only "
+            f"AdaptiveKernels are saved, {MAX_KERNELS} at most"
+        )
+    return {
+        "kernel_centers": kernels.centers,
+        "kernel_concentrations": kernels.concentrations,
+        "kernel_weights": kernels.weights,
+        "shares": density.shares,
     }
-    rows = [f.parameters_.detach().double().cpu() for f in fields]  # type: ignore[union-attr]
-    return header, {"parameters": torch.stack(rows)}
 
 
 def read_density(path: str | Path) -> tuple[SymmetricDensity, dict[str, Any]]:
-    """A saved density, float64, and what was saved with it.
+    """A saved density, float64, and what was saved with it; files of version 0.1 as well.
 
     Raises:
         InputFileError: if the file is missing, too large, damaged or of another kind.
     """
-    path = Path(path)
+    try:
+        path = Path(path)
+    except TypeError as error:
+        raise InputFileError(f"expected the path of a file, got {path!r}") from error
     try:
         size = path.stat().st_size
         if size > MAX_BYTES:
@@ -109,12 +157,13 @@ def read_density(path: str | Path) -> tuple[SymmetricDensity, dict[str, Any]]:
         raise InputFileError(f"cannot read {path}: {error.strerror or error}") from error
     try:
         length = int.from_bytes(data[:8], "little")
-        if not 2 <= length <= min(len(data) - 8, 2**20):
+        if not 2 <= length <= min(len(data) - 8, MAX_HEADER):
             raise ValueError("no header")
         header = json.loads(json.loads(data[8 : 8 + length])["__metadata__"]["orbiflow"])
-        if header["format"] != FORMAT:
+        if header["format"] not in (FORMAT, FORMAT_1):
             raise ValueError(f"format {header['format']!r}")
-        return _restored(header, load(data)), header["extra"]
+        with torch.inference_mode(False):  # what is made in it could never be differentiated
+            return _restored(header, load(data)), header["extra"]
     except (
         SafetensorError,
         OrbiflowError,
@@ -128,56 +177,28 @@ def read_density(path: str | Path) -> tuple[SymmetricDensity, dict[str, Any]]:
         ) from error
 
 
-def _restored(header: dict[str, Any], tensors: dict[str, torch.Tensor]) -> SymmetricDensity:
+def _restored(header: dict[str, Any], tensors: dict[str, Tensor]) -> SymmetricDensity:
     options = dict(header["space"])
     space = make_space(str(options.pop("name")), **options)
+    if header["format"] != FORMAT_1:
+        check_group(header["group"], space.group)
     neural = header["flow"]["kind"] == "neural"
-    flow = (
-        neural_from_header(header["flow"], tensors, space)
-        if neural
-        else _tabled_flow(header["flow"], tensors["parameters"], space)
-    )
-    base: Base = UniformBase(space)
-    if header["base"]["kind"] == "von-mises":
-        base = VonMisesBase(space, float(header["base"]["concentration"]))
-    elif header["base"]["kind"] == "mixture":
-        base = mixture_from_header(header["base"], tensors, space)
+    flow = (neural_from_header if neural else series_from_header)(header["flow"], tensors, space)
+    base = _restored_base(header["base"], tensors, space)
     if "shares" not in tensors:
         return SymmetricDensity(space, flow, base)
     parts = [tensors[f"kernel_{name}"] for name in ("centers", "concentrations", "weights")]
     if len(parts[0]) > MAX_KERNELS:
         raise ValueError(f"{len(parts[0])} kernels")
-    return MixedDensity(space, flow, base, AdaptiveKernels(space, *parts), tensors["shares"])
+    return BlendedDensity(space, flow, base, AdaptiveKernels(space, *parts), tensors["shares"])
 
 
-def _tabled_flow(header: dict[str, Any], stack: torch.Tensor, space: Space) -> Flow:
-    """A flow of Fourier or spline fields."""
-    frequency = _bounded(header["max_frequency"], MAX_FREQUENCY, "max_frequency")
-    if space.dim > 3:
-        raise ValueError("a flow of Fourier or spline fields has at most three dimensions")
-    if stack.dim() != 2 or not 1 <= len(stack) <= MAX_SEGMENTS:
-        raise ValueError(f"parameters of shape {tuple(stack.shape)}")
-    if not bool(torch.isfinite(stack).all()):
-        raise ValueError("parameters that are not finite")
-    fields = []
-    for row in stack:
-        field = FIELDS[header["kind"]](
-            space.group, frequency, smoothness=float(header["smoothness"])
-        )
-        if field.parameters_.shape != row.shape:
-            raise ValueError(f"{len(row)} parameters where {field.size} belong")
-        with torch.no_grad():
-            field.parameters_.copy_(row)
-        fields.append(field)
-    return Flow(
-        fields,
-        steps=_bounded(header["steps"], MAX_STEPS, "steps"),
-        method=str(header["method"]),
-        duration=float(header["duration"]),
-    )
-
-
-def _bounded(value: Any, most: int, name: str) -> int:
-    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= most:
-        raise ValueError(f"{name} {value!r}")
-    return value
+def _restored_base(header: dict[str, Any], tensors: dict[str, Tensor], space: Space) -> Base:
+    kind = header["kind"]
+    if kind == "uniform":
+        return UniformBase(space)
+    if kind == "von-mises":
+        return VonMisesBase(space, float(header["concentration"]))
+    if kind == "mixture":
+        return chains_from_header(header, tensors, space)
+    raise ValueError(f"a base of kind {kind!r}")

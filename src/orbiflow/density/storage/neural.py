@@ -1,24 +1,28 @@
-"""Neural flows and mixture bases as JSON headers and tensors, for `orbiflow.density.storage.files`."""
+"""Neural flows as a JSON header and tensors."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Any
 
 import torch
 from torch import Tensor
 
-from orbiflow.density.models.chains import SCALES, MixtureBase
-from orbiflow.density.models.neural import MAX_DEPTH, MAX_WAVES, MAX_WIDTH, NeuralField, NeuralFlow
+from orbiflow.density.models.neural import (
+    MAX_DEPTH,
+    MAX_WAVES,
+    MAX_WIDTH,
+    NeuralFlow,
+    NeuralTorusField,
+)
 from orbiflow.density.spaces.space import Space
+from orbiflow.density.storage.checks import checked_integer, checked_tensor
 from orbiflow.errors import OrbiflowError
 
 MAX_STEPS = 4096
-MAX_COMPONENTS = 65536
 
-FLOW, BASE = "flow.", "base."
-"""Beginnings of the tensors' names."""
+FLOW = "flow."
+"""Beginning of the tensors' names."""
 
 
 def neural_header(flow: NeuralFlow) -> dict[str, Any]:
@@ -54,21 +58,21 @@ def neural_from_header(
     Raises:
         OrbiflowError: for sizes out of range, of another space, or tensors that do not fit.
     """
-    width = _integer(header, "width", MAX_WIDTH)
-    depth = _integer(header, "depth", MAX_DEPTH)
-    waves = _integer(header, "waves", MAX_WAVES)
-    steps = _integer(header, "steps", MAX_STEPS)
-    if _integer(header, "dim", space.dim) != space.dim:
+    width = checked_integer(header, "width", MAX_WIDTH)
+    depth = checked_integer(header, "depth", MAX_DEPTH)
+    waves = checked_integer(header, "waves", MAX_WAVES)
+    steps = checked_integer(header, "steps", MAX_STEPS)
+    if checked_integer(header, "dim", space.dim) != space.dim:
         raise OrbiflowError(f"a flow of {header['dim']} angles on a torus of {space.dim}")
     # on the meta device, shapes cost nothing
     with torch.device("meta"):
-        field = NeuralField(space.dim, width=width, depth=depth, waves=waves)
+        field = NeuralTorusField(space.dim, width=width, depth=depth, waves=waves)
     expected = {FLOW + name: value.shape for name, value in field.state_dict().items()}
     found = {name: value for name, value in tensors.items() if name.startswith(FLOW)}
     if expected.keys() != found.keys():
         raise OrbiflowError(f"a neural flow of depth {depth} has {len(expected)} tensors")
     for name, shape in expected.items():
-        _checked(name, found[name], shape)
+        checked_tensor(name, found[name], shape)
     field.load_state_dict(
         {name.removeprefix(FLOW): value.double() for name, value in found.items()}, assign=True
     )
@@ -78,59 +82,3 @@ def neural_from_header(
     if not isinstance(method, str):
         raise OrbiflowError(f"method {method!r}")
     return NeuralFlow(field, steps=steps, method=method)
-
-
-def mixture_header(base: MixtureBase) -> dict[str, Any]:
-    """What, with the tensors of `mixture_tensors`, makes the base again; ready for JSON."""
-    return {"kind": "mixture", "components": len(base.concentrations), "scales": list(SCALES)}
-
-
-def mixture_tensors(base: MixtureBase) -> dict[str, Tensor]:
-    """Weights, means, concentrations and orders, float64, by names that begin with "base."."""
-    return {
-        BASE + "log_weights": base.log_weights,
-        BASE + "means": base.means,
-        BASE + "concentrations": base.concentrations,
-        BASE + "order": base.order.double(),
-    }
-
-
-def mixture_from_header(
-    header: Mapping[str, Any], tensors: Mapping[str, Tensor], space: Space
-) -> MixtureBase:
-    """The base of `mixture_header` and `mixture_tensors`, bit for bit.
-
-    Raises:
-        OrbiflowError: for tensors that are missing, do not fit or make no distribution.
-    """
-    count, d = _integer(header, "components", MAX_COMPONENTS), space.dim
-    if header.get("scales") != list(SCALES):
-        raise OrbiflowError(f"scales {header.get('scales')!r}, expected {list(SCALES)}")
-    shapes = {
-        "log_weights": (count, len(SCALES)),
-        "means": (count, d, 1 + 2 * d),
-        "concentrations": (count, d),
-        "order": (count, d),
-    }
-    parts = []
-    for name, shape in shapes.items():
-        if BASE + name not in tensors:
-            raise OrbiflowError(f"the tensor {BASE + name} is missing")
-        # a component of no weight has the logarithm -inf
-        parts.append(_checked(BASE + name, tensors[BASE + name], shape, least=-math.inf))
-    return MixtureBase(space, *parts)
-
-
-def _checked(name: str, value: Tensor, shape: tuple[int, ...], *, least: float = -1e30) -> Tensor:
-    if tuple(value.shape) != tuple(shape):
-        raise OrbiflowError(f"{name} has shape {tuple(value.shape)}, expected {tuple(shape)}")
-    if not value.is_floating_point() or not bool(((value >= least) & (value < 1e30)).all()):
-        raise OrbiflowError(f"{name} has values that are not finite numbers")
-    return value
-
-
-def _integer(header: Mapping[str, Any], name: str, most: int) -> int:
-    value = header.get(name)
-    if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= most:
-        raise OrbiflowError(f"{name} must be an integer from 1 to {most}, got {value!r}")
-    return value

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from orbiflow.arguments import path as as_path
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.silhouette.readers.polygon_files import read_dat, read_json
 from orbiflow.silhouette.readers.raster import read_image
@@ -43,7 +44,7 @@ def read_outline(
     that is missing, of no kind that is read, damaged, too large, or without a usable shape, and
     `OrbiflowError` for a setting that cannot be used.
     """
-    path = Path(path)
+    path = as_path(path, "the silhouette's file")
     check_file(path)
     kind = _kind(path, read_head(path, _HEAD_BYTES))
     if kind == "image":

@@ -4,6 +4,7 @@ import re
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
+from numbers import Real
 from pathlib import Path
 from typing import TypeVar
 
@@ -54,7 +55,7 @@ def read_image(
     Raises `InputFileError` for a file over 64 MB, an image over 40 megapixels, one that cannot be
     decoded, and one without a shape of its own; `OrbiflowError` for a threshold out of range.
     """
-    if threshold is not None and not 0 < threshold < 1:
+    if threshold is not None and not (isinstance(threshold, Real) and 0 < threshold < 1):
         raise OrbiflowError(f"threshold must lie between 0 and 1, got {threshold}")
     picture = open_image(path, _decode)
     level, notes = _choose_shape(path, picture, threshold, invert)

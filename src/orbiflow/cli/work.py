@@ -1,0 +1,33 @@
+"""Doing what the options ask for: a job in this process, its events on the terminal."""
+
+from __future__ import annotations
+
+from contextlib import nullcontext
+
+import typer
+
+from orbiflow.cancel import Cancel
+from orbiflow.cli.interrupts import stopped_by_interrupt
+from orbiflow.cli.terminal import Terminal
+from orbiflow.jobs import EscherizeRequest, Request, run
+
+STATUS = {"done": 0, "nothing found": 1, "cancelled": 130}
+
+
+def do(request: Request) -> None:
+    """Run the job.
+
+    Raises:
+        OrbiflowError: for anything that the user can mend.
+        typer.Exit: with status 1 if nothing was found, 130 after Ctrl-C.
+    """
+    import torch  # now, and not while options are read
+
+    torch.set_num_threads(1)  # many small operations; and workers may be forked
+    # only a search has something to keep
+    keeps = isinstance(request, EscherizeRequest)
+    stopping = stopped_by_interrupt() if keeps else nullcontext(Cancel())
+    with stopping as cancel, Terminal() as terminal:
+        finished = run(request, terminal, cancel)
+    if STATUS[finished.state]:
+        raise typer.Exit(STATUS[finished.state])

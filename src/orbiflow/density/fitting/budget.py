@@ -1,0 +1,84 @@
+"""What a fit may spend: evaluations, which end alike on every machine, and time as an outer limit."""
+
+from __future__ import annotations
+
+import math
+import time
+
+clock = time.monotonic
+"""Seconds since some moment; tests put another in its place."""
+
+
+class Spent(Exception):
+    """Raised where the next evaluation would begin; `reason` is "evaluations" or "time"."""
+
+    def __init__(self, reason: str) -> None:
+        super().__init__(reason)
+        self.reason = reason
+
+
+class Budget:
+    """Counts evaluations of an objective, and looks at the clock between them.
+
+    A fit that ends by its evaluations is the same on a busy machine; one that ends by time is not, so
+    it has to say so: `notes`.
+
+    Args:
+        evaluations: at most.
+        seconds: from now, at most.
+
+    >>> budget = Budget(evaluations=1)
+    >>> budget.spend()
+    >>> budget.is_spent
+    True
+    """
+
+    def __init__(self, evaluations: float = math.inf, seconds: float = math.inf) -> None:
+        self.evaluations, self.seconds = evaluations, seconds
+        self.used = 0
+        self._began = clock()
+        self._reason: str | None = None
+
+    @property
+    def is_spent(self) -> bool:
+        """Whether the next evaluation may not begin: ask only before one. Once so, always so."""
+        if self._reason is None:
+            if self.used >= self.evaluations:
+                self._reason = "evaluations"
+            elif self._is_late():
+                self._reason = "time"
+        return self._reason is not None
+
+    @property
+    def is_late(self) -> bool:
+        """Whether a look at the clock has found it spent."""
+        return self._reason == "time"
+
+    @property
+    def seconds_left(self) -> float:
+        """Of the limit on time, at least 0."""
+        if self.seconds == math.inf:
+            return math.inf
+        return max(0.0, self.seconds - (clock() - self._began))
+
+    def spend(self) -> None:
+        """Count an evaluation that is about to begin.
+
+        Raises:
+            Spent: if it must not.
+        """
+        if self.is_spent:
+            raise Spent(str(self._reason))
+        self.used += 1
+
+    def notes(self) -> list[str]:
+        """What the user should know, in words."""
+        if self._reason == "time":
+            return [f"stopped by the limit of {self.seconds:g} s: another run may differ"]
+        if self._reason == "evaluations":
+            return [f"stopped by the budget of {self.evaluations:g} evaluations"]
+        return []
+
+    def _is_late(self) -> bool:
+        # no limit needs no clock
+        return self.seconds < math.inf and clock() - self._began >= self.seconds

@@ -1,0 +1,44 @@
+"""The four spaces by their names."""
+
+from __future__ import annotations
+
+import inspect
+from typing import Any
+
+from orbiflow.density.spaces.flat import KleinBottle, Torus
+from orbiflow.density.spaces.round import ProjectivePlane, Sphere
+from orbiflow.density.spaces.space import Space
+from orbiflow.errors import OrbiflowError
+
+CLASSES: dict[str, type[Space]] = {
+    kind.name: kind for kind in (Torus, Sphere, KleinBottle, ProjectivePlane)
+}
+SPACES = tuple(CLASSES)
+"""Names of the four."""
+
+
+def space_class(name: str) -> type[Space]:
+    """The class of a space, by its name.
+
+    Raises:
+        OrbiflowError: for an unknown name.
+    """
+    if not isinstance(name, str) or name not in CLASSES:
+        raise OrbiflowError(f"unknown space {name!r}; the four are {', '.join(SPACES)}")
+    return CLASSES[name]
+
+
+def make_space(name: str, **options: Any) -> Space:
+    """A space by its name; `options` are those of its class.
+
+    Raises:
+        OrbiflowError: for an unknown name or an option that the space does not have.
+
+    >>> make_space("torus", dim=2, unit="degrees")
+    Torus(dim=2, unit='degrees')
+    """
+    kind = space_class(name)
+    wrong = [key for key in options if key not in inspect.signature(kind).parameters]
+    if wrong:
+        raise OrbiflowError(f"the {name} has no option {', '.join(wrong)}")
+    return kind(**options)

@@ -1,0 +1,142 @@
+"""Flows of Fourier and spline fields as a JSON header and tensors."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any, cast
+
+import torch
+from torch import Tensor
+
+from orbiflow.density.spaces.space import Space
+from orbiflow.density.storage.groups import is_same_group
+from orbiflow.errors import OrbiflowError
+from orbiflow.fields import FourierField, InvariantField, SplineField
+from orbiflow.flows import Flow
+
+MAX_SEGMENTS, MAX_FREQUENCY, MAX_STEPS, MAX_DIM = 256, 128, 4096, 3
+FIELDS: dict[str, type[FourierField | SplineField]] = {
+    "fourier": FourierField,
+    "spline": SplineField,
+}
+KINDS = {kind: name for name, kind in FIELDS.items()}
+
+
+def series_parts(flow: Flow, space: Space) -> tuple[dict[str, Any], dict[str, Tensor]]:
+    """What makes the flow again, float64: a header ready for JSON, and a tensor "flow.k" a segment.
+
+    Raises:
+        OrbiflowError: naming the part of the flow that cannot be saved.
+    """
+    if type(flow) is not Flow:
+        raise OrbiflowError(
+            f"the flow is a {type(flow).__name__}: only flows of Fourier, spline or neural fields "
+            "are saved; save its weights yourself"
+        )
+    if len(flow.segments) > MAX_SEGMENTS or flow.steps > MAX_STEPS or space.dim > MAX_DIM:
+        raise OrbiflowError(
+            f"the flow has {len(flow.segments)} segments of {flow.steps} steps in {space.dim} "
+            f"dimensions; saved are {MAX_SEGMENTS}, {MAX_STEPS} and {MAX_DIM} at most"
+        )
+    segments, tensors = [], {}
+    for number, field in enumerate(flow.segments):
+        segments.append(_segment(number, field, space))
+        parameters = cast(InvariantField, field).parameters_
+        tensors[f"flow.{number}"] = parameters.detach().double().cpu()
+    header = {
+        "kind": "series",
+        "segments": segments,
+        "steps": flow.steps,
+        "method": flow.method,
+        "duration": flow.duration,
+    }
+    return header, tensors
+
+
+def _segment(number: int, field: Any, space: Space) -> dict[str, Any]:
+    name = f"segment {number + 1} of the flow"
+    if type(field) not in KINDS:
+        raise OrbiflowError(
+            f"{name} is a {type(field).__name__}: only flows of Fourier, spline or neural fields are "
+            "saved; save its weights yourself"
+        )
+    if field.parameters_.dim() != 1:
+        raise OrbiflowError(
+            f"{name} is a stack of {len(field.parameters_)} fields: a density has one field a segment"
+        )
+    if not is_same_group(field.group, space.group):
+        raise OrbiflowError(
+            f"{name} has the {field.group!r}, its space the {space.group!r}: parameters depend on "
+            "the basis of the lattice; make the field with the space's own group"
+        )
+    if field.max_frequency > MAX_FREQUENCY or not bool(torch.isfinite(field.parameters_).all()):
+        raise OrbiflowError(
+            f"{name} has the frequency {field.max_frequency}, saved are {MAX_FREQUENCY} at most, or "
+            "parameters that are not finite"
+        )
+    return {
+        "kind": KINDS[type(field)],
+        "max_frequency": field.max_frequency,
+        "smoothness": float(field.smoothness),
+    }
+
+
+def series_from_header(
+    header: Mapping[str, Any], tensors: Mapping[str, Tensor], space: Space
+) -> Flow:
+    """The flow of `series_parts`, or of a file of version 0.1.
+
+    Raises:
+        OrbiflowError, ValueError, KeyError, TypeError: for what does not fit.
+    """
+    if space.dim > MAX_DIM:
+        raise ValueError(f"a flow of Fourier or spline fields has {MAX_DIM} dimensions at most")
+    if header["kind"] != "series":
+        header, tensors = _of_version_1(header, tensors["parameters"])
+    segments = header["segments"]
+    if not isinstance(segments, list) or not 1 <= len(segments) <= MAX_SEGMENTS:
+        raise ValueError("no segments, or too many")
+    return Flow(
+        [_field(part, tensors[f"flow.{k}"], space) for k, part in enumerate(segments)],
+        steps=_bounded(header["steps"], MAX_STEPS, "steps"),
+        method=str(header["method"]),
+        duration=_finite(header["duration"], "duration"),
+        warn=False,  # the fit has settled them and said if it could not
+    )
+
+
+def _of_version_1(
+    header: Mapping[str, Any], stack: Tensor
+) -> tuple[Mapping[str, Any], Mapping[str, Tensor]]:
+    """All segments had one kind, frequency and smoothness, and their parameters one tensor."""
+    if stack.dim() != 2 or not 1 <= len(stack) <= MAX_SEGMENTS:
+        raise ValueError(f"parameters of shape {tuple(stack.shape)}")
+    shared = {name: header[name] for name in ("kind", "max_frequency", "smoothness")}
+    tensors = {f"flow.{k}": row for k, row in enumerate(stack)}
+    return {**header, "segments": [shared] * len(stack)}, tensors
+
+
+def _field(header: Mapping[str, Any], row: Tensor, space: Space) -> InvariantField:
+    frequency = _bounded(header["max_frequency"], MAX_FREQUENCY, "max_frequency")
+    smoothness = _finite(header["smoothness"], "smoothness")
+    if not bool(torch.isfinite(row).all()):
+        raise ValueError("parameters that are not finite")
+    field = FIELDS[header["kind"]](space.group, frequency, smoothness=smoothness)
+    if field.parameters_.shape != row.shape:
+        raise ValueError(f"parameters of shape {tuple(row.shape)} where {field.size} belong")
+    with torch.no_grad():
+        field.parameters_.copy_(row)
+    return field
+
+
+def _finite(value: Any, name: str) -> float:
+    if not math.isfinite(float(value)):
+        raise ValueError(f"{name} {value!r}")
+    return float(value)
+
+
+def _bounded(value: Any, most: int, name: str) -> int:
+    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= most:
+        raise ValueError(f"{name} {value!r}")
+    return value

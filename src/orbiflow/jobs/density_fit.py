@@ -1,0 +1,123 @@
+"""Read, fit, check, write: the job of a `DensityFitRequest`."""
+
+from __future__ import annotations
+
+import json
+import math
+import time
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from orbiflow.cancel import Cancel
+from orbiflow.density import DensityEstimator, density_to_bytes
+from orbiflow.density.fitting.report import FitReport
+from orbiflow.density.tables import Table
+from orbiflow.files import write_atomic
+from orbiflow.folders import ResultFolder
+from orbiflow.jobs.density_data import MODEL, PICTURES, REPORT, read_data
+from orbiflow.jobs.events import Finished, Note, Progress, Written
+from orbiflow.jobs.requests import DensityFitRequest
+from orbiflow.jobs.run import Sink
+from orbiflow.threads import one_thread
+
+WIDTH = {"sphere": None, "projective-plane": None, "klein-bottle": 2, "torus": None}
+
+
+@one_thread()
+def density_fit(request: DensityFitRequest, tell: Sink, cancel: Cancel) -> Finished:
+    """Fit, and write the folder whole.
+
+    Returns:
+        `summary`: `folder`, `rows`, `log_likelihood` and `seconds`, as in report.json.
+
+    Raises:
+        OrbiflowError: for anything that the user can mend.
+        Cancelled: if it was told to stop; nothing is written.
+    """
+    begin = time.perf_counter()
+    table = read_data(request.data, request.columns, WIDTH[request.space], tell)
+    estimator = DensityEstimator(
+        request.space,
+        unit=request.unit,
+        detail=request.detail,
+        segments=request.segments,
+        kernels=request.kernels,
+        seconds=math.inf if request.seconds is None else request.seconds,
+        seed=request.seed,
+    )
+    folder = ResultFolder(request.out, _written_files)
+
+    reached = 0.0
+
+    def progress(share: float, what: str) -> None:
+        nonlocal reached
+        cancel.check()
+        reached = max(reached, share)
+        tell(Progress(reached, what))
+
+    estimator.fit(table.values, progress=progress)
+    document = _document(request, table, estimator, begin)
+    with folder.replaced() as staged:
+        saved = density_to_bytes(estimator.density_, columns=list(table.columns))
+        write_atomic(staged / MODEL, saved)
+        write_atomic(staged / REPORT, json.dumps(document, allow_nan=False, indent=1))
+    for name in (MODEL, REPORT):
+        tell(Written(request.out / name))
+    for note in (*estimator.report_.notes, *_told(request, document, len(table.values))):
+        tell(Note(note))
+    summary = {name: document[name] for name in ("log_likelihood", "seconds")}
+    return Finished("done", {"folder": str(request.out), "rows": len(table.values), **summary})
+
+
+def _written_files(folder: Path) -> set[str]:
+    """What an earlier fit wrote into the folder, and pictures of its model."""
+    try:
+        document = json.loads((folder / REPORT).read_text(encoding="utf-8"))
+        ours = "space" in document and "report" in document
+    except (OSError, ValueError, TypeError, RecursionError):
+        ours = False
+    return {MODEL, REPORT, *PICTURES} if ours else set()
+
+
+def _document(
+    request: DensityFitRequest, table: Table, estimator: DensityEstimator, begin: float
+) -> dict[str, Any]:
+    """Of report.json."""
+    report = estimator.report_
+    return {
+        "space": {"name": estimator.space_.name, **estimator.space_.settings()},
+        "columns": table.columns,
+        "settings": {
+            name: getattr(request, name) for name in ("detail", "segments", "kernels", "seed")
+        },
+        "log_likelihood": {
+            "natural": estimator.score(table.values),
+            "uniform": -math.log(estimator.space_.volume),
+            "square_train": -report.train_nll,
+            "square_validation": -report.validation_nll,
+        },
+        "report": _plain(report),
+        "seconds": time.perf_counter() - begin,
+    }
+
+
+def _told(request: DensityFitRequest, document: dict[str, Any], rows: int) -> tuple[str, str]:
+    """What came of it, in words."""
+    likelihood, mass = document["log_likelihood"], document["report"]["mass"]
+    gain = likelihood["natural"] - likelihood["uniform"]
+    return (
+        f"{rows} rows: mean log density {likelihood['natural']:.4f} nats, {gain:.4f} more than the "
+        f"uniform density; integral {'not checked' if mass is None else f'{mass:.5f}'}",
+        f"written to {request.out} in {document['seconds']:.0f} s",
+    )
+
+
+def _plain(report: FitReport) -> dict[str, Any]:
+    document = asdict(report)
+    for stage in document["stages"]:
+        for name in ("train", "validation"):
+            stage[name] = [round(v, 6) if np.isfinite(v) else None for v in stage[name]]
+    return document

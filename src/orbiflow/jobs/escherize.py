@@ -1,0 +1,178 @@
+"""Read, fit, certify, draw: the job of an `EscherizeRequest`."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from typing import Any
+
+from orbiflow.cancel import Cancel
+from orbiflow.escher import ClassFailure, DescentSettings, OccupancySettings, TileResult, search
+from orbiflow.escher.methods import Settings
+from orbiflow.escher.report import report
+from orbiflow.export.gallery import OVERVIEW, RESULT, write_gallery, written_files
+from orbiflow.files import write_atomic
+from orbiflow.folders import ResultFolder
+from orbiflow.jobs.events import (
+    ClassFailed,
+    Finished,
+    Note,
+    Preview,
+    Progress,
+    State,
+    TileFound,
+    Written,
+)
+from orbiflow.jobs.records import RecordError
+from orbiflow.jobs.requests import EscherizeRequest
+from orbiflow.jobs.run import Sink
+from orbiflow.silhouette import Emphasis, Target
+from orbiflow.tilings import CLASSES, isohedral_class
+
+
+def escherize(request: EscherizeRequest, tell: Sink, cancel: Cancel) -> Finished:
+    """Search, and write the folder whole.
+
+    A run that finishes no class with a tile leaves an earlier run's folder as it is.
+
+    Returns:
+        `summary`: `folder`, whether it was `written`, `seconds` in all, the `tiles` that it holds
+        now (best first), and `failed`.
+
+    Raises:
+        OrbiflowError: for anything that the user can mend.
+    """
+    begin = time.perf_counter()
+    names = _class_names(request.classes)
+    settings = _settings(request)
+    workers = min(request.workers or os.cpu_count() or 1, len(names))
+    target, emphasis = _read(request)
+    folder = ResultFolder(request.out, written_files)
+    for note in (*target.notes, *(emphasis.notes if emphasis else ())):
+        tell(Note(note))
+    results, failures = search.escherize(
+        target,
+        names,
+        settings,
+        emphasis=emphasis,
+        per_class=request.per_class,
+        workers=workers,
+        force=request.force,
+        watch=_Relay(names, tell),
+        cancel=cancel,
+    )
+    document = report(
+        target,
+        results,
+        failures,
+        settings,
+        seconds=time.perf_counter() - begin,
+        workers=workers,
+        emphasis=emphasis,
+    )
+    interrupted = {failure.name for failure in failures if failure.reason == search.INTERRUPTED}
+    # a first look at a class that was interrupted is less than an earlier run's tiles
+    earlier = folder.has_a_run and (request.out / OVERVIEW).is_file()
+    write = not earlier or any(result.name not in interrupted for result in results)
+    if write:
+        _write(folder, document, results, target, workers, tell)
+    state: State = "done" if results else "nothing found"
+    summary = {
+        "folder": str(request.out),
+        "written": write,
+        "seconds": time.perf_counter() - begin,
+        "tiles": [_row(result) for result in results if write],
+        "failed": document["failed"],
+    }
+    return Finished("cancelled" if interrupted or cancel.cancelled else state, summary)
+
+
+class _Relay:
+    """A search's events as a job's."""
+
+    def __init__(self, names: list[str], tell: Sink) -> None:
+        self.shares = dict.fromkeys(names, 0.0)
+        self.tell = tell
+        self.begin = time.perf_counter()
+        tell(Progress(0.0, "fitting"))
+
+    def __call__(self, event: search.Event) -> None:
+        name, outcome = event.name, event.outcome
+        if event.preview is not None:
+            seconds = time.perf_counter() - self.begin
+            self.tell(Preview(name, event.preview.metrics.iou, seconds))
+            return
+        self.shares[name] = event.share
+        share = sum(self.shares.values()) / len(self.shares)
+        loss = event.loss if abs(event.loss) < float("inf") else None  # no NaN in JSON
+        self.tell(Progress(share, "fitting", name, event.share, loss))
+        if isinstance(outcome, ClassFailure):
+            self.tell(ClassFailed(name, outcome.reason))
+        elif outcome is not None:
+            iou, certified = outcome.metrics.iou, outcome.certificate.valid
+            self.tell(TileFound(name, iou, outcome.score, certified))
+
+
+def _class_names(classes: tuple[str, ...] | None) -> list[str]:
+    if classes is None:
+        return list(CLASSES)
+    if not classes:
+        raise RecordError(f"{{classes}} names no class; the nine are {', '.join(CLASSES)}, or all")
+    return list(dict.fromkeys(isohedral_class(name).name for name in classes))
+
+
+def _settings(request: EscherizeRequest) -> Settings:
+    asked: dict[str, Any] = {
+        name: value
+        for name in ("max_frequency", "turns", "iterations")
+        if (value := getattr(request, name)) is not None
+    }
+    if request.method == "occupancy":
+        return OccupancySettings(seed=request.seed, **asked)
+    return DescentSettings.for_effort(request.effort or "normal", seed=request.seed, **asked)
+
+
+def _read(request: EscherizeRequest) -> tuple[Target, Emphasis | None]:
+    target = Target.read(request.image, threshold=request.threshold, invert=request.invert)
+    if request.emphasis is None:
+        return target, None
+    strength = {} if request.strength is None else {"strength": request.strength}
+    return target, Emphasis.read(request.emphasis, target, **strength)
+
+
+def _write(
+    folder: ResultFolder,
+    document: dict[str, Any],
+    results: list[TileResult],
+    target: Target,
+    workers: int,
+    tell: Sink,
+) -> None:
+    """All files. No cancelling here: what was found is to be kept."""
+    with folder.replaced() as staged:
+        if results:
+            tell(Note("drawing"))
+            write_gallery(results, target, staged, workers=workers)
+        write_atomic(staged / RESULT, json.dumps(document, allow_nan=False))
+        written = sorted(path.relative_to(staged) for path in staged.rglob("*") if path.is_file())
+    for path in written:
+        tell(Written(folder.path / path))
+
+
+def _row(result: TileResult) -> dict[str, Any]:
+    return {
+        "class": result.name,
+        "group": result.group_name,
+        "score": result.score,
+        "iou": result.metrics.iou,
+        "dice": result.metrics.dice,
+        "recognised": result.recognisability.score,
+        "certified": result.certificate.valid,
+        "edge_mismatch": _finite(result.certificate.edge_mismatch),
+        "seconds": result.seconds,
+    }
+
+
+def _finite(value: float) -> float | None:
+    return value if abs(value) < float("inf") else None

@@ -1,0 +1,230 @@
+"""What can be asked for: one frozen dataclass a job, checked when it is made.
+
+Importing this takes no time: no numerical library.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from orbiflow.jobs.records import Record, RecordError, kind_of
+
+SCHEMA_VERSION = 1
+MOST_SAMPLES = 100_000_000
+
+SpaceName = Literal["torus", "sphere", "klein-bottle", "projective-plane"]
+Unit = Literal["radians", "degrees", "turns"]
+Measure = Literal["natural", "square", "uniform"]
+
+
+class Request(Record):
+    """Base of all requests."""
+
+    def to_json(self) -> dict[str, Any]:
+        """An object for `json.dumps`, with the version of its layout.
+
+        >>> DensitySampleRequest(model="quakes", out="drawn.csv").to_json()["schema_version"]
+        1
+        """
+        return {"schema_version": SCHEMA_VERSION, **super().to_json()}
+
+
+@dataclass(frozen=True)
+class EscherizeRequest(Request):
+    """Find tiles that look like a silhouette; options as in `orbiflow escherize --help`.
+
+    - `image`: the silhouette. `out`: folder for the results.
+    - `classes`: isohedral classes, None for all nine.
+    - `method`, `effort`, `max_frequency`, `turns`, `iterations`, `seed`: of the fit; None is the
+      method's own default.
+    - `emphasis`, `strength`: mask of what must survive, and how many times more it counts.
+    - `per_class`: tiles of each class at most. `force`: keep tiles that are not certified.
+    - `workers`: processes, None for one a core.
+    - `threshold`, `invert`: how the picture is read, None to find out.
+    """
+
+    KIND = "escherize"
+
+    image: Path
+    out: Path = Path("out")
+    classes: tuple[str, ...] | None = None
+    method: Literal["descent", "occupancy"] = "descent"
+    effort: Literal["fast", "normal", "best"] | None = None
+    emphasis: Path | None = None
+    strength: float | None = None
+    per_class: int = 1
+    max_frequency: int | None = None
+    seed: int = 0
+    turns: int | None = None
+    iterations: int | None = None
+    workers: int | None = None
+    threshold: float | None = None
+    invert: bool | None = None
+    force: bool = False
+
+    def check(self) -> None:
+        at_least_one(self, "per_class")
+        if self.strength is not None and self.emphasis is None:
+            raise RecordError("{strength} needs {emphasis}: the mask that it belongs to")
+        if self.method == "occupancy":
+            for name in ("emphasis", "effort"):
+                if getattr(self, name) is not None:
+                    raise RecordError(f"{{{name}}} belongs to {{method}} descent")
+        else:
+            for name in ("turns", "iterations"):
+                if getattr(self, name) is not None:
+                    raise RecordError(
+                        f"{{{name}}} belongs to {{method}} occupancy; the descent has {{effort}} "
+                        "instead"
+                    )
+        at_least_one(self, "workers")
+        if self.threshold is not None and not 0 <= self.threshold <= 1:
+            raise RecordError(f"{{threshold}} must lie between 0 and 1, got {self.threshold:g}")
+
+
+@dataclass(frozen=True)
+class DensityFitRequest(Request):
+    """Fit a density to a table; see `orbiflow density fit --help`.
+
+    - `data`: the table. `out`: folder for the model and its report.
+    - `columns`: names or numbers, None for what the space takes.
+    - `seconds`: of refinement at most, None for no limit.
+    """
+
+    KIND = "density-fit"
+
+    data: Path
+    space: SpaceName
+    out: Path = Path("density")
+    columns: tuple[str, ...] | None = None
+    unit: Unit = "radians"
+    detail: int = 8
+    segments: int = 6
+    kernels: bool = False
+    seconds: float | None = None
+    seed: int = 0
+
+    def check(self) -> None:
+        _columns_named(self.columns)
+
+
+@dataclass(frozen=True)
+class DensityScoreRequest(Request):
+    """Add log densities to a table; see `orbiflow density score --help`."""
+
+    KIND = "density-score"
+
+    data: Path
+    model: Path
+    out: Path = Path("scores.csv")
+    columns: tuple[str, ...] | None = None
+    measure: Measure = "natural"
+
+    def check(self) -> None:
+        _columns_named(self.columns)
+
+
+@dataclass(frozen=True)
+class DensitySampleRequest(Request):
+    """Draw samples in the units of the data; see `orbiflow density sample --help`."""
+
+    KIND = "density-sample"
+
+    model: Path
+    out: Path = Path("samples.csv")
+    count: int = 1000
+    seed: int = 0
+
+    def check(self) -> None:
+        if not 1 <= self.count <= MOST_SAMPLES:
+            raise RecordError(f"{{count}} must be from 1 to {MOST_SAMPLES}, got {self.count}")
+
+
+@dataclass(frozen=True)
+class DensityPlotRequest(Request):
+    """Draw a density; see `orbiflow density plot --help`.
+
+    - `center`: angles in the middle of a torus' pictures, such as "180,180".
+    """
+
+    KIND = "density-plot"
+
+    model: Path
+    out: Path = Path("plots")
+    data: Path | None = None
+    columns: tuple[str, ...] | None = None
+    coastlines: Path | None = None
+    measure: Measure = "natural"
+    scale: Literal["auto", "linear", "log"] = "auto"
+    center: str | None = None
+    dots: bool = False
+    seed: int = 0
+
+    def check(self) -> None:
+        _columns_named(self.columns)
+
+
+@dataclass(frozen=True)
+class PatchesRequest(Request):
+    """Turn image patches into angles on the Klein bottle; see `orbiflow density patches --help`."""
+
+    KIND = "density-patches"
+
+    data: Path
+    out: Path = Path("angles.csv")
+    columns: tuple[str, ...] | None = None
+    unit: Unit = "radians"
+    farthest: float | None = None
+
+    def check(self) -> None:
+        _columns_named(self.columns)
+        if self.farthest is not None and not self.farthest >= 0:
+            raise RecordError(f"{{farthest}} must be at least 0, got {self.farthest:g}")
+
+
+REQUESTS: dict[str, type[Request]] = {
+    kind.KIND: kind
+    for kind in (
+        EscherizeRequest,
+        DensityFitRequest,
+        DensityScoreRequest,
+        DensitySampleRequest,
+        DensityPlotRequest,
+        PatchesRequest,
+    )
+}
+
+
+def request_from_json(document: object) -> Request:
+    """A request from what its `to_json` gave, or from anybody: every field is checked.
+
+    Raises:
+        RecordError: for another version or kind, and for fields that are unknown, missing, of
+            another type or out of range, by their names.
+
+    >>> document = {"schema_version": 1, "kind": "escherize", "image": "cat.png", "workers": 2}
+    >>> request_from_json(document) == EscherizeRequest(image="cat.png", workers=2)
+    True
+    """
+    kind = kind_of(document, REQUESTS, "request")
+    assert issubclass(kind, Request)
+    assert isinstance(document, dict)
+    version = document.get("schema_version")
+    if version != SCHEMA_VERSION:
+        raise RecordError(f"a request has schema_version {SCHEMA_VERSION}, got {version!r}")
+    own = {name: v for name, v in document.items() if name not in ("kind", "schema_version")}
+    return kind.of_fields(own)
+
+
+def at_least_one(request: Request, name: str) -> None:
+    """Raises a `RecordError` if the field is a number below 1."""
+    value = getattr(request, name)
+    if value is not None and value < 1:
+        raise RecordError(f"{{{name}}} must be at least 1, got {value}")
+
+
+def _columns_named(columns: tuple[str, ...] | None) -> None:
+    if columns == ():
+        raise RecordError("{columns} names no column; give their names or numbers, as in lat,lon")

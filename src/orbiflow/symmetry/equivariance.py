@@ -1,0 +1,140 @@
+"""A check for tests: does a function commute with a crystallographic group?"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterator
+from typing import Literal
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from orbiflow.errors import OrbiflowError
+from orbiflow.symmetry.group import CrystallographicGroup, checked_group
+from orbiflow.symmetry.isometry import Isometry, translation
+
+Kind = Literal["field", "map", "invariant"]
+
+
+class EquivarianceError(AssertionError):
+    """A function that does not commute with a group; the message names the element and the error.
+
+    - `element`: of the group.
+    - `error`: the largest deviation.
+    """
+
+    def __init__(self, message: str, element: Isometry, error: float) -> None:
+        super().__init__(message)
+        self.element, self.error = element, error
+
+
+@torch.no_grad()
+def assert_equivariant(
+    function: Callable[[Tensor], Tensor],
+    group: CrystallographicGroup,
+    *,
+    kind: Kind = "field",
+    points: Tensor | None = None,
+    atol: float = 1e-9,
+    rtol: float = 1e-9,
+    cells: int = 1,
+    seed: int = 0,
+) -> None:
+    """Raise unless `function` commutes with `group` at sampled points, in any dimension.
+
+    For tests of your own fields and maps. Every coset representative g is tried, moved by up to
+    `cells` cells along each lattice vector, against what the kind asks for:
+
+    - "field": V(g p) = R_g V(p), vectors are pushed forward by the linear part (paper, section 3);
+    - "map": D(g p) = g D(p), such as a flow;
+    - "invariant": f(g p) = f(p), such as a log-density.
+
+    Args:
+        function: of points (N, d).
+        group: of R^d.
+        kind: "field", "map" or "invariant".
+        points: (N, d); default 32 random ones of float64 in a cell.
+        atol, rtol: deviations up to atol + rtol times the largest value are let pass.
+        cells: how far to go.
+        seed: of the default points and of the translations.
+
+    Raises:
+        EquivarianceError: an AssertionError that names the worst coset, the error and the point.
+        OrbiflowError: for an unknown kind, or values of another shape than asked for.
+
+    >>> from orbiflow.symmetry import wallpaper_group
+    >>> p4 = wallpaper_group("p4")
+    >>> assert_equivariant(lambda p: p, p4, kind="map")
+    >>> assert_equivariant(lambda p: torch.ones_like(p), p4)  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+        ...
+    orbiflow.symmetry.equivariance.EquivarianceError: V(g p) = R_g V(p) fails for ...
+    """
+    group = checked_group(group)
+    if kind not in ("field", "map", "invariant"):
+        raise OrbiflowError(f"kind must be 'field', 'map' or 'invariant', got {kind!r}")
+    if points is None:
+        source = torch.Generator().manual_seed(seed)
+        unit = torch.rand(32, group.dim, dtype=torch.float64, generator=source)
+        points = unit @ torch.tensor(np.array(group.lattice)).mT
+    values = _values(function, points, kind)
+    worst: tuple[float, int, Isometry, Tensor] | None = None
+    for number, element in _elements(group, cells, seed):
+        expected = {"field": element.push, "map": element, "invariant": _same}[kind](values)
+        error = (_values(function, element(points), kind) - expected).abs()
+        largest = float(error.max())
+        # NaN compares as false
+        if worst is None or not largest <= worst[0]:
+            at = points[int(error.reshape(len(points), -1).amax(dim=1).argmax())]
+            worst = (largest, number, element, at)
+    allowed = atol + rtol * float(values.abs().max())
+    if worst is not None and not worst[0] <= allowed:
+        raise _failure(kind, group, worst, allowed)
+
+
+def _failure(
+    kind: Kind,
+    group: CrystallographicGroup,
+    worst: tuple[float, int, Isometry, Tensor],
+    allowed: float,
+) -> EquivarianceError:
+    error, number, element, at = worst
+    law = {"field": "V(g p) = R_g V(p)", "map": "D(g p) = g D(p)", "invariant": "f(g p) = f(p)"}
+    return EquivarianceError(
+        f"{law[kind]} fails for {group!r}, worst in coset {number} of {group.order}, g = "
+        f"{element!r}: off by {error:.1e} at p = {at.tolist()}, {allowed:.1e} allowed",
+        element,
+        error,
+    )
+
+
+def _elements(
+    group: CrystallographicGroup, cells: int, seed: int
+) -> Iterator[tuple[int, Isometry]]:
+    """Each coset's number from 1 with: its representative, and some of it in other cells."""
+    d = group.dim
+    steps = [np.array(s) for s in itertools.product((-cells, 0, cells), repeat=d) if any(s)]
+    if len(steps) > 8:  # dimensions above two: a sample
+        chosen = np.random.default_rng(seed).choice(len(steps), 8, replace=False)
+        steps = [steps[i] for i in chosen]
+    for number, coset in enumerate(group.cosets, start=1):
+        yield number, coset
+        for step in steps:
+            yield number, translation(group.lattice @ step.astype(np.float64)) @ coset
+
+
+def _values(function: Callable[[Tensor], Tensor], points: Tensor, kind: Kind) -> Tensor:
+    values = function(points)
+    wanted = points.shape if kind != "invariant" else values.shape
+    if values.shape != wanted or values.shape[:1] != points.shape[:1]:
+        raise OrbiflowError(
+            f"a {kind} at points of shape {tuple(points.shape)} must give values of that shape "
+            f"({'of length N for' if kind == 'invariant' else 'expected for'} every point), got "
+            f"{tuple(values.shape)}"
+        )
+    return values
+
+
+def _same(values: Tensor) -> Tensor:
+    return values

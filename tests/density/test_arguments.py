@@ -1,0 +1,186 @@
+"""Wrong arguments of public functions: our messages, or it simply works."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+
+from orbiflow.density import (
+    AdaptiveKernels,
+    BlendedDensity,
+    DensityEstimator,
+    FitSettings,
+    NeuralSettings,
+    Sphere,
+    SymmetricDensity,
+    TabulatedDensity,
+    Torus,
+    UniformBase,
+    VonMisesBase,
+    VonMisesChains,
+    blend_kernels,
+    clear_rotation,
+    density_to_bytes,
+    fit_density,
+    fit_neural,
+    kl_by_quadrature,
+    make_space,
+    midpoints,
+    read_density,
+)
+from orbiflow.errors import OrbiflowError
+from orbiflow.fields import SplineField
+from orbiflow.flows import Flow
+
+SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")
+torus, sphere = Torus(2), Sphere()
+
+
+def a_density(space: Any = torus, dtype: torch.dtype = torch.float64) -> SymmetricDensity:
+    field = SplineField(space.group, 2, dtype=dtype)
+    with torch.no_grad():
+        field.parameters_.normal_(std=0.02)
+    return SymmetricDensity(space, Flow([field], steps=2, warn=False))
+
+
+POINTS = torch.rand(30, 2, dtype=torch.float64)
+HALVES = torch.full((4,), 0.25)
+QUICK: Any = {"detail": 1, "segments": 1, "iterations": 1}
+
+WRONG: dict[str, tuple[Callable[[], Any], str]] = {
+    "a name for a space": (
+        lambda: SymmetricDensity("torus", Flow(lambda x: x)),  # type: ignore[arg-type]
+        "space must be of the class Space, got 'torus': see `make_space`",
+    ),
+    "no flow": (lambda: SymmetricDensity(torus, None), "flow must be of the class Flow"),  # type: ignore[arg-type]
+    "no base": (
+        lambda: SymmetricDensity(torus, Flow(lambda x: x), "uniform"),  # type: ignore[arg-type]
+        "base must be of the class Base",
+    ),
+    "three columns": (lambda: a_density().log_prob(torch.rand(5, 3)), r"got \(5, 3\)"),
+    "a number": (lambda: a_density().log_prob(torch.tensor(0.5)), r"got \(\)"),
+    "text": (lambda: a_density().log_prob("points"), "points: expected real numbers"),  # type: ignore[arg-type]
+    "complex": (
+        lambda: a_density().log_prob(torch.rand(2, 2, dtype=torch.complex64)),
+        "points: expected real numbers",
+    ),
+    "nan": (lambda: a_density().log_prob(torch.full((2, 2), torch.nan)), "points must be finite"),
+    "to_base": (lambda: a_density().to_base(torch.rand(5)), r"got \(5,\)"),
+    "from_base": (lambda: a_density().from_base(torch.rand(5, 4)), r"got \(5, 4\)"),
+    "measure": (lambda: a_density().log_prob(POINTS, measure=3), "measure must be one of"),  # type: ignore[arg-type]
+    "sample text": (lambda: a_density().sample("five"), "a number or shape of samples"),
+    "sample less": (lambda: a_density().sample(-1), "a number or shape of samples"),
+    "midpoints": (lambda: midpoints(torus, 2.5), "resolution must be an integer"),  # type: ignore[arg-type]
+    "kl": (lambda: kl_by_quadrature(torch.ones(3), torch.ones(4)), r"\(3,\) and \(4,\)"),
+    "a table of nothing": (lambda: TabulatedDensity("x"), "class SymmetricDensity"),  # type: ignore[arg-type]
+    "a table's size": (lambda: TabulatedDensity(a_density(), 64.5), "resolution must be"),  # type: ignore[arg-type]
+    "a base's space": (lambda: UniformBase("sphere"), "space must be of the class Space"),  # type: ignore[arg-type]
+    "concentration": (lambda: VonMisesBase(torus, "1"), "concentration must be positive"),  # type: ignore[arg-type]
+    "kernels": (
+        lambda: AdaptiveKernels(torus, "a", torch.ones(1), torch.ones(1)),  # type: ignore[arg-type]
+        "centers: expected real numbers",
+    ),
+    "kernels' shapes": (
+        lambda: AdaptiveKernels(torus, torch.tensor(1.0), torch.ones(1), torch.ones(1)),
+        "do not fit",
+    ),
+    "chains": (
+        lambda: VonMisesChains(sphere, HALVES, HALVES, HALVES),
+        "von Mises chains need a torus",
+    ),
+    "chains' shapes": (
+        lambda: VonMisesChains(torus, [0.0], HALVES, HALVES),  # type: ignore[arg-type]
+        "log_weights has shape",
+    ),
+    "a blend of nothing": (
+        lambda: BlendedDensity(torus, a_density().flow, None, None, torch.ones(3) / 3),  # type: ignore[arg-type]
+        "kernels must be of the class AdaptiveKernels",
+    ),
+    "blend_kernels": (
+        lambda: blend_kernels("density", POINTS, POINTS),  # type: ignore[arg-type]
+        "density must be of the class SymmetricDensity",
+    ),
+    "blend_kernels' points": (
+        lambda: blend_kernels(a_density(), POINTS, POINTS[:, :1]),
+        r"expected held points \(N, 2\), got \(30, 1\)",
+    ),
+    "fit: a name": (lambda: fit_density("torus", POINTS), "space must be of the class Space"),  # type: ignore[arg-type]
+    "fit: columns": (lambda: fit_density(sphere, torch.rand(30, 3)), r"\(N, 2\), got \(30, 3\)"),
+    "fit: one row": (lambda: fit_density(sphere, torch.rand(2)), r"\(N, 2\), got \(2,\)"),
+    "fit: nan": (lambda: fit_density(sphere, POINTS / 0 * 0), "points must be finite"),
+    "fit: settings": (
+        lambda: fit_density(sphere, POINTS, {"detail": 2}),  # type: ignore[arg-type]
+        "settings must be of the class FitSettings",
+    ),
+    "fit: other settings": (
+        lambda: fit_density(sphere, POINTS, NeuralSettings()),  # type: ignore[arg-type]
+        "settings must be of the class FitSettings",
+    ),
+    "fit: four angles": (lambda: fit_density(Torus(4), torch.rand(30, 4)), "call `fit_neural`"),
+    "neural: a name": (lambda: fit_neural("torus", POINTS), "space must be of the class Space"),  # type: ignore[arg-type]
+    "neural: columns": (lambda: fit_neural(torus, torch.rand(30, 3)), r"\(N, 2\), got \(30, 3\)"),
+    "detail": (lambda: FitSettings(detail=2.5), "detail must be an integer from 1 to 64"),  # type: ignore[arg-type]
+    "detail text": (lambda: FitSettings(detail="8"), "detail must be an integer"),  # type: ignore[arg-type]
+    "seed": (lambda: FitSettings(seed=None), "seed must be an integer"),  # type: ignore[arg-type]
+    "roughness": (lambda: FitSettings(roughness=1e-3), "roughness needs weights"),  # type: ignore[arg-type]
+    "weights": (lambda: FitSettings(roughness=("a",)), "each weight of roughness"),  # type: ignore[arg-type]
+    "validation": (lambda: FitSettings(validation="a"), "validation must be between"),  # type: ignore[arg-type]
+    "base": (lambda: FitSettings(base=["uniform"]), "base must be"),  # type: ignore[arg-type]
+    "width": (lambda: NeuralSettings(width=3.5), "width must be an integer"),  # type: ignore[arg-type]
+    "dim": (lambda: Torus("2"), "dim must be an integer from 1 to 64"),  # type: ignore[arg-type]
+    "unit": (lambda: Torus(2, unit=None), "unit must be one of"),  # type: ignore[arg-type]
+    "form": (lambda: Sphere(form=["latlon"]), "form must be one of"),  # type: ignore[arg-type]
+    "rotation": (lambda: Sphere(rotation="none"), "rotation: expected numbers"),
+    "clear_rotation": (lambda: clear_rotation(torus, [[0.0, 0.0]]), "class RoundSpace"),  # type: ignore[arg-type]
+    "make_space": (lambda: make_space(torus), "unknown space"),  # type: ignore[arg-type]
+    "from_chart": (lambda: torus.from_chart(torch.rand(3, 3)), r"got \(3, 3\)"),
+    "from_chart, round": (lambda: sphere.from_chart(torch.rand(3, 1)), r"got \(3, 1\)"),
+    "project": (lambda: sphere.project(torch.rand(3, 5)), r"got \(3, 5\)"),
+    "to bytes": (lambda: density_to_bytes("density"), "the density is a str"),  # type: ignore[arg-type]
+    "read": (lambda: read_density(3), "expected the path of a file"),  # type: ignore[arg-type]
+    "estimator": (lambda: DensityEstimator(3).fit(POINTS), "unknown space 3"),  # type: ignore[arg-type]
+    "estimator's data": (lambda: DensityEstimator().fit(["a"]), "shape"),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_our_messages(case: str) -> None:
+    call, message = WRONG[case]
+    with pytest.raises(OrbiflowError, match=message):
+        call()
+
+
+@pytest.mark.parametrize("name", SPACES)
+@pytest.mark.parametrize("flow_dtype", [torch.float32, torch.float64])
+def test_dtypes_mix(name: str, flow_dtype: torch.dtype) -> None:
+    space = make_space(name)
+    density = a_density(space, flow_dtype)
+    exact = density.log_prob(POINTS).detach()
+    assert exact.dtype == torch.float64
+    single = density.log_prob(POINTS.float()).detach()
+    assert single.dtype == torch.float32
+    assert torch.allclose(single.double(), exact, atol=2e-3)
+    listed = density.log_prob(POINTS.tolist())  # type: ignore[arg-type]
+    assert torch.equal(listed.detach(), exact)
+    assert torch.equal(density.log_prob(POINTS.numpy()).detach(), exact)  # type: ignore[arg-type]
+    whole = torch.tensor([[1, 2], [3, 4]])
+    if not space.is_round:  # whole numbers are cone points there
+        assert torch.equal(density.log_prob(whole), density.log_prob(whole.double()))
+
+
+def test_arrays_of_every_kind_are_fitted() -> None:
+    for points in (POINTS.numpy(), POINTS.tolist(), POINTS.float()):
+        density, _ = fit_density(torus, points, FitSettings(**QUICK))  # type: ignore[arg-type]
+        assert density.sample(3).shape == (3, 2)
+    whole = np.random.default_rng(0).integers(-90, 90, (30, 2))
+    assert DensityEstimator("sphere", **QUICK).fit(whole).sample(2).shape == (2, 2)
+
+
+def test_a_number_of_samples_is_a_shape() -> None:
+    density = a_density()
+    generators = [torch.Generator().manual_seed(0) for _ in range(2)]
+    assert torch.equal(
+        density.sample(5, generators[0]), density.sample(torch.Size([5]), generators[1])
+    )

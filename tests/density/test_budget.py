@@ -1,0 +1,154 @@
+"""What a fit may spend: evaluations decide, the clock only ends, and the integral is 1 in any case."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import given
+from hypothesis import strategies as st
+
+from orbiflow.density import (
+    FitSettings,
+    NeuralSettings,
+    SymmetricDensity,
+    Torus,
+    fit_density,
+    fit_neural,
+    make_space,
+)
+from orbiflow.density.fitting.budget import Budget, Spent
+from orbiflow.density.fitting.likelihood import EVERY, refine
+from orbiflow.fields import SplineField
+from orbiflow.flows import Flow
+
+SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")
+SMALL: dict[str, Any] = {"detail": 2, "segments": 2}
+
+
+class Clock:
+    """Stands still for so many looks, then leaps ahead."""
+
+    def __init__(self, looks: float) -> None:
+        self.looks, self.asked = looks, 0
+
+    def __call__(self) -> float:
+        self.asked += 1
+        return 0.0 if self.asked <= self.looks else 1e9
+
+
+@pytest.fixture(name="striking_after")
+def striking_after_fixture(monkeypatch):
+    """A clock in place of the real one."""
+
+    def put(looks: float) -> Clock:
+        clock = Clock(looks)
+        monkeypatch.setattr("orbiflow.density.fitting.budget.clock", clock)
+        return clock
+
+    return put
+
+
+def cluster(name: str, count: int = 200) -> torch.Tensor:
+    """Chart points about (20, 60) degrees."""
+    rng = np.random.default_rng(0)
+    unit = {"unit": "degrees"} if name in ("torus", "klein-bottle") else {}
+    table = rng.normal([20.0, 60.0], 15.0, (count, 2)).clip(-89, 89)
+    return make_space(name, **unit).to_chart(table)
+
+
+@given(st.integers(0, 20), st.integers(0, 20))
+def test_a_budget_counts(limit: int, wanted: int) -> None:
+    budget = Budget(evaluations=limit)
+    for _ in range(min(limit, wanted)):
+        budget.spend()
+    assert budget.used == min(limit, wanted)
+    assert budget.notes() == []
+    if wanted > limit:
+        with pytest.raises(Spent, match="evaluations"):
+            budget.spend()
+        assert budget.used == limit
+        assert budget.notes() == [f"stopped by the budget of {limit} evaluations"]
+
+
+def test_without_a_limit_no_clock_is_asked(striking_after) -> None:
+    clock = striking_after(math.inf)
+    fit_density(make_space("torus"), cluster("torus"), FitSettings(**SMALL, iterations=3))
+    assert clock.asked <= 5  # when budgets begin
+
+
+@pytest.mark.parametrize("looks", [1, 20, 100])
+@pytest.mark.parametrize("name", SPACES)
+def test_the_integral_does_not_depend_on_the_clock(name: str, looks: int, striking_after) -> None:
+    clock = striking_after(looks)
+    settings = FitSettings(**SMALL, seconds=1.0)
+    density, report = fit_density(make_space(name), cluster(name), settings)
+    assert report.mass == pytest.approx(1.0, abs=5e-4)
+    assert density.mass(96) == pytest.approx(1.0, abs=1e-3)
+    assert report.integration_error < 5e-4
+    struck = clock.asked > looks
+    assert report.notes == ("stopped by the limit of 1 s: another run may differ",) * struck
+
+
+@pytest.mark.parametrize("name", ["torus", "sphere"])
+def test_the_same_evaluations_give_the_same_density(name: str, striking_after) -> None:
+    space, points, values = make_space(name), cluster(name), []
+    for _ in range(2):
+        clock = striking_after(10**6)  # never, however many looks
+        settings = FitSettings(**SMALL, evaluations=25, seconds=1e6)
+        density, report = fit_density(space, points, settings)
+        assert clock.asked > 20
+        assert report.notes == ("stopped by the budget of 25 evaluations",)
+        with torch.no_grad():
+            values.append(density.log_prob(points))
+    assert torch.equal(*values)
+
+
+def test_the_default_budget_leaves_the_defaults_alone() -> None:
+    settings, points = FitSettings(**SMALL), cluster("sphere")
+    few, many = (
+        fit_density(make_space("sphere"), points, FitSettings(**SMALL, evaluations=count))
+        for count in (settings.evaluations, 10**9)
+    )
+    assert few[1].validation_nll == many[1].validation_nll
+    assert few[1].notes == ()
+
+
+@pytest.mark.parametrize("iterations", [1, 2, 4, 5])
+def test_every_last_iterate_is_scored(iterations: int) -> None:
+    points = cluster("torus").float()
+    space = make_space("torus")
+    fields = [SplineField(space.group, 2, smoothness=2.0, dtype=torch.float32)]
+    density = SymmetricDensity(space, Flow(fields, steps=2, warn=False))
+    before = fields[0].parameters_.detach().clone()
+    done = refine(density, points, points, iterations=iterations)
+    assert len(done.validation) == 1 + math.ceil(iterations / EVERY)
+    # train and validation are the same points: every iterate is better than the one before
+    assert done.best == len(done.validation) - 1
+    assert done.validation[-1] < done.validation[0] - 0.05
+    assert not torch.equal(fields[0].parameters_, before)
+
+
+def test_no_iteration_changes_nothing() -> None:
+    space = make_space("torus")
+    density = SymmetricDensity(space, Flow([SplineField(space.group, 2)]))
+    done = refine(density, cluster("torus"), cluster("torus"), iterations=0)
+    assert (done.best, len(done.validation)) == (0, 1)
+    assert not bool(next(iter(density.flow.parameters())).any())
+
+
+@pytest.mark.parametrize("looks", [1, 3, 10, 25, 40])
+def test_a_neural_fit_says_when_the_limit_struck(looks: int, striking_after) -> None:
+    clock = striking_after(looks)
+    angles = np.random.default_rng(0).vonmises([0, 1, 2, 3], 5.0, (100, 4))
+    space = Torus(4)
+    options = NeuralSettings(components=2, members=2, width=8, depth=1, seconds=2.0)
+    density, report = fit_neural(space, space.to_chart(angles), options)
+    said = "stopped by the limit of 2 s: another run may differ" in report.notes
+    assert said == (clock.asked > looks)
+    assert report.integration_error < 1e-3
+    if looks < 10:  # no iteration of the flow
+        at = space.to_chart(angles[:5])
+        assert torch.equal(density.flow(at), at)
+        assert any("left at the identity" in note for note in report.notes)

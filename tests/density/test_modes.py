@@ -1,0 +1,122 @@
+"""Whatever torch's settings are: one thread inside, the caller's afterwards, and usable results."""
+
+import contextlib
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+
+from orbiflow.density import (
+    DensityEstimator,
+    FitSettings,
+    SymmetricDensity,
+    TabulatedDensity,
+    UniformBase,
+    density_to_bytes,
+    fit_density,
+    make_space,
+    read_density,
+)
+from orbiflow.fields import SplineField
+from orbiflow.flows import Flow
+
+SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")
+DATA = np.random.default_rng(0).normal([20.0, 40.0], 10.0, (60, 2))
+QUICK: dict[str, Any] = {"detail": 1, "segments": 1, "iterations": 3}
+
+
+@pytest.fixture(name="three_threads")
+def three_threads_fixture():
+    before = torch.get_num_threads()
+    torch.set_num_threads(3)
+    yield
+    torch.set_num_threads(before)
+
+
+class Watched(UniformBase):
+    """Notes how many threads it is evaluated on."""
+
+    def __init__(self, space) -> None:
+        super().__init__(space)
+        self.seen: set[int] = set()
+
+    def log_prob(self, points):
+        self.seen.add(torch.get_num_threads())
+        return super().log_prob(points)
+
+    def sample(self, count, generator):
+        self.seen.add(torch.get_num_threads())
+        return super().sample(count, generator)
+
+
+@pytest.mark.usefixtures("three_threads")
+def test_densities_work_on_one_thread_and_give_the_others_back() -> None:
+    space = make_space("torus")
+    base = Watched(space)
+    density = SymmetricDensity(space, Flow([SplineField(space.group, 1)]), base)
+    points = torch.rand(5, 2, dtype=torch.float64)
+    density.log_prob(points)
+    density.sample((3,))
+    density.mass(8)
+    density.entropy(10)
+    TabulatedDensity(density, 16).log_prob(points)
+    assert base.seen == {1}
+    assert torch.get_num_threads() == 3
+
+
+@pytest.mark.usefixtures("three_threads")
+def test_fits_work_on_one_thread_and_give_the_others_back() -> None:
+    seen: set[int] = set()
+    estimator = DensityEstimator("sphere", **QUICK)
+    estimator.fit(DATA, progress=lambda *_: seen.add(torch.get_num_threads()))
+    assert seen == {1}
+    estimator.score(DATA)
+    estimator.sample(3)
+    assert torch.get_num_threads() == 3
+
+
+MODES = {
+    "plain": contextlib.nullcontext,
+    "no_grad": torch.no_grad,
+    "inference": torch.inference_mode,
+}
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("name", SPACES)
+def test_fits_do_not_depend_on_the_callers_mode(name: str, mode: str) -> None:
+    estimator = DensityEstimator(name, kernels=True, **QUICK)
+    with MODES[mode]():
+        estimator.fit(DATA)
+    plain = DensityEstimator(name, kernels=True, **QUICK).fit(DATA)
+    assert estimator.score(DATA) == plain.score(DATA)
+    points = torch.rand(4, 2, dtype=torch.float64, requires_grad=True)
+    value = estimator.density_.log_prob(points).sum()
+    wanted = (points, *estimator.density_.flow.parameters())
+    assert all(bool(g.isfinite().all()) for g in torch.autograd.grad(value, wanted))
+
+
+@pytest.mark.parametrize("name", SPACES)
+def test_no_cache_is_poisoned_when_it_is_first_filled_under_inference(name: str, tmp_path) -> None:
+    path = tmp_path / "density.safetensors"
+    path.write_bytes(density_to_bytes(DensityEstimator(name, **QUICK).fit(DATA).density_))
+    with torch.inference_mode():  # everything is made and evaluated here first
+        density, _ = read_density(path)
+        space = make_space(name)
+        own = SymmetricDensity(space, Flow([SplineField(space.group, 3, smoothness=0.7)]))
+        at = torch.rand(3, 2, dtype=torch.float64)
+        for each in (density, own):
+            each.log_prob(at, measure="natural")
+            each.sample((2,))
+            space.displacement(at, at.flip(0))
+    fresh = make_space(name)
+    points = fresh.uniform(60, torch.Generator().manual_seed(0))
+    found, _ = fit_density(fresh, points, FitSettings(detail=3, segments=1, iterations=2))
+    found.log_prob(points.requires_grad_()).sum().backward()
+    assert points.grad is not None
+    points.grad = None
+    # a model that was read under inference is like any other
+    density.log_prob(points).sum().backward()
+    assert points.grad is not None
+    assert bool(points.grad.isfinite().all())

@@ -1,0 +1,244 @@
+"""Densities on disk: what is read is what was saved, and what cannot be saved is refused by name."""
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import given
+from hypothesis import strategies as st
+
+from orbiflow.density import (
+    AdaptiveKernels,
+    Base,
+    BlendedDensity,
+    DensityEstimator,
+    NeuralFlow,
+    NeuralTorusField,
+    Sphere,
+    SymmetricDensity,
+    Torus,
+    UniformBase,
+    VonMisesBase,
+    density_to_bytes,
+    make_space,
+    read_density,
+)
+from orbiflow.errors import InputFileError, OrbiflowError
+from orbiflow.fields import FourierField, InvariantField, SplineField
+from orbiflow.flows import Flow
+from orbiflow.symmetry import CrystallographicGroup, wallpaper_group
+from strategies import seeds
+
+OLD = Path(__file__).parent / "data"
+SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")
+
+
+def filled(field: InvariantField, seed: int, size: float = 0.05) -> InvariantField:
+    """With random parameters."""
+    values = np.random.default_rng(seed).normal(size=tuple(field.parameters_.shape))
+    with torch.no_grad():
+        field.parameters_.copy_(size * torch.tensor(values))
+    return field
+
+
+def back(density: SymmetricDensity, folder: Path) -> SymmetricDensity:
+    path = folder / "density.safetensors"
+    path.write_bytes(density_to_bytes(density))
+    return read_density(path)[0]
+
+
+def plain(*fields: InvariantField, space=None, base=None) -> SymmetricDensity:
+    return SymmetricDensity(space or Torus(2), Flow(fields, steps=2, warn=False), base)
+
+
+@given(
+    name=st.sampled_from(SPACES),
+    seed=seeds,
+    segments=st.lists(
+        st.tuples(
+            st.sampled_from([FourierField, SplineField]),
+            st.integers(1, 3),
+            st.floats(0, 4),
+        ),
+        min_size=1,
+        max_size=3,
+    ),
+    von_mises=st.booleans(),
+)
+def test_what_is_read_is_what_was_saved(
+    name: str, seed: int, segments, von_mises: bool, tmp_path_factory
+) -> None:
+    space = make_space(name)
+    fields = [
+        filled(kind(space.group, frequency, smoothness=smoothness), seed + k)
+        for k, (kind, frequency, smoothness) in enumerate(segments)
+    ]
+    base = VonMisesBase(space, 1.5) if von_mises else None
+    density = plain(*fields, space=space, base=base)
+    at = space.uniform(20, torch.Generator().manual_seed(seed))
+    again = back(density, tmp_path_factory.mktemp("saved"))
+    with torch.no_grad():
+        assert torch.equal(again.log_prob(at), density.log_prob(at))
+
+
+class Tilted(Base):
+    """Not one of orbiflow's."""
+
+    def log_prob(self, points):
+        return 50 * (2 * math.pi * points[..., 0]).cos()
+
+    def sample(self, count, generator):
+        return torch.rand(count, 2, dtype=torch.float64, generator=generator)
+
+
+class TiltedUniform(UniformBase, Tilted):
+    """Looks like one of orbiflow's."""
+
+
+class Doubled(SymmetricDensity):
+    """Another density than its flow's."""
+
+
+class OtherTorus(Torus):
+    """A space of the same name."""
+
+
+def skewed() -> CrystallographicGroup:
+    """The torus' translations, with another basis of their lattice."""
+    return CrystallographicGroup.generate([[1.0, 1.0], [0.0, 1.0]])
+
+
+torus = Torus(2)
+REFUSED = {
+    "the density is a Doubled": lambda: Doubled(torus, Flow(FourierField(torus.group, 1))),
+    "the base is a Tilted:": lambda: plain(FourierField(torus.group, 1), base=Tilted(torus)),
+    "the base is a TiltedUniform": lambda: plain(
+        FourierField(torus.group, 1), base=TiltedUniform(torus)
+    ),
+    "the base is on Sphere": lambda: plain(
+        FourierField(torus.group, 1), base=UniformBase(Sphere())
+    ),
+    "the space is a OtherTorus": lambda: plain(FourierField(torus.group, 1), space=OtherTorus(2)),
+    "segment 2 of the flow has the CrystallographicGroup": lambda: plain(
+        FourierField(torus.group, 1), filled(FourierField(skewed(), 1), 0)
+    ),
+    "segment 1 of the flow has the CrystallographicGroup": lambda: plain(
+        FourierField(wallpaper_group("p4", np.eye(2)), 2)
+    ),
+    "segment 1 of the flow is a stack of 3": lambda: plain(FourierField(torus.group, 1, batch=3)),
+    "segment 1 of the flow is a _Plain: only flows of Fourier": lambda: SymmetricDensity(
+        torus, Flow(lambda x: 0 * x)
+    ),
+    "parameters that are not finite": lambda: plain(
+        filled(FourierField(torus.group, 1), 0, math.nan)
+    ),
+    "has 1 segments of 5000 steps": lambda: SymmetricDensity(
+        torus, Flow(FourierField(torus.group, 1), steps=5000)
+    ),
+    "kernels is on Torus": lambda: BlendedDensity(
+        Sphere(),
+        Flow(FourierField(Sphere().group, 1)),
+        UniformBase(Sphere()),
+        AdaptiveKernels(torus, torch.rand(1, 2), torch.ones(1, 2), torch.ones(1)),
+        torch.full((3,), 1 / 3),
+    ),
+}
+
+
+@pytest.mark.parametrize("message", REFUSED)
+def test_what_cannot_be_saved_is_refused_by_name(message: str) -> None:
+    with pytest.raises(OrbiflowError, match=message):
+        density_to_bytes(REFUSED[message]())
+
+
+@pytest.mark.parametrize(
+    "extra",
+    [{"a": math.nan}, {"a": torch.ones(1)}, {"a": "long" * 2**18}],
+    ids=["nan", "tensor", "long"],
+)
+def test_extras_that_would_not_be_read_again(extra) -> None:
+    with pytest.raises(OrbiflowError, match=r"JSON|header"):
+        density_to_bytes(plain(FourierField(torus.group, 1)), **extra)
+
+
+@pytest.mark.parametrize("name", [*SPACES, "fourier", "neural"])
+def test_files_of_version_0_1_are_read(name: str) -> None:
+    """Each was written by version 0.1 with log densities of its own at some points."""
+    density, extra = read_density(OLD / f"{name}.safetensors")
+    with torch.no_grad():
+        found = density.log_prob(torch.tensor(extra["points"], dtype=torch.float64))
+    assert found.tolist() == pytest.approx(extra["log_prob"], abs=1e-9)
+    again = density_to_bytes(density)
+    assert b"orbiflow-density/2" in again[:4096]
+
+
+def test_a_flow_of_a_neural_field_is_read_again(tmp_path: Path) -> None:
+    flow = NeuralFlow(NeuralTorusField(2, width=4, depth=1), steps=3)
+    density = SymmetricDensity(torus, flow)
+    assert torch.equal(
+        back(density, tmp_path).log_prob(torch.rand(5, 2, dtype=torch.float64)),
+        torch.zeros(5, dtype=torch.float64),
+    )
+
+
+DATA = np.random.default_rng(1).normal(20, 10, (100, 2))
+
+
+@pytest.mark.parametrize("space", SPACES)
+def test_saved_and_read(space: str, tmp_path) -> None:
+    estimator = DensityEstimator(space, detail=2, segments=2, iterations=3).fit(DATA)
+    path = tmp_path / "density.safetensors"
+    path.write_bytes(density_to_bytes(estimator.density_, columns=["a", "b"]))
+    density, extra = read_density(path)
+    assert extra == {"columns": ["a", "b"]}
+    points = estimator.space_.to_chart(DATA)
+    with torch.no_grad():
+        assert torch.equal(density.log_prob(points), estimator.density_.log_prob(points))
+
+
+def test_files_that_are_no_density(tmp_path) -> None:
+    path = tmp_path / "density.safetensors"
+    with pytest.raises(InputFileError, match="cannot read"):
+        read_density(path)
+    estimator = DensityEstimator("torus", detail=1, segments=1, iterations=0).fit(DATA)
+    good = density_to_bytes(estimator.density_)
+    length = int.from_bytes(good[:8], "little")
+    outer = json.loads(good[8 : 8 + length])
+
+    def changed(edit) -> bytes:
+        header = json.loads(outer["__metadata__"]["orbiflow"])
+        edit(header)
+        text = json.dumps(outer | {"__metadata__": {"orbiflow": json.dumps(header)}}).encode()
+        return len(text).to_bytes(8, "little") + text + good[8 + length :]
+
+    bad = [
+        b"",
+        b"hello world, this is no density",
+        good[:-9],
+        b"\xff" * 100,
+        changed(lambda h: h.update(format="orbiflow-tile/1")),
+        changed(lambda h: h["space"].update(name="moebius")),
+        changed(lambda h: h["space"].update(dim=40)),
+        changed(lambda h: h["flow"]["segments"][0].update(max_frequency=10**6)),
+        changed(lambda h: h["flow"]["segments"][0].update(max_frequency=2)),
+        changed(lambda h: h["flow"]["segments"][0].update(kind="wavelet")),
+        changed(lambda h: h["flow"]["segments"][0].update(smoothness=math.nan)),
+        changed(lambda h: h["flow"].update(segments=[])),
+        changed(lambda h: h["flow"].update(duration=math.inf)),
+        changed(lambda h: h["base"].update(kind="normal")),
+        changed(lambda h: h.pop("group")),
+        changed(lambda h: h["group"].update(lattice=[[1.0, 1.0], [0.0, 1.0]])),
+        changed(lambda h: h["group"].update(linear=[[[0.0, 1.0], [1.0, 0.0]]])),
+        changed(lambda h: h["group"].update(translations=[[0.5, 0.0]])),
+        changed(lambda h: h["group"].update(translations="none")),
+        changed(lambda h: h["flow"].update(steps=10**9)),
+        changed(lambda h: h["flow"].update(method="magic")),
+        changed(lambda h: h.pop("base")),
+    ]
+    for content in bad:
+        path.write_bytes(content)
+        with pytest.raises(InputFileError, match="not a density saved by orbiflow"):
+            read_density(path)

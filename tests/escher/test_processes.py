@@ -1,0 +1,91 @@
+"""Worker processes: news, errors, deaths and cancelling."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from orbiflow.cancel import Cancel
+from orbiflow.errors import OrbiflowError
+from orbiflow.escher.processes import work
+
+Tell = Callable[[Any], None]
+
+
+def square(item: int, tell: Tell, _cancel: Cancel) -> int:
+    tell(f"squaring {item}")
+    return item * item
+
+
+def forever(_item: int, tell: Tell, cancel: Cancel) -> int:
+    tell("begun")
+    while True:
+        cancel.check()
+
+
+def mistaken(item: int, _tell: Tell, _cancel: Cancel) -> int:
+    raise OrbiflowError(f"no such thing as {item}")
+
+
+class Odd(Exception):
+    """Cannot be unpickled from its message."""
+
+    def __init__(self, one: int, two: int) -> None:
+        super().__init__(f"{one} and {two}")
+
+
+def odd(_item: int, _tell: Tell, _cancel: Cancel) -> int:
+    raise Odd(1, 2)
+
+
+def dying(_item: int, _tell: Tell, _cancel: Cancel) -> int:
+    os._exit(3)
+
+
+@pytest.mark.parametrize("workers", [1, 2, 5])
+def test_every_item_is_done_once_and_its_news_come_first(workers: int) -> None:
+    news = list(work(square, range(4), workers))
+    for index in range(4):
+        own = [(n.value, n.done) for n in news if n.index == index]
+        assert own == [(f"squaring {index}", False), (index * index, True)]
+    assert multiprocessing.active_children() == []
+
+
+def test_no_items() -> None:
+    assert list(work(square, [], 2)) == []
+
+
+def test_an_error_comes_out_with_its_traceback() -> None:
+    with pytest.raises(OrbiflowError, match="no such thing as 7") as caught:
+        list(work(mistaken, [7], 2))
+    assert "in mistaken" in "".join(caught.value.__notes__)
+    with pytest.raises(RuntimeError, match="Odd: 1 and 2"):
+        list(work(odd, [7], 1))
+
+
+def test_a_worker_that_dies_is_an_error() -> None:
+    with pytest.raises(OrbiflowError, match="a worker process died"):
+        list(work(dying, range(3), 2))
+    assert multiprocessing.active_children() == []
+
+
+def test_cancelling_ends_all() -> None:
+    cancel = Cancel()
+    told = []
+    for news in work(forever, range(9), 2, cancel=cancel):
+        told.append(news)
+        cancel.cancel()
+    assert 1 <= len(told) <= 2
+    assert not any(news.done for news in told)
+    assert multiprocessing.active_children() == []
+
+
+def test_closing_ends_all() -> None:
+    news = work(forever, range(9), 2)
+    assert next(news).value == "begun"
+    news.close()
+    assert multiprocessing.active_children() == []

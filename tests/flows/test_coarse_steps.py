@@ -1,0 +1,105 @@
+"""A flow whose steps are too coarse says so once; one that is fine says nothing."""
+
+from __future__ import annotations
+
+import re
+import warnings
+
+import pytest
+import torch
+from hypothesis import given, settings
+from torch import nn
+
+from orbiflow.errors import CoarseStepsWarning
+from orbiflow.fields import FourierField
+from orbiflow.flows import METHODS, Flow
+from orbiflow.symmetry import wallpaper_group
+from strategies import gentle_field, groups, random_field, random_tensor, seeds, space_group
+
+STEEP = random_field(space_group("P2_1/c", 0), 2, 0, rms=0.8)
+POINTS = random_tensor(0, 200, 3)
+
+
+def roundtrip(flow: Flow) -> float:
+    return float((flow.inverse(flow(POINTS)) - POINTS).norm(dim=-1).max())
+
+
+@torch.no_grad()
+def test_a_steep_flow_of_few_steps_warns_once_with_steps_that_do():
+    flow = Flow(STEEP, steps=8)
+    with pytest.warns(CoarseStepsWarning) as caught:
+        assert roundtrip(flow) > 0.3
+    assert len(caught) == 1
+    message = str(caught[0].message)
+    found = re.search(r"8 rk4 steps .* by (\d+) % of their way; raise steps to (\d+)", message)
+    assert found
+    assert int(found[1]) > 5
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert roundtrip(flow) > 0.3  # once is enough
+        assert roundtrip(flow.with_steps(int(found[2]))) < 0.05
+        assert roundtrip(flow.with_steps(512)) < 1e-6
+
+
+@torch.no_grad()
+@pytest.mark.parametrize("apply", ["inverse", "forward_and_log_det", "trajectories"])
+def test_every_way_through_the_flow_is_looked_at(apply):
+    with pytest.warns(CoarseStepsWarning):
+        getattr(Flow(STEEP, steps=8), apply)(POINTS)
+    Flow(STEEP, steps=8, warn=False).forward(POINTS)
+
+
+@torch.no_grad()
+def test_any_callable_is_looked_at():
+    with pytest.warns(CoarseStepsWarning, match="1 euler steps"):
+        Flow(lambda p: -3 * p, steps=1, method="euler")(POINTS)
+
+
+def test_it_is_noticed_when_training_makes_a_field_steep():
+    field = FourierField(wallpaper_group("p4"), 3)
+    flow, points = Flow(field, steps=2), random_tensor(0, 20, 2)
+    with torch.no_grad():
+        flow(points)
+        field.parameters_.copy_(random_field(field.group, 3, 0, rms=2.0).parameters_)
+        with pytest.warns(CoarseStepsWarning):
+            flow(points)
+
+
+def test_training_is_looked_at_ever_more_rarely():
+    calls = 0
+
+    class Counted(nn.Module):
+        def __init__(self) -> None:
+            super().__init__()
+            self.rate = nn.Parameter(torch.tensor(0.1, dtype=torch.float64))
+
+        def forward(self, points: torch.Tensor) -> torch.Tensor:
+            nonlocal calls
+            calls += 1
+            return self.rate * points
+
+    field = Counted()
+    flow = Flow(field, steps=4)
+    for _ in range(100):
+        flow(POINTS[:5]).sum()
+        with torch.no_grad():
+            field.rate.mul_(0.99)
+    # 16 evaluations a call; looks at calls 1, 2, 4, ..., 64 cost 48 each
+    assert calls == 16 * 100 + 48 * 7
+
+
+@settings(max_examples=25)
+@given(groups, seeds)
+def test_gentle_flows_are_silent(group, seed):
+    # warnings are errors here
+    flow = Flow([gentle_field(group, 1, seed + i, slope=2.0) for i in range(2)], steps=8)
+    points = random_tensor(seed, 10, group.dim)
+    with torch.no_grad():
+        flow.inverse(flow(points))
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_views_for_an_estimate_are_silent(name):
+    flow = Flow(STEEP, steps=1, method=name, warn=False)
+    assert flow.error_estimate(POINTS) > 0.1
+    assert Flow(STEEP, steps=1, method=name).error_estimate(POINTS) > 0.1

@@ -1,0 +1,131 @@
+"""What cannot be carried is refused in words."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import given
+from torch import nn
+
+from orbiflow.errors import GroupError, OrbiflowError
+from orbiflow.fields import (
+    FourierField,
+    PeriodicFeatures,
+    SplineField,
+    jacobian,
+    neural_field,
+    symmetrize,
+)
+from orbiflow.flows import Flow
+from orbiflow.symmetry import IDENTIFICATION_SPACES, identification_group, wallpaper_group
+from strategies import groups, random_tensor
+
+P4 = wallpaper_group("p4")
+THREE = random_tensor(0, 4, 3)
+PLANAR = {
+    "fourier": FourierField(P4, 2),
+    "spline": SplineField(P4, 2),
+    "network": neural_field(P4, hidden=(4,)),
+    "symmetrized": symmetrize(torch.tanh, P4),
+}
+
+
+@pytest.mark.parametrize("kind", PLANAR)
+def test_three_columns_into_a_planar_field(kind):
+    with pytest.raises(OrbiflowError, match=r"points of shape \(\.\.\., 2\), got \(4, 3\)"):
+        Flow(PLANAR[kind], steps=1)(THREE)
+    for apply in (P4.images, P4.wrap, P4.cosets[1], P4.cosets[1].push):
+        with pytest.raises(GroupError, match=r"shape \(\.\.\., 2\), got \(4, 3\)"):
+            apply(THREE)
+        with pytest.raises(GroupError, match=r"shape \(\.\.\., 2\), got \(4, 3\)"):
+            apply(THREE.numpy())
+
+
+@pytest.mark.parametrize("kind", ["fourier", "spline", "network"])
+def test_a_float32_field_at_float64_points(kind):
+    make = {
+        "fourier": lambda: FourierField(P4, 2, dtype=torch.float32),
+        "spline": lambda: SplineField(P4, 2, dtype=torch.float32),
+        "network": lambda: neural_field(P4, hidden=(4,), dtype=torch.float32),
+    }
+    flow = Flow(make[kind](), steps=1)
+    points = random_tensor(0, 4, 2)
+    for apply in (flow, flow.inverse, flow.forward_and_log_det):
+        with pytest.raises(OrbiflowError, match=r"float32.*convert the points"):
+            apply(points)
+    assert flow(points.float()).dtype == torch.float32
+    assert flow.double()(points).dtype == torch.float64
+
+
+@pytest.mark.parametrize(
+    ("points", "message"),
+    [
+        (np.zeros((3, 2)), "as a torch tensor .* got a ndarray"),
+        (torch.zeros(3, 2, dtype=torch.int64), "floating-point dtype, got torch.int64"),
+        (torch.tensor(1.0), r"shape \(\)"),
+    ],
+)
+def test_points_that_are_none(points, message):
+    with pytest.raises(OrbiflowError, match=message):
+        Flow(torch.sin)(points)
+
+
+def test_fields_that_are_none():
+    with pytest.raises(OrbiflowError, match="a callable from points to vectors, got 'p6m'"):
+        Flow(["p6m"])  # type: ignore[list-item]
+    with pytest.raises(OrbiflowError, match=r"expected \(4, 3\), got \(4, 1\)"):
+        Flow(lambda p: p[..., :1])(THREE)
+    with pytest.raises(RuntimeError, match="mat1 and mat2"):  # the user's own
+        Flow(nn.Linear(2, 2).double())(THREE)
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda group: FourierField(group, 3),
+        lambda group: SplineField(group, 3),
+        lambda group: symmetrize(torch.tanh, group),
+        lambda group: PeriodicFeatures(group),
+        lambda group: neural_field(group),
+    ],
+    ids=["fourier", "spline", "symmetrize", "features", "network"],
+)
+def test_a_groups_name_in_place_of_a_group(make):
+    with pytest.raises(GroupError, match=r"expected a Crys.* got 'p6m'.*wallpaper_group\('p6m'\)"):
+        make("p6m")
+    with pytest.raises(GroupError, match="got None"):
+        make(None)
+
+
+@given(groups)
+def test_omega_zero_gives_the_constant_fields(group):
+    field = FourierField(group, 0)
+    assert field.size == round(np.trace(group.linear_parts.mean(axis=0)))
+    check_constant(field)
+
+
+@pytest.mark.parametrize("name", IDENTIFICATION_SPACES)
+def test_omega_zero_of_splines(name):
+    check_constant(SplineField(identification_group(name), 0))
+
+
+def check_constant(field: FourierField | SplineField) -> None:
+    d = field.group.dim
+    with torch.no_grad():
+        field.parameters_.normal_()
+    flow, points = Flow(field, steps=2), random_tensor(0, 5, d)
+    moved, log_det = flow.forward_and_log_det(points)
+    (moved.square().sum() + log_det.sum()).backward()
+    assert field.parameters_.grad is not None
+    shift = (moved - points).detach()
+    torch.testing.assert_close(shift, shift[:1].expand(5, d), rtol=0, atol=1e-12)
+    torch.testing.assert_close(flow.inverse(moved), points, rtol=0, atol=1e-12)
+    assert log_det.abs().max() < 1e-12
+    assert field.divergence(points).abs().max() < 1e-12
+    assert jacobian(field, points).abs().max() < 1e-12
+    assert float(field.lipschitz_bound()) < 1e-12
+    assert field.adjoint(points, points).shape == (field.size,)
+    again = type(field)(field.group, 0)
+    again.load_state_dict(field.state_dict())
+    assert torch.equal(again(points), field(points))

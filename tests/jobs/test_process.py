@@ -1,0 +1,98 @@
+"""Jobs in processes of their own."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import threading
+from pathlib import Path
+
+import pytest
+
+from jobs.searches import ENDLESS, boot_request, check_order
+from orbiflow.jobs import ClassFailed, Event, Failed, Finished, Progress, TileFound, start
+
+
+def test_a_search_in_a_process(tmp_path: Path) -> None:
+    with start(boot_request(tmp_path, "IH4", "IH6", workers=2)) as job:
+        events = list(job.events())
+        assert job.wait() == job.exitcode == 0
+    check_order(events, "IH4", "IH6")
+    assert isinstance(events[-1], Finished)
+    assert events[-1].state == "done"
+    assert (tmp_path / "out" / "overview.png").is_file()
+
+
+def test_two_jobs_are_started_from_threads(tmp_path: Path) -> None:
+    found: dict[str, list[Event]] = {}
+
+    def work(name: str) -> None:
+        (tmp_path / name).mkdir()
+        with start(boot_request(tmp_path / name, name)) as job:
+            found[name] = list(job.events())
+
+    threads = [threading.Thread(target=work, args=(name,)) for name in ("IH4", "IH6")]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    for name in ("IH4", "IH6"):
+        check_order(found[name], name)
+        assert isinstance(found[name][-1], Finished)
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_cancelling_keeps_the_order_and_ends_the_process(workers: int, tmp_path: Path) -> None:
+    request = boot_request(tmp_path, "IH4", "IH6", iterations=ENDLESS, workers=workers)
+    events = []
+    with start(request) as job:
+        for event in job.events():
+            events.append(event)
+            if isinstance(event, Progress) and event.class_name:
+                job.cancel()
+        assert job.wait() == 0
+    check_order(events, "IH4", "IH6")
+    assert isinstance(events[-1], Finished)
+    assert events[-1].state == "cancelled"
+    reasons = {event.reason for event in events if isinstance(event, ClassFailed)}
+    assert reasons == {"interrupted"}
+    assert not any(isinstance(event, TileFound) for event in events)
+    document = json.loads((tmp_path / "out" / "result.json").read_text())
+    assert [entry["class"] for entry in document["failed"]] == ["IH4", "IH6"]
+
+
+def test_a_mistake_is_the_last_event(tmp_path: Path) -> None:
+    request = boot_request(tmp_path, "IH8")
+    with start(request) as job:
+        events = list(job.events())
+        assert job.wait() == 1
+    check_order(events)
+    assert isinstance(events[-1], Failed)
+    assert events[-1].failure == "mistake"
+    assert "unknown isohedral class 'IH8'" in events[-1].message
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals")
+def test_a_process_that_dies_is_the_last_event(tmp_path: Path) -> None:
+    events = []
+    with start(boot_request(tmp_path, "IH4", iterations=ENDLESS)) as job:
+        for event in job.events():
+            events.append(event)
+            if isinstance(event, Progress):
+                job.kill()
+        assert job.exitcode == -signal.SIGKILL
+        assert job.wait() == -signal.SIGKILL
+        job.cancel()  # no harm
+    check_order(events)
+    assert isinstance(events[-1], Failed)
+    assert events[-1].failure == "died"
+    assert "signal 9" in events[-1].message
+    assert not (tmp_path / "out").exists()
+
+
+def test_waiting_has_a_limit(tmp_path: Path) -> None:
+    with start(boot_request(tmp_path, "IH4", iterations=ENDLESS)) as job:
+        assert job.exitcode is None
+        with pytest.raises(TimeoutError, match="still runs"):
+            job.wait(timeout=0.01)
