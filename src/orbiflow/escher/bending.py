@@ -14,6 +14,7 @@ from orbiflow.escher.co_deformation import drawn_to_tiles, held_on_tiles
 from orbiflow.escher.outline_starts import mirror_closed
 from orbiflow.escher.placements import Complex, Placements, best_placements
 from orbiflow.escher.tile_space import TileSpace
+from orbiflow.geometry import complex_points, plane_points
 from orbiflow.likeness.elastic import Elastic, Stiffness
 from orbiflow.silhouette.sampling import Samples, sampled
 from orbiflow.silhouette.target import Target
@@ -117,7 +118,7 @@ def _best_coarse(
 ) -> list[tuple[Placements, Complex]]:
     """Placements whose tiles cost least, with these: few points, all placements side by side."""
     body = hand.coarse
-    outline = hand.samples.coarse @ np.array([1, 1j])
+    outline = complex_points(hand.samples.coarse)
     placements = best_placements(kind, outline, settings.placements)
     z, space = drawn_to_tiles(body, kind, placements)
     rough, _ = _costs(body, z)
@@ -152,7 +153,7 @@ def _detailed(
         tiles = held_on_tiles(body.forgiving(tiles.points), space, tiles.points, 6)
     ring = tiles.points[: body.size, 0]
     area = _areas(ring[:, None])[0]
-    simple = shapely.is_valid(shapely.Polygon(np.stack([ring.real, ring.imag], axis=-1)))
+    simple = shapely.is_valid(shapely.Polygon(plane_points(ring)))
     if not simple or area < 0.1 or np.linalg.det(tiles.linear[0]) < 1e-6:
         return None
     return Bent(
@@ -170,16 +171,12 @@ def _costs(body: Elastic, z: Complex) -> tuple[Array, NDArray[np.bool_]]:
     """Costs (C,) of shapes, and which of them do not cross themselves."""
     ring = z[: body.size]
     area = _areas(ring)
-    sound = np.asarray(shapely.is_valid(shapely.polygons(_rings(ring)))) & (area > 0.1)
+    sound = np.asarray(shapely.is_valid(shapely.polygons(plane_points(ring.T)))) & (area > 0.1)
     return body.energy(z) / np.maximum(area, 0.1) + POSE * body.displacement(z), sound
 
 
 def _areas(ring: Complex) -> Array:
     return 0.5 * (np.conj(ring) * np.roll(ring, -1, axis=0)).imag.sum(axis=0)
-
-
-def _rings(z: Complex) -> Array:
-    return np.stack([z.T.real, z.T.imag], axis=-1)
 
 
 def _without_twins(body: Elastic, z: Complex, order: NDArray[np.int64], count: int) -> list[int]:

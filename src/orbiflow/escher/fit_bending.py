@@ -8,11 +8,10 @@ import scipy.optimize
 from orbiflow.escher.bending import Bent
 from orbiflow.escher.prototiles import Prototiles
 from orbiflow.escher.tile_space import NearestTiles
+from orbiflow.geometry import complex_points, plane_points
 from orbiflow.likeness.overlap import Overlap
 from orbiflow.symmetry.isometry import Array
 from orbiflow.tilings import IsohedralClass
-
-Complex = np.ndarray
 
 
 def placed(bent: Bent, overlap: Overlap) -> tuple[complex, complex]:
@@ -31,10 +30,10 @@ def placed(bent: Bent, overlap: Overlap) -> tuple[complex, complex]:
     ring = bent.points[: bent.hand.fine.size] - center
 
     def loss(x: Array) -> tuple[float, Array]:
-        own = factor * np.exp(x[0] + 1j * x[1]) * ring
+        own = factor * complex(np.exp(x[0] + 1j * x[1])) * ring
         place = own + rest.mean() + x[2] + 1j * x[3]
-        value, slope = overlap.iou(np.stack([place.real, place.imag], axis=-1))
-        pull = slope @ np.array([1, 1j])
+        value, slope = overlap.iou(plane_points(place))
+        pull = complex_points(slope)
         turned = np.conj(own) * pull
         gradient = [turned.real.sum(), turned.imag.sum(), pull.real.sum(), pull.imag.sum()]
         return -value, -np.array(gradient)

@@ -40,7 +40,13 @@ class NearestTiles(NamedTuple):
 
     def take(self, index: Integers) -> NearestTiles:
         """Those at `index`."""
-        return NearestTiles(*(part[index] for part in self))
+        return NearestTiles(
+            self.vertices[index],
+            self.linear[index],
+            self.offset[index],
+            self.corners[index],
+            self.distance[index],
+        )
 
 
 class TileSpace:

@@ -7,11 +7,21 @@ from orbiflow.geometry.arc_length import (
     ring_length,
 )
 from orbiflow.geometry.polygons import polygons_in
-from orbiflow.geometry.rings import centroid, orient, reverse, signed_area, subdivided
+from orbiflow.geometry.rings import (
+    centroid,
+    complex_points,
+    orient,
+    plane_points,
+    reverse,
+    signed_area,
+    subdivided,
+)
 
 __all__ = [
     "centroid",
+    "complex_points",
     "orient",
+    "plane_points",
     "points_along",
     "polygons_in",
     "resampled",

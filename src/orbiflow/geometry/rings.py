@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 Ring = NDArray[Any]
 AnyRing = TypeVar("AnyRing", NDArray[Any], torch.Tensor)
@@ -84,3 +84,18 @@ def _crosses(local: AnyRing) -> AnyRing:
     """Twice the area (..., N) of the triangle of each side and the origin."""
     ahead = local[..., [*range(1, local.shape[-2]), 0], :]
     return local[..., 0] * ahead[..., 1] - ahead[..., 0] * local[..., 1]
+
+
+def complex_points(points: ArrayLike) -> NDArray[np.complex128]:
+    """Points (..., 2) as complex numbers x + iy (...).
+
+    >>> complex_points([[1.0, 2.0]])
+    array([1.+2.j])
+    """
+    array = np.asarray(points, dtype=np.float64)
+    return array[..., 0] + 1j * array[..., 1]
+
+
+def plane_points(z: NDArray[np.complex128]) -> NDArray[np.float64]:
+    """Complex numbers (...) as points (..., 2): the inverse of `complex_points`."""
+    return np.stack([z.real, z.imag], axis=-1)

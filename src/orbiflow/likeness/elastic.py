@@ -14,6 +14,7 @@ from __future__ import annotations
 import copy
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import scipy.linalg
@@ -21,6 +22,7 @@ import scipy.sparse
 from numpy.typing import NDArray
 
 from orbiflow.errors import OrbiflowError
+from orbiflow.geometry import complex_points
 from orbiflow.silhouette.mesh import Mesh, triangulate
 from orbiflow.silhouette.thickness import local_thickness
 
@@ -80,7 +82,7 @@ class Elastic:
         self.mesh = mesh or triangulate(ring)
         self.stiffness = stiffness or Stiffness()
         self.size = len(ring)
-        self.rest: Complex = self.mesh.points @ np.array([1, 1j])
+        self.rest = complex_points(self.mesh.points)
         pairs = self._pairs(stiff)
         self._i, self._j = pairs.row, pairs.col
         self._d = self.rest[self._i] - self.rest[self._j]
@@ -204,7 +206,7 @@ class Elastic:
         if not len(inner):
             none = np.zeros((0, n))
             return Condensed(self.matrix, none, none[:, :0])
-        inverse = np.linalg.inv(inner)
+        inverse = np.asarray(np.linalg.inv(inner), dtype=np.float64)
         follow = -inverse @ self.matrix[n:, :n]
         return Condensed(self.matrix[:n, :n] + self.matrix[:n, n:] @ follow, follow, inverse)
 
@@ -225,7 +227,7 @@ class Elastic:
         factor = np.conj(rest) @ (z - center) / (abs(rest) ** 2).sum()
         return center + rest[:, None] * factor, factor
 
-    def _pairs(self, stiff: Array | None) -> scipy.sparse.coo_matrix:
+    def _pairs(self, stiff: Array | None) -> Any:
         triangles, count, n = self.mesh.triangles, len(self), self.size
         factors = self._salience()
         rows, columns, values = [], [], []

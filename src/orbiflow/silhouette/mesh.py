@@ -66,7 +66,7 @@ def triangulate(ring: Array, spacing: float | None = None) -> Mesh:
     own_share: Array = np.zeros(0)
     for _ in range(ROUNDS):
         points = np.concatenate([ring, extra, inside])
-        triangles = Delaunay(points).simplices
+        triangles = Delaunay(points).simplices.astype(np.int64)
         missing = ~_are_sides(ends, triangles, len(points))
         if not missing.any():
             return _divided(_kept(Mesh(points, triangles, own_side, own_share, n), polygon))
