@@ -30,7 +30,9 @@ CALM = 0.4
 
 def calm(field: FourierField) -> float:
     """`CALM`, or as much less as makes every midpoint step injective whatever the field's group."""
-    return min(CALM, METHODS["midpoint"].injective_below / group_factor(field.group, field.basis))
+    factor = group_factor(field.group, field.basis)
+    safe = METHODS["midpoint"].injective_below
+    return min(CALM, safe / factor) if factor else CALM  # a constant field is as calm as can be
 
 
 class Descent:
