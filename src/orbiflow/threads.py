@@ -10,6 +10,7 @@ import contextlib
 import threading
 from collections.abc import Iterator
 
+import threadpoolctl
 import torch
 
 _lock = threading.Lock()
@@ -47,3 +48,30 @@ def _default_for_new_threads(count: int) -> None:
     helper = threading.Thread(target=torch.set_num_threads, args=(count,))
     helper.start()
     helper.join()
+
+
+_blas_lock = threading.Lock()
+_blas_users = 0
+_blas_limit: threadpoolctl.threadpool_limits | None = None
+
+
+@contextlib.contextmanager
+def one_blas_thread() -> Iterator[None]:
+    """Run NumPy's and SciPy's linear algebra on one thread in this block.
+
+    These libraries know one number for the whole process: it is set when the first block is entered
+    and set back when the last is left, whichever threads they belong to.
+    """
+    global _blas_users, _blas_limit
+    with _blas_lock:
+        if _blas_users == 0:
+            _blas_limit = threadpoolctl.threadpool_limits(1, user_api="blas")
+        _blas_users += 1
+    try:
+        yield
+    finally:
+        with _blas_lock:
+            _blas_users -= 1
+            if _blas_users == 0 and _blas_limit is not None:
+                _blas_limit.restore_original_limits()
+                _blas_limit = None

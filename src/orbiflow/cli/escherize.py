@@ -20,6 +20,14 @@ class Method(StrEnum):
     OCCUPANCY = "occupancy"
 
 
+class Objective(StrEnum):
+    """What a tile is to be good at."""
+
+    LIKENESS = "likeness"
+    OVERLAP = "overlap"
+    BOTH = "both"
+
+
 class Effort(StrEnum):
     """How long the descent searches."""
 
@@ -48,6 +56,14 @@ def escherize(
             help="Seconds, a quarter of a minute, or minutes; default normal.", show_default=False
         ),
     ] = None,
+    objective: Annotated[
+        Objective | None,
+        typer.Option(
+            help="Likeness: the silhouette bends until it is a tile, every limb kept. Overlap: the "
+            "tile covers the silhouette as it is. Default likeness.",
+            show_default=False,
+        ),
+    ] = None,
     emphasis: Annotated[
         Path | None,
         typer.Option(
@@ -65,11 +81,19 @@ def escherize(
     per_class: Annotated[
         int, typer.Option(help="Tiles of each class, the best and others that differ from it.")
     ] = 1,
+    min_neck: Annotated[
+        float | None,
+        typer.Option(
+            help="Tiles with necks thinner than this rank lower; in square roots of the area, "
+            "default 0.01.",
+            show_default=False,
+        ),
+    ] = None,
     max_frequency: Annotated[
         int | None,
         typer.Option(
-            help="Detail of the deformation (Omega in the paper), 1 to 60; default 10, or 15 for "
-            "effort best.",
+            help="Overlap: detail of the deformation (Omega in the paper), 0 to 60; default 10, or "
+            "15 for effort best.",
             show_default=False,
         ),
     ] = None,
@@ -113,6 +137,8 @@ def escherize(
         out=out,
         classes=None if names is None else tuple(filter(None, names)),
         method=method.value,
+        objective=objective.value if objective else None,
+        min_neck=min_neck,
         effort=effort.value if effort else None,
         emphasis=emphasis,
         strength=strength,

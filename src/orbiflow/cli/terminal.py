@@ -128,15 +128,24 @@ def _show_tiles(event: Finished) -> None:
 
 def _table(tiles: list[dict[str, Any]]) -> Table:
     table = Table(title="Tiles, best first")
-    for column in ("class", "score", "IoU", "Dice", "recognised", "certified", "edges", "s"):
+    for column in (
+        "class",
+        "score",
+        "bent",
+        "IoU",
+        "recognised",
+        "certified",
+        "edges",
+        "s",
+    ):
         table.add_column(column, justify="left" if column == "class" else "right", no_wrap=True)
     for tile in tiles:
         mismatch = tile["edge_mismatch"]
         table.add_row(
             f"{tile['class']} ({tile['group']})",
             f"{tile['score']:.3f}",
+            "-" if tile["deformation"] is None else f"{tile['deformation']:.3f}",
             f"{tile['iou']:.4f}",
-            f"{tile['dice']:.4f}",
             f"{tile['recognised']:.3f}",
             "yes" if tile["certified"] else "[red]NO[/]",
             "-" if mismatch is None else f"{mismatch:.0e}",

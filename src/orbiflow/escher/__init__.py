@@ -1,8 +1,10 @@
 """Escherization: starts, the descent, the paper's occupancy method, the search and its results."""
 
+from orbiflow.escher.bending_settings import BendingSettings
 from orbiflow.escher.descent_settings import DescentSettings
 from orbiflow.escher.fit import Fit
 from orbiflow.escher.fit_descent import fit_descent
+from orbiflow.escher.methods import BothSettings
 from orbiflow.escher.model import TileModel
 from orbiflow.escher.occupancy import (
     OccupancySamples,
@@ -15,6 +17,8 @@ from orbiflow.escher.search import Event, escherize, escherize_class
 from orbiflow.escher.storage import SavedModel, load_model, load_saved
 
 __all__ = [
+    "BendingSettings",
+    "BothSettings",
     "ClassFailure",
     "DescentSettings",
     "Event",

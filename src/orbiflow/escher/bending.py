@@ -9,6 +9,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from orbiflow.cancel import Cancel
 from orbiflow.escher.bending_settings import BendingSettings
 from orbiflow.escher.co_deformation import drawn_to_tiles, held_on_tiles
 from orbiflow.escher.outline_starts import mirror_closed
@@ -16,6 +17,8 @@ from orbiflow.escher.placements import Complex, Placements, best_placements
 from orbiflow.escher.tile_space import TileSpace
 from orbiflow.geometry import complex_points, plane_points
 from orbiflow.likeness.elastic import Elastic, Stiffness
+from orbiflow.silhouette.emphasis import Emphasis
+from orbiflow.silhouette.mesh import triangulate
 from orbiflow.silhouette.sampling import Samples, sampled
 from orbiflow.silhouette.target import Target
 from orbiflow.symmetry.isometry import Array
@@ -29,6 +32,9 @@ TWIN = 2e-4
 
 FIRST_ROUNDS = 6
 """Steps of the minimisation for all that are held."""
+
+RELAXED = 1500.0
+"""Strength of the springs that keep a relaxed outline near its tile."""
 
 SOFTENINGS = 6
 """Times that finalists are minimised anew with the forgiving energy."""
@@ -50,6 +56,7 @@ class Bent(NamedTuple):
     - `points`: (N,) of the fine body; its outline is the tile, up to a similarity.
     - `linear`, `offset`: the map from the group's own frame, of `points`.
     - `placement`: one, of the fine outline.
+    - `relaxed`: (n,) the outline let go a little: bent as it would like to be near this tile.
     - `energy`, `displacement`: of deforming.
     """
 
@@ -58,6 +65,7 @@ class Bent(NamedTuple):
     linear: Array
     offset: Array
     placement: Placements
+    relaxed: Complex
     energy: float
     displacement: float
 
@@ -68,9 +76,19 @@ class Bent(NamedTuple):
 
 
 def hands(
-    target: Target, settings: BendingSettings, stiffness: Stiffness | None = None
+    target: Target,
+    settings: BendingSettings,
+    stiffness: Stiffness | None = None,
+    *,
+    emphasis: Emphasis | None = None,
 ) -> tuple[Hand, Hand]:
     """The silhouette and its mirror image in the x axis, ready to be bent.
+
+    Args:
+        target: the silhouette.
+        settings: of the search.
+        stiffness: what deforming costs.
+        emphasis: what is to bend less, by as much as it matters more.
 
     Raises:
         OrbiflowError: for a silhouette that cannot be sampled or triangulated.
@@ -79,8 +97,16 @@ def hands(
     samples = sampled(np.asarray(target.normal), phase, settings.multiples)
     # read backwards from the same first point: every k-th fine point stays beside a coarse one
     mirror = Samples(*(np.roll(part[::-1], 1, axis=0) * (1.0, -1.0) for part in samples))
+
+    def elastic(points: Array, mirrored: bool) -> Elastic:
+        mesh = triangulate(points)
+        stiff = None
+        if emphasis is not None:
+            stiff = emphasis.weight(mesh.points * ((1.0, -1.0) if mirrored else (1.0, 1.0)))
+        return Elastic(points, stiffness, stiff=stiff, mesh=mesh)
+
     own, other = (
-        Hand(mirrored, both, *(Elastic(points, stiffness) for points in both))
+        Hand(mirrored, both, *(elastic(points, mirrored) for points in both))
         for mirrored, both in ((False, samples), (True, mirror))
     )
     return own, other
@@ -91,7 +117,8 @@ def bent_tiles(
     kind: IsohedralClass,
     settings: BendingSettings,
     progress: Callable[[float], None] | None = None,
-) -> list[Bent]:
+    cancel: Cancel | None = None,
+) -> tuple[list[Bent], int]:
     """The finalists of one class, least cost first, no two of them twins.
 
     Args:
@@ -99,18 +126,30 @@ def bent_tiles(
         kind: the class.
         settings: of the search.
         progress: told the share of the work done.
+        cancel: looked at before each step.
+
+    Returns:
+        The finalists, and how many were dropped because they cross themselves.
+
+    Raises:
+        Cancelled: if it was told to stop.
     """
-    told = progress or (lambda _share: None)
+    told, cancel = progress or (lambda _share: None), cancel or Cancel()
     found: list[Bent] = []
+    dropped = 0
     sides = both[:1] if mirror_closed(kind) else both
     for number, hand in enumerate(sides):
+        cancel.check()
         for k, (placement, outline) in enumerate(_best_coarse(hand, kind, settings)):
+            cancel.check()
             bent = _detailed(hand, kind, placement, outline, settings.rounds)
-            if bent is not None:
+            if bent is None:
+                dropped += 1
+            else:
                 found.append(bent)
             told((number + 0.5 + 0.5 * (k + 1) / settings.finalists) / len(sides))
     found.sort(key=lambda bent: bent.cost)
-    return found
+    return found, dropped
 
 
 def _best_coarse(
@@ -162,6 +201,7 @@ def _detailed(
         tiles.linear[0],
         tiles.offset[0],
         tiles.placements,
+        body.pulled(tiles.points, tiles.points[: body.size], RELAXED, 3)[: body.size, 0],
         float(body.forgiving_energy(tiles.points)[0] / area),
         float(body.displacement(tiles.points)[0]),
     )

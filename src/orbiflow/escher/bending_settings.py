@@ -59,6 +59,7 @@ class BendingSettings:
 EFFORTS: dict[str, dict[str, Any]] = {
     "fast": {"placements": 80, "held": 20, "finalists": 1, "rounds": 20, "multiples": (4,)},
     "normal": {},
-    "best": {"placements": 1500, "held": 300, "finalists": 16, "rounds": 80, "multiples": (6, 8)},
+    # all that "normal" looks at, and more
+    "best": {"placements": 1500, "held": 300, "finalists": 20, "rounds": 80},
 }
 """What each level changes."""

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from orbiflow.escher.model import TileModel
+
+if TYPE_CHECKING:
+    from orbiflow.escher.fit_bending import PlacedBent
 
 Progress = Callable[[float, float], None]
 """Called with the share of the work done and the best loss so far."""
@@ -18,9 +21,11 @@ class Fit(NamedTuple):
     - `starts`: candidates that the method began with.
     - `crossed`: of these, how many were dropped on the way because their boundary crossed itself.
     - `enough`: certified finalists after which the others need not be looked at.
+    - `bent`: of a search for likeness, the bent silhouette of each finalist.
     """
 
     model: TileModel
     starts: int
     crossed: int
     enough: int
+    bent: tuple[PlacedBent, ...] = ()

@@ -1,21 +1,121 @@
-"""The whole fit of one class by co-deformation: from a silhouette to start tiles of a flow."""
+"""The whole fit of one class by co-deformation: from a silhouette to start tiles, placed on it."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
 import numpy as np
 import scipy.optimize
+import torch
 
-from orbiflow.escher.bending import Bent
+from orbiflow.cancel import Cancel
+from orbiflow.errors import CertificationError
+from orbiflow.escher.bending import Bent, Hand, bent_tiles
+from orbiflow.escher.bending_settings import BendingSettings
+from orbiflow.escher.fit import Fit, Progress
+from orbiflow.escher.model import TileModel
+from orbiflow.escher.placements import Complex
 from orbiflow.escher.prototiles import Prototiles
 from orbiflow.escher.tile_space import NearestTiles
 from orbiflow.geometry import complex_points, plane_points
 from orbiflow.likeness.overlap import Overlap
+from orbiflow.silhouette.target import Target
 from orbiflow.symmetry.isometry import Array
+from orbiflow.threads import one_blas_thread
 from orbiflow.tilings import IsohedralClass
 
 
-def placed(bent: Bent, overlap: Overlap) -> tuple[complex, complex]:
-    """The similarity z -> factor z + shift of a bent tile with the largest IoU.
+class PlacedBent(NamedTuple):
+    """A bent silhouette that is a tile, laid over the target by a similarity.
+
+    - `bent`: the silhouette, in a frame of its own, mirrored if its hand is.
+    - `factor`, `shift`: z -> factor z + shift, after which a mirrored one is reflected in the x axis.
+    """
+
+    bent: Bent
+    factor: complex
+    shift: complex
+
+    def place(self, z: Complex) -> Array:
+        """Points (...) x + iy of the bent silhouette as points (..., 2) of the normal form."""
+        placed = self.factor * z + self.shift
+        return plane_points(np.conj(placed) if self.bent.hand.mirrored else placed)
+
+    @property
+    def outline(self) -> Array:
+        """The bent outline (n, 2) near its tile, counter-clockwise, in the normal form."""
+        ring = self.place(self.bent.relaxed)
+        return ring[::-1] if self.bent.hand.mirrored else ring
+
+
+def fit_bending(
+    target: Target,
+    kind: IsohedralClass,
+    settings: BendingSettings,
+    both: Sequence[Hand],
+    *,
+    per_class: int = 1,
+    progress: Progress | None = None,
+    cancel: Cancel | None = None,
+) -> Fit:
+    """Fit tiles of one class to a target by letting the silhouette bend (design point 15).
+
+    Args:
+        target: the silhouette.
+        kind: the class.
+        settings: of the search.
+        both: the target's hands, see `hands`.
+        per_class: certified tiles that are wanted.
+        progress: told the share of the work done.
+        cancel: looked at before each step.
+
+    Raises:
+        CertificationError: if every finalist crosses itself.
+        Cancelled: if it was told to stop.
+    """
+    with one_blas_thread():  # many small systems
+        return _fit(target, kind, settings, both, per_class, progress, cancel)
+
+
+def _fit(
+    target: Target,
+    kind: IsohedralClass,
+    settings: BendingSettings,
+    both: Sequence[Hand],
+    per_class: int,
+    progress: Progress | None,
+    cancel: Cancel | None,
+) -> Fit:
+    told = progress or (lambda _share, _loss: None)
+    settings = replace(settings, finalists=max(settings.finalists, 3 * per_class))
+    found, dropped = bent_tiles(
+        both, kind, settings, lambda share: told(0.9 * share, float("nan")), cancel
+    )
+    if not found:
+        raise CertificationError(f"{kind.name}: all tiles near the silhouette cross themselves")
+    overlaps = [Overlap(target.normal * (1.0, -1.0 if hand.mirrored else 1.0)) for hand in both]
+    placed = [placed_best(bent, overlaps[bent.hand.mirrored]) for bent in found]
+    starts = Prototiles.joined([prototile(kind, one) for one in placed])
+    model = TileModel(
+        kind,
+        max_frequency=1,
+        segments=1,
+        smoothness=0.0,
+        steps=1,
+        dtype=torch.float64,
+        prototiles=starts,
+    )
+    with torch.no_grad():  # a flow that stays where it is
+        for field in model.fourier_fields():
+            field.parameters_.zero_()
+    enough = 2 if per_class == 1 else 3 * per_class
+    return Fit(model, settings.placements, dropped, enough, tuple(placed))
+
+
+def placed_best(bent: Bent, overlap: Overlap) -> PlacedBent:
+    """Lay a bent tile over the silhouette by the similarity of largest IoU.
 
     From the one that lays the bent points nearest to where they were, by L-BFGS on exact gradients.
 
@@ -41,22 +141,22 @@ def placed(bent: Bent, overlap: Overlap) -> tuple[complex, complex]:
     found = scipy.optimize.minimize(
         loss, np.zeros(4), jac=True, method="L-BFGS-B", options={"maxiter": 40}
     )
-    scale = factor * np.exp(found.x[0] + 1j * found.x[1])
-    return complex(scale), complex(rest.mean() + found.x[2] + 1j * found.x[3] - scale * center)
+    scale = complex(factor * np.exp(found.x[0] + 1j * found.x[1]))
+    shift = complex(rest.mean() + found.x[2] + 1j * found.x[3] - scale * center)
+    return PlacedBent(bent, scale, shift)
 
 
-def prototile(kind: IsohedralClass, bent: Bent, factor: complex, shift: complex) -> Prototiles:
-    """A bent tile under a similarity as a start tile, placed on the target."""
-    placement = bent.placement
+def prototile(kind: IsohedralClass, placed: PlacedBent) -> Prototiles:
+    """A placed bent tile as a start tile of a flow."""
+    bent, factor, shift = placed
     n = bent.hand.fine.size
-    order = (np.arange(n) + placement.starts[0]) % n
+    order = (np.arange(n) + bent.placement.starts[0]) % n
     turn = np.array([[factor.real, -factor.imag], [factor.imag, factor.real]])
-    offset = turn @ bent.offset + [shift.real, shift.imag]
     tiles = NearestTiles(
         (factor * bent.points[:n] + shift)[order][None],
         (turn @ bent.linear)[None],
-        offset[None],
-        np.cumsum(placement.lengths, axis=1) - placement.lengths,
+        (turn @ bent.offset + [shift.real, shift.imag])[None],
+        np.cumsum(bent.placement.lengths, axis=1) - bent.placement.lengths,
         np.zeros(1),
     )
     return Prototiles.of(kind, tiles, n, mirrored=bent.hand.mirrored)

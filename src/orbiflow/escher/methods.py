@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 from orbiflow.cancel import Cancel
+from orbiflow.escher.bending import Hand, hands
+from orbiflow.escher.bending_settings import BendingSettings
 from orbiflow.escher.descent_settings import DescentSettings
 from orbiflow.escher.fit import Fit, Progress
+from orbiflow.escher.fit_bending import fit_bending
 from orbiflow.escher.fit_descent import fit_descent
 from orbiflow.escher.occupancy import OccupancySettings, fit_occupancy
 from orbiflow.escher.starts import initial_poses
@@ -16,15 +19,36 @@ from orbiflow.silhouette.soft_target import SoftTarget
 from orbiflow.silhouette.target import Target
 from orbiflow.tilings import CLASSES, IsohedralClass
 
-Settings = DescentSettings | OccupancySettings
+
+@dataclass(frozen=True)
+class BothSettings:
+    """Search for likeness and for overlap, each with its own settings."""
+
+    likeness: BendingSettings = field(default_factory=BendingSettings)
+    overlap: DescentSettings = field(default_factory=DescentSettings)
+
+    @property
+    def seed(self) -> int:
+        """Of both."""
+        return self.likeness.seed
+
+
+Settings = BendingSettings | DescentSettings | BothSettings | OccupancySettings
 
 
 def method_name(settings: Settings) -> str:
     """As in `--method`."""
-    return "descent" if isinstance(settings, DescentSettings) else "occupancy"
+    return "occupancy" if isinstance(settings, OccupancySettings) else "descent"
 
 
-def fit(
+def objective_name(settings: Settings) -> str:
+    """As in `--objective`."""
+    if isinstance(settings, BendingSettings):
+        return "likeness"
+    return "both" if isinstance(settings, BothSettings) else "overlap"
+
+
+def fits(
     target: Target,
     kind: IsohedralClass,
     settings: Settings,
@@ -33,34 +57,73 @@ def fit(
     per_class: int = 1,
     progress: Progress | None = None,
     cancel: Cancel | None = None,
-) -> Fit:
-    """Fit tiles of one class by the method that the settings belong to.
+) -> list[Fit]:
+    """Fit tiles of one class by the methods that the settings belong to.
 
     Args:
         target: the silhouette.
         kind: the class.
         settings: of the method.
-        emphasis: what must survive; the descent alone takes notice.
+        emphasis: what must survive; the occupancy method takes no notice.
         per_class: certified tiles that are wanted.
         progress: told how far it is.
         cancel: looked at before each step.
 
     Raises:
+        CertificationError: if no candidate is left.
         Cancelled: if it was told to stop.
     """
+    if isinstance(settings, BothSettings):
+        told = progress or (lambda _share, _loss: None)
+        first = fits(
+            target,
+            kind,
+            settings.likeness,
+            emphasis=emphasis,
+            per_class=per_class,
+            progress=lambda share, loss: told(0.3 * share, loss),
+            cancel=cancel,
+        )
+        return first + fits(
+            target,
+            kind,
+            settings.overlap,
+            emphasis=emphasis,
+            per_class=per_class,
+            progress=lambda share, loss: told(0.3 + 0.7 * share, loss),
+            cancel=cancel,
+        )
+    if isinstance(settings, BendingSettings):
+        both = shared_hands(target, settings, emphasis)
+        return [
+            fit_bending(
+                target,
+                kind,
+                settings,
+                both,
+                per_class=per_class,
+                progress=progress,
+                cancel=cancel,
+            )
+        ]
     if isinstance(settings, DescentSettings):
         soft = _soft_target(target, emphasis)
         settings = settings.with_survivors(2 * per_class)
         found = fit_descent(target, kind, settings, soft=soft, progress=progress, cancel=cancel)
-        return found._replace(enough=1 if per_class == 1 else 2 * per_class)
+        return [found._replace(enough=1 if per_class == 1 else 2 * per_class)]
     number = list(CLASSES).index(kind.name)
     own = replace(settings, seed=(settings.seed * 1009 + number) % 2**32)
     model = fit_occupancy(target, kind, own, progress, cancel=cancel)
-    return Fit(model, len(initial_poses(kind, settings.turns)[0]), 0, model.size)
+    return [Fit(model, len(initial_poses(kind, settings.turns)[0]), 0, model.size)]
 
 
 def prepare(target: Target, settings: Settings, emphasis: Emphasis | None) -> None:
     """Compute what the fits of all classes share, so that forked processes find it done."""
+    if isinstance(settings, BothSettings):
+        prepare(target, settings.likeness, emphasis)
+        prepare(target, settings.overlap, emphasis)
+    if isinstance(settings, BendingSettings):
+        shared_hands(target, settings, emphasis)
     if isinstance(settings, DescentSettings):
         _soft_target(target, emphasis)
 
@@ -68,3 +131,18 @@ def prepare(target: Target, settings: Settings, emphasis: Emphasis | None) -> No
 @lru_cache(maxsize=2)  # targets hash by identity; one serves all classes
 def _soft_target(target: Target, emphasis: Emphasis | None) -> SoftTarget:
     return SoftTarget(target, emphasis=emphasis)
+
+
+def shared_hands(
+    target: Target, settings: BendingSettings, emphasis: Emphasis | None
+) -> tuple[Hand, Hand]:
+    """The target's hands, made once for all classes."""
+    return _hands(target, settings.seed, settings.multiples, emphasis)
+
+
+@lru_cache(maxsize=2)
+def _hands(
+    target: Target, seed: int, multiples: tuple[int, ...], emphasis: Emphasis | None
+) -> tuple[Hand, Hand]:
+    settings = BendingSettings(seed=seed, multiples=multiples)
+    return hands(target, settings, emphasis=emphasis)

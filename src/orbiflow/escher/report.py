@@ -12,11 +12,12 @@ import shapely
 import torch
 
 from orbiflow import __version__
-from orbiflow.escher.methods import Settings, method_name
+from orbiflow.escher.methods import Settings, method_name, objective_name
 from orbiflow.escher.result import ClassFailure, TileResult
 from orbiflow.silhouette.emphasis import Emphasis
 from orbiflow.silhouette.target import Target
 from orbiflow.symmetry import CrystallographicGroup
+from orbiflow.symmetry.isometry import Array
 
 SCHEMA_VERSION = 1
 
@@ -35,20 +36,29 @@ def group_json(group: CrystallographicGroup) -> dict[str, Any]:
 
 def tile_json(result: TileResult) -> dict[str, Any]:
     """One entry of `tiles`: polygon and group in the input's own coordinates."""
-    ring = result.tile.polygon
     return {
         "class": result.name,
         "score": result.score,
-        "metrics": result.metrics.as_dict(),
+        "objective": result.objective,
+        "metrics": {
+            **result.metrics.as_dict(),
+            "deformation": result.deformation,
+            "bent_iou": result.bent_iou,
+        },
         "recognisability": result.recognisability.as_dict(),
         "certificate": result.certificate.as_dict(),
-        "polygon": np.concatenate([ring, ring[:1]]).tolist(),
+        "polygon": _closed(result.tile.polygon),
+        "bent": None if result.bent is None else _closed(result.bent),
         "corners": list(result.tile.corners),
         "group": group_json(result.tile.group),
         "starts": result.starts,
         "dropped": result.dropped,
         "seconds": round(result.seconds, 3),
     }
+
+
+def _closed(ring: Array) -> list[list[float]]:
+    return np.concatenate([ring, ring[:1]]).tolist()
 
 
 def report(
@@ -71,6 +81,7 @@ def report(
     return {
         "schema_version": SCHEMA_VERSION,
         "method": method_name(settings),
+        "objective": objective_name(settings),
         "seed": settings.seed,
         "settings": asdict(settings),
         "versions": {

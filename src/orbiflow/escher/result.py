@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -10,12 +11,14 @@ import shapely
 from orbiflow.errors import CertificationError
 from orbiflow.escher.boundary import extract_tile
 from orbiflow.escher.fit import Fit
+from orbiflow.escher.fit_bending import PlacedBent
 from orbiflow.escher.model import TileModel
 from orbiflow.escher.storage import SavedModel
-from orbiflow.likeness.metrics import ShapeMetrics, compare
+from orbiflow.likeness.metrics import ShapeMetrics, compare, iou
 from orbiflow.likeness.ranking import rank_score
 from orbiflow.likeness.recognition import Recognisability, Recogniser
 from orbiflow.silhouette.target import Target
+from orbiflow.symmetry.isometry import Array
 from orbiflow.tilings import Certificate, Tile, certify
 
 
@@ -33,6 +36,11 @@ class TileResult:
     - `starts`, `dropped`: starts of the fit; those whose boundary crossed itself on the way, or that
       gave no certified tile.
     - `seconds`: of computing, on one core.
+    - `objective`: what the fit was after, "likeness" or "overlap".
+    - `bent`: of a search for likeness, the bent silhouette near which the tile was found: its outline
+      (n, 2) in the input's coordinates.
+    - `bent_iou`: IoU of the tile with it.
+    - `deformation`: what bending the silhouette costs (docs/likeness.md); smaller is better.
     - `others`: more tiles of the class, if they were asked for.
     """
 
@@ -47,11 +55,19 @@ class TileResult:
     starts: int
     dropped: int
     seconds: float
+    objective: str = "overlap"
+    bent: Array | None = None
+    bent_iou: float | None = None
+    deformation: float | None = None
     others: tuple[TileResult, ...] = ()
 
     @property
     def score(self) -> float:
-        """What tiles are ranked by: `rank_score` of IoU and recognisability."""
+        """What tiles are ranked by, 0 to 1: after a search for likeness exp(-`deformation`), else
+        `rank_score` of IoU and recognisability.
+        """
+        if self.deformation is not None:
+            return math.exp(-self.deformation)
         return rank_score(self.metrics.iou, self.recognisability.score)
 
     def family(self) -> tuple[TileResult, ...]:
@@ -83,6 +99,8 @@ def best_tiles(
     for index in range(fit.model.size):
         try:
             result = _result(target, fit.model.take([index]), fit.starts, seconds, force=force)
+            if fit.bent:
+                result = _with_bent(target, result, fit.bent[index])
             if not force:
                 result.certificate.require()
             found.append(result)
@@ -116,6 +134,20 @@ def _result(
         starts=starts,
         dropped=0,
         seconds=seconds,
+    )
+
+
+def _with_bent(target: Target, result: TileResult, placed: PlacedBent) -> TileResult:
+    outline = target.frame.to_input(placed.outline)
+    region = shapely.Polygon(outline)
+    whole = region if region.is_valid else shapely.make_valid(region).buffer(0)
+    tile = shapely.Polygon(result.tile.polygon)
+    return replace(
+        result,
+        objective="likeness",
+        bent=outline,
+        bent_iou=iou(whole, tile) if tile.is_valid else None,  # pyright: ignore[reportArgumentType]
+        deformation=placed.bent.cost,
     )
 
 

@@ -11,9 +11,10 @@ from typing import Any
 
 from orbiflow.cancel import Cancel, Cancelled
 from orbiflow.errors import CertificationError, OrbiflowError
+from orbiflow.escher.bending_settings import BendingSettings
 from orbiflow.escher.descent_settings import DescentSettings
-from orbiflow.escher.methods import Settings, fit, prepare
-from orbiflow.escher.preview import quick_tile
+from orbiflow.escher.methods import BothSettings, Settings, fits, prepare
+from orbiflow.escher.preview import quick_bent_tile, quick_tile
 from orbiflow.escher.processes import process_context, work
 from orbiflow.escher.result import ClassFailure, TileResult, best_tiles
 from orbiflow.likeness.ranking import diverse, tile_similarity
@@ -24,6 +25,9 @@ from orbiflow.tilings import CLASSES, isohedral_class
 
 INTERRUPTED = "interrupted"
 """The reason given for a class that was left undone."""
+
+ALIKE = 0.9
+"""Mutual IoU above which two tiles of a class are too much alike to be shown both."""
 
 Watcher = Callable[["Event"], None]
 Outcome = TileResult | ClassFailure
@@ -81,7 +85,8 @@ def escherize(
     Args:
         target: the silhouette.
         classes: names; each is done once, in its own process.
-        settings: of the descent (`DescentSettings`, the default) or of the paper's method
+        settings: of the search for likeness (`BendingSettings`, the default), for overlap
+            (`DescentSettings`), for both (`BothSettings`), or of the paper's method
             (`OccupancySettings`).
         emphasis: what must survive.
         per_class: tiles of each class at most, no two of them twins.
@@ -107,7 +112,7 @@ def escherize(
     for what, number in (("workers", workers), ("per_class", per_class)):
         if number < 1:
             raise OrbiflowError(f"{what} must be at least 1, got {number}")
-    task = Task(target, settings or DescentSettings(), emphasis, per_class, force)
+    task = Task(target, settings or BendingSettings(), emphasis, per_class, force)
     cancel = cancel or Cancel()
     teller = _Teller(watch)
     count = min(workers, len(names))
@@ -184,19 +189,26 @@ def _work_on(task: Task, name: str, watch: Watcher, cancel: Cancel) -> Outcome:
     kind = isohedral_class(name)
     begin = time.perf_counter()
     with one_thread():
-        found = fit(
-            task.target,
-            kind,
-            task.settings,
-            emphasis=task.emphasis,
-            per_class=task.per_class,
-            progress=lambda share, loss: watch(Event(kind.name, share, loss)),
-            cancel=cancel,
-        )
         try:
-            tiles = best_tiles(task.target, found, force=task.force)
+            found = fits(
+                task.target,
+                kind,
+                task.settings,
+                emphasis=task.emphasis,
+                per_class=task.per_class,
+                progress=lambda share, loss: watch(Event(kind.name, share, loss)),
+                cancel=cancel,
+            )
         except CertificationError as error:
             return ClassFailure(kind.name, str(error))
+        tiles, reasons = [], []
+        for one in found:
+            try:
+                tiles += best_tiles(task.target, one, force=task.force)
+            except CertificationError as error:
+                reasons.append(str(error))
+    if not tiles:
+        return ClassFailure(kind.name, "; ".join(dict.fromkeys(reasons)))
     chosen = _without_twins(tiles, task.per_class)
     seconds = time.perf_counter() - begin
     best, *others = (replace(tiles[k], seconds=seconds) for k in chosen)
@@ -208,16 +220,22 @@ def _without_twins(tiles: Sequence[TileResult], count: int) -> list[int]:
         return [0]
     sound = [k for k, tile in enumerate(tiles) if tile.certificate.simple]
     alike = tile_similarity([tiles[k].tile.polygon for k in sound], [tiles[k].name for k in sound])
-    return [sound[k] for k in diverse([tiles[k].score for k in sound], count, alike)] or [0]
+    chosen = diverse([tiles[k].score for k in sound], count, alike, twin=ALIKE)
+    return [sound[k] for k in chosen] or [0]
 
 
 def _preview(task: Task, names: Sequence[str], watch: Watcher, cancel: Cancel) -> None:
     """A first tile to look at, while the others are on their way."""
-    if isinstance(task.settings, DescentSettings) and task.settings.starts == "outline":
-        with one_thread():
+    settings, tile = task.settings, None
+    if isinstance(settings, BothSettings):
+        settings = settings.likeness
+    with one_thread():
+        if isinstance(settings, BendingSettings):
+            tile = quick_bent_tile(task.target, names, settings, task.emphasis, cancel=cancel)
+        elif isinstance(settings, DescentSettings) and settings.starts == "outline":
             tile = quick_tile(task.target, names, cancel=cancel)
-        if tile is not None:
-            watch(Event(tile.name, 0.0, 1 - tile.metrics.iou, preview=tile))
+    if tile is not None:
+        watch(Event(tile.name, 0.0, 1 - tile.metrics.iou, preview=tile))
 
 
 def _ignore(_event: Event) -> None:

@@ -8,7 +8,15 @@ import time
 from typing import Any
 
 from orbiflow.cancel import Cancel
-from orbiflow.escher import ClassFailure, DescentSettings, OccupancySettings, TileResult, search
+from orbiflow.escher import (
+    BendingSettings,
+    BothSettings,
+    ClassFailure,
+    DescentSettings,
+    OccupancySettings,
+    TileResult,
+    search,
+)
 from orbiflow.escher.methods import Settings
 from orbiflow.escher.report import report
 from orbiflow.export.gallery import OVERVIEW, RESULT, write_gallery, written_files
@@ -130,7 +138,13 @@ def _settings(request: EscherizeRequest) -> Settings:
     }
     if request.method == "occupancy":
         return OccupancySettings(seed=request.seed, **asked)
-    return DescentSettings.for_effort(request.effort or "normal", seed=request.seed, **asked)
+    effort, objective = request.effort or "normal", request.objective or "likeness"
+    neck = {} if request.min_neck is None else {"min_neck": request.min_neck}
+    bending = BendingSettings.for_effort(effort, seed=request.seed, **neck)
+    if objective == "likeness":
+        return bending
+    descent = DescentSettings.for_effort(effort, seed=request.seed, **asked)
+    return descent if objective == "overlap" else BothSettings(bending, descent)
 
 
 def _read(request: EscherizeRequest) -> tuple[Target, Emphasis | None]:
@@ -164,6 +178,8 @@ def _row(result: TileResult) -> dict[str, Any]:
     return {
         "class": result.name,
         "group": result.group_name,
+        "objective": result.objective,
+        "deformation": result.deformation,
         "score": result.score,
         "iou": result.metrics.iou,
         "dice": result.metrics.dice,

@@ -39,6 +39,9 @@ class EscherizeRequest(Request):
     - `classes`: isohedral classes, None for all nine.
     - `method`, `effort`, `max_frequency`, `turns`, `iterations`, `seed`: of the fit; None is the
       method's own default.
+    - `objective`: "likeness" (the default: the silhouette bends until it is a tile), "overlap" (the
+      tile overlaps the silhouette as it is) or "both"; of the descent.
+    - `min_neck`: width of necks that a tile may have, in square roots of its area.
     - `emphasis`, `strength`: mask of what must survive, and how many times more it counts.
     - `per_class`: tiles of each class at most. `force`: keep tiles that are not certified.
     - `workers`: processes, None for one a core.
@@ -51,6 +54,8 @@ class EscherizeRequest(Request):
     out: Path = Path("out")
     classes: tuple[str, ...] | None = None
     method: Literal["descent", "occupancy"] = "descent"
+    objective: Literal["likeness", "overlap", "both"] | None = None
+    min_neck: float | None = None
     effort: Literal["fast", "normal", "best"] | None = None
     emphasis: Path | None = None
     strength: float | None = None
@@ -69,7 +74,7 @@ class EscherizeRequest(Request):
         if self.strength is not None and self.emphasis is None:
             raise RecordError("{strength} needs {emphasis}: the mask that it belongs to")
         if self.method == "occupancy":
-            for name in ("emphasis", "effort"):
+            for name in ("emphasis", "effort", "objective", "min_neck"):
                 if getattr(self, name) is not None:
                     raise RecordError(f"{{{name}}} belongs to {{method}} descent")
         else:
@@ -79,6 +84,11 @@ class EscherizeRequest(Request):
                         f"{{{name}}} belongs to {{method}} occupancy; the descent has {{effort}} "
                         "instead"
                     )
+        likeness = self.method == "descent" and self.objective in (None, "likeness")
+        if self.max_frequency is not None and likeness:
+            raise RecordError("{max_frequency} belongs to {objective} overlap or both")
+        if self.min_neck is not None and not 0 <= self.min_neck <= 0.2:
+            raise RecordError(f"{{min_neck}} must be from 0 to 0.2, got {self.min_neck:g}")
         at_least_one(self, "workers")
         if self.threshold is not None and not 0 <= self.threshold <= 1:
             raise RecordError(f"{{threshold}} must lie between 0 and 1, got {self.threshold:g}")
