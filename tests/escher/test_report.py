@@ -129,7 +129,7 @@ def test_the_schema_notices(
 
 def test_every_field_is_required(case: tuple[Target, dict[str, Any]]) -> None:
     _, document = case
-    for key in document:
+    for key in document.keys() - {"objective"}:  # newer than the first version of the layout
         assert not validator().is_valid({k: v for k, v in document.items() if k != key})
 
 

@@ -122,6 +122,7 @@ def test_a_first_look_alone_is_kept_unless_there_is_more(tmp_path: Path) -> None
         method="descent",
         turns=None,
         iterations=None,
+        max_frequency=None,
         effort="fast",
     )
 
