@@ -44,10 +44,15 @@ class PlacedBent(NamedTuple):
         return plane_points(np.conj(placed) if self.bent.hand.mirrored else placed)
 
     @property
-    def outline(self) -> Array:
-        """The bent outline (n, 2) near its tile, counter-clockwise, in the normal form."""
-        ring = self.place(self.bent.relaxed)
-        return ring[::-1] if self.bent.hand.mirrored else ring
+    def outlines(self) -> tuple[Array, Array]:
+        """The outline at rest and bent near its tile, (n, 2) each, counter-clockwise, point by point.
+
+        In the normal form, where the silhouette lies as it is.
+        """
+        hand = self.bent.hand
+        rest = hand.samples.fine * ((1.0, -1.0) if hand.mirrored else (1.0, 1.0))
+        bent = self.place(self.bent.relaxed)
+        return (rest[::-1], bent[::-1]) if hand.mirrored else (rest, bent)
 
 
 def fit_bending(

@@ -37,8 +37,8 @@ class TileResult:
       gave no certified tile.
     - `seconds`: of computing, on one core.
     - `objective`: what the fit was after, "likeness" or "overlap".
-    - `bent`: of a search for likeness, the bent silhouette near which the tile was found: its outline
-      (n, 2) in the input's coordinates.
+    - `bent`, `rest`: of a search for likeness, the bent silhouette near which the tile was found, and
+      the silhouette as it is: outlines (n, 2) in the input's coordinates, point by point.
     - `bent_iou`: IoU of the tile with it.
     - `deformation`: what bending the silhouette costs (docs/likeness.md); smaller is better.
     - `others`: more tiles of the class, if they were asked for.
@@ -57,6 +57,7 @@ class TileResult:
     seconds: float
     objective: str = "overlap"
     bent: Array | None = None
+    rest: Array | None = None
     bent_iou: float | None = None
     deformation: float | None = None
     others: tuple[TileResult, ...] = ()
@@ -138,13 +139,14 @@ def _result(
 
 
 def _with_bent(target: Target, result: TileResult, placed: PlacedBent) -> TileResult:
-    outline = target.frame.to_input(placed.outline)
+    rest, outline = (target.frame.to_input(ring) for ring in placed.outlines)
     region = shapely.Polygon(outline)
     whole = region if region.is_valid else shapely.make_valid(region).buffer(0)
     tile = shapely.Polygon(result.tile.polygon)
     return replace(
         result,
         objective="likeness",
+        rest=rest,
         bent=outline,
         bent_iou=iou(whole, tile) if tile.is_valid else None,  # pyright: ignore[reportArgumentType]
         deformation=placed.bent.cost,

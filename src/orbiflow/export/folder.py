@@ -8,6 +8,7 @@ from pathlib import Path
 from orbiflow.escher.placed_field import placed_field
 from orbiflow.escher.result import TileResult
 from orbiflow.export.svg import tile_svg, tiling_svg
+from orbiflow.figures.bending import bending_png
 from orbiflow.figures.field import field_png
 from orbiflow.figures.tilings import overlay_png, tiling_png
 from orbiflow.files import make_folder, write_atomic
@@ -22,6 +23,20 @@ TILE_FILES = (
     "field.png",
     "model.safetensors",
 )
+
+
+def overlay(result: TileResult, target: Target, *, label: str = "", width_px: int = 1600) -> bytes:
+    """PNG of a tile and its silhouette: how it bent, or what is missing and added."""
+    y_down = target.y_down
+    label = label or result.name
+    if result.bent is None or result.rest is None:
+        return overlay_png(
+            result.tile, target.outline, y_down=y_down, label=label, width_px=width_px
+        )
+    label = f"{label}  IoU {result.metrics.iou:.3f}"
+    return bending_png(
+        result.tile, result.rest, result.bent, y_down=y_down, label=label, width_px=width_px
+    )
 
 
 def write_tile_folder(result: TileResult, target: Target, folder: Path) -> list[Path]:
@@ -41,10 +56,14 @@ def write_tile_folder(result: TileResult, target: Target, folder: Path) -> list[
         "tile.svg": lambda: tile_svg(result.tile, y_down=y_down, title=title),
         "tiling.svg": lambda: tiling_svg(result.tile, y_down=y_down, title=title, colours=colours),
         "tiling.png": lambda: tiling_png(result.tile, y_down=y_down, colours=colours),
-        "overlay.png": lambda: overlay_png(result.tile, target.outline, y_down=y_down, label=label),
+        "overlay.png": lambda: overlay(result, target, label=label),
         "field.png": lambda: field_png(
             placed_field(result.model.restore()), result.normal_tile.group, result.normal_tile
         ),
         "model.safetensors": result.model.to_bytes,
     }
-    return [write_atomic(folder / name, contents[name]()) for name in TILE_FILES]
+    if result.objective == "likeness":  # no flow moves it
+        del contents["field.png"]
+    return [
+        write_atomic(folder / name, contents[name]()) for name in TILE_FILES if name in contents
+    ]

@@ -14,8 +14,8 @@ from PIL import Image, ImageDraw, ImageFont
 
 from orbiflow.escher.processes import work
 from orbiflow.escher.result import TileResult
-from orbiflow.export.folder import TILE_FILES, write_tile_folder
-from orbiflow.figures.tilings import overlay_png, tiling_png
+from orbiflow.export.folder import TILE_FILES, overlay, write_tile_folder
+from orbiflow.figures.tilings import tiling_png
 from orbiflow.files import write_atomic
 from orbiflow.silhouette.target import Target
 
@@ -89,6 +89,12 @@ def written_files(folder: Path) -> set[str]:
     return {RESULT, OVERVIEW} | inside
 
 
+def _measure(result: TileResult) -> str:
+    if result.deformation is None:
+        return f"recognised {result.recognisability.score:.2f}"
+    return f"bent {result.deformation:.2f}"
+
+
 def overview_png(
     results: Sequence[TileResult],
     target: Target,
@@ -110,15 +116,15 @@ def overview_png(
         left, top = (i % columns) * 2 * _PANEL, (i // columns) * (_PANEL + _HEADER)
         proof = "certified" if result.certificate.valid else "NOT CERTIFIED"
         title = (
-            f"{result.name}  {result.group_name}    IoU {result.metrics.iou:.3f}    "
-            f"recognised {result.recognisability.score:.2f}    {proof}"
+            f"{result.name}  {result.group_name}    {_measure(result)}    "
+            f"IoU {result.metrics.iou:.3f}    {proof}"
         )
         pen.text((left + 24, top + 14), title, fill="#1a1a1a", font=font)
         both = (
             pictures[i]
             if pictures is not None
             else (
-                overlay_png(result.tile, target.outline, y_down=target.y_down, width_px=900),
+                overlay(result, target, width_px=900),
                 tiling_png(result.tile, y_down=target.y_down, width_px=900),
             )
         )
