@@ -89,10 +89,10 @@ def likeness_tiles(target: Target, effort: str) -> list[LikenessTile]:
     return [tile for _, tile in found]
 
 
-def aligned(tile: Ring, goal: Ring) -> Ring:
+def aligned(tile: Ring, goal: Ring, tries: int = 3) -> Ring:
     """The tile moved by the similarity (turns and mirror images included) of largest IoU with the goal.
 
-    Nelder and Mead from the best three of 48 turns.
+    Nelder and Mead from the best of 48 turns: `tries` of them.
     """
     target = shapely.Polygon(goal)
     shapely.prepare(target)
@@ -132,7 +132,7 @@ def aligned(tile: Ring, goal: Ring) -> Ring:
                 ),
                 mirrored,
             )
-            for start, mirrored in starts[:3]
+            for start, mirrored in starts[:tries]
         ),
         key=lambda found: found[0].fun,
     )

@@ -22,7 +22,7 @@ from pathlib import Path
 
 import numpy as np
 from common import DATA, GOALS, LikenessTile, Ring, goal, likeness_tiles, needed
-from likeness_tiles import kept
+from likeness_methods import kept
 from numpy.typing import NDArray
 
 from orbiflow.geometry import complex_points, orient, plane_points, ring_length, signed_area
