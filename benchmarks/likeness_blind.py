@@ -62,7 +62,7 @@ number 1, of number 2, and so on; equal marks are a tie:
 def shuffled(methods: Sequence[str], seed: int, round_number: int, index: int) -> list[str]:
     """The methods in the order of one picture: the first has number 1."""
     order = np.random.default_rng([seed, round_number, index]).permutation(len(methods))
-    return [methods[k] for k in order]
+    return [methods[int(k)] for k in order]
 
 
 def sheet(target: Ring, tiles: Sequence[Ring]) -> Image.Image:
