@@ -5,14 +5,18 @@ from __future__ import annotations
 import json
 import os
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.optimize
 import shapely
 from numpy.typing import NDArray
 
+from orbiflow.escher.bending import bent_tiles, hands
+from orbiflow.escher.bending_settings import BendingSettings
+from orbiflow.geometry import orient, plane_points
 from orbiflow.silhouette import Target
+from orbiflow.tilings import CLASSES
 
 ROOT = Path(__file__).resolve().parents[1]
 BUNDLED = ROOT / "examples" / "silhouettes"
@@ -36,8 +40,11 @@ Ring = NDArray[np.float64]
 
 
 def goal(name: str) -> Target:
-    """One of the nine goals, at its true aspect."""
-    return Target.read(BUNDLED / "nagata" / f"{name}.dat")
+    """One of the nine goals, or another polygon of their authors, at its true aspect."""
+    path = BUNDLED / "nagata" / f"{name}.dat"
+    if not path.exists():
+        path = needed(DATA / "silhouettes" / "nagata" / f"{name}.dat", f"the polygon {name}")
+    return Target.read(path)
 
 
 def published(section: str) -> dict[str, Any]:
@@ -54,10 +61,38 @@ def needed(path: Path, what: str) -> Path:
     return path
 
 
-def aligned(tile: Ring, goal: Ring) -> Ring:
+class LikenessTile(NamedTuple):
+    """A tile of the search for likeness.
+
+    - `name`: of its class.
+    - `ring`: (M, 2) the tile, counter-clockwise with y up, up to a similarity.
+    - `source`: (M, 2) the points of the target's outline, in its normal form, that became `ring`.
+    """
+
+    name: str
+    ring: Ring
+    source: Ring
+
+
+def likeness_tiles(target: Target, effort: str) -> list[LikenessTile]:
+    """Tiles of all classes by the search for likeness, best first: the only place that calls it."""
+    settings = BendingSettings.for_effort(effort)
+    both = hands(target, settings)
+    found = []
+    for name, kind in CLASSES.items():
+        for bent in bent_tiles(both, kind, settings):
+            n = bent.hand.fine.size
+            flip = (1.0, -1.0 if bent.hand.mirrored else 1.0)
+            ring, source = (plane_points(z[:n]) * flip for z in (bent.points, bent.hand.fine.rest))
+            found.append((bent.cost, LikenessTile(name, orient(ring), orient(source))))
+    found.sort(key=lambda one: one[0])
+    return [tile for _, tile in found]
+
+
+def aligned(tile: Ring, goal: Ring, tries: int = 3) -> Ring:
     """The tile moved by the similarity (turns and mirror images included) of largest IoU with the goal.
 
-    Nelder and Mead from the best three of 48 turns.
+    Nelder and Mead from the best of 48 turns: `tries` of them.
     """
     target = shapely.Polygon(goal)
     shapely.prepare(target)
@@ -97,7 +132,7 @@ def aligned(tile: Ring, goal: Ring) -> Ring:
                 ),
                 mirrored,
             )
-            for start, mirrored in starts[:3]
+            for start, mirrored in starts[:tries]
         ),
         key=lambda found: found[0].fun,
     )

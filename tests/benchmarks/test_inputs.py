@@ -16,6 +16,7 @@ ROOT = Path(__file__).parents[2]
 BENCHMARKS = ROOT / "benchmarks"
 WANTING = {
     "phylopic.py": "the twenty PhyloPic silhouettes",
+    "likeness_energy.py": "the tiles of EST and ARAP",
     "density_rna.py": "the torsion angles of RNA",
     "escherization.py": "the paper's distorted PNGs",
 }
@@ -76,6 +77,6 @@ def test_what_is_missing_is_said_in_one_line(name: str, tmp_path: Path) -> None:
 def test_the_page_names_every_benchmark() -> None:
     page = (ROOT / "docs" / "benchmarks.md").read_text()
     helpers = {"common", "density_data", "density_kde", "density_unoriented_data"}
-    helpers.add("density_unoriented_kde")
+    helpers |= {"density_unoriented_kde", "likeness_methods"}
     for path in BENCHMARKS.glob("*.py"):
         assert path.stem in helpers or f"`{path.name}" in page
