@@ -76,9 +76,9 @@ def slit_square(width: float, depth: float) -> Array:
 
 def crescent(count: int = 60) -> Array:
     """Two arcs that meet in sharp tips; counter-clockwise, of area 1."""
-    turns = np.linspace(-2.2, 2.2, count)
+    turns = np.linspace(-1.45, 1.45, count)
     outer = np.stack([np.cos(turns), np.sin(turns)], axis=-1)
-    inner = np.stack([0.5 * np.cos(turns) - 0.295, np.sin(turns)], axis=-1)
+    inner = outer * (0.4, 1.0) + (0.6 * np.cos(1.45), 0.0)
     return unit(np.concatenate([outer, inner[-2:0:-1]]))
 
 

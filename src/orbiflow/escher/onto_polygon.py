@@ -9,6 +9,7 @@ import shapely
 from numpy.typing import NDArray
 
 from orbiflow.errors import OrbiflowError
+from orbiflow.geometry import arc_lengths
 from orbiflow.silhouette.mesh import Mesh
 from orbiflow.symmetry.isometry import Array
 
@@ -41,7 +42,7 @@ def onto_polygon(
         OrbiflowError: if the corners do not run round the outline and the polygon once.
     """
     n, outline = mesh.size, mesh.size + len(mesh.sides)
-    knots = _arc_lengths(np.roll(images[:n], -corners[0], axis=0))
+    knots = arc_lengths(np.roll(images[:n], -corners[0], axis=0))
     polygon = np.roll(polygon, -vertices[0], axis=0)
     own, goal = (corners - corners[0]) % n, (vertices - vertices[0]) % len(polygon)
     if len(own) != len(goal) or (np.diff(own) < 1).any() or (np.diff(goal) < 1).any():
@@ -64,7 +65,7 @@ def onto_polygon(
 
 def _places(ring: Array, polygon: Array, knots: Array, own: Integers, goal: Integers) -> Array:
     """(Q,) where on the ring, in arc length, the polygon's vertices belong: increasing from 0."""
-    lengths = _arc_lengths(polygon)
+    lengths = arc_lengths(polygon)
     closed, loop = np.concatenate([ring, ring[:1]]), np.concatenate([polygon, polygon[:1]])
     found = np.empty(len(polygon))
     ends = zip(own, [*own[1:], len(ring)], goal, [*goal[1:], len(polygon)], strict=True)
@@ -129,8 +130,3 @@ def _with_points(mesh: Mesh, at: Array, order: Integers, slots: Integers) -> Mes
         np.concatenate([mesh.shares, at - side]),
         n,
     )
-
-
-def _arc_lengths(ring: Array) -> Array:
-    steps = np.linalg.norm(np.roll(ring, -1, axis=0) - ring, axis=1)
-    return np.concatenate([[0.0], np.cumsum(steps)])
