@@ -101,7 +101,7 @@ def test_hairs_are_counted_by_length(width: float, length: float) -> None:
     ring = comb(4, width, 0.3, length)
     expected = 4 * (2 * length + width) / ring_length(ring)
     # a disc in the back does not reach where the outer teeth's sides go on
-    assert hair_share(ring, 0.01) == pytest.approx(expected, abs=0.012 / ring_length(ring))
+    assert hair_share(ring, 0.01) == pytest.approx(expected, abs=0.025 / ring_length(ring))
     assert hair_share(ring, 0.9 * width) == 0
     assert slit_share(ring, 0.2) == 0
     assert slit_share(ring, 0.31) == pytest.approx(
