@@ -16,6 +16,7 @@ from orbiflow.escher.bending import bent_tiles, hands
 from orbiflow.escher.bending_settings import BendingSettings
 from orbiflow.geometry import orient, plane_points
 from orbiflow.silhouette import Target
+from orbiflow.threads import one_blas_thread
 from orbiflow.tilings import CLASSES
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -80,7 +81,9 @@ def likeness_tiles(target: Target, effort: str) -> list[LikenessTile]:
     both = hands(target, settings)
     found = []
     for name, kind in CLASSES.items():
-        for bent in bent_tiles(both, kind, settings):
+        with one_blas_thread():
+            bents, _ = bent_tiles(both, kind, settings)
+        for bent in bents:
             n = bent.hand.fine.size
             flip = (1.0, -1.0 if bent.hand.mirrored else 1.0)
             ring, source = (plane_points(z[:n]) * flip for z in (bent.points, bent.hand.fine.rest))

@@ -108,8 +108,14 @@ def test_bad_inputs(case: str, tmp_path: Path, orbiflow) -> None:
 BAD_OPTIONS: dict[str, tuple[list[str], str]] = {
     "class": (["--classes", "IH4,IH8"], "unknown isohedral class 'IH8'"),
     "no class": (["--classes", " , "], "--classes names no class"),
-    "frequency -1": (["--objective", "overlap", "--max-frequency", "-1"], "max_frequency must be at least 0, got -1"),
-    "frequency 10000": (["--objective", "overlap", "--max-frequency", "10000"], "from 0 to 60, got 10000"),
+    "frequency -1": (
+        ["--objective", "overlap", "--max-frequency", "-1"],
+        "max_frequency must be at least 0, got -1",
+    ),
+    "frequency 10000": (
+        ["--objective", "overlap", "--max-frequency", "10000"],
+        "from 0 to 60, got 10000",
+    ),
     "frequency of likeness": (["--max-frequency", "5"], "--max-frequency belongs to --objective"),
     "objective": (["--objective", "beauty"], "--objective"),
     "neck": (["--min-neck", "3"], "--min-neck must be from 0 to 0.2, got 3"),

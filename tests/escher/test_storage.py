@@ -15,8 +15,16 @@ from safetensors.numpy import save
 
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.escher.boundary import extract_tile
+from orbiflow.escher.carried import Bending
 from orbiflow.escher.model import TileModel
-from orbiflow.escher.storage import FORMAT, MAX_BYTES, SavedModel, load_model, load_saved
+from orbiflow.escher.storage import (
+    BENDING,
+    FORMAT,
+    MAX_BYTES,
+    SavedModel,
+    load_model,
+    load_saved,
+)
 from orbiflow.silhouette import Frame
 from orbiflow.tilings import CLASSES, certify
 from strategies import seeds
@@ -103,6 +111,84 @@ def test_the_frame_is_kept_bit_for_bit(tmp_path: Path) -> None:
     assert loaded.frame.as_dict() == frame.as_dict()
     assert loaded.settings == saved.settings
     assert_same(loaded.restore(), saved.restore())
+
+
+def two_triangles() -> Bending:
+    square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+    sheared = square @ [[1.0, 0.0], [1 / 3, 1.0]]
+    return Bending(square, sheared, np.array([[0, 1, 2], [0, 2, 3]]))
+
+
+def test_the_bending_is_kept_bit_for_bit(tmp_path: Path) -> None:
+    path = tmp_path / "model.safetensors"
+    bending = two_triangles()
+    saved = SavedModel.of(candidate("IH4"), bending=bending)
+    path.write_bytes(saved.to_bytes())
+    for again in (load_saved(path), pickle.loads(pickle.dumps(saved))):
+        assert again.bending is not None
+        for name in ("rest", "images", "triangles"):
+            assert np.array_equal(getattr(again.bending, name), getattr(bending, name))
+        assert set(again.arrays) == set(saved.arrays)
+        assert_same(again.restore(), saved.restore())
+
+
+def test_files_without_a_bending_have_none(tmp_path: Path) -> None:
+    path = tmp_path / "model.safetensors"
+    path.write_bytes(good())
+    assert load_saved(path).bending is None
+    assert load_saved(OLD.with_suffix(".safetensors")).bending is None
+
+
+def with_bending(name: str, array: np.ndarray | None) -> Callable[[], bytes]:
+    bending = two_triangles()
+    arrays = dict(zip(BENDING, (bending.rest, bending.images, bending.triangles), strict=True))
+
+    def make() -> bytes:
+        saved = SavedModel.of(candidate("IH4"))
+        own = {**arrays, name: array}
+        stored = {key: np.array(value) for key, value in own.items() if value is not None}
+        return SavedModel(saved.settings, {**saved.arrays, **stored}).to_bytes()
+
+    return make
+
+
+REST, IMAGES, TRIANGLES = BENDING
+BAD_BENDINGS: dict[str, tuple[Callable[[], bytes], str]] = {
+    "rest missing": (with_bending(REST, None), "the model's bending.rest is missing"),
+    "images missing": (with_bending(IMAGES, None), "the model's bending.images is missing"),
+    "triangles missing": (with_bending(TRIANGLES, None), "bending.triangles is missing"),
+    "too many points": (with_bending(REST, np.zeros((100_001, 2))), "images: expected shape"),
+    "too many triangles": (
+        with_bending(TRIANGLES, np.zeros((200_001, 3), dtype=np.int64)),
+        "1 to 200000 triangles, got 4 and 200001",
+    ),
+    "no triangles": (with_bending(TRIANGLES, np.zeros((0, 3), dtype=np.int64)), "got 4 and 0"),
+    "index too large": (with_bending(TRIANGLES, np.array([[0, 1, 4]])), "indices of its 4"),
+    "index negative": (with_bending(TRIANGLES, np.array([[0, 1, -1]])), "indices of its 4"),
+    "index huge": (
+        with_bending(TRIANGLES, np.array([[0, 1, 2**64 - 1]], dtype=np.uint64)),
+        "indices of its 4",
+    ),
+    "index a float": (with_bending(TRIANGLES, np.array([[0.0, 1.0, 2.0]])), "whole numbers"),
+    "turned over": (with_bending(TRIANGLES, np.array([[2, 1, 0]])), "flat or turned over"),
+    "flat": (with_bending(TRIANGLES, np.array([[0, 0, 1]])), "flat or turned over"),
+    "images folded": (
+        with_bending(IMAGES, np.array([[0, 0], [1, 0], [0.2, 0.5], [0.5, 0.0]])),
+        "images: 1 triangles are flat or turned over",
+    ),
+    "rest NaN": (with_bending(REST, np.full((4, 2), np.nan)), "finite"),
+    "rest in 3-D": (with_bending(REST, np.zeros((4, 3))), "rest: expected shape"),
+}
+
+
+@pytest.mark.parametrize("case", BAD_BENDINGS)
+def test_bad_bendings_are_refused(case: str, tmp_path: Path) -> None:
+    make, message = BAD_BENDINGS[case]
+    path = tmp_path / "model.safetensors"
+    path.write_bytes(make())
+    with pytest.raises(InputFileError, match=message) as caught:
+        load_saved(path)
+    assert str(path) in str(caught.value)
 
 
 def test_single_precision_is_widened() -> None:

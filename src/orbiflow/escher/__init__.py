@@ -1,6 +1,7 @@
 """Escherization: starts, the descent, the paper's occupancy method, the search and its results."""
 
 from orbiflow.escher.bending_settings import BendingSettings
+from orbiflow.escher.carried import Bending, CarriedTile
 from orbiflow.escher.descent_settings import DescentSettings
 from orbiflow.escher.fit import Fit
 from orbiflow.escher.fit_descent import fit_descent
@@ -17,8 +18,10 @@ from orbiflow.escher.search import Event, escherize, escherize_class
 from orbiflow.escher.storage import SavedModel, load_model, load_saved
 
 __all__ = [
+    "Bending",
     "BendingSettings",
     "BothSettings",
+    "CarriedTile",
     "ClassFailure",
     "DescentSettings",
     "Event",

@@ -17,6 +17,7 @@ from safetensors.numpy import load, save
 from orbiflow.arguments import instance
 from orbiflow.arguments import path as as_path
 from orbiflow.errors import InputFileError, OrbiflowError
+from orbiflow.escher.carried import Bending
 from orbiflow.escher.descent_settings import MAX_SEGMENTS
 from orbiflow.escher.max_frequency import MAX_FREQUENCY
 from orbiflow.escher.model import TileModel
@@ -28,6 +29,8 @@ FORMAT = "orbiflow-tile/1"
 MAX_BYTES = 64 * 2**20
 MAX_SIDES = 100_000
 VERTICES, CORNERS = "prototile.outline", "prototile.corners"
+BENDING = ("bending.rest", "bending.images", "bending.triangles")
+"""Arrays of the map from the silhouette; earlier files have none, earlier readers pass over them."""
 FRAME = "frame"
 """Entry of the settings in a file; not in those of version 0.1, which passes over it."""
 
@@ -41,15 +44,19 @@ class SavedModel:
       not the template.
     - `frame`: where the target's normal form, the model's own coordinates, lies in the input; None if
       that is not known.
+    - `bending`: the map from the silhouette onto the tile, in normal form; None if there is none.
     """
 
     settings: dict[str, Any]
     arrays: dict[str, Array]
     frame: Frame | None = None
+    bending: Bending | None = None
 
     @classmethod
-    def of(cls, model: TileModel, frame: Frame | None = None) -> SavedModel:
-        """Take a single candidate apart.
+    def of(
+        cls, model: TileModel, frame: Frame | None = None, bending: Bending | None = None
+    ) -> SavedModel:
+        """Take a single candidate apart; `frame` and `bending` go with it.
 
         Raises:
             OrbiflowError: for a model that holds more than one.
@@ -71,7 +78,7 @@ class SavedModel:
         if model.vertices is not None and model.corners is not None:
             arrays[VERTICES] = model.vertices.cpu().numpy()[0].copy()
             arrays[CORNERS] = model.corners.cpu().numpy()[0].copy()
-        return cls(settings, arrays, frame)
+        return cls(settings, arrays, frame, bending)
 
     def restore(self) -> TileModel:
         """The model again, float64, one candidate.
@@ -149,15 +156,17 @@ class SavedModel:
         # one entry: the library writes several in random order, and the same seed gives one file
         frame = {} if self.frame is None else {FRAME: self.frame.as_dict()}
         metadata = {FORMAT: json.dumps({**self.settings, **frame}, sort_keys=True)}
-        arrays = {name: np.array(a, order="C") for name, a in self.arrays.items()}  # keeps 0-d
+        bending = {} if self.bending is None else _arrays_of(self.bending)
+        stored = {**self.arrays, **bending}
+        arrays = {name: np.array(a, order="C") for name, a in stored.items()}  # keeps 0-d
         return save(arrays, metadata=metadata)
 
 
 def load_saved(path: str | Path) -> SavedModel:
     """Read a `model.safetensors` that `orbiflow escherize` wrote, with the input's frame.
 
-    What the file holds is checked by `SavedModel.restore`, which makes the map; `frame` says where the
-    tile lies in the input, `None` in files of version 0.1.
+    The model itself is checked by `SavedModel.restore`, which makes it; `frame` says where the tile
+    lies in the input, and `bending` is the map from the silhouette: `None` in files from before them.
 
     Raises:
         InputFileError: for a file that is missing, too large or not such a model.
@@ -173,7 +182,8 @@ def load_saved(path: str | Path) -> SavedModel:
         settings = dict(json.loads(metadata[FORMAT]))
         stored = settings.pop(FRAME, None)
         frame = None if stored is None else Frame.from_dict(stored)
-        return SavedModel(settings, dict(arrays), frame)
+        arrays = dict(arrays)
+        return SavedModel(settings, arrays, frame, _bending_in(arrays))
 
 
 def load_model(path: str | Path) -> TileModel:
@@ -188,6 +198,21 @@ def load_model(path: str | Path) -> TileModel:
     saved = load_saved(path)
     with _naming(Path(path)):
         return saved.restore()
+
+
+def _arrays_of(bending: Bending) -> dict[str, Array]:
+    return dict(zip(BENDING, (bending.rest, bending.images, bending.triangles), strict=True))
+
+
+def _bending_in(arrays: dict[str, Array]) -> Bending | None:
+    """Take the map out of a file's arrays."""
+    found = {name: arrays.pop(name) for name in BENDING if name in arrays}
+    if not found:
+        return None
+    missing = [name for name in BENDING if name not in found]
+    if missing:
+        raise OrbiflowError(f"the model's {', '.join(missing)} is missing")
+    return Bending(*(found[name] for name in BENDING))
 
 
 def _read(path: Path) -> bytes:

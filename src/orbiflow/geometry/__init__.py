@@ -1,6 +1,7 @@
 """Closed rings and polygons: area, centroid, sense, points by arc length. Imports no other room."""
 
 from orbiflow.geometry.arc_length import (
+    arc_lengths,
     points_along,
     resampled,
     resampled_with_corners,
@@ -18,6 +19,7 @@ from orbiflow.geometry.rings import (
 )
 
 __all__ = [
+    "arc_lengths",
     "centroid",
     "complex_points",
     "orient",

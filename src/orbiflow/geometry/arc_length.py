@@ -20,7 +20,7 @@ def ring_length(ring: Ring) -> float:
     >>> ring_length(np.array([[0.0, 0.0], [3.0, 0.0], [3.0, 4.0]]))
     12.0
     """
-    return float(_knots(ring)[-1])
+    return float(arc_lengths(ring)[-1])
 
 
 def points_along(ring: Ring, at: ArrayLike) -> Ring:
@@ -31,7 +31,7 @@ def points_along(ring: Ring, at: ArrayLike) -> Ring:
     >>> points_along(np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]), [0.5, 4.5]).tolist()
     [[0.5, 0.0], [0.5, 0.0]]
     """
-    knots = _knots(ring)
+    knots = arc_lengths(ring)
     return _interpolated(ring, knots, np.asarray(at, dtype=np.float64) % knots[-1])
 
 
@@ -44,7 +44,7 @@ def resampled(ring: Ring, count: int, phase: float = 0.0) -> Ring:
     >>> resampled(square, 4, phase=0.5).tolist()
     [[0.5, 0.0], [1.0, 0.5], [0.5, 1.0], [0.0, 0.5]]
     """
-    knots = _knots(ring)
+    knots = arc_lengths(ring)
     return _interpolated(ring, knots, (np.arange(count) + phase) / count * knots[-1])
 
 
@@ -79,7 +79,7 @@ def resampled_with_corners(
         )
     if count < len(kept):
         raise OrbiflowError(f"{len(kept)} corners need at least as many points, got {count}")
-    knots = _knots(ring)
+    knots = arc_lengths(ring)
     starts = knots[kept]
     lengths = np.diff(starts, append=starts[0] + knots[-1])
     shares = _shared_out(lengths, count)
@@ -93,8 +93,12 @@ def resampled_with_corners(
     return points, indices
 
 
-def _knots(ring: Ring) -> Ring:
-    """Arc length (N + 1,) at each vertex, and at the first again."""
+def arc_lengths(ring: Ring) -> Ring:
+    """Arc lengths (N + 1,) at each vertex of the closed `ring` (N, 2), and at the first again.
+
+    >>> arc_lengths(np.array([[0.0, 0.0], [3.0, 0.0], [3.0, 4.0]])).tolist()
+    [0.0, 3.0, 7.0, 12.0]
+    """
     sides = np.roll(ring, -1, axis=0) - ring
     return np.concatenate([[0.0], np.cumsum(np.linalg.norm(sides, axis=1))])
 

@@ -14,6 +14,13 @@ from orbiflow.likeness.metrics import (
 from orbiflow.likeness.overlap import Overlap, prepared_region
 from orbiflow.likeness.ranking import diverse, rank_score, tile_similarity
 from orbiflow.likeness.recognition import Recognisability, Recogniser, recognisability
+from orbiflow.likeness.thinnest import (
+    Thinnest,
+    hair_share,
+    narrowest_neck,
+    narrowest_slit,
+    slit_share,
+)
 
 __all__ = [
     "Overlap",
@@ -22,15 +29,20 @@ __all__ = [
     "Region",
     "Shape",
     "ShapeMetrics",
+    "Thinnest",
     "as_region",
     "compare",
     "dice",
     "diverse",
+    "hair_share",
     "hausdorff",
     "iou",
+    "narrowest_neck",
+    "narrowest_slit",
     "pixel_accuracy",
     "prepared_region",
     "rank_score",
     "recognisability",
+    "slit_share",
     "tile_similarity",
 ]

@@ -92,7 +92,7 @@ class _Distortion:
         det = np.linalg.det(j)
         root = np.sqrt(det**2 + self.epsilon**2)
         # (det + root) / 2 without cancellation
-        bounded = np.where(det > 0, det + root, self.epsilon**2 / (root - det)) / 2
+        bounded = np.where(det > 0, det + root, self.epsilon**2 / (root + abs(det))) / 2
         norm = (j**2).sum(axis=(1, 2))
         cofactor = np.stack(
             [np.stack([j[:, 1, 1], -j[:, 1, 0]], -1), np.stack([-j[:, 0, 1], j[:, 0, 0]], -1)], 1
