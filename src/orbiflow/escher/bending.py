@@ -17,6 +17,7 @@ from orbiflow.escher.placements import Complex, Placements, best_placements
 from orbiflow.escher.tile_space import TileSpace
 from orbiflow.geometry import complex_points, plane_points
 from orbiflow.likeness.elastic import Elastic, Stiffness
+from orbiflow.likeness.fidelity import Fidelity, fidelity
 from orbiflow.silhouette.emphasis import Emphasis
 from orbiflow.silhouette.mesh import triangulate
 from orbiflow.silhouette.sampling import Samples, sampled
@@ -58,6 +59,7 @@ class Bent(NamedTuple):
     - `placement`: one, of the fine outline.
     - `relaxed`: (n,) the outline let go a little: bent as it would like to be near this tile.
     - `energy`, `displacement`: of deforming.
+    - `fidelity`: what is left of the outline; finalists are ordered by its score.
     """
 
     hand: Hand
@@ -68,10 +70,11 @@ class Bent(NamedTuple):
     relaxed: Complex
     energy: float
     displacement: float
+    fidelity: Fidelity
 
     @property
     def cost(self) -> float:
-        """What candidates are ordered by; smaller is better."""
+        """The energy and the displacement together; smaller is better."""
         return self.energy + POSE * self.displacement
 
 
@@ -119,7 +122,7 @@ def bent_tiles(
     progress: Callable[[float], None] | None = None,
     cancel: Cancel | None = None,
 ) -> tuple[list[Bent], int]:
-    """The finalists of one class, least cost first, no two of them twins.
+    """The finalists of one class, best fidelity first, no two of them twins.
 
     Args:
         both: of the target.
@@ -148,7 +151,7 @@ def bent_tiles(
             else:
                 found.append(bent)
             told((number + 0.5 + 0.5 * (k + 1) / settings.finalists) / len(sides))
-    found.sort(key=lambda bent: bent.cost)
+    found.sort(key=lambda bent: -bent.fidelity.score)
     return found, dropped
 
 
@@ -204,6 +207,7 @@ def _detailed(
         body.pulled(tiles.points, tiles.points[: body.size], RELAXED, 3)[: body.size, 0],
         float(body.forgiving_energy(tiles.points)[0] / area),
         float(body.displacement(tiles.points)[0]),
+        fidelity(body.rest[: body.size], ring),
     )
 
 

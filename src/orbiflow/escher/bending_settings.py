@@ -17,13 +17,13 @@ class BendingSettings:
     - `finalists`: of these, the best that are worked out with all of the outline's detail, a class.
     - `rounds`: steps of the minimisation for finalists.
     - `multiples`: points of a tile for each point of the search, the first that holds the corners.
-    - `min_neck`: width of necks below which a tile ranks lower, in square roots of the area.
+    - `min_neck`: width of necks below which a tile's score falls, in square roots of the area.
     - `seed`: moves the outline's points.
     """
 
     placements: int = 300
     held: int = 80
-    finalists: int = 5
+    finalists: int = 8
     rounds: int = 40
     multiples: tuple[int, ...] = (4, 6)
     min_neck: float = 0.01
@@ -57,7 +57,7 @@ class BendingSettings:
 
 
 EFFORTS: dict[str, dict[str, Any]] = {
-    "fast": {"placements": 80, "held": 20, "finalists": 1, "rounds": 20, "multiples": (4,)},
+    "fast": {"placements": 80, "held": 20, "finalists": 2, "rounds": 12, "multiples": (4,)},
     "normal": {},
     # all that "normal" looks at, and more
     "best": {"placements": 1500, "held": 300, "finalists": 20, "rounds": 80},

@@ -43,6 +43,7 @@ class DescentSettings:
     - `lattice`: whether the lattice freedom takes part.
     - `polish`: L-BFGS iterations on the exact IoU; 0 for none.
     - `finalists`: survivors of the last stage that are polished, best first.
+    - `min_neck`: width of necks below which a tile's score falls, in square roots of the area.
     - `seed`: moves the starts.
     """
 
@@ -63,6 +64,7 @@ class DescentSettings:
     lattice: bool = True
     polish: int = 20
     finalists: int = 1
+    min_neck: float = 0.0
     seed: int = 0
 
     def __post_init__(self) -> None:

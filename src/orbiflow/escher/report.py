@@ -44,11 +44,13 @@ def tile_json(result: TileResult) -> dict[str, Any]:
             **result.metrics.as_dict(),
             "deformation": result.deformation,
             "bent_iou": result.bent_iou,
+            "fidelity": None if result.fidelity is None else asdict(result.fidelity),
         },
         "recognisability": result.recognisability.as_dict(),
         "certificate": result.certificate.as_dict(),
         "polygon": _closed(result.tile.polygon),
         "bent": None if result.bent is None else _closed(result.bent),
+        "thinnest": _thinnest(result),
         "corners": list(result.tile.corners),
         "group": group_json(result.tile.group),
         "starts": result.starts,
@@ -59,6 +61,13 @@ def tile_json(result: TileResult) -> dict[str, Any]:
 
 def _closed(ring: Array) -> list[list[float]]:
     return np.concatenate([ring, ring[:1]]).tolist()
+
+
+def _thinnest(result: TileResult) -> dict[str, Any] | None:
+    found = result.thinnest
+    if found is None:
+        return None
+    return {"width": found.width, "share": found.share, "ends": found.ends.tolist()}
 
 
 def report(

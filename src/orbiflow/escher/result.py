@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
-import math
+import contextlib
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import shapely
 
-from orbiflow.errors import CertificationError
+from orbiflow.errors import CertificationError, OrbiflowError
 from orbiflow.escher.boundary import extract_tile
+from orbiflow.escher.carried import Bending
 from orbiflow.escher.fit import Fit
 from orbiflow.escher.fit_bending import PlacedBent
 from orbiflow.escher.model import TileModel
 from orbiflow.escher.storage import SavedModel
+from orbiflow.likeness.fidelity import Fidelity
 from orbiflow.likeness.metrics import ShapeMetrics, compare, iou
 from orbiflow.likeness.ranking import rank_score
 from orbiflow.likeness.recognition import Recognisability, Recogniser
+from orbiflow.likeness.thinnest import Thinnest, narrowest_neck
 from orbiflow.silhouette.target import Target
 from orbiflow.symmetry.isometry import Array
 from orbiflow.tilings import Certificate, Tile, certify
@@ -36,11 +39,14 @@ class TileResult:
     - `starts`, `dropped`: starts of the fit; those whose boundary crossed itself on the way, or that
       gave no certified tile.
     - `seconds`: of computing, on one core.
+    - `thinnest`: the narrowest neck of `tile`.
+    - `min_neck`: width in square roots of the area below which necks lower the score.
     - `objective`: what the fit was after, "likeness" or "overlap".
     - `bent`, `rest`: of a search for likeness, the bent silhouette near which the tile was found, and
       the silhouette as it is: outlines (n, 2) in the input's coordinates, point by point.
     - `bent_iou`: IoU of the tile with it.
-    - `deformation`: what bending the silhouette costs (docs/likeness.md); smaller is better.
+    - `deformation`, `fidelity`: what bending the silhouette costs, and what is left of its outline
+      (docs/likeness.md).
     - `others`: more tiles of the class, if they were asked for.
     """
 
@@ -55,7 +61,10 @@ class TileResult:
     starts: int
     dropped: int
     seconds: float
+    thinnest: Thinnest | None = None
+    min_neck: float = 0.0
     objective: str = "overlap"
+    fidelity: Fidelity | None = None
     bent: Array | None = None
     rest: Array | None = None
     bent_iou: float | None = None
@@ -64,12 +73,16 @@ class TileResult:
 
     @property
     def score(self) -> float:
-        """What tiles are ranked by, 0 to 1: after a search for likeness exp(-`deformation`), else
-        `rank_score` of IoU and recognisability.
+        """What tiles are ranked by, 0 to 1: after a search for likeness its `fidelity`, else
+        `rank_score` of IoU and recognisability; less in proportion where a neck is too thin.
         """
-        if self.deformation is not None:
-            return math.exp(-self.deformation)
-        return rank_score(self.metrics.iou, self.recognisability.score)
+        if self.fidelity is not None:
+            score = self.fidelity.score
+        else:
+            score = rank_score(self.metrics.iou, self.recognisability.score)
+        if self.thinnest is None or self.thinnest.share >= self.min_neck:
+            return score
+        return score * self.thinnest.share / self.min_neck
 
     def family(self) -> tuple[TileResult, ...]:
         """This tile and the others of its class."""
@@ -85,7 +98,12 @@ class ClassFailure:
 
 
 def best_tiles(
-    target: Target, fit: Fit, *, seconds: float = 0.0, force: bool = False
+    target: Target,
+    fit: Fit,
+    *,
+    seconds: float = 0.0,
+    force: bool = False,
+    min_neck: float = 0.0,
 ) -> list[TileResult]:
     """Turn finalists into polygons and certify them, best first, until there are enough.
 
@@ -100,6 +118,7 @@ def best_tiles(
     for index in range(fit.model.size):
         try:
             result = _result(target, fit.model.take([index]), fit.starts, seconds, force=force)
+            result = replace(result, min_neck=min_neck)
             if fit.bent:
                 result = _with_bent(target, result, fit.bent[index])
             if not force:
@@ -135,7 +154,14 @@ def _result(
         starts=starts,
         dropped=0,
         seconds=seconds,
+        thinnest=narrowest_neck(placed.polygon) if shape.is_valid else None,
     )
+
+
+def _bending(placed: PlacedBent, tile: Tile) -> Bending | None:
+    with contextlib.suppress(OrbiflowError):  # hairs that no triangulation follows
+        return Bending.from_bent(placed.bent, placed.factor, placed.shift, tile)
+    return None
 
 
 def _with_bent(target: Target, result: TileResult, placed: PlacedBent) -> TileResult:
@@ -150,6 +176,8 @@ def _with_bent(target: Target, result: TileResult, placed: PlacedBent) -> TileRe
         bent=outline,
         bent_iou=iou(whole, tile) if tile.is_valid else None,  # pyright: ignore[reportArgumentType]
         deformation=placed.bent.cost,
+        fidelity=placed.bent.fidelity,
+        model=replace(result.model, bending=_bending(placed, result.normal_tile)),
     )
 
 

@@ -202,17 +202,25 @@ def _work_on(task: Task, name: str, watch: Watcher, cancel: Cancel) -> Outcome:
         except CertificationError as error:
             return ClassFailure(kind.name, str(error))
         tiles, reasons = [], []
+        neck = _min_neck(task.settings)
         for one in found:
             try:
-                tiles += best_tiles(task.target, one, force=task.force)
+                tiles += best_tiles(task.target, one, force=task.force, min_neck=neck)
             except CertificationError as error:
                 reasons.append(str(error))
     if not tiles:
         return ClassFailure(kind.name, "; ".join(dict.fromkeys(reasons)))
+    tiles.sort(key=lambda tile: (not tile.certificate.valid, -tile.score))
     chosen = _without_twins(tiles, task.per_class)
     seconds = time.perf_counter() - begin
     best, *others = (replace(tiles[k], seconds=seconds) for k in chosen)
     return replace(best, others=tuple(others))
+
+
+def _min_neck(settings: Settings) -> float:
+    if isinstance(settings, BothSettings):
+        settings = settings.likeness
+    return settings.min_neck if isinstance(settings, BendingSettings | DescentSettings) else 0.0
 
 
 def _without_twins(tiles: Sequence[TileResult], count: int) -> list[int]:

@@ -139,11 +139,11 @@ def _settings(request: EscherizeRequest) -> Settings:
     if request.method == "occupancy":
         return OccupancySettings(seed=request.seed, **asked)
     effort, objective = request.effort or "normal", request.objective or "likeness"
-    neck = {} if request.min_neck is None else {"min_neck": request.min_neck}
-    bending = BendingSettings.for_effort(effort, seed=request.seed, **neck)
+    neck = BendingSettings.min_neck if request.min_neck is None else request.min_neck
+    bending = BendingSettings.for_effort(effort, seed=request.seed, min_neck=neck)
     if objective == "likeness":
         return bending
-    descent = DescentSettings.for_effort(effort, seed=request.seed, **asked)
+    descent = DescentSettings.for_effort(effort, seed=request.seed, min_neck=neck, **asked)
     return descent if objective == "overlap" else BothSettings(bending, descent)
 
 

@@ -1,6 +1,7 @@
 """How much of a silhouette is left in its bent outline, as eyes see it: pose-blind, point by point.
 
-Three things together predict what people say of bent silhouettes (docs/likeness.md has the evidence):
+Three of four things together predict what people say of bent silhouettes (docs/likeness.md has the
+evidence); the other, `necks`, keeps threads away that no cutter can make:
 
 - `parts`: how well short pieces of the outline are kept, each compared after its own best motion
   (Procrustes; Gower, 1975), by the mean of the roots: a few pieces may be lost, the rest is to be
@@ -8,6 +9,7 @@ Three things together predict what people say of bent silhouettes (docs/likeness
 - `notches`: where the space outside has become narrower than it was: slits, notches and folds that
   the silhouette does not have. The width is that of the largest disc outside that touches the outline
   (the outer medial axis; found as by Ma, Bae and Choi, 3D medial axis point approximation, 2012).
+- `necks`: how much narrower the inside has become at its worst place beyond half: threads.
 - `moved`: mean squared distance from the best similar copy.
 
 Outlines are given point by point: this compares a shape with what it was bent from, not any two.
@@ -33,6 +35,9 @@ CLEAR = 0.02
 POWERS = (5.6, 1.1, 0.5)
 """Of parts, notches and moved in the damage; fitted to blind marks within targets."""
 
+THREADS = 2.0
+"""Of necks in the damage, as an exponent."""
+
 USUAL = (0.16, 0.05, 0.004)
 """Their values in a tile of middling likeness."""
 
@@ -41,25 +46,27 @@ USUAL = (0.16, 0.05, 0.004)
 class Fidelity:
     """What bending left of an outline; all values from 0, smaller is better, but for `score`.
 
-    - `parts`, `notches`, `moved`: see the module.
+    - `parts`, `notches`, `moved`, `necks`: see the module.
     """
 
     parts: float
     notches: float
     moved: float
+    necks: float
 
     @property
     def score(self) -> float:
         """From 0 to 1, larger is better; 0.5 for a tile of middling likeness, 1 for no change.
 
-        1 / (1 + damage), the damage being the product of the three over their usual values, each to
-        its power.
+        1 / (1 + d^(1/4)), with d the product of the first three over their usual values, each to its
+        power, times exp(`THREADS` necks).
         """
         values = (self.parts, self.notches, self.moved)
         damage = sum(
             power * math.log(max(value, 1e-6) / usual)
             for value, usual, power in zip(values, USUAL, POWERS, strict=True)
         )
+        damage += THREADS * self.necks
         return 1 / (1 + math.exp(min(damage / 4, 700.0)))
 
 
@@ -78,10 +85,12 @@ def fidelity(rest: Complex, bent: Complex) -> Fidelity:
     weight = abs(np.roll(rest, -1) - rest)
     weight /= weight.sum()
     narrower = np.log(_clearance(rest) / _clearance(bent))
+    thinner = np.log(_clearance(rest, inside=True) / _clearance(bent, inside=True))
     return Fidelity(
         float(np.sqrt(_misfits(rest, bent)).mean()),
         float((weight * np.maximum(narrower, 0) ** 2).sum()),
         _moved(rest, bent),
+        max(0.0, float(thinner.max()) - math.log(2.0)),
     )
 
 
@@ -101,8 +110,9 @@ def _misfits(rest: Complex, bent: Complex) -> Array:
     return np.maximum(1 - 2 * common / sizes, 0.0)
 
 
-def _clearance(z: Complex) -> Array:
+def _clearance(z: Complex, *, inside: bool = False) -> Array:
     """(n,) radius of the largest disc outside that touches the outline at each point, at most 1."""
+    z = z[::-1] if inside else z
     n = len(z)
     along = np.roll(z, -1) - np.roll(z, 1)
     inward = 1j * along / np.maximum(abs(along), 1e-300)
@@ -114,7 +124,8 @@ def _clearance(z: Complex) -> Array:
     for near in range(-2, 3):
         radius[own, (own + near) % n] = np.inf
     least = np.minimum(radius.min(axis=1), 1.0)
-    return (np.roll(least, 1) + 2 * least + np.roll(least, -1)) / 4 + CLEAR
+    smooth = (np.roll(least, 1) + 2 * least + np.roll(least, -1)) / 4 + CLEAR
+    return smooth[::-1] if inside else smooth
 
 
 def _moved(rest: Complex, bent: Complex) -> float:
