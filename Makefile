@@ -21,6 +21,7 @@ bench: $(VENV)/.installed-dev
 	$(BIN)/python benchmarks/field.py --quick
 	$(BIN)/python benchmarks/nine_classes.py --quick
 	$(BIN)/python benchmarks/escherization.py --quick
+	$(BIN)/python benchmarks/likeness_energy.py --quick || test $$? -eq 2
 	$(BIN)/python benchmarks/ablations.py --quick
 	$(BIN)/python benchmarks/density_kl.py --quick
 	$(BIN)/python benchmarks/density_nll.py --quick || test $$? -eq 2 # its data are not here
