@@ -87,7 +87,7 @@ def likeness_tiles(target: Target, effort: str) -> list[LikenessTile]:
             n = bent.hand.fine.size
             flip = (1.0, -1.0 if bent.hand.mirrored else 1.0)
             ring, source = (plane_points(z[:n]) * flip for z in (bent.points, bent.hand.fine.rest))
-            found.append((bent.cost, LikenessTile(name, orient(ring), orient(source))))
+            found.append((-bent.fidelity.score, LikenessTile(name, orient(ring), orient(source))))
     found.sort(key=lambda one: one[0])
     return [tile for _, tile in found]
 

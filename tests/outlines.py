@@ -11,7 +11,7 @@ import numpy as np
 from orbiflow.escher.bending import Bent, Hand, bent_tiles, hands
 from orbiflow.escher.bending_settings import BendingSettings
 from orbiflow.escher.boundary import extract_tile
-from orbiflow.escher.fit_bending import placed, prototile
+from orbiflow.escher.fit_bending import PlacedBent, placed_best, prototile
 from orbiflow.escher.model import TileModel
 from orbiflow.geometry import complex_points, plane_points, signed_area
 from orbiflow.likeness.overlap import Overlap
@@ -138,8 +138,8 @@ def bent_squirrel(name: str, mirrored: bool = False) -> BentTile:
     """A small search's best tile of a class, from one hand of the squirrel."""
     kind = CLASSES[name]
     hand = squirrel_hands()[mirrored]
-    bent = bent_tiles([hand], kind, SMALL)[0]
-    factor, shift = placed(bent, Overlap(np.asarray(hand.samples.fine)))
+    bent = bent_tiles([hand], kind, SMALL)[0][0]
+    _, factor, shift = placed_best(bent, Overlap(np.asarray(hand.samples.fine)))
     tile, _ = extract_tile(flowless(name, bent, factor, shift))
     return BentTile(bent, factor, shift, tile)
 
@@ -147,7 +147,9 @@ def bent_squirrel(name: str, mirrored: bool = False) -> BentTile:
 def flowless(name: str, bent: Bent, factor: complex, shift: complex) -> TileModel:
     """The model of a bent tile, with a field of no effect."""
     kind = CLASSES[name]
-    return TileModel(kind, max_frequency=0, prototiles=prototile(kind, bent, factor, shift))
+    return TileModel(
+        kind, max_frequency=0, prototiles=prototile(kind, PlacedBent(bent, factor, shift))
+    )
 
 
 def as_complex(ring: Array) -> np.ndarray:
