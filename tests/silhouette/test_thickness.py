@@ -20,8 +20,7 @@ def thickness(ring: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
 
 def test_a_disc_is_as_thick_everywhere() -> None:
     _, found = thickness(disc(200), 120)
-    assert np.ptp(found) < 1e-12  # one disc covers all
-    assert 0.9 < found[0] * np.pi**0.5 <= 1
+    assert found == pytest.approx(np.pi**-0.5, rel=0.01)
 
 
 @given(st.floats(0.1, 0.5), st.floats(-3, 3))
@@ -30,8 +29,7 @@ def test_a_bar_has_half_its_width(width: float, turn: float) -> None:
     middle, found = thickness(ring @ rotation_matrix(turn).T, 240)
     middle = middle @ rotation_matrix(turn)
     inside = (middle[:, 0] > width / 2) & (middle[:, 0] < 1 / width - width / 2)
-    assert found[inside].min() > 0.75 * width / 2
-    assert np.median(found[inside]) == pytest.approx(width / 2, rel=0.1)
+    assert found[inside] == pytest.approx(width / 2, rel=0.03)
     assert found.max() <= width / 2 + 1e-12
     assert (found > 0).all()
 
@@ -40,7 +38,7 @@ def test_the_teeth_of_a_comb_are_thin_and_its_back_is_not() -> None:
     middle, found = thickness(comb(3, 0.2, 0.4, 1.0, back=0.8), 400)
     teeth = (middle[:, 1] > 0.9) & (middle[:, 1] < 1.65)  # not the corners of the ends
     assert found[teeth].max() <= 0.1 + 1e-12
-    assert np.median(found[teeth]) == pytest.approx(0.1, rel=0.1)
+    assert found[teeth].min() > 0.09
     back = (abs(middle[:, 0] - 0.7) < 0.3) & (middle[:, 1] < 0.6)
     assert found[back] == pytest.approx(0.4, rel=0.1)
 
