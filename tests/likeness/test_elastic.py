@@ -1,6 +1,7 @@
 """The silhouette as an elastic body."""
 
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -170,9 +171,8 @@ def test_the_condensed_system_solves_the_same(name: str, seed: int) -> None:
     right = forces.copy()
     right[:n] += springs @ goal
     expected = np.linalg.solve(full, right)
-    outline = np.linalg.solve(
-        condensed.outline + springs, condensed.forces(forces) + springs @ goal
-    )
+    pulls = condensed.forces(forces) + springs @ goal
+    outline: Any = np.linalg.solve(condensed.outline + springs, pulls)
     assert condensed.whole(outline, forces) == pytest.approx(expected, abs=1e-9)
 
 
