@@ -123,7 +123,7 @@ def test_forgiving_costs_less(name: str, seed: int, stiffness: Stiffness) -> Non
 
 
 @settings(max_examples=15)
-@given(names, seeds, st.floats(0.001, 0.2))
+@given(names, seeds, st.floats(0.001, 0.03))  # beyond, rotations have several minima
 def test_the_forgiving_body_touches_from_above(name: str, seed: int, size: float) -> None:
     """Its energy, less what it has too much at the shape, bounds the forgiving energy."""
     own = body(name)
