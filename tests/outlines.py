@@ -13,7 +13,7 @@ from orbiflow.escher.bending_settings import BendingSettings
 from orbiflow.escher.boundary import extract_tile
 from orbiflow.escher.fit_bending import PlacedBent, placed_best, prototile
 from orbiflow.escher.model import TileModel
-from orbiflow.geometry import complex_points, plane_points, signed_area
+from orbiflow.geometry import plane_points, signed_area
 from orbiflow.likeness.overlap import Overlap
 from orbiflow.silhouette import Target
 from orbiflow.symmetry.isometry import Array
@@ -150,8 +150,3 @@ def flowless(name: str, bent: Bent, factor: complex, shift: complex) -> TileMode
     return TileModel(
         kind, max_frequency=0, prototiles=prototile(kind, PlacedBent(bent, factor, shift))
     )
-
-
-def as_complex(ring: Array) -> np.ndarray:
-    """A column (n, 1) of complex points."""
-    return complex_points(ring)[:, None]

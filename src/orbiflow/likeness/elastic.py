@@ -39,6 +39,10 @@ SALIENT = (0.5, 8.0)
 """Bounds of what thinness may multiply weights by."""
 
 
+REWEIGHTINGS = 50
+"""Steps to the rotations of least forgiving energy, at most."""
+
+
 @dataclass(frozen=True)
 class Stiffness:
     """What deforming costs, in a silhouette of area 1.
@@ -84,7 +88,7 @@ class Elastic:
         self.size = len(ring)
         self.rest = complex_points(self.mesh.points)
         pairs = self._pairs(stiff)
-        self._i, self._j = pairs.row, pairs.col
+        self._i, self._j = pairs.row.astype(np.int64), pairs.col.astype(np.int64)
         self._d = self.rest[self._i] - self.rest[self._j]
         self._rod, rod_cost = self._bending(stiff)
         self._curved = self._rod @ self.rest[: self.size]
@@ -123,12 +127,10 @@ class Elastic:
         stiffness' `forgiven` strain and angle: a joint that bends, or a toe that is lost, costs
         less than the same spread over all of the outline.
         """
-        strain, bent = self._misfits(z, self.rotations(z))
+        _, misfits = self._forgiving_rotations(z)
         f, g = self.stiffness.forgiven
-        length = abs(self._d)[:, None]
-        tamed = 2 * (f * length) ** 2 * (np.sqrt(1 + _squares(strain) / (f * length) ** 2) - 1)
-        kinks = 2 * g**2 * (np.sqrt(1 + _squares(bent) / g**2) - 1)
-        return self._w @ tamed + self._rod_cost @ kinks
+        strain, kinks = (2 * (np.sqrt(1 + m) - 1) for m in misfits)
+        return (self._w * (f * abs(self._d)) ** 2) @ strain + (self._rod_cost * g**2) @ kinks
 
     def forgiving(self, z: Complex) -> Elastic:
         """The body whose energy touches `forgiving_energy` at a shape (N,) or (N, 1) from above.
@@ -136,20 +138,48 @@ class Elastic:
         Minimising with it, anew and anew, minimises that energy (iteratively reweighted least
         squares).
         """
-        z = z.reshape(-1, 1)
-        strain, bent = self._misfits(z, self.rotations(z))
-        f, g = self.stiffness.forgiven
-        relative = _squares(strain)[:, 0] / (f * abs(self._d)) ** 2
-        # both ends of a pair at once
-        shape = (len(self), len(self))
-        both = scipy.sparse.csr_matrix((relative, (self._i, self._j)), shape=shape)
-        mean = np.asarray(((both + both.T) / 2)[self._i, self._j]).ravel()
+        _, (strain, bent) = self._forgiving_rotations(z.reshape(-1, 1))
         body = copy.copy(self)
         for name in ("matrix", "condensed"):
             body.__dict__.pop(name, None)
-        kinked = _squares(bent)[:, 0] / g**2
-        body._weigh(self._w / np.sqrt(1 + mean), self._rod_cost / np.sqrt(1 + kinked))
+        body._weigh(self._w / np.sqrt(1 + strain[:, 0]), self._rod_cost / np.sqrt(1 + bent[:, 0]))
         return body
+
+    def _forgiving_rotations(self, z: Complex) -> tuple[Complex, tuple[Array, Array]]:
+        """The rotations (N, C) of least forgiving energy, and what is forgiven there.
+
+        That is the squared strains of pairs, the mean of both ends' so that weights stay symmetric,
+        and the squared kinks, in units of the stiffness' `forgiven`.
+        """
+        n, (f, g) = self.size, self.stiffness.forgiven
+        turned = np.conj(self._d)[:, None] * (z[self._i] - z[self._j])
+        curved = np.conj(self._curved)[:, None] * (self._rod @ z[:n])
+        r = self.rotations(z)
+        for _ in range(REWEIGHTINGS):
+            strain, bent = self._misfits(z, r)
+            relative = _squares(strain) / (f * abs(self._d[:, None])) ** 2
+            misfits = (relative + relative[self._mates]) / 2, _squares(bent) / g**2
+            weights = (self._w[:, None] / np.sqrt(1 + misfits[0])) * turned
+            sums = self._gather @ weights
+            sums[:n] += self._rod_cost[:, None] / np.sqrt(1 + misfits[1]) * curved
+            before, r = r, sums / np.maximum(abs(sums), 1e-300)
+            if abs(r - before).max() < 1e-9:
+                break
+        return r, misfits
+
+    @cached_property
+    def _mates(self) -> NDArray[np.int64]:
+        """For each pair, the same pair from its other end."""
+        own = self._i * len(self) + self._j
+        order = np.argsort(own)
+        return order[np.searchsorted(own[order], self._j * len(self) + self._i)]
+
+    @cached_property
+    def _gather(self) -> scipy.sparse.csr_matrix:
+        """(N, P): sums over the pairs of each point."""
+        count = len(self._i)
+        at = (self._i, np.arange(count))
+        return scipy.sparse.csr_matrix((np.ones(count), at), shape=(len(self), count))
 
     def _misfits(self, z: Complex, r: Complex) -> tuple[Complex, Complex]:
         strain = (z[self._i] - z[self._j]) - r[self._i] * self._d[:, None]

@@ -153,6 +153,10 @@ def _without_flat(triangles: Integers, flat: Integers) -> Integers:
 def _divided(mesh: Mesh) -> Mesh:
     """Halve every side that crosses the inside between two points of the outline."""
     on_outline = mesh.size + len(mesh.sides)
+    if len(mesh.points) == 3:  # no side crosses, and yet nothing could follow
+        middle = np.array([[0, 1, 3], [1, 2, 3], [2, 0, 3]])
+        points = np.concatenate([mesh.points, mesh.points.mean(axis=0, keepdims=True)])
+        return mesh._replace(points=points, triangles=middle)
     directed = {(t[k - 1], t[k]) for t in mesh.triangles.tolist() for k in range(3)}
     crossing = sorted((a, b) for a, b in directed if a < b < on_outline and (b, a) in directed)
     middle = {pair: len(mesh.points) + k for k, pair in enumerate(crossing)}

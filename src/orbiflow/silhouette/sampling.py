@@ -114,7 +114,7 @@ def with_corners(ring: Array, corners: list[int], count: int, phase: float = 0.0
     slots, first = np.unique((index % count)[order], return_index=True)
     shifts = (at - index)[order][first]
     if not len(slots):
-        return resampled(ring, count, phase / count * 0)
+        return resampled(ring, count, phase)
     around = np.concatenate([slots - count, slots, slots + count])
     shift = np.interp(np.arange(count), around, np.tile(shifts, 3))
     return points_along(ring, (np.arange(count) + shift + phase) / count * total)

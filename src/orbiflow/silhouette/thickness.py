@@ -5,10 +5,15 @@ from __future__ import annotations
 import numpy as np
 import shapely
 from numpy.typing import NDArray
+from scipy.spatial import Voronoi
 
+from orbiflow.geometry import subdivided
 from orbiflow.silhouette.mesh import Mesh
 
 Array = NDArray[np.float64]
+
+PIECES = 3
+"""Parts of each side of the outline: more make the medial axis finer."""
 
 ROUNDING = 1.02
 """Balls reach a little beyond themselves: triangles have size."""
@@ -17,15 +22,16 @@ ROUNDING = 1.02
 def local_thickness(mesh: Mesh) -> Array:
     """Radius (M,) of the largest disc in the polygon that covers the middle of each triangle.
 
-    The local thickness of Hildebrand and Rüegsegger (1997), over discs about the points inside and
-    about the centres of triangles' circumcircles, which lie near the medial axis.
+    The local thickness of Hildebrand and Rüegsegger (1997), over discs about the Voronoi
+    vertices of points on the outline, which lie near the medial axis.
 
     Args:
         mesh: of the polygon.
     """
     polygon = shapely.Polygon(mesh.points[: mesh.size])
     corners = mesh.points[mesh.triangles]
-    centers = np.concatenate([mesh.points[mesh.size + len(mesh.sides) :], _circumcenters(corners)])
+    dense = subdivided(mesh.points[: mesh.size], PIECES)
+    centers = Voronoi(dense).vertices
     centers = centers[shapely.contains_xy(polygon, centers[:, 0], centers[:, 1])]
     middle = corners.mean(axis=1)
     outline = polygon.exterior
@@ -41,12 +47,3 @@ def local_thickness(mesh: Mesh) -> Array:
         covering = np.where(apart <= ROUNDING * radius, radius, 0.0).max(axis=1)
         found[start : start + 512] = np.maximum(own[start : start + 512], covering)
     return found
-
-
-def _circumcenters(corners: Array) -> Array:
-    a, u, v = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    twice = 2 * (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
-    uu, vv = (u**2).sum(axis=1), (v**2).sum(axis=1)
-    x = (v[:, 1] * uu - u[:, 1] * vv) / twice
-    y = (u[:, 0] * vv - v[:, 0] * uu) / twice
-    return a + np.stack([x, y], axis=1)
