@@ -37,4 +37,4 @@ def test_the_model_snippet_maps_there_and_back(tmp_path, monkeypatch):
     (folder / "model.safetensors").write_bytes(found.model.to_bytes())
     monkeypatch.chdir(tmp_path)
     names = run(snippet)
-    np.testing.assert_allclose(names["back"], names["eye"], atol=1e-8)
+    np.testing.assert_allclose(np.asarray(names["back"]), np.asarray(names["eye"]), atol=1e-8)

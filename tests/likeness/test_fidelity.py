@@ -1,0 +1,64 @@
+"""Fidelity: blind to motions and scale, strict on notches, threads and lost parts."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from orbiflow.geometry import complex_points, resampled
+from orbiflow.likeness.fidelity import fidelity
+from outlines import animal
+
+SQUIRREL = complex_points(resampled(animal("squirrel.dat").normal, 240))
+
+
+@given(st.floats(0.1, 10), st.floats(-3.2, 3.2), st.complex_numbers(max_magnitude=100))
+def test_motions_and_scale_cost_nothing(scale: float, turn: float, shift: complex) -> None:
+    found = fidelity(SQUIRREL, scale * np.exp(1j * turn) * SQUIRREL + shift)
+    assert found.score > 0.999
+    assert found.parts < 1e-5
+    assert found.necks == 0
+
+
+@given(st.integers(0, 239))
+def test_where_the_outline_begins_does_not_matter(first: int) -> None:
+    bent = SQUIRREL + 0.02 * np.sin(7 * SQUIRREL.real) * 1j
+    rolled = fidelity(np.roll(SQUIRREL, first), np.roll(bent, first))
+    assert rolled.score == pytest.approx(fidelity(SQUIRREL, bent).score, abs=1e-9)
+
+
+def bar(height: float = 0.4) -> np.ndarray:
+    corners = np.array([0, 3, 3 + 1j * height, 1j * height])
+    sides = zip(corners, np.roll(corners, -1), strict=True)
+    return np.concatenate([a + np.arange(40) / 40 * (b - a) for a, b in sides])
+
+
+def test_a_bent_bar_is_better_than_a_notched_and_a_pinched_one() -> None:
+    rest = bar()
+    bent = rest * np.exp(0.25j * rest.real)  # bent as a bow
+    dent = np.exp(-(((rest.real - 1.5) / 0.05) ** 2))
+    notched = rest - 0.15j * dent * (rest.imag > 0.3)
+    pinched = rest - 0.38j * dent * (rest.imag > 0.3)
+    scores = [fidelity(rest, shape).score for shape in (bent, notched, pinched)]
+    assert scores == sorted(scores, reverse=True)
+    assert fidelity(rest, notched).notches > 3 * fidelity(rest, bent).notches
+    assert fidelity(rest, pinched).necks > 0 == fidelity(rest, bent).necks
+
+
+def limb(tilt: float = 0.0, length: float = 1.2) -> np.ndarray:
+    """A disc with a limb 0.3 wide."""
+    body = np.exp(1j * np.linspace(0.15, 2 * np.pi - 0.15, 180))
+    reach = np.linspace(0, length, 30)[1:]
+    sides = [np.cos(0.15) + reach + 0.15j * side for side in (-1, 1)]
+    tip = sides[0][-1] + 0.3j * np.linspace(0, 1, 8)[1:-1]
+    own = np.concatenate([sides[0], tip, sides[1][::-1]])
+    root = np.cos(0.15)
+    return np.concatenate([body, root + (own - root) * np.exp(1j * tilt)])
+
+
+def test_a_lost_limb_costs_more_than_a_bent_one() -> None:
+    bent, lost = (fidelity(limb(), shape) for shape in (limb(0.3), limb(length=0.05)))
+    assert lost.score < bent.score
+    assert lost.parts > bent.parts
