@@ -210,3 +210,11 @@ def test_arguments_are_checked() -> None:
     for workers in (0, -1):
         with pytest.raises(OrbiflowError, match=f"workers must be at least 1, got {workers}"):
             escherize(TARGET, ["IH4"], QUICK, workers=workers)
+
+
+@pytest.mark.parametrize("wrong", ["fast", 3, {"placements": 5}])
+def test_settings_of_no_method_are_refused(wrong: object) -> None:
+    with pytest.raises(OrbiflowError, match="settings must be of a method, got"):
+        escherize(TARGET, ["IH1"], wrong)  # pyright: ignore[reportArgumentType]
+    with pytest.raises(OrbiflowError, match="the target must be a Target"):
+        escherize("turtle.png", ["IH1"])  # pyright: ignore[reportArgumentType]

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
 from orbiflow.geometry import complex_points, resampled
 from orbiflow.likeness.fidelity import fidelity
@@ -29,7 +30,7 @@ def test_where_the_outline_begins_does_not_matter(first: int) -> None:
     assert rolled.score == pytest.approx(fidelity(SQUIRREL, bent).score, abs=1e-9)
 
 
-def bar(height: float = 0.4) -> np.ndarray:
+def bar(height: float = 0.4) -> NDArray[np.complex128]:
     corners = np.array([0, 3, 3 + 1j * height, 1j * height])
     sides = zip(corners, np.roll(corners, -1), strict=True)
     return np.concatenate([a + np.arange(40) / 40 * (b - a) for a, b in sides])
@@ -47,7 +48,7 @@ def test_a_bent_bar_is_better_than_a_notched_and_a_pinched_one() -> None:
     assert fidelity(rest, pinched).necks > 0 == fidelity(rest, bent).necks
 
 
-def limb(tilt: float = 0.0, length: float = 1.2) -> np.ndarray:
+def limb(tilt: float = 0.0, length: float = 1.2) -> NDArray[np.complex128]:
     """A disc with a limb 0.3 wide."""
     body = np.exp(1j * np.linspace(0.15, 2 * np.pi - 0.15, 180))
     reach = np.linspace(0, length, 30)[1:]

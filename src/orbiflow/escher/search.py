@@ -9,6 +9,7 @@ from collections.abc import Callable, Generator, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from orbiflow.arguments import described, instance
 from orbiflow.cancel import Cancel, Cancelled
 from orbiflow.errors import CertificationError, OrbiflowError
 from orbiflow.escher.bending_settings import BendingSettings
@@ -112,7 +113,14 @@ def escherize(
     for what, number in (("workers", workers), ("per_class", per_class)):
         if number < 1:
             raise OrbiflowError(f"{what} must be at least 1, got {number}")
-    task = Task(target, settings or BendingSettings(), emphasis, per_class, force)
+    instance(target, Target, "the target", "Target.read and Target.from_polygon make one")
+    settings = BendingSettings() if settings is None else settings
+    if not isinstance(settings, Settings):
+        raise OrbiflowError(
+            f"settings must be of a method, got {described(settings)}; for a level of effort: "
+            'BendingSettings.for_effort("fast")'
+        )
+    task = Task(target, settings, emphasis, per_class, force)
     cancel = cancel or Cancel()
     teller = _Teller(watch)
     count = min(workers, len(names))
