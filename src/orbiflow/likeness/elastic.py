@@ -236,7 +236,7 @@ class Elastic:
         if not len(inner):
             none = np.zeros((0, n))
             return Condensed(self.matrix, none, none[:, :0])
-        inverse = np.asarray(np.linalg.inv(inner), dtype=np.float64)
+        inverse = _inverse(inner)
         follow = -inverse @ self.matrix[n:, :n]
         return Condensed(self.matrix[:n, :n] + self.matrix[:n, n:] @ follow, follow, inverse)
 
@@ -337,6 +337,16 @@ def _times(matrix: Array, z: Complex) -> Complex:
     """A real matrix times complex columns, without making it complex."""
     z = np.ascontiguousarray(z)
     return (matrix @ z.view(np.float64)).view(np.complex128)
+
+
+def _inverse(matrix: Array) -> Array:
+    """Of a positive definite matrix, by Cholesky: a third of the work of a general one."""
+    factorize, invert = scipy.linalg.get_lapack_funcs(("potrf", "potri"), (matrix,))
+    factor, failed = factorize(matrix, lower=True)
+    inverse, missing = invert(factor, lower=True)
+    if failed or missing:
+        raise OrbiflowError("the silhouette's stiffness has no inverse: is a part without width?")
+    return np.tril(inverse) + np.tril(inverse, -1).T
 
 
 def _squares(z: Complex) -> Array:
