@@ -13,7 +13,7 @@ from orbiflow.escher.boundary import extract_tile
 from orbiflow.escher.descent import CALM, Descent
 from orbiflow.escher.descent_settings import EFFORTS, DescentSettings
 from orbiflow.escher.fit_descent import fit_descent
-from orbiflow.escher.methods import fits, method_name
+from orbiflow.escher.methods import fit, method_name
 from orbiflow.escher.occupancy import OccupancySettings
 from orbiflow.escher.outline_starts import template_starts
 from orbiflow.escher.preview import quick_tile
@@ -190,7 +190,7 @@ def test_a_preview_is_certified() -> None:
 def test_methods_have_names() -> None:
     assert method_name(QUICK) == "descent"
     assert method_name(OccupancySettings()) == "occupancy"
-    assert fits(TARGET, isohedral_class("IH1"), QUICK, per_class=2)[0].enough == 4
+    assert fit(TARGET, isohedral_class("IH1"), QUICK, per_class=2).enough == 4
 
 
 def test_soft_target_agrees_with_the_polygon(soft: SoftTarget) -> None:

@@ -11,7 +11,7 @@ import torch
 
 from orbiflow.cancel import Cancel, Cancelled
 from orbiflow.errors import OrbiflowError
-from orbiflow.escher import methods
+from orbiflow.escher import BendingSettings, BothSettings, DescentSettings, methods
 from orbiflow.escher.model import TileModel
 from orbiflow.escher.occupancy import OccupancySettings
 from orbiflow.escher.result import ClassFailure, TileResult
@@ -218,3 +218,31 @@ def test_settings_of_no_method_are_refused(wrong: object) -> None:
         escherize(TARGET, ["IH1"], wrong)  # pyright: ignore[reportArgumentType]
     with pytest.raises(OrbiflowError, match="the target must be a Target"):
         escherize("turtle.png", ["IH1"])  # pyright: ignore[reportArgumentType]
+
+
+def test_of_both_objectives_one_may_fail() -> None:
+    bar = Target.from_polygon([[0, 0], [20, 0], [20, 1], [0, 1]])
+    likeness = BendingSettings(placements=20, held=4, finalists=1, rounds=4)
+    alone = escherize_class(bar, "IH7", likeness)
+    assert isinstance(alone, ClassFailure)
+    overlap = DescentSettings.for_effort("fast")
+    both = escherize_class(bar, "IH7", BothSettings(likeness, overlap))
+    assert isinstance(both, TileResult)
+    assert [tile.objective for tile in both.family()] == ["overlap"]
+
+
+def test_both_objectives_are_shown_likeness_first() -> None:
+    likeness = BendingSettings(placements=20, held=4, finalists=1, rounds=4)
+    shares: list[float] = []
+    results, failures = escherize(
+        TARGET,
+        ["IH4", "IH1"],
+        BothSettings(likeness, DescentSettings.for_effort("fast")),
+        watch=lambda event: shares.append(event.share),
+    )
+    assert not failures
+    assert [r.objective for r in results] == ["likeness"] * 2 + ["overlap"] * 2
+    for kind in ("likeness", "overlap"):
+        scores = [r.score for r in results if r.objective == kind]
+        assert scores == sorted(scores, reverse=True)
+    assert max(shares) <= 1

@@ -33,7 +33,15 @@ class BothSettings:
         return self.likeness.seed
 
 
-Settings = BendingSettings | DescentSettings | BothSettings | OccupancySettings
+OneSettings = BendingSettings | DescentSettings | OccupancySettings
+Settings = OneSettings | BothSettings
+
+
+def parts(settings: Settings) -> list[tuple[float, OneSettings]]:
+    """The fits that settings ask for, each with its share of the work."""
+    if isinstance(settings, BothSettings):
+        return [(0.3, settings.likeness), (0.7, settings.overlap)]
+    return [(1.0, settings)]
 
 
 def method_name(settings: Settings) -> str:
@@ -48,17 +56,17 @@ def objective_name(settings: Settings) -> str:
     return "both" if isinstance(settings, BothSettings) else "overlap"
 
 
-def fits(
+def fit(
     target: Target,
     kind: IsohedralClass,
-    settings: Settings,
+    settings: OneSettings,
     *,
     emphasis: Emphasis | None = None,
     per_class: int = 1,
     progress: Progress | None = None,
     cancel: Cancel | None = None,
-) -> list[Fit]:
-    """Fit tiles of one class by the methods that the settings belong to.
+) -> Fit:
+    """Fit tiles of one class by the method that the settings belong to.
 
     Args:
         target: the silhouette.
@@ -73,59 +81,29 @@ def fits(
         CertificationError: if no candidate is left.
         Cancelled: if it was told to stop.
     """
-    if isinstance(settings, BothSettings):
-        told = progress or (lambda _share, _loss: None)
-        first = fits(
-            target,
-            kind,
-            settings.likeness,
-            emphasis=emphasis,
-            per_class=per_class,
-            progress=lambda share, loss: told(0.3 * share, loss),
-            cancel=cancel,
-        )
-        return first + fits(
-            target,
-            kind,
-            settings.overlap,
-            emphasis=emphasis,
-            per_class=per_class,
-            progress=lambda share, loss: told(0.3 + 0.7 * share, loss),
-            cancel=cancel,
-        )
     if isinstance(settings, BendingSettings):
         both = shared_hands(target, settings, emphasis)
-        return [
-            fit_bending(
-                target,
-                kind,
-                settings,
-                both,
-                per_class=per_class,
-                progress=progress,
-                cancel=cancel,
-            )
-        ]
+        return fit_bending(
+            target, kind, settings, both, per_class=per_class, progress=progress, cancel=cancel
+        )
     if isinstance(settings, DescentSettings):
         soft = _soft_target(target, emphasis)
         settings = settings.with_survivors(2 * per_class)
         found = fit_descent(target, kind, settings, soft=soft, progress=progress, cancel=cancel)
-        return [found._replace(enough=1 if per_class == 1 else 2 * per_class)]
+        return found._replace(enough=1 if per_class == 1 else 2 * per_class)
     number = list(CLASSES).index(kind.name)
     own = replace(settings, seed=(settings.seed * 1009 + number) % 2**32)
     model = fit_occupancy(target, kind, own, progress, cancel=cancel)
-    return [Fit(model, len(initial_poses(kind, settings.turns)[0]), 0, model.size)]
+    return Fit(model, len(initial_poses(kind, settings.turns)[0]), 0, model.size)
 
 
 def prepare(target: Target, settings: Settings, emphasis: Emphasis | None) -> None:
     """Compute what the fits of all classes share, so that forked processes find it done."""
-    if isinstance(settings, BothSettings):
-        prepare(target, settings.likeness, emphasis)
-        prepare(target, settings.overlap, emphasis)
-    if isinstance(settings, BendingSettings):
-        shared_hands(target, settings, emphasis)
-    if isinstance(settings, DescentSettings):
-        _soft_target(target, emphasis)
+    for _, part in parts(settings):
+        if isinstance(part, BendingSettings):
+            shared_hands(target, part, emphasis)
+        elif isinstance(part, DescentSettings):
+            _soft_target(target, emphasis)
 
 
 @lru_cache(maxsize=2)  # targets hash by identity; one serves all classes

@@ -119,10 +119,10 @@ def best_tiles(
         try:
             result = _result(target, fit.model.take([index]), fit.starts, seconds, force=force)
             result = replace(result, min_neck=min_neck)
-            if fit.bent:
-                result = _with_bent(target, result, fit.bent[index])
             if not force:
                 result.certificate.require()
+            if fit.bent:
+                result = _with_bent(target, result, fit.bent[index])
             found.append(result)
         except CertificationError as error:
             reasons.append(str(error))

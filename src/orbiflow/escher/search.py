@@ -14,7 +14,8 @@ from orbiflow.cancel import Cancel, Cancelled
 from orbiflow.errors import CertificationError, OrbiflowError
 from orbiflow.escher.bending_settings import BendingSettings
 from orbiflow.escher.descent_settings import DescentSettings
-from orbiflow.escher.methods import BothSettings, Settings, fits, prepare
+from orbiflow.escher.methods import OneSettings, Settings, fit, parts, prepare
+from orbiflow.escher.occupancy import OccupancySettings
 from orbiflow.escher.preview import quick_bent_tile, quick_tile
 from orbiflow.escher.processes import process_context, work
 from orbiflow.escher.result import ClassFailure, TileResult, best_tiles
@@ -22,7 +23,7 @@ from orbiflow.likeness.ranking import diverse, tile_similarity
 from orbiflow.silhouette.emphasis import Emphasis
 from orbiflow.silhouette.target import Target
 from orbiflow.threads import one_thread
-from orbiflow.tilings import CLASSES, isohedral_class
+from orbiflow.tilings import CLASSES, IsohedralClass, isohedral_class
 
 INTERRUPTED = "interrupted"
 """The reason given for a class that was left undone."""
@@ -68,6 +69,14 @@ class Task:
     per_class: int = 1
     force: bool = False
 
+    def __post_init__(self) -> None:
+        instance(self.target, Target, "the target", "Target.read and Target.from_polygon make one")
+        if not isinstance(self.settings, Settings):
+            raise OrbiflowError(
+                f"settings must be of a method, got {described(self.settings)}; for a level of "
+                'effort: BendingSettings.for_effort("fast")'
+            )
+
 
 def escherize(
     target: Target,
@@ -100,9 +109,10 @@ def escherize(
             before each step of every fit.
 
     Returns:
-        Certified tiles, best first (`TileResult.score`), and the classes that gave none. The same
-        seed gives the same tiles, whatever the number of workers. If it was cancelled: what was
-        found by then, and the other classes as failures with the reason `INTERRUPTED`.
+        Certified tiles, best first (`TileResult.score`; of `BothSettings` first those for
+        likeness), and the classes that gave none. The same seed gives the same tiles, whatever the
+        number of workers. If it was cancelled: what was found by then, and the other classes as
+        failures with the reason `INTERRUPTED`.
 
     Raises:
         OrbiflowError: for an unknown class, a setting out of range, or workers that die.
@@ -113,13 +123,7 @@ def escherize(
     for what, number in (("workers", workers), ("per_class", per_class)):
         if number < 1:
             raise OrbiflowError(f"{what} must be at least 1, got {number}")
-    instance(target, Target, "the target", "Target.read and Target.from_polygon make one")
     settings = BendingSettings() if settings is None else settings
-    if not isinstance(settings, Settings):
-        raise OrbiflowError(
-            f"settings must be of a method, got {described(settings)}; for a level of effort: "
-            'BendingSettings.for_effort("fast")'
-        )
     task = Task(target, settings, emphasis, per_class, force)
     cancel = cancel or Cancel()
     teller = _Teller(watch)
@@ -183,52 +187,64 @@ class _Teller:
                 self.tell(Event(name, self.shares.get(name, 0.0), float("nan"), failure))
 
     def sorted(self, names: Sequence[str]) -> tuple[list[TileResult], list[ClassFailure]]:
-        """Tiles, best first, and failures; ties in the order in which classes were asked for."""
+        """Tiles, best first, and failures; ties in the order in which classes were asked for.
+
+        Those of a search for likeness come before those for overlap: their scores are of two kinds.
+        """
         failures = [o for o in self.outcomes.values() if isinstance(o, ClassFailure)]
         best = [o for o in self.outcomes.values() if isinstance(o, TileResult)]
         if self.preview and ClassFailure(self.preview.name, INTERRUPTED) in failures:
             best.append(self.preview)
         results = [tile for first in best for tile in first.family()]
-        results.sort(key=lambda r: (-r.score, names.index(r.name)))
+        results.sort(key=lambda r: (r.objective != "likeness", -r.score, names.index(r.name)))
         return results, failures
 
 
 def _work_on(task: Task, name: str, watch: Watcher, cancel: Cancel) -> Outcome:
     kind = isohedral_class(name)
     begin = time.perf_counter()
-    with one_thread():
+    chosen: list[TileResult] = []
+    reasons: list[str] = []
+    done = 0.0
+    for share, settings in parts(task.settings):
         try:
-            found = fits(
-                task.target,
-                kind,
-                task.settings,
-                emphasis=task.emphasis,
-                per_class=task.per_class,
-                progress=lambda share, loss: watch(Event(kind.name, share, loss)),
-                cancel=cancel,
-            )
-        except CertificationError as error:
-            return ClassFailure(kind.name, str(error))
-        tiles, reasons = [], []
-        neck = _min_neck(task.settings)
-        for one in found:
-            try:
-                tiles += best_tiles(task.target, one, force=task.force, min_neck=neck)
-            except CertificationError as error:
-                reasons.append(str(error))
-    if not tiles:
+            chosen += _chosen_tiles(task, kind, settings, watch, cancel, done, share)
+        except CertificationError as error:  # the other part may give one
+            reasons.append(str(error))
+        done += share
+    if not chosen:
         return ClassFailure(kind.name, "; ".join(dict.fromkeys(reasons)))
-    tiles.sort(key=lambda tile: (not tile.certificate.valid, -tile.score))
-    chosen = _without_twins(tiles, task.per_class)
     seconds = time.perf_counter() - begin
-    best, *others = (replace(tiles[k], seconds=seconds) for k in chosen)
+    best, *others = (replace(tile, seconds=seconds) for tile in chosen)
     return replace(best, others=tuple(others))
 
 
-def _min_neck(settings: Settings) -> float:
-    if isinstance(settings, BothSettings):
-        settings = settings.likeness
-    return settings.min_neck if isinstance(settings, BendingSettings | DescentSettings) else 0.0
+def _chosen_tiles(
+    task: Task,
+    kind: IsohedralClass,
+    settings: OneSettings,
+    watch: Watcher,
+    cancel: Cancel,
+    done: float,
+    share: float,
+) -> list[TileResult]:
+    """The tiles of one fit that are shown, best first; `done` of the class's work was done before."""
+    with one_thread():
+        found = fit(
+            task.target,
+            kind,
+            settings,
+            emphasis=task.emphasis,
+            per_class=task.per_class,
+            progress=lambda own, loss: watch(Event(kind.name, done + share * own, loss)),
+            cancel=cancel,
+        )
+        tiles = best_tiles(task.target, found, force=task.force, min_neck=_min_neck(settings))
+    return [tiles[k] for k in _without_twins(tiles, task.per_class)]
+
+
+def _min_neck(settings: OneSettings) -> float:
+    return 0.0 if isinstance(settings, OccupancySettings) else settings.min_neck
 
 
 def _without_twins(tiles: Sequence[TileResult], count: int) -> list[int]:
@@ -242,9 +258,8 @@ def _without_twins(tiles: Sequence[TileResult], count: int) -> list[int]:
 
 def _preview(task: Task, names: Sequence[str], watch: Watcher, cancel: Cancel) -> None:
     """A first tile to look at, while the others are on their way."""
-    settings, tile = task.settings, None
-    if isinstance(settings, BothSettings):
-        settings = settings.likeness
+    tile = None
+    _, settings = parts(task.settings)[0]
     with one_thread():
         if isinstance(settings, BendingSettings):
             tile = quick_bent_tile(task.target, names, settings, task.emphasis, cancel=cancel)

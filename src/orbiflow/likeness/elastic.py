@@ -127,7 +127,7 @@ class Elastic:
         stiffness' `forgiven` strain and angle: a joint that bends, or a toe that is lost, costs
         less than the same spread over all of the outline.
         """
-        _, misfits = self._forgiving_rotations(z)
+        misfits = self._forgiven_misfits(z)
         f, g = self.stiffness.forgiven
         strain, kinks = (2 * (np.sqrt(1 + m) - 1) for m in misfits)
         return (self._w * (f * abs(self._d)) ** 2) @ strain + (self._rod_cost * g**2) @ kinks
@@ -138,15 +138,15 @@ class Elastic:
         Minimising with it, anew and anew, minimises that energy (iteratively reweighted least
         squares).
         """
-        _, (strain, bent) = self._forgiving_rotations(z.reshape(-1, 1))
+        strain, bent = self._forgiven_misfits(z.reshape(-1, 1))
         body = copy.copy(self)
         for name in ("matrix", "condensed"):
             body.__dict__.pop(name, None)
         body._weigh(self._w / np.sqrt(1 + strain[:, 0]), self._rod_cost / np.sqrt(1 + bent[:, 0]))
         return body
 
-    def _forgiving_rotations(self, z: Complex) -> tuple[Complex, tuple[Array, Array]]:
-        """The rotations (N, C) of least forgiving energy, and what is forgiven there.
+    def _forgiven_misfits(self, z: Complex) -> tuple[Array, Array]:
+        """What is forgiven at the rotations of least forgiving energy.
 
         That is the squared strains of pairs, the mean of both ends' so that weights stay symmetric,
         and the squared kinks, in units of the stiffness' `forgiven`.
@@ -165,7 +165,7 @@ class Elastic:
             before, r = r, sums / np.maximum(abs(sums), 1e-300)
             if abs(r - before).max() < 1e-9:
                 break
-        return r, misfits
+        return misfits
 
     @cached_property
     def _mates(self) -> NDArray[np.int64]:
@@ -241,14 +241,15 @@ class Elastic:
         return Condensed(self.matrix[:n, :n] + self.matrix[:n, n:] @ follow, follow, inverse)
 
     def _pulled_solver(self, mu: float) -> Array:
-        if mu not in self._solvers:
-            if len(self._solvers) >= 16:
-                self._solvers.clear()
+        solver = self._solvers.get(mu)  # looked up once: another thread may clear them
+        if solver is None:
             matrix = self.matrix.copy()
             matrix[np.arange(self.size), np.arange(self.size)] += mu
-            factor = scipy.linalg.cho_factor(matrix, overwrite_a=True)
-            self._solvers[mu] = scipy.linalg.cho_solve(factor, np.eye(len(self)))
-        return self._solvers[mu]
+            solver = _inverse(matrix)
+            if len(self._solvers) >= 16:
+                self._solvers.clear()
+            self._solvers[mu] = solver
+        return solver
 
     def _copies(self, z: Complex) -> tuple[Complex, Complex]:
         """Best similar copies (N, C) of the body at rest, and the similarities' factors (C,)."""
