@@ -15,7 +15,7 @@ from orbiflow.escher.co_deformation import drawn_to_tiles, held_on_tiles
 from orbiflow.escher.outline_starts import mirror_closed
 from orbiflow.escher.placements import Complex, Placements, best_placements
 from orbiflow.escher.tile_space import TileSpace
-from orbiflow.geometry import complex_points, plane_points
+from orbiflow.geometry import best_similarity, complex_points, plane_points, signed_area
 from orbiflow.likeness.elastic import Elastic, Stiffness
 from orbiflow.likeness.fidelity import Fidelity, fidelity
 from orbiflow.silhouette.emphasis import Emphasis
@@ -194,8 +194,9 @@ def _detailed(
     for _ in range(SOFTENINGS):
         tiles = held_on_tiles(body.forgiving(tiles.points), space, tiles.points, 6)
     ring = tiles.points[: body.size, 0]
-    area = _areas(ring[:, None])[0]
-    simple = shapely.is_valid(shapely.Polygon(plane_points(ring)))
+    polygon = plane_points(ring)
+    area = float(signed_area(polygon))
+    simple = shapely.is_valid(shapely.Polygon(polygon))
     if not simple or area < 0.1 or np.linalg.det(tiles.linear[0]) < 1e-6:
         return None
     return Bent(
@@ -213,14 +214,10 @@ def _detailed(
 
 def _costs(body: Elastic, z: Complex) -> tuple[Array, NDArray[np.bool_]]:
     """Costs (C,) of shapes, and which of them do not cross themselves."""
-    ring = z[: body.size]
-    area = _areas(ring)
-    sound = np.asarray(shapely.is_valid(shapely.polygons(plane_points(ring.T)))) & (area > 0.1)
+    rings = plane_points(z[: body.size].T)
+    area = signed_area(rings)
+    sound = np.asarray(shapely.is_valid(shapely.polygons(rings))) & (area > 0.1)
     return body.energy(z) / np.maximum(area, 0.1) + POSE * body.displacement(z), sound
-
-
-def _areas(ring: Complex) -> Array:
-    return 0.5 * (np.conj(ring) * np.roll(ring, -1, axis=0)).imag.sum(axis=0)
 
 
 def _without_twins(body: Elastic, z: Complex, order: NDArray[np.int64], count: int) -> list[int]:
@@ -236,6 +233,5 @@ def _without_twins(body: Elastic, z: Complex, order: NDArray[np.int64], count: i
 
 def _apart(a: Complex, b: Complex) -> float:
     """Mean squared distance of two outlines after the best similarity."""
-    a, b = a - a.mean(), b - b.mean()
-    factor = np.vdot(a, b) / np.vdot(a, a).real
-    return float((abs(factor * a - b) ** 2).mean())
+    factor = complex(best_similarity(a, b))
+    return float((abs(factor * (a - a.mean()) - (b - b.mean())) ** 2).mean())

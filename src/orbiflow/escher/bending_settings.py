@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
 from orbiflow.errors import OrbiflowError
+from orbiflow.escher.efforts import settings_for
 
 
 @dataclass(frozen=True)
@@ -47,19 +48,12 @@ class BendingSettings:
         >>> BendingSettings.for_effort("fast", seed=3).seed
         3
         """
-        if effort not in EFFORTS:
-            raise OrbiflowError(f"effort must be one of {', '.join(EFFORTS)}, got {effort!r}")
-        known = {field.name for field in fields(cls)}
-        unknown = [name for name in changes if name not in known]
-        if unknown:
-            raise OrbiflowError(f"unknown settings {', '.join(unknown)}")
-        return cls(**{**EFFORTS[effort], **changes})
+        return settings_for(cls, EFFORTS, effort, changes)
 
 
 EFFORTS: dict[str, dict[str, Any]] = {
     "fast": {"placements": 80, "held": 20, "finalists": 2, "rounds": 12, "multiples": (4,)},
     "normal": {},
-    # all that "normal" looks at, and more
     "best": {"placements": 1500, "held": 300, "finalists": 20, "rounds": 80},
 }
 """What each level changes."""

@@ -14,6 +14,7 @@ from orbiflow.arguments import numbers
 from orbiflow.errors import OrbiflowError
 from orbiflow.escher.bending import Bent
 from orbiflow.escher.onto_polygon import onto_polygon
+from orbiflow.geometry import best_similarity, complex_points
 from orbiflow.silhouette.frame import Frame
 from orbiflow.silhouette.location import Locator
 from orbiflow.silhouette.unfolding import unfolded
@@ -202,8 +203,7 @@ class _PiecewiseAffine:
 
 def _similarity(start: Array, end: Array) -> Array:
     """Linear part (2, 2) of the similarity that takes points nearest to their images."""
-    a, b = ((p - p.mean(axis=0)) @ [1, 1j] for p in (start, end))
-    factor = np.vdot(a, b) / np.vdot(a, a).real
+    factor = complex(best_similarity(complex_points(start), complex_points(end)))
     return np.array([[factor.real, -factor.imag], [factor.imag, factor.real]])
 
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 from orbiflow.arguments import number, numbers, whole
 from orbiflow.errors import OrbiflowError
+from orbiflow.escher.efforts import settings_for
 from orbiflow.escher.max_frequency import check_max_frequency
 
 MAX_SEGMENTS = 2000
@@ -135,13 +136,7 @@ class DescentSettings:
         >>> DescentSettings.for_effort("fast", seed=3).seed
         3
         """
-        if effort not in EFFORTS:
-            raise OrbiflowError(f"effort must be one of {', '.join(EFFORTS)}, got {effort!r}")
-        known = {field.name for field in fields(cls)}
-        unknown = [name for name in changes if name not in known]
-        if unknown:
-            raise OrbiflowError(f"unknown settings {', '.join(unknown)}")
-        return cls(**{**EFFORTS[effort], **changes})  # type: ignore[arg-type]
+        return settings_for(cls, EFFORTS, effort, changes)
 
 
 EFFORTS: dict[str, dict[str, object]] = {

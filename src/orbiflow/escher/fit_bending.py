@@ -19,7 +19,7 @@ from orbiflow.escher.model import TileModel
 from orbiflow.escher.placements import Complex
 from orbiflow.escher.prototiles import Prototiles
 from orbiflow.escher.tile_space import NearestTiles
-from orbiflow.geometry import complex_points, plane_points
+from orbiflow.geometry import best_similarity, complex_points, plane_points
 from orbiflow.likeness.overlap import Overlap
 from orbiflow.silhouette.target import Target
 from orbiflow.symmetry.isometry import Array
@@ -113,10 +113,7 @@ def _fit(
         steps=1,
         dtype=torch.float64,
         prototiles=starts,
-    )
-    with torch.no_grad():  # a flow that stays where it is
-        for field in model.fourier_fields():
-            field.parameters_.zero_()
+    )  # its field is zero: a flow that stays where it is
     return Fit(model, settings.placements, dropped, enough, tuple(placed))
 
 
@@ -131,8 +128,7 @@ def placed_best(bent: Bent, overlap: Overlap) -> PlacedBent:
     """
     rest, points = bent.hand.fine.rest, bent.points
     center = points.mean()
-    moved = points - center
-    factor = np.vdot(moved, rest - rest.mean()) / np.vdot(moved, moved).real
+    factor = complex(best_similarity(points, rest))
     ring = bent.points[: bent.hand.fine.size] - center
 
     def loss(x: Array) -> tuple[float, Array]:

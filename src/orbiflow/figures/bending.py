@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
-import numpy as np
-import shapely
+from typing import TYPE_CHECKING
 
-from orbiflow.figures.canvas import blank_figure, fill_rings, plane_axes, png_bytes
+import numpy as np
+
+from orbiflow.figures.canvas import captioned_axes, fill_rings, png_bytes, strip_text
 from orbiflow.symmetry.isometry import Array
 from orbiflow.tilings import Tile
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.colors import Colormap
+
 TILE, GHOST, ARROW = "#d7dee6", "#9a8c7a", "#b0413e"
-STILL = 0.03
-"""Distance, in square roots of the area, up to which a point counts as not moved."""
+STILL = 0.06
+"""Distance, in square roots of the area, up to which no arrow is drawn."""
 
 
 def bending_png(
@@ -34,27 +39,22 @@ def bending_png(
         y_down: whether the y axis points down, as in images.
         label: in front of the legend, default the class.
     """
-    low = np.min([ring.min(axis=0) for ring in (rest, bent, tile.polygon)], axis=0)
-    high = np.max([ring.max(axis=0) for ring in (rest, bent, tile.polygon)], axis=0)
-    margin = 0.03 * float((high - low).max())
-    window = (*(low - margin).tolist(), *(high + margin).tolist())
-    picture = round(width_px * (window[3] - window[1]) / (window[2] - window[0]))
-    legend = round(0.075 * width_px)
-    figure = blank_figure(width_px, picture + legend)
-    share = legend / (picture + legend)
-    axes = plane_axes(figure, window, y_down=y_down, box=(0.0, share, 1.0, 1.0 - share))
+    text = label or tile.isohedral_class or ""
+    figure, axes, strip = captioned_axes(
+        [rest, bent, tile.polygon], width_px, y_down=y_down, text=text
+    )
     fill_rings(axes, [tile.polygon], TILE, "none", 0)
-    size = float(np.sqrt(shapely.Polygon(tile.polygon).area))
+    size = float(np.sqrt(abs(tile.signed_area)))
     moved = np.linalg.norm(bent - rest, axis=1) / size
     closed = np.concatenate([rest, rest[:1]])
     axes.plot(*closed.T, color=GHOST, linewidth=1.3, linestyle=(0, (4, 3)), zorder=2)
     colours = _outline(axes, bent, moved)
     _arrows(axes, rest, bent, moved, size)
-    _legend(figure, share, label or tile.isohedral_class or "", colours)
+    _legend(strip, colours)
     return png_bytes(figure)
 
 
-def _outline(axes, bent: Array, moved: Array):
+def _outline(axes: Axes, bent: Array, moved: Array) -> Colormap:
     from matplotlib.collections import LineCollection
     from matplotlib.colors import LinearSegmentedColormap
 
@@ -68,11 +68,11 @@ def _outline(axes, bent: Array, moved: Array):
     return colours
 
 
-def _arrows(axes, rest: Array, bent: Array, moved: Array, size: float) -> None:
+def _arrows(axes: Axes, rest: Array, bent: Array, moved: Array, size: float) -> None:
     """Where the outline went, at points some way apart that went far."""
     taken: list[int] = []
     for k in np.argsort(-moved):
-        if moved[k] < 2 * STILL or len(taken) == 24:
+        if moved[k] < STILL or len(taken) == 24:
             break
         near = [np.linalg.norm(rest[k] - rest[other]) < 0.16 * size for other in taken]
         if not any(near):
@@ -87,19 +87,11 @@ def _arrows(axes, rest: Array, bent: Array, moved: Array, size: float) -> None:
         )
 
 
-def _legend(figure, share: float, text: str, colours) -> None:
-    strip = figure.add_axes((0.0, 0.0, 1.0, share))
-    strip.set_axis_off()
-    strip.set_xlim(0, 1)
-    strip.set_ylim(0, 1)
-    size = 10.5 * figure.get_figwidth() / 8
-    style = {"va": "center", "fontsize": size, "color": "#1a1a1a"}
-    strip.text(0.03, 0.5, text, weight="bold", **style)
+def _legend(strip: Axes, colours: Colormap) -> None:
     strip.plot([0.47, 0.52], [0.5, 0.5], color=GHOST, linewidth=1.3, linestyle=(0, (4, 3)))
-    strip.text(0.53, 0.5, "as it was", **style)
-    strip.imshow(
-        np.linspace(0, 1, 64)[None], extent=(0.70, 0.80, 0.38, 0.62), aspect="auto", cmap=colours
-    )
-    strip.text(0.81, 0.5, "moved, little to far", **style)
-    strip.set_xlim(0, 1)
+    strip_text(strip, 0.53, "as it was")
+    extent = (0.70, 0.80, 0.38, 0.62)
+    strip.imshow(np.linspace(0, 1, 64)[None], extent=extent, aspect="auto", cmap=colours)
+    strip_text(strip, 0.81, "moved, little to far")
+    strip.set_xlim(0, 1)  # imshow moves the limits
     strip.set_ylim(0, 1)

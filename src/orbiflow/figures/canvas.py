@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -49,6 +50,38 @@ def plane_axes(
     axes.set_ylim(*((window[3], window[1]) if y_down else (window[1], window[3])))
     axes.set_aspect("equal")
     return axes
+
+
+def captioned_axes(
+    rings: Sequence[Array], width_px: int, *, y_down: bool, text: str
+) -> tuple[Figure, Axes, Axes]:
+    """Axes that show all of `rings` (N, 2) with a margin, over a strip that `text` stands in.
+
+    Returns:
+        The figure, `width_px` wide; the picture's axes; and the strip's, from 0 to 1 both ways, free
+        from x = 0.4 on, with the size of its text as the default.
+    """
+    low = np.min([ring.min(axis=0) for ring in rings], axis=0)
+    high = np.max([ring.max(axis=0) for ring in rings], axis=0)
+    margin = 0.03 * float((high - low).max())
+    window = (*(low - margin).tolist(), *(high + margin).tolist())
+    picture = round(width_px * (window[3] - window[1]) / (window[2] - window[0]))
+    legend = round(0.075 * width_px)
+    figure = blank_figure(width_px, picture + legend)
+    share = legend / (picture + legend)
+    axes = plane_axes(figure, window, y_down=y_down, box=(0.0, share, 1.0, 1.0 - share))
+    strip = figure.add_axes((0.0, 0.0, 1.0, share))
+    strip.set_axis_off()
+    strip.set_xlim(0, 1)
+    strip.set_ylim(0, 1)
+    strip_text(strip, 0.03, text, weight="bold")
+    return figure, axes, strip
+
+
+def strip_text(strip: Axes, x: float, text: str, **style: Any) -> None:
+    """Words in a strip of `captioned_axes`."""
+    size = 10.5 * strip.figure.get_figwidth() / 8  # pyright: ignore[reportAttributeAccessIssue]
+    strip.text(x, 0.5, text, va="center", fontsize=size, color="#1a1a1a", **style)
 
 
 def fill_rings(axes: Axes, rings: list[Array], fill: str, outline: str, width: float) -> None:

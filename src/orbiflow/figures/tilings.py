@@ -11,7 +11,15 @@ from shapely.geometry.base import BaseGeometry
 
 from orbiflow.arguments import instance, numbers
 from orbiflow.errors import OrbiflowError
-from orbiflow.figures.canvas import blank_figure, fill_geometry, fill_rings, plane_axes, png_bytes
+from orbiflow.figures.canvas import (
+    blank_figure,
+    captioned_axes,
+    fill_geometry,
+    fill_rings,
+    plane_axes,
+    png_bytes,
+    strip_text,
+)
 from orbiflow.figures.palette import DEFAULT_PALETTE, Palette, palette
 from orbiflow.figures.window import default_window
 from orbiflow.symmetry.isometry import Array
@@ -19,7 +27,7 @@ from orbiflow.tilings import Colouring, Tile, colouring, patch
 from orbiflow.tilings.patch import Window
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from matplotlib.axes import Axes
 
 COMMON, MISSING, ADDED = "#c9d3dc", "#d95f02", "#2b6cb0"
 """Fills of the overlay: in both, in the target only, in the tile only."""
@@ -87,37 +95,24 @@ def overlay_png(
     shape, goal = _clean(shapely.Polygon(tile.polygon)), _target(target)
     common = shapely.intersection(shape, goal)
     overlap = common.area / shapely.union(shape, goal).area
-    bounds = np.array(goal.bounds)
-    low = np.minimum(tile.polygon.min(axis=0), bounds[:2])
-    high = np.maximum(tile.polygon.max(axis=0), bounds[2:])
-    margin = 0.03 * float((high - low).max())
-    window = (*(low - margin).tolist(), *(high + margin).tolist())
-    picture = round(width_px * (window[3] - window[1]) / (window[2] - window[0]))
-    legend = round(0.075 * width_px)
-    figure = blank_figure(width_px, picture + legend)
-    share = legend / (picture + legend)
-    axes = plane_axes(figure, window, y_down=y_down, box=(0.0, share, 1.0, 1.0 - share))
+    text = f"{label or tile.isohedral_class}  IoU {overlap:.3f}".strip()
+    bounds = np.array(goal.bounds).reshape(2, 2)
+    figure, axes, strip = captioned_axes([tile.polygon, bounds], width_px, y_down=y_down, text=text)
     fill_geometry(axes, common, COMMON)
     fill_geometry(axes, shapely.difference(goal, shape), MISSING)
     fill_geometry(axes, shapely.difference(shape, goal), ADDED)
     fill_rings(axes, [tile.polygon], "none", "#1a1a1a", 1.6)
-    _legend(figure, share, f"{label or tile.isohedral_class}  IoU {overlap:.3f}".strip())
+    _legend(strip)
     return png_bytes(figure)
 
 
-def _legend(figure: Figure, share: float, text: str) -> None:
+def _legend(strip: Axes) -> None:
     from matplotlib.patches import Rectangle
 
-    strip = figure.add_axes((0.0, 0.0, 1.0, share))
-    strip.set_axis_off()
-    strip.set_xlim(0, 1)
-    strip.set_ylim(0, 1)
-    size = 10.5 * figure.get_figwidth() / 8
-    strip.text(0.03, 0.5, text, va="center", fontsize=size, weight="bold", color="#1a1a1a")
     entries = [("in both", COMMON, 0.40), ("missing", MISSING, 0.58), ("added", ADDED, 0.76)]
     for name, colour, x in entries:
         strip.add_patch(Rectangle((x, 0.32), 0.03, 0.36, facecolor=colour, edgecolor="none"))
-        strip.text(x + 0.04, 0.5, name, va="center", fontsize=size, color="#1a1a1a")
+        strip_text(strip, x + 0.04, name)
 
 
 def _target(target: ArrayLike | BaseGeometry) -> BaseGeometry:

@@ -9,6 +9,7 @@ from orbiflow.geometry.arc_length import (
 )
 from orbiflow.geometry.polygons import polygons_in
 from orbiflow.geometry.rings import (
+    best_similarity,
     centroid,
     complex_points,
     orient,
@@ -20,6 +21,7 @@ from orbiflow.geometry.rings import (
 
 __all__ = [
     "arc_lengths",
+    "best_similarity",
     "centroid",
     "complex_points",
     "orient",

@@ -99,3 +99,25 @@ def complex_points(points: ArrayLike) -> NDArray[np.complex128]:
 def plane_points(z: NDArray[np.complex128]) -> NDArray[np.float64]:
     """Complex numbers (...) as points (..., 2): the inverse of `complex_points`."""
     return np.stack([z.real, z.imag], axis=-1)
+
+
+def best_similarity(
+    points: NDArray[np.complex128], images: NDArray[np.complex128]
+) -> NDArray[np.complex128]:
+    """Factors of the similarities z -> factor (z - mean) + mean' nearest to given images.
+
+    Least squares over the first axis (Procrustes): a turn and a scale, without mirror images.
+
+    Args:
+        points: (N,) x + iy.
+        images: (N,) or (N, C), where each point goes, C times.
+
+    Returns:
+        () or (C,), in the images' units over the points'.
+
+    >>> triangle = np.array([0, 1, 1j])
+    >>> complex(best_similarity(triangle, 2j * triangle + 5))
+    2j
+    """
+    own = points - points.mean(axis=0)
+    return np.conj(own) @ (images - images.mean(axis=0)) / (abs(own) ** 2).sum()

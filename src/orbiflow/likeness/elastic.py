@@ -22,7 +22,7 @@ import scipy.sparse
 from numpy.typing import NDArray
 
 from orbiflow.errors import OrbiflowError
-from orbiflow.geometry import complex_points
+from orbiflow.geometry import best_similarity, complex_points
 from orbiflow.silhouette.mesh import Mesh, triangulate
 from orbiflow.silhouette.thickness import local_thickness
 
@@ -254,9 +254,8 @@ class Elastic:
     def _copies(self, z: Complex) -> tuple[Complex, Complex]:
         """Best similar copies (N, C) of the body at rest, and the similarities' factors (C,)."""
         center = z.mean(axis=0)
-        rest = self.rest - self.rest.mean()
-        factor = np.conj(rest) @ (z - center) / (abs(rest) ** 2).sum()
-        return center + rest[:, None] * factor, factor
+        factor = best_similarity(self.rest, z)
+        return center + (self.rest - self.rest.mean())[:, None] * factor, factor
 
     def _pairs(self, stiff: Array | None) -> Any:
         triangles, count, n = self.mesh.triangles, len(self), self.size

@@ -23,6 +23,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from orbiflow.geometry import best_similarity, plane_points, signed_area
+
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
@@ -81,7 +83,7 @@ def fidelity(rest: Complex, bent: Complex) -> Fidelity:
     >>> fidelity(square, 3 * square * 1j + 7).score > 0.999
     True
     """
-    rest, bent = (z / np.sqrt(abs(_area(z))) for z in (rest, bent))
+    rest, bent = (z / np.sqrt(abs(signed_area(plane_points(z)))) for z in (rest, bent))
     weight = abs(np.roll(rest, -1) - rest)
     weight /= weight.sum()
     narrower = np.log(_clearance(rest) / _clearance(bent))
@@ -92,10 +94,6 @@ def fidelity(rest: Complex, bent: Complex) -> Fidelity:
         _moved(rest, bent),
         max(0.0, float(thinner.max()) - math.log(2.0)),
     )
-
-
-def _area(z: Complex) -> float:
-    return float(0.5 * (np.conj(z) * np.roll(z, -1)).imag.sum())
 
 
 def _misfits(rest: Complex, bent: Complex) -> Array:
@@ -129,6 +127,6 @@ def _clearance(z: Complex, *, inside: bool = False) -> Array:
 
 
 def _moved(rest: Complex, bent: Complex) -> float:
-    a, b = rest - rest.mean(), bent - bent.mean()
-    factor = np.vdot(a, b) / np.vdot(a, a).real
-    return float((abs(b - factor * a) ** 2).mean() / max(abs(factor) ** 2, 1e-12))
+    factor = complex(best_similarity(rest, bent))
+    apart = (bent - bent.mean()) - factor * (rest - rest.mean())
+    return float((abs(apart) ** 2).mean() / max(abs(factor) ** 2, 1e-12))

@@ -9,7 +9,7 @@ import shapely
 from numpy.typing import NDArray
 
 from orbiflow.errors import OrbiflowError
-from orbiflow.geometry import points_along, resampled, ring_length
+from orbiflow.geometry import arc_lengths, points_along, resampled, ring_length
 
 Array = NDArray[np.float64]
 
@@ -106,7 +106,7 @@ def with_corners(ring: Array, corners: list[int], count: int, phase: float = 0.0
     Point i stays within a spacing of where even spacing has it. Of corners that are nearest to the
     same point, the first is kept.
     """
-    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.roll(ring, -1, 0) - ring, axis=1))])
+    along = arc_lengths(ring)
     total = along[-1]
     at = along[corners] / total * count - phase
     index = np.round(at).astype(int)
