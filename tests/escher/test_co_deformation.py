@@ -1,5 +1,7 @@
 """A silhouette that bends until it is a tile."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import shapely
@@ -131,7 +133,7 @@ def test_finalists_are_in_order_and_told() -> None:
 
 def test_more_rounds_cost_no_more() -> None:
     few = bent_squirrel("IH5").bent
-    settings = BendingSettings(40, 8, 1, 40, (4,))
+    settings = replace(SMALL, rounds=40)
     (more,), _ = bent_tiles([squirrel_hands()[0]], CLASSES["IH5"], settings)
     assert more.energy <= few.energy * 1.02
     assert SMALL.rounds < 40

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from orbiflow.cancel import Cancel
 from orbiflow.escher.bending_settings import BendingSettings
 from orbiflow.escher.co_deformation import drawn_to_tiles, held_on_tiles
+from orbiflow.escher.corner_shifts import Drawn, Stage, shifted
 from orbiflow.escher.outline_starts import mirror_closed
 from orbiflow.escher.placements import Complex, Placements, best_placements
 from orbiflow.escher.tile_space import TileSpace
@@ -34,6 +35,9 @@ TWIN = 2e-4
 FIRST_ROUNDS = 6
 """Steps of the minimisation for all that are held."""
 
+FOLLOWING = 60.0
+"""Strength of the springs by which a finer body follows a coarser one."""
+
 RELAXED = 1500.0
 """Strength of the springs that keep a relaxed outline near its tile."""
 
@@ -42,11 +46,12 @@ SOFTENINGS = 6
 
 
 class Hand(NamedTuple):
-    """A silhouette or its mirror image, sampled and made elastic, coarse and fine."""
+    """A silhouette or its mirror image, sampled and made elastic, coarse to fine."""
 
     mirrored: bool
     samples: Samples
     coarse: Elastic
+    middle: Elastic
     fine: Elastic
 
 
@@ -108,11 +113,13 @@ def hands(
             stiff = emphasis.weight(mesh.points * ((1.0, -1.0) if mirrored else (1.0, 1.0)))
         return Elastic(points, stiffness, stiff=stiff, mesh=mesh)
 
-    own, other = (
-        Hand(mirrored, both, *(elastic(points, mirrored) for points in both))
-        for mirrored, both in ((False, samples), (True, mirror))
-    )
-    return own, other
+    def hand(points: Samples, mirrored: bool) -> Hand:
+        coarse, fine = elastic(points.coarse, mirrored), elastic(points.fine, mirrored)
+        same = len(points.middle) == len(points.fine)
+        middle = fine if same else elastic(points.middle, mirrored)
+        return Hand(mirrored, points, coarse, middle, fine)
+
+    return hand(samples, False), hand(mirror, True)
 
 
 def bent_tiles(
@@ -143,21 +150,50 @@ def bent_tiles(
     sides = both[:1] if mirror_closed(kind) else both
     for number, hand in enumerate(sides):
         cancel.check()
-        for k, (placement, outline) in enumerate(_best_coarse(hand, kind, settings)):
+        best = _best_placements(hand, kind, settings, cancel)
+        count = len(best.costs)
+        for k in range(count):
             cancel.check()
-            bent = _detailed(hand, kind, placement, outline, settings.rounds)
+            own = best.take(np.array([k]))
+            bent = _detailed(hand, kind, own.placements, own.points, settings.rounds)
             if bent is None:
                 dropped += 1
             else:
                 found.append(bent)
-            told((number + 0.5 + 0.5 * (k + 1) / settings.finalists) / len(sides))
+            told((number + 0.5 + 0.5 * (k + 1) / count) / len(sides))
     found.sort(key=lambda bent: -bent.fidelity.score)
     return found, dropped
 
 
+def _best_placements(
+    hand: Hand, kind: IsohedralClass, settings: BendingSettings, cancel: Cancel
+) -> Drawn:
+    """Placements of the fine outline whose tiles cost least: few points, then more and more."""
+    coarse, middle, fine = hand.coarse, hand.middle, hand.fine
+    placements, points = _best_coarse(hand, kind, settings)
+    share = settings.share
+    if middle is not fine:
+        placements, points = _finer(coarse, middle, placements, points)
+        stages = [Stage(2, settings.starts), Stage(1, 2 * settings.finalists)]
+        drawn = shifted(
+            middle, kind, placements, points, stages, share=share, pose=POSE, cancel=cancel
+        )
+        drawn = drawn.take(np.arange(min(len(drawn.costs), settings.finalists)))
+        placements, points = _finer(middle, fine, drawn.placements, drawn.points)
+        stages = [Stage(1, settings.finalists)]
+    else:
+        placements, points = _finer(coarse, fine, placements, points)
+        stages = [
+            Stage(4, settings.starts),
+            Stage(2, 2 * settings.finalists),
+            Stage(1, settings.finalists),
+        ]
+    return shifted(fine, kind, placements, points, stages, share=share, pose=POSE, cancel=cancel)
+
+
 def _best_coarse(
     hand: Hand, kind: IsohedralClass, settings: BendingSettings
-) -> list[tuple[Placements, Complex]]:
+) -> tuple[Placements, Complex]:
     """Placements whose tiles cost least, with these: few points, all placements side by side."""
     body = hand.coarse
     outline = complex_points(hand.samples.coarse)
@@ -169,28 +205,33 @@ def _best_coarse(
     tiles = held_on_tiles(body, TileSpace(kind, picked), z[:, chosen], FIRST_ROUNDS)
     costs, sound = _costs(body, tiles.points)
     order = np.lexsort((costs, ~sound))
-    fresh = _without_twins(body, tiles.points, order, settings.finalists)
-    return [(tiles.placements.take(np.array([k])), tiles.points[: body.size, k]) for k in fresh]
+    fresh = np.array(_without_twins(body, tiles.points, order, settings.starts), dtype=np.int64)
+    return tiles.placements.take(fresh), tiles.points[:, fresh]
+
+
+def _finer(
+    body: Elastic, finer: Elastic, placements: Placements, points: Complex
+) -> tuple[Placements, Complex]:
+    """The same placements, and shapes (N, C) much like those given, of a body with more points."""
+    n, multiple = body.size, finer.size // body.size
+    closed = np.vstack([points[:n], points[:1]])
+    below, part = np.divmod(np.arange(finer.size), multiple)
+    share = (part / multiple)[:, None]
+    outline = (1 - share) * closed[below] + share * closed[below + 1]
+    rest = np.repeat(finer.rest[:, None], outline.shape[1], axis=1)
+    more = placements._replace(
+        lengths=placements.lengths * multiple, starts=placements.starts * multiple
+    )
+    return more, finer.pulled(rest, outline, FOLLOWING, 6)
 
 
 def _detailed(
-    hand: Hand, kind: IsohedralClass, placement: Placements, outline: Complex, rounds: int
+    hand: Hand, kind: IsohedralClass, placement: Placements, points: Complex, rounds: int
 ) -> Bent | None:
-    """The same placement with all of the outline's points; None if the tile crosses itself."""
-    body, n = hand.fine, len(outline)
-    multiple = body.size // n
-    fine = placement._replace(
-        lengths=placement.lengths * multiple, starts=placement.starts * multiple
-    )
-    space = TileSpace(kind, fine)
-    at = np.arange(body.size) / multiple
-    closed = np.append(outline, outline[0])
-    towards = np.interp(at, np.arange(n + 1), closed.real) + 1j * np.interp(
-        at, np.arange(n + 1), closed.imag
-    )
-    z = body.pulled(body.rest[:, None].copy(), towards[:, None], 60.0, 6)
-    z = body.pulled(z, towards[:, None], 600.0, 6)
-    tiles = held_on_tiles(body, space, z, rounds)
+    """A placement of the fine outline worked out, from points (N, 1); None if it crosses itself."""
+    body = hand.fine
+    space = TileSpace(kind, placement)
+    tiles = held_on_tiles(body, space, points, rounds)
     for _ in range(SOFTENINGS):
         tiles = held_on_tiles(body.forgiving(tiles.points), space, tiles.points, 6)
     ring = tiles.points[: body.size, 0]

@@ -15,7 +15,10 @@ class BendingSettings:
 
     - `placements`: ways to lay the outline along the template's edges that are tried, a class.
     - `held`: of these, the best after the springs, whose energy is minimised among tiles.
-    - `finalists`: of these, the best that are worked out with all of the outline's detail, a class.
+    - `starts`: of these, the best whose corners are moved along the outline, step by step.
+    - `share`: of all such steps that are worked out, those that look best.
+    - `finalists`: of what comes of it, the best that are worked out with all of the outline's detail,
+      a class and hand.
     - `rounds`: steps of the minimisation for finalists.
     - `multiples`: points of a tile for each point of the search, the first that holds the corners.
     - `min_neck`: width of necks below which a tile's score falls, in square roots of the area.
@@ -24,16 +27,20 @@ class BendingSettings:
 
     placements: int = 300
     held: int = 80
-    finalists: int = 8
-    rounds: int = 40
+    starts: int = 32
+    share: float = 0.3
+    finalists: int = 5
+    rounds: int = 20
     multiples: tuple[int, ...] = (4, 6)
     min_neck: float = 0.01
     seed: int = 0
 
     def __post_init__(self) -> None:
-        for name in ("placements", "held", "finalists", "rounds"):
+        for name in ("placements", "held", "starts", "finalists", "rounds"):
             if getattr(self, name) < 1:
                 raise OrbiflowError(f"{name} must be at least 1, got {getattr(self, name)}")
+        if not 0 < self.share <= 1:
+            raise OrbiflowError(f"share must be above 0, at most 1, got {self.share}")
         if not self.multiples or min(self.multiples) < 1:
             raise OrbiflowError(f"multiples must be at least 1, got {self.multiples}")
         if not 0 <= self.min_neck <= 0.2:
@@ -52,8 +59,23 @@ class BendingSettings:
 
 
 EFFORTS: dict[str, dict[str, Any]] = {
-    "fast": {"placements": 80, "held": 20, "finalists": 2, "rounds": 12, "multiples": (4,)},
+    "fast": {
+        "placements": 80,
+        "held": 20,
+        "starts": 8,
+        "share": 0.15,
+        "finalists": 2,
+        "rounds": 12,
+        "multiples": (4,),
+    },
     "normal": {},
-    "best": {"placements": 1500, "held": 300, "finalists": 20, "rounds": 80},
+    "best": {
+        "placements": 1500,
+        "held": 300,
+        "starts": 128,
+        "share": 1.0,
+        "finalists": 12,
+        "rounds": 40,
+    },
 }
 """What each level changes."""

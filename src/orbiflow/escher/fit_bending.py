@@ -94,7 +94,8 @@ def _fit(
     cancel: Cancel | None,
 ) -> Fit:
     told = progress or (lambda _share, _loss: None)
-    settings = replace(settings, finalists=max(settings.finalists, 3 * per_class))
+    finalists = max(settings.finalists, 3 * per_class)
+    settings = replace(settings, finalists=finalists, starts=max(settings.starts, 2 * finalists))
     found, dropped = bent_tiles(
         both, kind, settings, lambda share: told(0.9 * share, float("nan")), cancel
     )

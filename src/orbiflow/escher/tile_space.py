@@ -80,6 +80,11 @@ class TileSpace:
         """(C, K) vertices at the template's corners."""
         return self._orbits.corners
 
+    @property
+    def glides(self) -> bool:
+        """Whether the class has glide reflections, whose axes can be turned."""
+        return any(not pair.reversed for pair in self.kind.identified_edges)
+
     def turn(self, turns: Array) -> None:
         """Set the directions (C,) of the glide axes, in radians; no effect without glides."""
         self.turns = np.asarray(turns, dtype=np.float64)
@@ -101,10 +106,10 @@ class TileSpace:
 
     def best_turns(self, outlines: Complex) -> Array:
         """(C,) directions of the glide axes that suit the outlines (C, n) best; 0 without glides."""
+        if not self.glides:
+            return self.turns
         glides = [pair for pair in self.kind.identified_edges if not pair.reversed]
         total = np.zeros(self.count, dtype=complex)
-        if not glides:
-            return self.turns
         goal = np.take_along_axis(outlines, self.order, axis=1)
         steps = np.roll(goal, -1, axis=1) - goal
         lengths, first = self.placements.lengths, self.corners

@@ -1,16 +1,16 @@
 """How much of a silhouette is left in its bent outline, as eyes see it: pose-blind, point by point.
 
-Three of four things together predict what people say of bent silhouettes (docs/likeness.md has the
-evidence); the other, `necks`, keeps threads away that no cutter can make:
+What people say of bent silhouettes goes with five things, none of which minds where a limb points
+(docs/likeness.md has the evidence), and a sixth keeps threads away that no cutter can make:
 
-- `parts`: how well short pieces of the outline are kept, each compared after its own best motion
+- `pieces`: how well pieces of the outline are kept, each compared after its own best motion
   (Procrustes; Gower, 1975), by the mean of the roots: a few pieces may be lost, the rest is to be
-  exact. Where limbs bend, the pieces between the joints keep their shape.
+  exact. Small pieces tell of corners and toes, middle ones of limbs and heads, large ones of the whole.
 - `notches`: where the space outside has become narrower than it was: slits, notches and folds that
   the silhouette does not have. The width is that of the largest disc outside that touches the outline
   (the outer medial axis; found as by Ma, Bae and Choi, 3D medial axis point approximation, 2012).
+- `narrowed`: the same inside: limbs and bodies grown thin.
 - `necks`: how much narrower the inside has become at its worst place beyond half: threads.
-- `moved`: mean squared distance from the best similar copy.
 
 Outlines are given point by point: this compares a shape with what it was bent from, not any two.
 """
@@ -23,53 +23,59 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from orbiflow.geometry import best_similarity, plane_points, signed_area
+from orbiflow.geometry import plane_points, signed_area
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-PIECE = 0.04
-"""Length of the pieces, as a share of the outline."""
+PIECES = (0.04, 0.15, 0.4)
+"""Lengths of the pieces, as shares of the outline."""
 
 CLEAR = 0.02
-"""Added to widths outside, in square roots of the area: below it, differences matter little."""
+"""Added to widths, in square roots of the area: below it, differences matter little."""
 
-POWERS = (5.6, 1.1, 0.5)
-"""Of parts, notches and moved in the damage; fitted to blind marks within targets."""
+USUAL = (0.12, 0.16, 0.13, 0.3, 0.037)
+"""Of the pieces, of notches and of what is narrowed: values in a tile of middling likeness."""
 
-THREADS = 2.0
-"""Of necks in the damage, as an exponent."""
+WEIGHTS = (6.5, 6.5, 6.5, 2.6, 2.3)
+"""Of their logarithms: one over how much these differ between tiles of one silhouette."""
 
-USUAL = (0.16, 0.05, 0.004)
-"""Their values in a tile of middling likeness."""
+LITTLE = 0.3
+"""Share of the usual values below which differences matter little."""
 
 
 @dataclass(frozen=True)
 class Fidelity:
     """What bending left of an outline; all values from 0, smaller is better, but for `score`.
 
-    - `parts`, `notches`, `moved`, `necks`: see the module.
+    - `pieces`: of three lengths, small to large.
+    - `notches`, `narrowed`, `necks`: see the module.
     """
 
-    parts: float
+    pieces: tuple[float, float, float]
     notches: float
-    moved: float
+    narrowed: float
     necks: float
+
+    @property
+    def damage(self) -> float:
+        """About 0 for a tile of middling likeness, smaller is better.
+
+        The sum of `necks` and of the first five values' logarithms, each relative to its usual value,
+        with `LITTLE` added, and weighted.
+        """
+        values = (*self.pieces, self.notches, self.narrowed)
+        relative = [value / usual for value, usual in zip(values, USUAL, strict=True)]
+        parts = [math.log((LITTLE + value) / (LITTLE + 1)) for value in relative]
+        return self.necks + float(np.dot(WEIGHTS, parts))
 
     @property
     def score(self) -> float:
         """From 0 to 1, larger is better; 0.5 for a tile of middling likeness, 1 for no change.
 
-        1 / (1 + d^(1/4)), with d the product of the first three over their usual values, each to its
-        power, times exp(`THREADS` necks).
+        1 / (1 + exp(damage / 4)).
         """
-        values = (self.parts, self.notches, self.moved)
-        damage = sum(
-            power * math.log(max(value, 1e-6) / usual)
-            for value, usual, power in zip(values, USUAL, POWERS, strict=True)
-        )
-        damage += THREADS * self.necks
-        return 1 / (1 + math.exp(min(damage / 4, 700.0)))
+        return 1 / (1 + math.exp(min(self.damage / 4, 700.0)))
 
 
 def fidelity(rest: Complex, bent: Complex) -> Fidelity:
@@ -86,20 +92,25 @@ def fidelity(rest: Complex, bent: Complex) -> Fidelity:
     rest, bent = (z / np.sqrt(abs(signed_area(plane_points(z)))) for z in (rest, bent))
     weight = abs(np.roll(rest, -1) - rest)
     weight /= weight.sum()
-    narrower = np.log(_clearance(rest) / _clearance(bent))
-    thinner = np.log(_clearance(rest, inside=True) / _clearance(bent, inside=True))
+    outside, inside = (
+        np.log(_clearance(rest, inside=side) / _clearance(bent, inside=side))
+        for side in (False, True)
+    )
+    small, middle, large = (
+        float(np.sqrt(_misfits(rest, bent, length)).mean()) for length in PIECES
+    )
     return Fidelity(
-        float(np.sqrt(_misfits(rest, bent)).mean()),
-        float((weight * np.maximum(narrower, 0) ** 2).sum()),
-        _moved(rest, bent),
-        max(0.0, float(thinner.max()) - math.log(2.0)),
+        (small, middle, large),
+        float((weight * np.maximum(outside, 0) ** 2).sum()),
+        float((weight * np.maximum(inside, 0) ** 2).sum()),
+        max(0.0, float(inside.max()) - math.log(2.0)),
     )
 
 
-def _misfits(rest: Complex, bent: Complex) -> Array:
+def _misfits(rest: Complex, bent: Complex, length: float) -> Array:
     """(n,) of the piece about each point: squared distance after the best motion, relative, 0 to 1."""
     n = len(rest)
-    half = min(max(3, round(PIECE * n / 2)), (n - 1) // 2)
+    half = min(max(3, round(length * n / 2)), (n - 1) // 2)
     index = (np.arange(n)[:, None] + np.arange(-half, half + 1)) % n
     a, b = rest[index], bent[index]
     a, b = a - a.mean(axis=1, keepdims=True), b - b.mean(axis=1, keepdims=True)
@@ -124,9 +135,3 @@ def _clearance(z: Complex, *, inside: bool = False) -> Array:
     least = np.minimum(radius.min(axis=1), 1.0)
     smooth = (np.roll(least, 1) + 2 * least + np.roll(least, -1)) / 4 + CLEAR
     return smooth[::-1] if inside else smooth
-
-
-def _moved(rest: Complex, bent: Complex) -> float:
-    factor = complex(best_similarity(rest, bent))
-    apart = (bent - bent.mean()) - factor * (rest - rest.mean())
-    return float((abs(apart) ** 2).mean() / max(abs(factor) ** 2, 1e-12))

@@ -25,20 +25,28 @@ DETAIL = 0.004
 MULTIPLES = (4, 6)
 """Points of the tile for each point of the search."""
 
+MIDDLE = 2
+"""Points between the two for each point of the search; divides all `MULTIPLES` of use."""
+
 
 class Samples(NamedTuple):
-    """An outline (M, 2) of area 1, counter-clockwise, sampled twice.
+    """An outline (M, 2) of area 1, counter-clockwise, sampled three times.
 
     - `coarse`: (n, 2) points, evenly spaced.
+    - `middle`: (2 n, 2) points, most of the outline's corners among them; or `fine` itself.
     - `fine`: (k n, 2) points; every k-th is near one of `coarse`; the outline's corners are among them.
     """
 
     coarse: Array
+    middle: Array
     fine: Array
 
 
 def sampled(ring: Array, phase: float = 0.0, multiples: tuple[int, ...] = MULTIPLES) -> Samples:
     """Sample an outline, more densely where it is long or rich in corners.
+
+    Where twice the coarse points make no simple polygon, or do not divide the fine ones, `middle` is
+    `fine`.
 
     Args:
         ring: (M, 2) of area about 1, counter-clockwise.
@@ -63,7 +71,10 @@ def sampled(ring: Array, phase: float = 0.0, multiples: tuple[int, ...] = MULTIP
         raise OrbiflowError(
             "parts of the silhouette are too thin to be sampled: thicken or remove the hairs"
         )
-    return Samples(coarse, fine)
+    middle = with_corners(ring, corners, MIDDLE * len(coarse), phase * MIDDLE)
+    if len(fine) % len(middle) or not shapely.Polygon(middle).is_valid:
+        middle = fine
+    return Samples(coarse, middle, fine)
 
 
 def _simple_coarse(ring: Array, count: int, phase: float) -> Array:
