@@ -1,0 +1,79 @@
+"""What people see in bent tiles, and what of it the order of tiles knows: correlations with marks.
+
+    python benchmarks/likeness_marks.py
+
+data/likeness_marks.json holds the marks from 0 to 10 that two judges gave to 165 tiles of 15
+silhouettes, on sheets without names, and for each of ours the values of `orbiflow.likeness.fidelity`,
+the energy and the displacement. All correlations are within silhouettes: each silhouette's mean is
+taken out of marks and values alike. The weights of the order are one over each value's usual spread:
+nothing but the choice of its parts was fitted to marks.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from common import ROOT, Ring
+
+from orbiflow.escher.bending import POSE
+from orbiflow.likeness.fidelity import Fidelity
+
+Row = dict[str, Any]
+
+
+def _fidelity(row: Row) -> Fidelity:
+    return Fidelity(tuple(row["pieces"]), row["notches"], row["narrowed"], row["necks"])
+
+
+VALUES: dict[str, Callable[[Row], float]] = {
+    "energy": lambda row: float(np.log(row["energy"])),
+    "displacement": lambda row: float(np.log(row["displacement"])),
+    "cost: both": lambda row: float(np.log(row["energy"] + POSE * row["displacement"])),
+    "small pieces": lambda row: float(np.log(row["pieces"][0])),
+    "middle pieces": lambda row: float(np.log(row["pieces"][1])),
+    "large pieces": lambda row: float(np.log(row["pieces"][2])),
+    "notches": lambda row: float(np.log(row["notches"] + 1e-3)),
+    "narrowed": lambda row: float(np.log(row["narrowed"] + 1e-3)),
+    "damage: the order": lambda row: _fidelity(row).damage,
+}
+"""Smaller is better in all; logarithms of all but the last."""
+
+
+def within(values: list[Ring]) -> Ring:
+    """Values of each silhouette less their mean, all in one."""
+    return np.concatenate([value - value.mean() for value in values])
+
+
+def main() -> None:
+    """Print the tables."""
+    document = json.loads((ROOT / "benchmarks" / "data" / "likeness_marks.json").read_text())
+    tiles: dict[str, list[Row]] = document["silhouettes"]
+    both = [np.array([row["marks"] for row in rows]).T for rows in tiles.values()]
+    agree = np.corrcoef(within([a for a, _ in both]), within([b for _, b in both]))[0, 1]
+    print(f"{sum(map(len, tiles.values()))} tiles; the judges with each other: {agree:.2f}")
+
+    ours = {name: [row for row in rows if "energy" in row] for name, rows in tiles.items()}
+    marks = {name: np.mean([row["marks"] for row in rows], axis=1) for name, rows in ours.items()}
+    seen = within(list(marks.values()))
+    best = np.mean([mark.max() for mark in marks.values()])
+    mean = np.mean([mark.mean() for mark in marks.values()])
+    print(f"\nmarks: mean {mean:.2f}; the best of each silhouette {best:.2f}")
+    print("value              correlation   mark of the tile that it puts first")
+    for label, value in VALUES.items():
+        own = {name: np.array([value(row) for row in rows]) for name, rows in ours.items()}
+        correlation = np.corrcoef(within(list(own.values())), seen)[0, 1]
+        first = np.mean([marks[name][np.argmin(own[name])] for name in own])
+        print(f"{label:20}{correlation:10.2f}{first:24.2f}")
+
+    print("\nARAP's first tile: its mark, and that of the tile that we would put first")
+    for name, rows in tiles.items():
+        for row in (row for row in rows if row["method"] == "arap"):
+            first = int(np.argmin([VALUES["damage: the order"](own) for own in ours[name]]))
+            print(f"{name:14}{np.mean(row['marks']):6.2f}{marks[name][first]:6.2f}")
+
+
+if __name__ == "__main__":
+    main()
