@@ -113,7 +113,7 @@ def copies_meeting(tile: Tile, window: Sequence[float]) -> Copies:
     found, low, high = _candidates(tile, box, whole=False)
     page = shapely.box(*box)
     shapely.prepare(page)
-    meets = ((low >= box[:2]) & (high <= box[2:])).all(axis=1)
+    meets = np.asarray(((low >= box[:2]) & (high <= box[2:])).all(axis=1))
     unsure = np.flatnonzero(~meets)
     rings = found.select(unsure).images(tile.polygon)
     # rings, not polygons: a tile that crosses itself must not stop the picture that shows it

@@ -1,0 +1,107 @@
+"""A tile in millimetres, in its place on the page."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+
+from orbiflow.errors import OrbiflowError
+from orbiflow.export.outline import Outline, outline
+from orbiflow.export.scene import Box, PlacedTile
+from orbiflow.export.settings import ExportSettings
+from orbiflow.symmetry.isometry import Array
+from orbiflow.tilings import Copies, Tile
+
+STRIP = 8.0
+"""Height in mm of the strip at the page's foot that the calibration mark has for itself."""
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """What every kind of export starts from.
+
+    - `settings`: as they were given.
+    - `tile`: in mm on the page, y down, in the middle of `box`.
+    - `outline`: its curves.
+    - `box`: the part of the page that tiles may use.
+    - `notes`: what the user should know.
+    """
+
+    settings: ExportSettings
+    tile: Tile
+    outline: Outline
+    box: Box
+    notes: tuple[str, ...]
+
+
+def layout(tile: Tile, settings: ExportSettings, *, y_down: bool) -> Layout:
+    """Scale the tile and put it in the middle of the page, the way up it has.
+
+    Args:
+        tile: in any units.
+        y_down: whether its y axis points down.
+
+    Raises:
+        OrbiflowError: for a page that is smaller than the tile.
+    """
+    width, height = settings.page
+    box = Box(0.0, 0.0, width, height - (STRIP if settings.calibrate else 0.0))
+    scale = settings.tile_size / longer_side(tile.polygon)
+    linear = scale * np.diag([1.0, 1.0 if y_down else -1.0])
+    middle = np.array([(box.left + box.right) / 2, (box.top + box.bottom) / 2])
+    placed = tile.transformed(linear, middle - linear @ tile.center)
+    curves = outline(placed, settings.deviation)
+    if settings.cut != "pieces":
+        _check_room(placed, settings, box)
+    return Layout(settings, placed, curves, box, (curves.note,) if curves.note else ())
+
+
+def longer_side(ring: Array) -> float:
+    """Longer side of a ring's smallest rectangle, turned as it may be."""
+    return rectangle_sides(ring)[1]
+
+
+def rectangle_sides(ring: Array) -> tuple[float, float]:
+    """Sides of a ring's smallest rectangle, the shorter first."""
+    corners = shapely.get_coordinates(shapely.oriented_envelope(shapely.MultiPoint(ring)))
+    sides = np.linalg.norm(np.diff(corners[:3], axis=0), axis=1)
+    return float(sides.min()), float(sides.max())
+
+
+def bleed(settings: ExportSettings) -> float:
+    """How far in mm a line may reach beyond its tile's polygon."""
+    return settings.deviation + (settings.stroke_width or 0.25) / 2
+
+
+def _check_room(tile: Tile, settings: ExportSettings, box: Box) -> None:
+    need = np.ptp(tile.polygon, axis=0) + 2 * bleed(settings)
+    if need[0] <= box.width and need[1] <= box.height:
+        return
+    extra = settings.page[1] - box.height
+    strip = f", {extra:g} mm of it for the calibration mark" if extra else ""
+    raise OrbiflowError(
+        f"a tile of {settings.tile_size:g} mm does not fit on the page of {settings.page[0]:g} x "
+        f"{settings.page[1]:g} mm: it needs {need[0]:.1f} x {need[1] + extra:.1f} mm{strip}; choose "
+        "a larger area or a smaller tile size"
+    )
+
+
+def placed_tiles(copies: Copies, layout: Layout, whole: Array) -> tuple[PlacedTile, ...]:
+    """What the JSON file says of each copy."""
+    own = layout.outline.edges
+    beyond = np.zeros((len(copies), 0), int) if own is None else copies.neighbours(own.across)
+    linear = copies.tile.group.linear_parts
+    return tuple(
+        PlacedTile(
+            int(coset),
+            linear[coset],
+            offset,
+            tuple(dict.fromkeys(k for k in near if k >= 0)),
+            bool(kept),
+        )
+        for coset, offset, near, kept in zip(
+            copies.cosets, copies.translations, beyond.tolist(), whole, strict=True
+        )
+    )
