@@ -21,11 +21,12 @@ def write_dxf(scene: Scene, *, tolerance: float) -> str:
 
     document: Any = new("R2010", units=units.MM)
     document.header["$MEASUREMENT"] = 1
-    document.header["$EXTMIN"], document.header["$EXTMAX"] = (
-        (0, 0, 0),
-        (scene.width, scene.height, 0),
-    )
     space = document.modelspace()
+    extents = (0, 0, 0), (scene.width, scene.height, 0)
+    space.reset_extents(*extents)
+    # ezdxf takes a corner at the origin for none
+    document.header["$EXTMIN"], document.header["$EXTMAX"] = extents
+    space.reset_limits((0, 0), (scene.width, scene.height))
     for note in filter(None, (scene.title, *scene.notes)):
         document.header.custom_vars.append("orbiflow", note[:250])
     for layer in scene.layers:

@@ -18,8 +18,11 @@ from orbiflow.export.scene import Box, Layer, PlacedTile, Scene
 from orbiflow.export.skeleton_scene import line_style
 from orbiflow.symmetry.isometry import Array
 
-LEAST_GAP = 1e-3
+LEAST_GAP = 0.01
 """Between cuts, in mm: pieces never touch."""
+
+LEAST_EDGE = 0.1
+"""Twice the distance of cuts from the sheet's edge at least, in mm."""
 
 
 def pieces_scenes(layout: Layout, *, fine: bool = True) -> list[Scene]:
@@ -40,7 +43,7 @@ def pieces_scenes(layout: Layout, *, fine: bool = True) -> list[Scene]:
     line = curve.flattened(flat / 4)
     gap = max(settings.spacing, LEAST_GAP)
     arrangements = dense_arrangements(layout.tile, line, gap)
-    edge = gap / 2  # to the sheet's edge
+    edge = max(gap, LEAST_EDGE) / 2
     placed = on_sheet(arrangements, line, box.width - 2 * edge, box.height - 2 * edge)
     placed = replace(placed, offsets=placed.offsets + edge)
     if not len(placed):
