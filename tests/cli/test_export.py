@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 from pathlib import Path
 from typing import Any
 
@@ -190,3 +191,20 @@ def test_a_full_disk(result: Path, tmp_path: Path, orbiflow, monkeypatch) -> Non
     assert outcome.status == 2
     assert "No space left on device; choose another place or free the one" in outcome.err
     assert not list(tmp_path.iterdir())
+
+
+def test_the_page_of_documentation_names_every_option(orbiflow) -> None:
+    text = (Path(__file__).parents[2] / "docs" / "export.md").read_text(encoding="utf-8")
+    offered = set(re.findall(r"--[a-z][a-z-]+", orbiflow("export", "--help").out)) - {"--help"}
+    assert len(offered) > 20
+    assert offered <= set(re.findall(r"--[a-z][a-z-]+", text))
+
+
+def test_the_snippet_of_the_documentation(result: Path, tmp_path: Path, monkeypatch) -> None:
+    text = (Path(__file__).parents[2] / "docs" / "export.md").read_text(encoding="utf-8")
+    (snippet,) = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "turtle").symlink_to(result)
+    exec(compile(snippet, "export.md", "exec"), {})
+    assert (tmp_path / "cut.svg").is_file()

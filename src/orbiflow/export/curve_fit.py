@@ -32,7 +32,7 @@ def fitted(points: Array, tolerance: float) -> Curve:
         A curve from the first point to the last; a polyline's corners are ends of its pieces.
 
     >>> turns = np.linspace(0, np.pi, 40)
-    >>> arc = fitted(np.stack([np.cos(turns), np.sin(turns)], axis=1), 1e-2)
+    >>> arc = fitted(np.stack([np.cos(turns), np.sin(turns)], axis=1), 3e-2)
     >>> len(arc.pieces)
     1
     """

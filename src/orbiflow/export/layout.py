@@ -12,7 +12,7 @@ from orbiflow.export.outline import Outline, outline
 from orbiflow.export.scene import Box, PlacedTile
 from orbiflow.export.settings import ExportSettings
 from orbiflow.symmetry.isometry import Array
-from orbiflow.tilings import Copies, Tile
+from orbiflow.tilings import Copies, Tile, copies_inside
 
 STRIP = 8.0
 """Height in mm of the strip at the page's foot that the calibration mark has for itself."""
@@ -23,7 +23,7 @@ class Layout:
     """What every kind of export starts from.
 
     - `settings`: as they were given.
-    - `tile`: in mm on the page, y down, in the middle of `box`.
+    - `tile`: in mm on the page, y down.
     - `outline`: its curves.
     - `box`: the part of the page that tiles may use.
     - `notes`: what the user should know.
@@ -36,8 +36,17 @@ class Layout:
     notes: tuple[str, ...]
 
 
+STEPS = 10
+"""Places along each side of a lattice cell that are tried for a page with most whole tiles."""
+
+MANY = 1000
+"""Tiles on a page beyond which a few more are not worth looking for."""
+
+
 def layout(tile: Tile, settings: ExportSettings, *, y_down: bool) -> Layout:
-    """Scale the tile and put it in the middle of the page, the way up it has.
+    """Scale the tile and put it on the page, the way up it has.
+
+    In the middle; where tiles are not cut at the page's edge, nearby, so that most are whole.
 
     Args:
         tile: in any units.
@@ -52,9 +61,11 @@ def layout(tile: Tile, settings: ExportSettings, *, y_down: bool) -> Layout:
     linear = scale * np.diag([1.0, 1.0 if y_down else -1.0])
     middle = np.array([(box.left + box.right) / 2, (box.top + box.bottom) / 2])
     placed = tile.transformed(linear, middle - linear @ tile.center)
-    curves = outline(placed, settings.deviation)
     if settings.cut != "pieces":
         _check_room(placed, settings, box)
+        if not settings.clip:
+            placed = _with_most_whole(placed, inner_box(box, settings))
+    curves = outline(placed, settings.deviation)
     return Layout(settings, placed, curves, box, (curves.note,) if curves.note else ())
 
 
@@ -73,6 +84,27 @@ def rectangle_sides(ring: Array) -> tuple[float, float]:
 def bleed(settings: ExportSettings) -> float:
     """How far in mm a line may reach beyond its tile's polygon."""
     return settings.deviation + (settings.stroke_width or 0.25) / 2
+
+
+def inner_box(box: Box, settings: ExportSettings) -> Box:
+    """Where polygons lie whose lines are all in the box."""
+    margin = bleed(settings)
+    return Box(box.left + margin, box.top + margin, box.right - margin, box.bottom - margin)
+
+
+def _with_most_whole(tile: Tile, box: Box) -> Tile:
+    """The tile moved so that most copies lie in the box whole; as it is where none is better."""
+    if box.width * box.height > MANY * abs(tile.signed_area):
+        return tile
+    best, shift = len(copies_inside(tile, box)), np.zeros(2)
+    shares = np.arange(STEPS) / STEPS
+    grid = np.stack(np.meshgrid(shares, shares), axis=-1).reshape(-1, 2)
+    for step in grid @ tile.group.lattice.T:
+        moved = (box.left - step[0], box.top - step[1], box.right - step[0], box.bottom - step[1])
+        count = len(copies_inside(tile, moved))
+        if count > best:
+            best, shift = count, step
+    return tile.transformed(np.eye(2), shift)
 
 
 def _check_room(tile: Tile, settings: ExportSettings, box: Box) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 
 from orbiflow.errors import OrbiflowError
 from orbiflow.export.curves import Curve
-from orbiflow.export.layout import Layout, bleed, placed_tiles
+from orbiflow.export.layout import Layout, inner_box, placed_tiles
 from orbiflow.export.scene import Box, Layer, Scene, Style, Uses
 from orbiflow.figures.palette import palette
 from orbiflow.tilings import Copies, colouring, copies_inside, copies_meeting
@@ -19,9 +19,7 @@ def chosen_copies(layout: Layout) -> Copies:
     settings, box = layout.settings, layout.box
     if settings.clip:
         return copies_meeting(layout.tile, box)
-    margin = bleed(settings)
-    inner = (box.left + margin, box.top + margin, box.right - margin, box.bottom - margin)
-    return copies_inside(layout.tile, inner)
+    return copies_inside(layout.tile, inner_box(box, settings))
 
 
 def tiling_scene(layout: Layout) -> Scene:
