@@ -182,6 +182,15 @@ def test_places_that_cannot_be_written(where: str, result: Path, tmp_path: Path,
     assert not list(tmp_path.iterdir())
 
 
+def test_a_pipe_is_not_replaced(result: Path, tmp_path: Path, orbiflow) -> None:
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    outcome = orbiflow("export", result, "--out", pipe)
+    assert outcome.status == 2
+    assert "it is no ordinary file" in outcome.err
+    assert pipe.is_fifo()
+
+
 def test_a_full_disk(result: Path, tmp_path: Path, orbiflow, monkeypatch) -> None:
     def full(_: int) -> None:
         raise OSError(28, "No space left on device")

@@ -75,10 +75,24 @@ def longer_side(ring: Array) -> float:
 
 
 def rectangle_sides(ring: Array) -> tuple[float, float]:
-    """Sides of a ring's smallest rectangle, the shorter first."""
-    corners = shapely.get_coordinates(shapely.oriented_envelope(shapely.MultiPoint(ring)))
-    sides = np.linalg.norm(np.diff(corners[:3], axis=0), axis=1)
-    return float(sides.min()), float(sides.max())
+    """Sides of a ring's smallest rectangle by area, the shorter first.
+
+    Of rectangles that are as small, as a regular hexagon has, the one with the shortest sides: which
+    of them comes out must not depend on rounding.
+
+    >>> square = np.array([[0.0, 0.0], [1.0, 1.0], [0.0, 2.0], [-1.0, 1.0]])
+    >>> [round(side, 6) for side in rectangle_sides(square)]
+    [1.414214, 1.414214]
+    """
+    hull = shapely.get_coordinates(shapely.convex_hull(shapely.MultiPoint(ring)))
+    steps = np.diff(hull, axis=0)  # a smallest rectangle lies along one of the hull's sides
+    along = steps / np.linalg.norm(steps, axis=1)[:, None]
+    across = np.stack([-along[:, 1], along[:, 0]], axis=1)
+    sides = np.sort(np.stack([np.ptp(hull @ way.T, axis=0) for way in (along, across)]), axis=0)
+    areas = sides.prod(axis=0)
+    smallest = np.flatnonzero(areas <= (1 + 1e-6) * areas.min())
+    best = smallest[sides[1, smallest].argmin()]
+    return float(sides[0, best]), float(sides[1, best])
 
 
 def bleed(settings: ExportSettings) -> float:

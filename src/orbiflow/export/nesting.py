@@ -22,6 +22,9 @@ from orbiflow.tilings import Tile
 TRIALS = 400
 """Random changes of each kind of start."""
 
+KEPT = 4
+"""Densest arrangements that are tried on a sheet."""
+
 ANGLES = 36
 """Turns of an arrangement that are tried on a sheet."""
 
@@ -66,8 +69,10 @@ def dense_arrangements(tile: Tile, ring: Array, gap: float, *, seed: int = 0) ->
     tight = sorted((tightened(start, coarse, gap) for start in starts), key=_area)
     clear = [found for found in tight if found.clear(ring, gap)]
     bettered = [_bettered(found, coarse, gap, rng) for found in clear[:3]]
-    # the coarse ring holds the fine one, so that what is clear for it is clear
-    return sorted((found for found in (*bettered, *clear) if found.clear(ring, gap)), key=_area)
+    best = sorted((*bettered, *clear), key=_area)[:KEPT]
+    # the coarse ring holds the fine one, so there is a little room left
+    exact = (tightened(found, ring, gap) for found in best)
+    return sorted((found for found in exact if found.clear(ring, gap)), key=_area)
 
 
 def _area(arrangement: Arrangement) -> float:

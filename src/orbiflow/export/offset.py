@@ -49,7 +49,7 @@ def cut_ring(ring: Array, kerf: float, clearance: float) -> Array:
 
 
 def _moved(ring: Array, distance: float) -> Array:
-    if distance == 0:
+    if abs(distance) < 1e-9:
         return ring
     moved = shapely.Polygon(ring).buffer(distance, join_style="mitre", mitre_limit=MITRE)
     parts = polygons_in(moved)

@@ -35,10 +35,7 @@ def export(request: ExportRequest, tell: Sink, cancel: Cancel) -> Finished:
     settings = _settings(request)
     tile = read_result(request.result, request.tile)
     out = request.out or Path(f"{tile.name}.{settings.format}")
-    if out.is_dir():
-        raise OutputError(f"cannot write {out}: it is a folder; give a file's name in it")
-    if not out.parent.is_dir():
-        raise OutputError(f"cannot write {out}: there is no folder {out.parent}; create it first")
+    _check_place(out)
     tell(Progress(0.0, "laying out"))
     found, notes = scenes(tile, settings, force=request.force)
     contents: list[str | bytes] = []
@@ -64,6 +61,16 @@ def export(request: ExportRequest, tell: Sink, cancel: Cancel) -> Finished:
         "tile_size": settings.tile_size,
     }
     return Finished("done", summary)
+
+
+def _check_place(out: Path) -> None:
+    """Before the work; a device must not be replaced by a file."""
+    if out.is_dir():
+        raise OutputError(f"cannot write {out}: it is a folder; give a file's name in it")
+    if out.exists() and not out.is_file():
+        raise OutputError(f"cannot write {out}: it is no ordinary file; choose another name")
+    if not out.parent.is_dir():
+        raise OutputError(f"cannot write {out}: there is no folder {out.parent}; create it first")
 
 
 def _said(done: Exported, settings: ExportSettings, name: str) -> str:
