@@ -13,6 +13,7 @@ from orbiflow.cli.classes import classes
 from orbiflow.cli.console import errors
 from orbiflow.cli.density import density
 from orbiflow.cli.escherize import escherize
+from orbiflow.cli.export import export
 from orbiflow.errors import OrbiflowError
 from orbiflow.jobs import RecordError
 
@@ -28,6 +29,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 app.command()(escherize)
+app.command()(export)
 app.command()(classes)
 app.add_typer(density)
 
@@ -46,7 +48,7 @@ def _global(
 
 def _option(field: str) -> str:
     """What a field of a request is called here."""
-    return {"count": "-n"}.get(field, "--" + field.replace("_", "-"))
+    return {"count": "-n", "purpose": "--for"}.get(field, "--" + field.replace("_", "-"))
 
 
 def main() -> None:

@@ -1,7 +1,40 @@
-"""Files that people take away: artwork in SVG, and the folder of a search."""
+"""Files that people take away: vector export in millimetres, artwork, and the folder of a search."""
 
+from orbiflow.export.curves import Curve
+from orbiflow.export.dxf_writer import write_dxf
+from orbiflow.export.exporting import Exported, export, scenes, write_scene
 from orbiflow.export.folder import write_tile_folder
 from orbiflow.export.gallery import overview_png, write_gallery
+from orbiflow.export.json_writer import write_json
+from orbiflow.export.pdf_writer import write_pdf
+from orbiflow.export.png_writer import write_png
+from orbiflow.export.result_file import ExportTile, read_result
+from orbiflow.export.scene import Layer, Scene, Style, Uses
+from orbiflow.export.settings import ExportSettings
 from orbiflow.export.svg import tile_svg, tiling_svg
+from orbiflow.export.svg_writer import write_svg
 
-__all__ = ["overview_png", "tile_svg", "tiling_svg", "write_gallery", "write_tile_folder"]
+__all__ = [
+    "Curve",
+    "ExportSettings",
+    "ExportTile",
+    "Exported",
+    "Layer",
+    "Scene",
+    "Style",
+    "Uses",
+    "export",
+    "overview_png",
+    "read_result",
+    "scenes",
+    "tile_svg",
+    "tiling_svg",
+    "write_dxf",
+    "write_gallery",
+    "write_json",
+    "write_pdf",
+    "write_png",
+    "write_scene",
+    "write_svg",
+    "write_tile_folder",
+]

@@ -95,6 +95,51 @@ class EscherizeRequest(Request):
 
 
 @dataclass(frozen=True)
+class ExportRequest(Request):
+    """Write a tile's tiling, lines or pieces in real size; see `orbiflow export --help`.
+
+    Lengths are text with their unit, such as "40mm"; sizes such as "300x200mm".
+
+    - `result`: a search's folder, or its result.json. `tile`: a class or a rank.
+    - `out`: the file, None for one named after the tile in the working directory.
+    - `purpose`: "laser", "print", "web" or "plotter", for what the other fields leave open.
+    - `format`: None for the file's ending, or the purpose's.
+    - others: as in `orbiflow.export.ExportSettings`; None is its default, or the purpose's.
+    """
+
+    KIND = "export"
+
+    result: Path
+    out: Path | None = None
+    tile: str = "1"
+    purpose: Literal["laser", "print", "web", "plotter"] | None = None
+    format: Literal["svg", "pdf", "dxf", "png", "json"] | None = None
+    tile_size: str | None = None
+    area: str | None = None
+    cut: Literal["none", "skeleton", "pieces"] | None = None
+    kerf: str | None = None
+    clearance: str | None = None
+    spacing: str | None = None
+    copies: int | None = None
+    clip: bool | None = None
+    border: bool = False
+    bed: str | None = None
+    calibrate: bool = False
+    tolerance: str | None = None
+    warn_neck: str | None = None
+    palette: str | None = None
+    dpi: float | None = None
+    force: bool = False
+
+    def check(self) -> None:
+        at_least_one(self, "copies")
+        if self.dpi is not None and not 1 <= self.dpi <= 10_000:
+            raise RecordError(f"{{dpi}} must be from 1 to 10000, got {self.dpi:g}")
+        if self.dpi is not None and self.format not in ("png", None):
+            raise RecordError("{dpi} belongs to {format} png")
+
+
+@dataclass(frozen=True)
 class DensityFitRequest(Request):
     """Fit a density to a table; see `orbiflow density fit --help`.
 
@@ -198,6 +243,7 @@ REQUESTS: dict[str, type[Request]] = {
     kind.KIND: kind
     for kind in (
         EscherizeRequest,
+        ExportRequest,
         DensityFitRequest,
         DensityScoreRequest,
         DensitySampleRequest,

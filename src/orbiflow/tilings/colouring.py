@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from orbiflow.arguments import instance
 from orbiflow.symmetry import Isometry
+from orbiflow.tilings.copies import Copies
 from orbiflow.tilings.graph_colouring import Graph, colour_graph
 from orbiflow.tilings.neighbours import neighbours
 from orbiflow.tilings.patch import Cell, coset_and_cell
@@ -47,6 +48,16 @@ class Colouring:
         coset, cell = coset_and_cell(self.tile, element)
         first, second = reduce_cell(cell, self.sublattice)
         return int(self.table[coset, first, second])
+
+    def colours(self, copies: Copies) -> NDArray[np.int64]:
+        """(M,) colour of each copy, all at once.
+
+        Args:
+            copies: of a tile with the same group as `tile`.
+        """
+        a, b, c = self.sublattice
+        wraps, second = np.divmod(copies.cells[:, 1], c)
+        return self.table[copies.cosets, (copies.cells[:, 0] - wraps * b) % a, second]
 
 
 def colouring(tile: Tile) -> Colouring:

@@ -43,7 +43,7 @@ def patch(tile: Tile, window: Sequence[float]) -> list[Isometry]:
     1
     """
     instance(tile, Tile, "the tile", "Tile(polygon, group) makes one")
-    xmin, ymin, xmax, ymax = _checked_window(window)
+    xmin, ymin, xmax, ymax = checked_window(window)
     low, high = np.array([xmin, ymin]), np.array([xmax, ymax])
     reach = float(np.linalg.norm(high - low)) / 2 + tile.radius
     _refuse_too_many(tile, high - low, reach)
@@ -87,7 +87,12 @@ def coset_and_cell(tile: Tile, element: Isometry) -> tuple[int, Cell]:
     return coset, (int(first), int(second))
 
 
-def _checked_window(window: Sequence[float]) -> Window:
+def checked_window(window: Sequence[float]) -> Window:
+    """`window` as four numbers.
+
+    Raises:
+        OrbiflowError: unless xmin < xmax and ymin < ymax.
+    """
     try:
         values = numbers(window, "window", (4,)).tolist()
     except OrbiflowError:

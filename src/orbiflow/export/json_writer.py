@@ -1,0 +1,79 @@
+"""A scene as JSON: every tile's transform, aspect, neighbours and polygon."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+
+from orbiflow.export.scene import Layer, PlacedTile, Scene
+
+SCHEMA_VERSION = 1
+
+
+def write_json(scene: Scene, *, tolerance: float, decimals: int = 4) -> str:
+    """The scene for programs; all lengths in mm, y down from the page's upper left corner.
+
+    Args:
+        tolerance: how close polygons keep to curves, in mm.
+        decimals: of coordinates.
+    """
+    prototile = scene.prototile
+    document: dict[str, Any] = {
+        "schema_version": SCHEMA_VERSION,
+        "kind": "orbiflow-export",
+        "title": scene.title,
+        "notes": list(scene.notes),
+        "units": "mm",
+        "y": "down",
+        "page": {"width": scene.width, "height": scene.height, "window": list(scene.clip)},
+        **scene.facts,
+        "prototile": None if prototile is None else _rounded(prototile, decimals),
+        "tiles": [
+            _tile(tile, number, prototile, decimals) for number, tile in enumerate(scene.tiles)
+        ],
+        "layers": [_layer(scene, layer, tolerance, decimals) for layer in scene.layers],
+    }
+    return json.dumps(document, allow_nan=False, separators=(",", ":"))
+
+
+def _tile(
+    tile: PlacedTile, number: int, prototile: np.ndarray | None, decimals: int
+) -> dict[str, Any]:
+    placed = (
+        {}
+        if prototile is None
+        else {"polygon": _rounded(prototile @ tile.linear.T + tile.offset, decimals)}
+    )
+    return {
+        "number": number,
+        "aspect": tile.aspect,
+        # as in SVG: a, b, c, d, e, f of x' = a x + c y + e, y' = b x + d y + f
+        "transform": [*np.round(tile.linear.T.ravel(), 9).tolist(), *_rounded(tile.offset, 6)],
+        "neighbours": list(tile.neighbours),
+        "whole": tile.whole,
+        **placed,
+    }
+
+
+def _layer(scene: Scene, layer: Layer, tolerance: float, decimals: int) -> dict[str, Any]:
+    paths: list[dict[str, Any]] = []
+    if layer.role in ("cut", "mark"):  # tiles are listed as such
+        paths = [
+            {"closed": curve.closed, "points": _rounded(curve.flattened(tolerance), decimals)}
+            for curve in scene.curves(layer)
+        ]
+    style = layer.style
+    return {
+        "name": layer.name,
+        "role": layer.role,
+        "fill": style.fill,
+        "stroke": style.stroke,
+        "stroke_width": style.width,
+        "paths": paths,
+    }
+
+
+def _rounded(values: np.ndarray, decimals: int) -> list[Any]:
+    return (np.round(values, decimals) + 0.0).tolist()

@@ -1,0 +1,81 @@
+"""Lengths and sizes as people write them: 40mm, 4 cm, 1.5in, 300x200mm."""
+
+from __future__ import annotations
+
+import math
+import re
+
+from orbiflow.errors import OrbiflowError
+
+MILLIMETRES = {"mm": 1.0, "cm": 10.0, "in": 25.4, "pt": 25.4 / 72}
+"""Of each unit."""
+
+MOST = 100_000.0
+"""Longest length that is taken, in mm: beyond it is a slip."""
+
+_NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?"
+_UNIT = r"[a-z\"'µ]*"
+
+
+def length(text: str, *, zero: bool = False) -> float:
+    """`text` in mm.
+
+    Args:
+        text: a number and one of mm, cm, in, pt.
+        zero: whether 0 is a length, too; it needs no unit.
+
+    Raises:
+        OrbiflowError: for a number without unit, another unit, or one that is too small or large.
+
+    >>> length("4 cm"), length("1in"), length("0", zero=True)
+    (40.0, 25.4, 0.0)
+    """
+    found = re.fullmatch(rf"\s*({_NUMBER})\s*({_UNIT})\s*", text, flags=re.IGNORECASE)
+    if not found:
+        raise OrbiflowError(f"{text!r} is no length; write a number and its unit, such as 40mm")
+    number, unit = float(found[1]), found[2].lower()
+    if zero and number == 0 and not unit:
+        return 0.0
+    return _checked(number * _unit(unit, found[1], text), text, zero=zero)
+
+
+def size(text: str) -> tuple[float, float]:
+    """Width and height in mm of `text`, such as 300x200mm, 30cm x 200mm or 12x8 in.
+
+    Raises:
+        OrbiflowError: as `length`.
+
+    >>> size("300x200mm"), size("1in × 5 cm")
+    ((300.0, 200.0), (25.4, 50.0))
+    """
+    pattern = rf"\s*({_NUMBER})\s*({_UNIT})\s*[x×]\s*({_NUMBER})\s*({_UNIT})\s*"
+    found = re.fullmatch(pattern, text, flags=re.IGNORECASE)
+    if not found:
+        raise OrbiflowError(
+            f"{text!r} is no width and height; write both and their unit, such as 300x200mm"
+        )
+    last = found[4].lower()
+    first = found[2].lower() or last
+    numbers = f"{found[1]}x{found[3]}"
+    width = float(found[1]) * _unit(first, numbers, text)
+    height = float(found[3]) * _unit(last, numbers, text)
+    return _checked(width, text, zero=False), _checked(height, text, zero=False)
+
+
+def _unit(unit: str, number: str, text: str) -> float:
+    if not unit:
+        raise OrbiflowError(f"{text!r} has no unit; write {number}mm, {number}cm or {number}in")
+    if unit not in MILLIMETRES:
+        raise OrbiflowError(
+            f"{text!r}: {unit!r} is no unit that is known here; there are {', '.join(MILLIMETRES)}"
+        )
+    return MILLIMETRES[unit]
+
+
+def _checked(value: float, text: str, *, zero: bool) -> float:
+    if not math.isfinite(value) or value > MOST:
+        raise OrbiflowError(f"{text!r} is longer than 100 m; check number and unit")
+    if value < 0 or (value == 0 and not zero):
+        bound = "at least 0" if zero else "above 0"
+        raise OrbiflowError(f"{text!r} must be {bound}")
+    return value

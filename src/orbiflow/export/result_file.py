@@ -1,0 +1,137 @@
+"""The tile to export, out of a run's folder."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from orbiflow.arguments import instance
+from orbiflow.arguments import path as as_path
+from orbiflow.errors import InputFileError, OrbiflowError
+from orbiflow.escher.result import TileResult
+from orbiflow.symmetry import CrystallographicGroup, Isometry
+from orbiflow.symmetry.group import checked_lattice
+from orbiflow.tilings import CLASSES, Tile, isohedral_class
+
+RESULT = "result.json"
+MOST_BYTES = 256 * 2**20
+
+
+@dataclass(frozen=True, eq=False)
+class ExportTile:
+    """A tile and what its file says of it.
+
+    - `tile`: in the input's coordinates.
+    - `y_down`: whether y points down there, as in images.
+    - `name`: such as "turtle-IH4", for titles and file names.
+    - `rank`: its place in the run's list, from 1; None if it is not out of one.
+    """
+
+    tile: Tile
+    y_down: bool = False
+    name: str = "tile"
+    rank: int | None = None
+
+    @classmethod
+    def of(cls, tile: ExportTile | TileResult | Tile) -> ExportTile:
+        """From whatever holds a tile.
+
+        Raises:
+            OrbiflowError: for what holds none.
+        """
+        if isinstance(tile, ExportTile):
+            return tile
+        if isinstance(tile, TileResult):
+            frame = tile.model.frame
+            return cls(tile.tile, frame is not None and frame.y_down, tile.name)
+        plain = instance(tile, Tile, "the tile", "read_result(folder) gives one")
+        return cls(plain, name=plain.isohedral_class or "tile")
+
+
+def read_result(path: str | Path, which: str | int = 1) -> ExportTile:
+    """A tile of a run.
+
+    Args:
+        path: the run's folder, or its result.json.
+        which: a class, such as "IH4" (its best tile), or a rank from 1, the best.
+
+    Raises:
+        InputFileError: if there is no such file, it is none of orbiflow's, or holds no such tile.
+    """
+    path = as_path(path, "the result")
+    file = path / RESULT if path.is_dir() else path
+    document = _read(file, path)
+    try:
+        entries = document["tiles"]
+        names = [str(entry["class"]) for entry in entries]
+        y_down = bool(document["input"]["y_down"])
+        source = Path(str(document["input"]["source"])).stem
+    except (KeyError, TypeError) as error:
+        raise InputFileError(f"{file}: not a result of orbiflow escherize: {error}") from error
+    index = _index(names, which, file)
+    try:
+        tile = _tile(entries[index])
+    except (KeyError, TypeError, ValueError, IndexError) as error:
+        raise InputFileError(f"{file}: tile {index + 1} cannot be read: {error}") from error
+    return ExportTile(tile, y_down, f"{source}-{names[index]}", index + 1)
+
+
+def _read(file: Path, given: Path) -> dict[str, Any]:
+    try:
+        if file.stat().st_size > MOST_BYTES:
+            raise InputFileError(f"{file}: {file.stat().st_size:,} bytes is too large for a result")
+        document = json.loads(file.read_bytes())
+    except FileNotFoundError as error:
+        if given.is_dir():
+            what = f"{given} holds no {RESULT}; give the folder that orbiflow escherize wrote"
+        else:
+            what = f"{given}: no such file or folder; give what orbiflow escherize wrote"
+        raise InputFileError(what) from error
+    except OSError as error:
+        raise InputFileError(f"{file}: cannot be read: {error.strerror or error}") from error
+    except (ValueError, RecursionError) as error:
+        raise InputFileError(f"{file}: not JSON: {error}") from error
+    if not isinstance(document, dict) or "tiles" not in document:
+        raise InputFileError(f"{file}: not a result of orbiflow escherize: it names no tiles")
+    return document
+
+
+def _index(names: list[str], which: str | int, file: Path) -> int:
+    if not names:
+        raise InputFileError(f"{file}: the run found no tile, so there is none to export")
+    text = str(which).strip()
+    if text.isdecimal():
+        if not 1 <= int(text) <= len(names):
+            raise InputFileError(
+                f"{file}: there is no tile of rank {text}; there are 1 to {len(names)}: "
+                f"{', '.join(names)}"
+            )
+        return int(text) - 1
+    name = isohedral_class(text).name
+    if name not in names:
+        raise InputFileError(f"{file}: holds no tile of {name}; there are {', '.join(names)}")
+    return names.index(name)
+
+
+def _tile(entry: dict[str, Any]) -> Tile:
+    group = entry["group"]
+    cosets = tuple(
+        Isometry(np.array(coset["linear"]), np.array(coset["translation"]))
+        for coset in group["cosets"]
+    )
+    if not cosets:
+        raise OrbiflowError("its group has no cosets")
+    name = str(entry["class"])
+    ring = np.array(entry["polygon"], dtype=np.float64)
+    if ring.ndim != 2 or ring.shape[1] != 2 or len(ring) < 4:
+        raise OrbiflowError(f"its polygon should be a closed ring of points, got {ring.shape}")
+    return Tile(
+        ring[:-1],
+        CrystallographicGroup(checked_lattice(group["lattice"]), cosets, str(group["name"])),
+        name if name in CLASSES else "",
+        tuple(entry["corners"]),
+    )

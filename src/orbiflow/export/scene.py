@@ -1,0 +1,145 @@
+"""A scene: what is on a page, in millimetres, before it is a file of any format.
+
+Coordinates are mm from the page's upper left corner, y down, as on a screen and in SVG.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orbiflow.export.curves import Curve
+from orbiflow.symmetry.isometry import Array
+
+Role = Literal["paper", "tiles", "cut", "mark"]
+"""What a layer is for: a background, filled tiles, lines to cut or draw, marks to measure by."""
+
+
+class Box(NamedTuple):
+    """A rectangle in mm."""
+
+    left: float
+    top: float
+    right: float
+    bottom: float
+
+    @property
+    def width(self) -> float:
+        return self.right - self.left
+
+    @property
+    def height(self) -> float:
+        return self.bottom - self.top
+
+
+class Style(NamedTuple):
+    """Fill and stroke as #rrggbb or None, and the stroke's width in mm."""
+
+    fill: str | None = None
+    stroke: str | None = None
+    width: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Uses:
+    """M copies of a symbol: a point p of it goes to linear[which[m]] p + offsets[m].
+
+    - `symbol`: its name in the scene.
+    - `linear`: (A, 2, 2) the aspects' linear parts.
+    - `which`: (M,) aspect of each copy.
+    - `offsets`: (M, 2) in mm.
+    """
+
+    symbol: str
+    linear: Array
+    which: NDArray[np.int64]
+    offsets: Array
+
+    def __len__(self) -> int:
+        return len(self.which)
+
+    def images(self, points: Array) -> Array:
+        """(M, ..., 2) images of points (..., 2) of the symbol."""
+        turned = np.einsum("aij,...j->a...i", self.linear, points)
+        shape = (len(self), *[1] * (points.ndim - 1), 2)
+        return turned[self.which] + self.offsets.reshape(shape)
+
+    def curves(self, curve: Curve) -> Iterator[Curve]:
+        """The images of a curve of the symbol."""
+        for pieces in self.images(curve.pieces):
+            yield Curve(pieces, curve.straight, curve.closed)
+
+
+@dataclass(frozen=True, eq=False)
+class Layer:
+    """Things of one kind, drawn alike, that programs show under one name.
+
+    - `name`: as people read it, such as "colour 1" or "cut".
+    - `items`: curves, and copies of symbols.
+    - `clipped`: whether to show it within the scene's `window` alone.
+    """
+
+    name: str
+    role: Role
+    style: Style
+    items: tuple[Curve | Uses, ...]
+    clipped: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class PlacedTile:
+    """What is known of a tile on the page, for programs that read it.
+
+    - `aspect`: index of its coset representative.
+    - `linear`, `offset`: from the prototile's own place in the scene to this tile's.
+    - `neighbours`: numbers of the tiles in the scene that it shares an edge with.
+    - `whole`: whether all of it is on the page.
+    """
+
+    aspect: int
+    linear: Array
+    offset: Array
+    neighbours: tuple[int, ...] = ()
+    whole: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A page.
+
+    - `width`, `height`: in mm.
+    - `layers`: from the bottom up.
+    - `symbols`: closed curves by name, for `Uses`.
+    - `window`: where clipped layers show, default all of the page.
+    - `title`, `notes`: in words, for the file's metadata.
+    - `prototile`: (N, 2) polygon of the tile that `tiles` are copies of, in mm.
+    - `facts`: plain data for the JSON file, such as the class.
+    """
+
+    width: float
+    height: float
+    layers: tuple[Layer, ...]
+    symbols: dict[str, Curve] = field(default_factory=dict)
+    window: Box | None = None
+    title: str = ""
+    notes: tuple[str, ...] = ()
+    prototile: Array | None = None
+    tiles: tuple[PlacedTile, ...] = ()
+    facts: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def clip(self) -> Box:
+        """The window."""
+        return self.window or Box(0.0, 0.0, self.width, self.height)
+
+    def curves(self, layer: Layer) -> Iterator[Curve]:
+        """Every curve of a layer, copies of symbols among them."""
+        for item in layer.items:
+            if isinstance(item, Uses):
+                yield from item.curves(self.symbols[item.symbol])
+            else:
+                yield item

@@ -1,0 +1,128 @@
+"""Writing a tile in real size: the job of an `ExportRequest`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from orbiflow.cancel import Cancel
+from orbiflow.errors import OrbiflowError, OutputError
+from orbiflow.export.exporting import Exported, scenes, sheet_names, write_scene
+from orbiflow.export.lengths import length, size
+from orbiflow.export.result_file import read_result
+from orbiflow.export.settings import FORMATS, ExportSettings, preset_values
+from orbiflow.files import write_atomic
+from orbiflow.jobs.events import Finished, Note, Progress, Written
+from orbiflow.jobs.records import RecordError
+from orbiflow.jobs.requests import ExportRequest
+from orbiflow.jobs.run import Sink
+
+LENGTHS = ("tile_size", "tolerance", "warn_neck")
+LENGTHS_OR_ZERO = ("kerf", "clearance", "spacing")
+SIZES = ("area", "bed")
+
+
+def export(request: ExportRequest, tell: Sink, cancel: Cancel) -> Finished:
+    """Write the file, or one a sheet.
+
+    Returns:
+        `summary`: the `files`, how many `tiles` are on them, the `class`, `tile_size` in mm.
+
+    Raises:
+        OrbiflowError: for anything that the user can mend.
+        Cancelled: if it was told to stop; nothing is written.
+    """
+    settings = _settings(request)
+    tile = read_result(request.result, request.tile)
+    out = request.out or Path(f"{tile.name}.{settings.format}")
+    _check_place(out)
+    tell(Progress(0.0, "laying out"))
+    found, notes = scenes(tile, settings, force=request.force)
+    contents: list[str | bytes] = []
+    for k, scene in enumerate(found):
+        cancel.check()
+        tell(Progress((1 + k) / (1 + len(found)), "writing"))
+        contents.append(write_scene(scene, settings))
+    cancel.check()
+    files = [
+        write_atomic(name, content)
+        for name, content in zip(sheet_names(out, len(found)), contents, strict=True)
+    ]
+    for note in notes:
+        tell(Note(note))
+    done = Exported(tuple(files), tuple(found), notes)
+    tell(Note(_said(done, settings, tile.tile.isohedral_class)))
+    for path in files:
+        tell(Written(path))
+    summary = {
+        "files": [str(path) for path in files],
+        "tiles": done.tiles,
+        "class": tile.tile.isohedral_class,
+        "tile_size": settings.tile_size,
+    }
+    return Finished("done", summary)
+
+
+def _check_place(out: Path) -> None:
+    """Before the work; a device must not be replaced by a file."""
+    if out.is_dir():
+        raise OutputError(f"cannot write {out}: it is a folder; give a file's name in it")
+    if out.exists() and not out.is_file():
+        raise OutputError(f"cannot write {out}: it is no ordinary file; choose another name")
+    if not out.parent.is_dir():
+        raise OutputError(f"cannot write {out}: there is no folder {out.parent}; create it first")
+
+
+def _said(done: Exported, settings: ExportSettings, name: str) -> str:
+    width, height = settings.page
+    what = {"none": "tiles", "skeleton": "tiles in outline", "pieces": "pieces"}[settings.cut]
+    files = str(done.files[0])
+    if len(done.files) > 1:
+        files = f"{len(done.files)} sheets, {done.files[0]} to {done.files[-1].name}"
+    return (
+        f"written {files}: {done.tiles} {what} of {name}, {settings.tile_size:g} mm, on "
+        f"{width:g} x {height:g} mm"
+    )
+
+
+def _settings(request: ExportRequest) -> ExportSettings:
+    asked: dict[str, Any] = {
+        name: value
+        for name in ("format", "cut", "copies", "clip", "palette", "dpi")
+        if (value := getattr(request, name)) is not None
+    }
+    asked |= {"border": request.border, "calibrate": request.calibrate}
+    asked |= _lengths(request)
+    ending = request.out.suffix.lower().lstrip(".") if request.out else ""
+    if "format" not in asked and ending in FORMATS:
+        asked["format"] = ending
+    elif ending in FORMATS and asked["format"] != ending:
+        raise RecordError(
+            f"{{out}} ends in .{ending} but {{format}} is {asked['format']}; make them the same"
+        )
+    if request.purpose is None:
+        chosen: dict[str, Any] = {}
+    else:
+        chosen = preset_values(request.purpose)
+    if asked.get("cut", "none") == "pieces" and "clip" not in asked:
+        chosen.pop("clip", None)
+    try:
+        return ExportSettings(**{**chosen, **asked})
+    except OrbiflowError as error:
+        raise RecordError(str(error).replace("{", "(").replace("}", ")")) from error
+
+
+def _lengths(request: ExportRequest) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for name in (*LENGTHS, *LENGTHS_OR_ZERO, *SIZES):
+        text = getattr(request, name)
+        if text is None:
+            continue
+        try:
+            if name in SIZES:
+                found[name] = size(text)
+            else:
+                found[name] = length(text, zero=name in LENGTHS_OR_ZERO)
+        except OrbiflowError as error:
+            raise RecordError(f"{{{name}}} {str(error).replace('{', '(')}") from error
+    return found

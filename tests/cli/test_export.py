@@ -1,0 +1,219 @@
+"""`orbiflow export`: files written, mistakes answered with status 2 and one sentence."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from exported import tile_of
+from orbiflow.escher.report import group_json
+from orbiflow.jobs import ExportRequest, Finished, Written, run
+
+
+def entry(name: str) -> dict[str, Any]:
+    tile = tile_of(name)
+    return {
+        "class": name,
+        "polygon": np.concatenate([tile.polygon, tile.polygon[:1]]).tolist(),
+        "corners": list(tile.corners),
+        "group": group_json(tile.group),
+    }
+
+
+@pytest.fixture(name="result", scope="module")
+def result_fixture(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("runs") / "boot"
+    folder.mkdir()
+    document = {
+        "schema_version": 1,
+        "input": {"source": "pictures/boot.png", "y_down": True},
+        "tiles": [entry("IH6"), entry("IH4"), entry("IH6")],
+    }
+    (folder / "result.json").write_text(json.dumps(document))
+    return folder
+
+
+@pytest.mark.parametrize("form", ["svg", "pdf", "dxf", "png", "json"])
+def test_the_ending_is_the_format(form: str, result: Path, tmp_path: Path, orbiflow) -> None:
+    out = tmp_path / f"boot.{form}"
+    outcome = orbiflow("export", result, "--out", out)
+    assert outcome.status == 0, outcome.err
+    assert f"written {out}: " in outcome.out
+    start = {
+        "svg": b"<?xml",
+        "pdf": b"%PDF",
+        "dxf": b"  0\nSECTION",
+        "png": b"\x89PNG",
+        "json": b"{",
+    }
+    assert out.read_bytes().startswith(start[form])
+
+
+@pytest.mark.parametrize("purpose", ["laser", "print", "web", "plotter"])
+def test_purposes(purpose: str, result: Path, tmp_path: Path, orbiflow, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    outcome = orbiflow("export", result / "result.json", "--for", purpose, "--tile", "IH4")
+    assert outcome.status == 0, outcome.err
+    ending = "pdf" if purpose == "print" else "svg"
+    text = (tmp_path / f"boot-IH4.{ending}").read_bytes()
+    assert (b"<use" in text) == (purpose == "web")
+    assert (b'stroke="#ff0000" stroke-width="0.01"' in text) == (purpose == "laser")
+
+
+def test_options_go_before_the_purpose(result: Path, tmp_path: Path, orbiflow) -> None:
+    out = tmp_path / "p.dxf"
+    options = ["--for", "laser", "--cut", "pieces", "--kerf", "0.15mm", "--copies", "3"]
+    outcome = orbiflow("export", result, "--out", out, *options, "--spacing", "2mm")
+    assert outcome.status == 0, outcome.err
+    assert "3 pieces of IH6" in outcome.out
+
+
+def test_the_neck_is_a_note_and_the_work_is_done(result: Path, tmp_path: Path, orbiflow) -> None:
+    outcome = orbiflow("export", result, "--out", tmp_path / "a.svg", "--warn-neck", "6cm")
+    assert outcome.status == 0
+    assert "the tile is thinner than 60 mm" in outcome.out
+
+
+def test_numbered_sheets_and_their_events(result: Path, tmp_path: Path) -> None:
+    events: list[Any] = []
+    request = ExportRequest(
+        result=result,
+        out=tmp_path / "cut.svg",
+        cut="pieces",
+        copies=30,
+        bed="12x9cm",
+        calibrate=True,
+    )
+    finished = run(request, events.append)
+    names = sorted(path.name for path in tmp_path.iterdir())
+    assert names == [f"cut-{k}.svg" for k in range(1, len(names) + 1)]
+    assert [e.path.name for e in events if isinstance(e, Written)] == names
+    assert finished == events[-1]
+    assert isinstance(finished, Finished)
+    assert finished.summary["tiles"] == 30
+    assert all("calibration" in (tmp_path / name).read_text() for name in names)
+
+
+MISTAKES: dict[str, tuple[list[str], str]] = {
+    "no unit": (["--tile-size", "40"], "--tile-size '40' has no unit; write 40mm, 40cm or 40in"),
+    "no unit of the area": (["--area", "300x200"], "--area '300x200' has no unit; write 300x200mm"),
+    "zero": (["--tile-size", "0mm"], "--tile-size '0mm' must be above 0"),
+    "one side": (["--bed", "300mm"], "--bed '300mm' is no width and height"),
+    "small page": (["--area", "10x10mm"], "does not fit on the page of 10 x 10 mm: it needs"),
+    "kerf of the skeleton": (["--for", "laser", "--kerf", "1mm"], "cannot be moved by half a kerf"),
+    "wide kerf": (["--cut", "pieces", "--kerf", "5cm"], "wider than the piece's neck"),
+    "many copies": (["--cut", "pieces", "--copies", "999"], "sheets are needed"),
+    "no copies": (["--cut", "pieces", "--copies", "0"], "--copies must be at least 1"),
+    "class": (["--tile", "IH9"], "unknown isohedral class 'IH9'"),
+    "class not there": (["--tile", "IH1"], "holds no tile of IH1; there are IH6, IH4, IH6"),
+    "rank": (["--tile", "4"], "no tile of rank 4; there are 1 to 3"),
+    "rank 0": (["--tile", "0"], "no tile of rank 0"),
+    "ending": (["--format", "pdf"], "--out ends in .svg but --format is pdf"),
+    "format": (["--format", "doc"], "--format"),
+    "dots": (["--dpi", "0"], "--dpi must be from 1 to 10000"),
+    "tiny tiles": (["--tile-size", "0.5mm", "--tolerance", "0.01mm"], "the most is 20000"),
+}
+
+
+@pytest.mark.parametrize("case", MISTAKES)
+def test_mistakes(case: str, result: Path, tmp_path: Path, orbiflow) -> None:
+    options, message = MISTAKES[case]
+    outcome = orbiflow("export", result, "--out", tmp_path / "a.svg", *options)
+    assert outcome.status == 2
+    assert message in outcome.err
+    assert "Traceback" not in outcome.err
+    assert not list(tmp_path.iterdir())
+
+
+def damaged(**changes: Any) -> str:
+    document = {
+        "schema_version": 1,
+        "input": {"source": "boot.png", "y_down": True},
+        "tiles": [{**entry("IH6"), **changes}],
+    }
+    return json.dumps(document)
+
+
+BAD_RESULTS: dict[str, tuple[str | None, str]] = {
+    "none": (None, "holds no result.json; give the folder that orbiflow escherize wrote"),
+    "no JSON": ("{", "not JSON"),
+    "a list": ("[]", "not a result of orbiflow escherize"),
+    "other JSON": ('{"tiles": []}', "not a result of orbiflow escherize"),
+    "no tile": ('{"tiles": [], "input": {"source": "a", "y_down": true}}', "found no tile"),
+    "polygon": (damaged(polygon=[[0, 0]]), "tile 1 cannot be read"),
+    "lattice": (damaged(group={"name": "p1", "lattice": [[1, 1], [1, 1]], "cosets": []}), "tile 1"),
+    "nan": (damaged(polygon=[[0, 0], [1, 0], [float("nan"), 1], [0, 0]]), "tile 1"),
+    "not certified": (
+        damaged(polygon=[[0, 0], [7, 0], [7, 7], [0, 0]]),
+        "boot-IH6 is not certified",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", BAD_RESULTS)
+def test_bad_results(case: str, tmp_path: Path, orbiflow) -> None:
+    text, message = BAD_RESULTS[case]
+    if text is not None:
+        (tmp_path / "result.json").write_text(text)
+    outcome = orbiflow("export", tmp_path, "--out", tmp_path / "a.svg")
+    assert outcome.status == 2
+    assert message in outcome.err
+    assert "Traceback" not in outcome.err
+    assert not (tmp_path / "a.svg").exists()
+
+
+def test_no_such_result(tmp_path: Path, orbiflow) -> None:
+    outcome = orbiflow("export", tmp_path / "none", "--out", tmp_path / "a.svg")
+    assert outcome.status == 2
+    assert "no such file or folder; give what orbiflow escherize wrote" in outcome.err
+
+
+@pytest.mark.parametrize("where", ["", "none/a.svg"])
+def test_places_that_cannot_be_written(where: str, result: Path, tmp_path: Path, orbiflow) -> None:
+    outcome = orbiflow("export", result, "--out", tmp_path / where)
+    assert outcome.status == 2
+    assert "cannot write" in outcome.err
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_pipe_is_not_replaced(result: Path, tmp_path: Path, orbiflow) -> None:
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    outcome = orbiflow("export", result, "--out", pipe)
+    assert outcome.status == 2
+    assert "it is no ordinary file" in outcome.err
+    assert pipe.is_fifo()
+
+
+def test_a_full_disk(result: Path, tmp_path: Path, orbiflow, monkeypatch) -> None:
+    def full(_: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    outcome = orbiflow("export", result, "--out", tmp_path / "a.svg")
+    assert outcome.status == 2
+    assert "No space left on device; choose another place or free the one" in outcome.err
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_page_of_documentation_names_every_option(orbiflow) -> None:
+    text = (Path(__file__).parents[2] / "docs" / "export.md").read_text(encoding="utf-8")
+    offered = set(re.findall(r"--[a-z][a-z-]+", orbiflow("export", "--help").out)) - {"--help"}
+    assert len(offered) > 20
+    assert offered <= set(re.findall(r"--[a-z][a-z-]+", text))
+
+
+def test_the_snippet_of_the_documentation(result: Path, tmp_path: Path, monkeypatch) -> None:
+    text = (Path(__file__).parents[2] / "docs" / "export.md").read_text(encoding="utf-8")
+    (snippet,) = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "turtle").symlink_to(result)
+    exec(compile(snippet, "export.md", "exec"), {})
+    assert (tmp_path / "cut.svg").is_file()
