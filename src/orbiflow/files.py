@@ -17,7 +17,8 @@ def write_atomic(path: str | os.PathLike[str], content: bytes | str) -> Path:
     ever sees half a file.
 
     Raises:
-        OutputError: if the folder does not exist or cannot be written.
+        OutputError: if the folder does not exist or cannot be written, or `path` is a folder, a pipe
+            or a device.
     """
     target = Path(path)
     data = content.encode() if isinstance(content, str) else content
@@ -25,6 +26,8 @@ def write_atomic(path: str | os.PathLike[str], content: bytes | str) -> Path:
         raise OutputError(
             f"cannot write {target}: there is no folder {target.parent}; create it first"
         )
+    if target.exists() and not target.is_file():
+        raise OutputError(f"cannot write {target}: it is not a file; choose another name")
     temporary = target.with_name(f".{target.name}.{secrets.token_hex(4)}.tmp")
     try:
         with temporary.open("xb") as file:

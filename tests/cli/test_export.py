@@ -187,7 +187,7 @@ def test_a_pipe_is_not_replaced(result: Path, tmp_path: Path, orbiflow) -> None:
     os.mkfifo(pipe)
     outcome = orbiflow("export", result, "--out", pipe)
     assert outcome.status == 2
-    assert "it is no ordinary file" in outcome.err
+    assert "it is not a file" in outcome.err
     assert pipe.is_fifo()
 
 

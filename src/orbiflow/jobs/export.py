@@ -68,7 +68,7 @@ def _check_place(out: Path) -> None:
     if out.is_dir():
         raise OutputError(f"cannot write {out}: it is a folder; give a file's name in it")
     if out.exists() and not out.is_file():
-        raise OutputError(f"cannot write {out}: it is no ordinary file; choose another name")
+        raise OutputError(f"cannot write {out}: it is not a file; choose another name")
     if not out.parent.is_dir():
         raise OutputError(f"cannot write {out}: there is no folder {out.parent}; create it first")
 
