@@ -7,6 +7,7 @@ silhouettes, on sheets without names, and for each of ours the values of `orbifl
 the energy and the displacement. All correlations are within silhouettes: each silhouette's mean is
 taken out of marks and values alike. The weights of the order are one over each value's usual spread:
 nothing but the choice of its parts was fitted to marks.
+Under `older` are tiles of two earlier searches, marked by others: no part was chosen by these.
 """
 
 from __future__ import annotations
@@ -67,6 +68,12 @@ def main() -> None:
         correlation = np.corrcoef(within(list(own.values())), seen)[0, 1]
         first = np.mean([marks[name][np.argmin(own[name])] for name in own])
         print(f"{label:20}{correlation:10.2f}{first:24.2f}")
+
+    older: list[list[Row]] = list(document["older"].values())
+    damages = within([np.array([_fidelity(row).damage for row in rows]) for rows in older])
+    means = within([np.mean([row["marks"] for row in rows], axis=1) for rows in older])
+    correlation = np.corrcoef(damages, means)[0, 1]
+    print(f"\n{len(means)} older tiles, which the order has not seen: {correlation:.2f}")
 
     print("\nARAP's first tile: its mark, and that of the tile that we would put first")
     for name, rows in tiles.items():
