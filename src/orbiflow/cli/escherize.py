@@ -78,6 +78,17 @@ def escherize(
             show_default=False,
         ),
     ] = None,
+    pin: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="What must keep its shape while the rest bends: x,y or x,y,radius in the input's "
+            "coordinates, or a mask, white where pinned; may be repeated.",
+            show_default=False,
+        ),
+    ] = None,
+    pin_angle: Annotated[
+        bool, typer.Option("--pin-angle", help="What is pinned keeps its angle, too.")
+    ] = False,
     per_class: Annotated[
         int, typer.Option(help="Tiles of each class, the best and others that differ from it.")
     ] = 1,
@@ -142,6 +153,8 @@ def escherize(
         effort=effort.value if effort else None,
         emphasis=emphasis,
         strength=strength,
+        pin=tuple(pin) if pin else None,
+        pin_angle=pin_angle,
         per_class=per_class,
         max_frequency=max_frequency,
         seed=seed,

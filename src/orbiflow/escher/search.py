@@ -14,13 +14,14 @@ from orbiflow.cancel import Cancel, Cancelled
 from orbiflow.errors import CertificationError, OrbiflowError
 from orbiflow.escher.bending_settings import BendingSettings
 from orbiflow.escher.descent_settings import DescentSettings
-from orbiflow.escher.methods import OneSettings, Settings, fit, parts, prepare
+from orbiflow.escher.methods import BothSettings, OneSettings, Settings, fit, parts, prepare
 from orbiflow.escher.occupancy import OccupancySettings
 from orbiflow.escher.preview import quick_bent_tile, quick_tile
 from orbiflow.escher.processes import process_context, work
 from orbiflow.escher.result import ClassFailure, TileResult, best_tiles
 from orbiflow.likeness.ranking import diverse, tile_similarity
 from orbiflow.silhouette.emphasis import Emphasis
+from orbiflow.silhouette.pins import Pins
 from orbiflow.silhouette.target import Target
 from orbiflow.threads import one_thread
 from orbiflow.tilings import CLASSES, IsohedralClass, isohedral_class
@@ -66,6 +67,7 @@ class Task:
     target: Target
     settings: Settings
     emphasis: Emphasis | None = None
+    pins: Pins | None = None
     per_class: int = 1
     force: bool = False
 
@@ -76,6 +78,12 @@ class Task:
                 f"settings must be of a method, got {described(self.settings)}; for a level of "
                 'effort: BendingSettings.for_effort("fast")'
             )
+        if self.pins is not None:
+            instance(self.pins, Pins, "pins", "Pins.read and Pins.at make one")
+            if not isinstance(self.settings, BendingSettings | BothSettings):
+                raise OrbiflowError(
+                    "pins belong to the search for likeness, where silhouettes bend"
+                )
 
 
 def escherize(
@@ -84,6 +92,7 @@ def escherize(
     settings: Settings | None = None,
     *,
     emphasis: Emphasis | None = None,
+    pins: Pins | None = None,
     per_class: int = 1,
     workers: int = 1,
     force: bool = False,
@@ -99,6 +108,7 @@ def escherize(
             (`DescentSettings`), for both (`BothSettings`), or of the paper's method
             (`OccupancySettings`).
         emphasis: what must survive.
+        pins: what must not bend, in the search for likeness.
         per_class: tiles of each class at most, no two of them twins.
         workers: processes; 1 stays in this process. A script that asks for more must do its work
             under `if __name__ == "__main__":`, as always with multiprocessing.
@@ -124,7 +134,7 @@ def escherize(
         if number < 1:
             raise OrbiflowError(f"{what} must be at least 1, got {number}")
     settings = BendingSettings() if settings is None else settings
-    task = Task(target, settings, emphasis, per_class, force)
+    task = Task(target, settings, emphasis, pins, per_class, force)
     cancel = cancel or Cancel()
     teller = _Teller(watch)
     count = min(workers, len(names))
@@ -148,6 +158,7 @@ def escherize_class(
     settings: Settings,
     *,
     emphasis: Emphasis | None = None,
+    pins: Pins | None = None,
     per_class: int = 1,
     force: bool = False,
     watch: Watcher | None = None,
@@ -158,7 +169,7 @@ def escherize_class(
     Raises:
         Cancelled: if it was told to stop.
     """
-    task = Task(target, settings, emphasis, per_class, force)
+    task = Task(target, settings, emphasis, pins, per_class, force)
     return _work_on(task, name, watch or _ignore, cancel or Cancel())
 
 
@@ -235,6 +246,7 @@ def _chosen_tiles(
             kind,
             settings,
             emphasis=task.emphasis,
+            pins=task.pins,
             per_class=task.per_class,
             progress=lambda own, loss: watch(Event(kind.name, done + share * own, loss)),
             cancel=cancel,
@@ -262,7 +274,9 @@ def _preview(task: Task, names: Sequence[str], watch: Watcher, cancel: Cancel) -
     _, settings = parts(task.settings)[0]
     with one_thread():
         if isinstance(settings, BendingSettings):
-            tile = quick_bent_tile(task.target, names, settings, task.emphasis, cancel=cancel)
+            tile = quick_bent_tile(
+                task.target, names, settings, task.emphasis, task.pins, cancel=cancel
+            )
         elif isinstance(settings, DescentSettings) and settings.starts == "outline":
             tile = quick_tile(task.target, names, cancel=cancel)
     if tile is not None:
@@ -289,7 +303,7 @@ def _run_pool(
     cancel.check()
     if context.get_start_method() == "fork":
         with one_thread():
-            prepare(task.target, task.settings, task.emphasis)  # once, for all workers
+            prepare(task.target, task.settings, task.emphasis, task.pins)  # once, for all workers
     # classes with more lattice freedom take longer
     order = sorted(names, key=lambda name: -isohedral_class(name).stretch_dim)
     function = functools.partial(_work_on, task)

@@ -35,7 +35,7 @@ from orbiflow.jobs.events import (
 from orbiflow.jobs.records import RecordError
 from orbiflow.jobs.requests import EscherizeRequest
 from orbiflow.jobs.run import Sink
-from orbiflow.silhouette import Emphasis, Target
+from orbiflow.silhouette import Emphasis, Pins, Target
 from orbiflow.tilings import CLASSES, isohedral_class
 
 
@@ -55,15 +55,17 @@ def escherize(request: EscherizeRequest, tell: Sink, cancel: Cancel) -> Finished
     names = _class_names(request.classes)
     settings = _settings(request)
     workers = min(request.workers or os.cpu_count() or 1, len(names))
-    target, emphasis = _read(request)
+    target, emphasis, pins = _read(request)
     folder = ResultFolder(request.out, written_files)
-    for note in (*target.notes, *(emphasis.notes if emphasis else ())):
-        tell(Note(note))
+    for source in (target, emphasis, pins):
+        for note in source.notes if source else ():
+            tell(Note(note))
     results, failures = search.escherize(
         target,
         names,
         settings,
         emphasis=emphasis,
+        pins=pins,
         per_class=request.per_class,
         workers=workers,
         force=request.force,
@@ -78,6 +80,7 @@ def escherize(request: EscherizeRequest, tell: Sink, cancel: Cancel) -> Finished
         seconds=time.perf_counter() - begin,
         workers=workers,
         emphasis=emphasis,
+        pins=pins,
     )
     interrupted = {failure.name for failure in failures if failure.reason == search.INTERRUPTED}
     # a first look at a class that was interrupted is less than an earlier run's tiles
@@ -147,12 +150,15 @@ def _settings(request: EscherizeRequest) -> Settings:
     return descent if objective == "overlap" else BothSettings(bending, descent)
 
 
-def _read(request: EscherizeRequest) -> tuple[Target, Emphasis | None]:
+def _read(request: EscherizeRequest) -> tuple[Target, Emphasis | None, Pins | None]:
     target = Target.read(request.image, threshold=request.threshold, invert=request.invert)
-    if request.emphasis is None:
-        return target, None
-    strength = {} if request.strength is None else {"strength": request.strength}
-    return target, Emphasis.read(request.emphasis, target, **strength)
+    emphasis = pins = None
+    if request.emphasis is not None:
+        strength = {} if request.strength is None else {"strength": request.strength}
+        emphasis = Emphasis.read(request.emphasis, target, **strength)
+    if request.pin is not None:
+        pins = Pins.read(request.pin, target, keep_angle=request.pin_angle)
+    return target, emphasis, pins
 
 
 def _write(
