@@ -20,11 +20,13 @@ def body(keep_angle: bool = False) -> Pinned:
 
 def shapes(count: int, seed: int = 0) -> Complex:
     noise = np.random.default_rng(seed).normal(size=(len(PLAIN), count, 2))
-    return PLAIN.rest[:, None] * np.exp(0.2j) + 0.03 * (noise @ [1, 1j])
+    moved: Complex = 0.03 * (noise @ [1, 1j])
+    return PLAIN.rest[:, None] * np.exp(0.2j) + moved
 
 
 def whole_matrix(pinned: Pinned) -> Complex:
-    return pinned.matrix - pinned._low @ pinned._low.conj().T
+    taken: Complex = pinned._low @ pinned._low.conj().T
+    return pinned.matrix.astype(complex) - taken
 
 
 @pytest.mark.parametrize("keep_angle", [False, True])

@@ -19,7 +19,13 @@ from orbiflow.escher import (
 )
 from orbiflow.escher.methods import Settings
 from orbiflow.escher.report import report
-from orbiflow.export.gallery import OVERVIEW, RESULT, write_gallery, written_files
+from orbiflow.export.gallery import (
+    OVERVIEW,
+    RESULT,
+    write_front,
+    write_gallery,
+    written_files,
+)
 from orbiflow.files import write_atomic
 from orbiflow.folders import ResultFolder
 from orbiflow.jobs.events import (
@@ -52,6 +58,7 @@ def escherize(request: EscherizeRequest, tell: Sink, cancel: Cancel) -> Finished
         OrbiflowError: for anything that the user can mend.
     """
     begin = time.perf_counter()
+    found: list[TileResult] = []
     names = _class_names(request.classes)
     settings = _settings(request)
     workers = min(request.workers or os.cpu_count() or 1, len(names))
@@ -69,7 +76,7 @@ def escherize(request: EscherizeRequest, tell: Sink, cancel: Cancel) -> Finished
         per_class=request.per_class,
         workers=workers,
         force=request.force,
-        watch=_Relay(names, tell),
+        watch=_Relay(names, tell, found),
         cancel=cancel,
     )
     document = report(
@@ -82,12 +89,14 @@ def escherize(request: EscherizeRequest, tell: Sink, cancel: Cancel) -> Finished
         emphasis=emphasis,
         pins=pins,
     )
+    if document["objective"] == "both" and results:
+        tell(Note(_chosen(results, found)))
     interrupted = {failure.name for failure in failures if failure.reason == search.INTERRUPTED}
     # a first look at a class that was interrupted is less than an earlier run's tiles
     earlier = folder.has_a_run and (request.out / OVERVIEW).is_file()
     write = not earlier or any(result.name not in interrupted for result in results)
     if write:
-        _write(folder, document, results, target, workers, tell)
+        _write(folder, document, results, found, target, workers, tell)
     state: State = "done" if results else "nothing found"
     summary = {
         "folder": str(request.out),
@@ -100,9 +109,10 @@ def escherize(request: EscherizeRequest, tell: Sink, cancel: Cancel) -> Finished
 
 
 class _Relay:
-    """A search's events as a job's."""
+    """A search's events as a job's; all tiles of all classes go into `found`."""
 
-    def __init__(self, names: list[str], tell: Sink) -> None:
+    def __init__(self, names: list[str], tell: Sink, found: list[TileResult]) -> None:
+        self.found = found
         self.shares = dict.fromkeys(names, 0.0)
         self.tell = tell
         self.begin = time.perf_counter()
@@ -121,6 +131,7 @@ class _Relay:
         if isinstance(outcome, ClassFailure):
             self.tell(ClassFailed(name, outcome.reason))
         elif outcome is not None:
+            self.found += outcome.family()
             iou, certified = outcome.metrics.iou, outcome.certificate.valid
             self.tell(TileFound(name, iou, outcome.score, certified))
 
@@ -165,6 +176,7 @@ def _write(
     folder: ResultFolder,
     document: dict[str, Any],
     results: list[TileResult],
+    found: list[TileResult],
     target: Target,
     workers: int,
     tell: Sink,
@@ -174,10 +186,19 @@ def _write(
         if results:
             tell(Note("drawing"))
             write_gallery(results, target, staged, workers=workers)
+            if document["objective"] == "both":
+                write_front(results, found, target, staged)
         write_atomic(staged / RESULT, json.dumps(document, allow_nan=False))
         written = sorted(path.relative_to(staged) for path in staged.rglob("*") if path.is_file())
     for path in written:
         tell(Written(folder.path / path))
+
+
+def _chosen(results: list[TileResult], found: list[TileResult]) -> str:
+    front = sum(result.front is True for result in results)
+    text = f"{len(results)} of {len(found)} tiles are listed: {front} that no other beats in both "
+    text += "deformation and overlap"
+    return text if front == len(results) else f"{text}, {len(results) - front} just behind"
 
 
 def _row(result: TileResult) -> dict[str, Any]:
@@ -186,6 +207,7 @@ def _row(result: TileResult) -> dict[str, Any]:
         "group": result.group_name,
         "objective": result.objective,
         "deformation": result.deformation,
+        "front": result.front,
         "score": result.score,
         "iou": result.metrics.iou,
         "dice": result.metrics.dice,

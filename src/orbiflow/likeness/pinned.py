@@ -128,21 +128,22 @@ class Pinned(Elastic):
     def condensed(self) -> PinnedCondensed:
         """The inner points solved for: a matrix of the outline alone."""
         plain, n = super().condensed, self.size
-        spread = plain.inverse @ self._low[n:]
+        low = self._low
+        spread = _complex(plain.inverse @ low[n:])
         return PinnedCondensed(
             plain.outline,
             plain.follow,
             plain.inverse,
-            coupling=self._low[:n] + plain.follow.T @ self._low[n:],
+            coupling=_complex(low[:n] + plain.follow.T @ low[n:]),
             spread=spread,
-            solve=np.linalg.inv(_one_less(self._low[n:], spread)),
+            solve=_complex(np.linalg.inv(_one_less(low[n:], spread))),
         )
 
     def pulled(self, z: Complex, towards: Complex, strength: float, rounds: int) -> Complex:
         """As of `Elastic`: let the outline be pulled towards other points."""
         mu = strength / self.size
         solve = self._pulled_solver(mu)
-        spread = solve @ self._low
+        spread = _complex(solve @ self._low)
         small = np.linalg.inv(_one_less(self._low, spread))
         for _ in range(rounds):
             right = self.forces(z)
@@ -217,6 +218,10 @@ class _Part:
         a = self.factor(z)
         apart = (abs(own - self.rest[:, None] * a) ** 2).sum(axis=0)
         return self.weight * apart + self.stays * abs(a - goal) ** 2
+
+
+def _complex(array: NDArray) -> Complex:
+    return np.asarray(array, dtype=np.complex128)
 
 
 def _one_less(low: Complex, spread: Complex) -> Complex:
