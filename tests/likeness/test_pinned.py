@@ -20,7 +20,7 @@ def body(keep_angle: bool = False) -> Pinned:
 
 def shapes(count: int, seed: int = 0) -> Complex:
     noise = np.random.default_rng(seed).normal(size=(len(PLAIN), count, 2))
-    moved: Complex = 0.03 * (noise @ [1, 1j])
+    moved = 0.03 * (noise[..., 0] + 1j * noise[..., 1])
     return PLAIN.rest[:, None] * np.exp(0.2j) + moved
 
 

@@ -21,7 +21,7 @@ MOST = 12
 ALIKE = 0.9
 """Mutual IoU from which two tiles are one to the eye."""
 
-NEAR = 0.15
+NEAR = 0.1
 """How far behind the front a tile may be that fills up the list."""
 
 WORTH = 0.2
@@ -32,12 +32,13 @@ TIE = 1e-9
 
 
 def front_list(results: Sequence[TileResult]) -> list[TileResult]:
-    """At most twelve tiles: those on the front, no two of them alike, then those just behind it.
+    """At most twelve tiles: those on the front, no two of them alike, then some behind it.
 
-    The tile of least deformation and that of largest IoU come first, then tiles in the order of
-    `results`; what has a mutual IoU of 0.9 with an earlier one is left out. While there is room,
-    tiles follow that are behind the front by at most 15% of their deformation or .03 of IoU,
-    nearest first. Tiles without a deformation (forced ones that cross themselves) come last.
+    The tile of least deformation and that of largest IoU are chosen first, then the others on the
+    front, from each search in turn in the order of `results`; what has a mutual IoU of 0.9 with an
+    earlier one is left out. While there is room, the first of each search follows, which it would
+    show alone, and tiles that are behind the front by at most a tenth of their deformation or .02 of
+    IoU, nearest first. Tiles without a deformation (forced ones that cross themselves) come last.
 
     Args:
         results: with their deformation measured, best first.
@@ -49,10 +50,14 @@ def front_list(results: Sequence[TileResult]) -> list[TileResult]:
     odd = [k for k, result in enumerate(results) if result.deformation is None]
     cost = np.array([results[k].deformation for k in measured], dtype=np.float64)
     overlap = np.array([results[k].metrics.iou for k in measured])
+    objectives = [results[k].objective for k in measured]
     late = behind(cost, overlap)
     ends = [] if not measured else [int(np.lexsort((-overlap, cost))[0]), int(overlap.argmax())]
     order = [k for k in ends if late[k] == 0]
-    order += [int(k) for k in np.flatnonzero(late == 0)]
+    # in turn from each search: one must not crowd the other out
+    own = [objectives[:k].count(objectives[k]) for k in range(len(objectives))]
+    order += [int(k) for k in np.argsort(own, kind="stable") if late[k] == 0]
+    order += [objectives.index(objective) for objective in dict.fromkeys(objectives)]
     order += [int(k) for k in np.argsort(late, kind="stable") if 0 < late[k] <= NEAR]
     alike = mutual_iou([results[k].normal_tile.polygon for k in measured], ALIKE)
     chosen: list[int] = []

@@ -49,7 +49,8 @@ def front_png(points: Sequence[FrontPoint], *, width_px: int = 1600, y_down: boo
     """PNG of tiles by deformation (to the right) and overlap (upwards), each a little silhouette.
 
     Listed tiles are large and coloured by what they were found for, with a line to where they stand
-    if they had to make room; those on the front are joined by a line of steps. Others are pale.
+    if they had to make room; full colour says that no other beats them. Others are pale, and the
+    dashed steps are the border of what is beaten.
 
     Args:
         points: of all tiles that were found.
@@ -63,7 +64,7 @@ def front_png(points: Sequence[FrontPoint], *, width_px: int = 1600, y_down: boo
         raise OrbiflowError("a picture of a front needs a tile at least")
     figure = blank_figure(width_px, round(0.7 * width_px))
     axes = _axes(figure, points)
-    _steps(axes, [point for point in points if point.front])
+    _steps(axes, points)
     corner = axes.transAxes.transform((0, 0)), axes.transAxes.transform((1, 1))
     anchors = axes.transData.transform([(p.deformation, p.iou) for p in points])
     listed = np.array([p.listed for p in points])
@@ -110,28 +111,34 @@ def _axes(figure: object, points: Sequence[FrontPoint]) -> Axes:
     marks = [
         Line2D([], [], marker="o", ls="", ms=5, color=COLOURS[k], label=NAMES[k]) for k in kinds
     ]
-    marks.append(Line2D([], [], marker="o", ls="", ms=5, color=PALE, label="beaten or much alike"))
+    marks.append(
+        Line2D(
+            [],
+            [],
+            marker="o",
+            ls="",
+            ms=5,
+            color=PALE,
+            label="left out: beaten, or much like one that is shown",
+        )
+    )
     axes.legend(
         handles=marks, fontsize=7.5, frameon=False, ncols=3, loc="lower left", bbox_to_anchor=(0, 1)
     )
     return axes
 
 
-def _steps(axes: Axes, front: list[FrontPoint]) -> None:
-    """The border of what is beaten by the front."""
-    corners = sorted((p.deformation, p.iou) for p in front)
-    if corners:
-        x, y = (np.array(values) for values in zip(*corners, strict=True))
-        right = axes.get_xlim()[1]
-        axes.step(
-            [*x, right],
-            [*y, y[-1]],
-            where="post",
-            color="#8a949e",
-            linewidth=0.8,
-            ls="--",
-            zorder=1,
-        )
+def _steps(axes: Axes, points: Sequence[FrontPoint]) -> None:
+    """The border of what is beaten by others."""
+    x: list[float] = []
+    y: list[float] = []
+    for point in sorted(points, key=lambda p: (p.deformation, -p.iou)):
+        if not y or point.iou > y[-1]:
+            x.append(point.deformation)
+            y.append(point.iou)
+    x.append(axes.get_xlim()[1])
+    y.append(y[-1])
+    axes.step(x, y, where="post", color="#8a949e", linewidth=0.8, linestyle="--", zorder=1)
 
 
 def _silhouette(
@@ -155,7 +162,7 @@ def _silhouette(
     patch.set_alpha(alpha)
     patch.set_zorder(zorder)
     inside = axes.transAxes.inverted().transform(place)
-    if (inside > -0.02).all() and (inside < 1.02).all():
+    if (inside > 0.01).all() and (inside < 0.99).all():
         axes.figure.add_artist(patch)
 
 
@@ -167,7 +174,8 @@ def _in(axes: Axes, pixels: Sequence[Array]) -> tuple[Array, Array]:
 
 def _apart(anchors: Array, gap: float, corner: tuple[Array, Array]) -> Array:
     """Places (n, 2) near the anchors, no two of them closer than `gap`, inside the corners' box."""
-    places = anchors + 1e-3 * np.arange(len(anchors))[:, None]
+    turns = 2.4 * np.arange(len(anchors))  # the golden angle: equal ones part in all directions
+    places = anchors + np.stack([np.cos(turns), np.sin(turns)], axis=-1)
     low, high = corner[0] + gap / 2, corner[1] - gap / 3
     for _ in range(PUSHES):
         ways = places[:, None] - places[None]

@@ -198,7 +198,7 @@ def _chosen(results: list[TileResult], found: list[TileResult]) -> str:
     front = sum(result.front is True for result in results)
     text = f"{len(results)} of {len(found)} tiles are listed: {front} that no other beats in both "
     text += "deformation and overlap"
-    return text if front == len(results) else f"{text}, {len(results) - front} just behind"
+    return text if front == len(results) else f"{text}, {len(results) - front} near these"
 
 
 def _row(result: TileResult) -> dict[str, Any]:
