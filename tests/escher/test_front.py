@@ -90,14 +90,20 @@ def test_forced_tiles_without_a_deformation_come_last(bent: list[TileResult]) ->
     assert front_list([]) == []
 
 
-def test_behind_counts_from_those_that_are_better_in_both() -> None:
+def test_behind_counts_from_the_nearest_that_is_better() -> None:
     rng = np.random.default_rng(3)
     cost, overlap = rng.random(40) + 0.1, rng.random(40)
     late = behind(cost, overlap)
+    front = late == 0
     for k in range(40):
-        moved = (cost < cost[k] * (1 - late[k] - 1e-9)) & (overlap > overlap[k] + 0.2 * late[k])
-        assert not moved.any()
-        assert (late[k] == 0) == (not ((cost < cost[k]) & (overlap > overlap[k])).any())
+        better = (cost < cost[k]) & (overlap > overlap[k])
+        assert front[k] == (not better.any())
+        near = (cost > cost[k] * (1 - late[k] - 1e-9)) & (
+            overlap < overlap[k] + 0.2 * late[k] + 1e-9
+        )
+        assert front[k] or (near & better & front).any()
+    assert behind(np.array([1.0, 1.0]), np.array([0.5, 0.6]))[0] == pytest.approx(0.5)
+    assert len(behind(np.zeros(0), np.zeros(0))) == 0
 
 
 def test_the_measure_finds_what_the_search_found(bent: list[TileResult]) -> None:

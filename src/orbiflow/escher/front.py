@@ -21,14 +21,11 @@ MOST = 12
 ALIKE = 0.9
 """Mutual IoU from which two tiles are one to the eye."""
 
-NEAR = 0.1
+NEAR = 0.15
 """How far behind the front a tile may be that fills up the list."""
 
 WORTH = 0.2
 """IoU that is worth as much as all of the deformation, behind the front."""
-
-TIE = 1e-9
-"""How far behind a point is that another only equals in one."""
 
 
 def front_list(results: Sequence[TileResult]) -> list[TileResult]:
@@ -37,7 +34,7 @@ def front_list(results: Sequence[TileResult]) -> list[TileResult]:
     The tile of least deformation and that of largest IoU are chosen first, then the others on the
     front, from each search in turn in the order of `results`; what has a mutual IoU of 0.9 with an
     earlier one is left out. While there is room, the first of each search follows, which it would
-    show alone, and tiles that are behind the front by at most a tenth of their deformation or .02 of
+    show alone, and tiles that one on the front beats by at most 15% of their deformation and .03 of
     IoU, nearest first. Tiles without a deformation (forced ones that cross themselves) come last.
 
     Args:
@@ -70,19 +67,19 @@ def front_list(results: Sequence[TileResult]) -> list[TileResult]:
 
 
 def behind(cost: Array, overlap: Array) -> Array:
-    """(n,) how far each point is behind the front: 0 on it, 1 for all of its cost or `WORTH`.
+    """(n,) how far each point is behind the nearest on the front that beats it; 0 on the front.
 
-    The least share e by which the cost falls, or e times `WORTH` by which the overlap rises, so that
-    no point is better in both; of a point that only ties, next to nothing.
+    The larger of two shares: that of its cost which the other saves, and that of `WORTH` by which the
+    other's overlap is larger.
 
-    >>> behind(np.array([1.0, 2.0, 2.0]), np.array([0.7, 0.6, 0.9])).round(3)
-    array([0. , 0.5, 0. ])
+    >>> behind(np.array([1.0, 1.25, 2.0, 1.3]), np.array([0.7, 0.68, 0.9, 0.68])).round(3)
+    array([0.   , 0.2  , 0.   , 0.231])
     """
-    late = np.zeros(len(cost))
-    for k in range(len(cost)):
-        better = (cost <= cost[k]) & (overlap >= overlap[k])
-        better &= (cost < cost[k]) | (overlap > overlap[k])
-        cheaper = (cost[k] - cost[better]) / max(cost[k], 1e-12)
-        wider = (overlap[better] - overlap[k]) / WORTH
-        late[k] = np.maximum(np.minimum(cheaper, wider), TIE).max(initial=0.0)
-    return late
+    # row k: what beats point k
+    beats = (cost <= cost[:, None]) & (overlap >= overlap[:, None])
+    beats &= (cost < cost[:, None]) | (overlap > overlap[:, None])
+    on_front = ~beats.any(axis=1)
+    saved = (cost[:, None] - cost) / np.maximum(cost[:, None], 1e-12)
+    late = np.maximum(saved, (overlap - overlap[:, None]) / WORTH)
+    late = np.where(beats & on_front, late, np.inf).min(axis=1, initial=np.inf)
+    return np.where(on_front, 0.0, late)
