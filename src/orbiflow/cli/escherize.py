@@ -60,7 +60,8 @@ def escherize(
         Objective | None,
         typer.Option(
             help="Likeness: the silhouette bends until it is a tile, every limb kept. Overlap: the "
-            "tile covers the silhouette as it is. Default likeness.",
+            "tile covers the silhouette as it is. Both: a short list of the best compromises. Default "
+            "likeness.",
             show_default=False,
         ),
     ] = None,
@@ -140,7 +141,8 @@ def escherize(
     """Find tiles that look like a silhouette and tile the plane, and prove it.
 
     Writes result.json and overview.png into the folder, and for each class a folder with tile.svg,
-    tiling.svg, tiling.png, overlay.png, field.png and model.safetensors.
+    tiling.svg, tiling.png, overlay.png, field.png and model.safetensors; after a search for both,
+    front.png, too.
     """
     names = None if classes.strip().lower() == "all" else re.split(r"[,\s]+", classes)
     request = EscherizeRequest(
