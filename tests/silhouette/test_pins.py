@@ -87,5 +87,5 @@ def test_mistakes_of_masks(tmp_path: Path) -> None:
     ImageDraw.Draw(corner).rectangle((0, 0, 5, 5), fill=255)
     with pytest.raises(InputFileError, match="does not touch the silhouette"):
         Pins.read([save(tmp_path, corner)], target)
-    with pytest.raises(InputFileError):
+    with pytest.raises(InputFileError, match=r"^12;80: a pin is x,y or x,y,radius or a mask, and"):
         Pins.read(["12;80"], target)

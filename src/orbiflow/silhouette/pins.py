@@ -15,7 +15,7 @@ import shapely
 from numpy.typing import ArrayLike, NDArray
 
 from orbiflow.arguments import instance, numbers
-from orbiflow.errors import OrbiflowError
+from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.geometry import resampled
 from orbiflow.silhouette.emphasis import Emphasis
 from orbiflow.silhouette.outlines import percent
@@ -91,6 +91,11 @@ class Pins:
         words = [str(one) for one in given]
         spots = [word for word in words if _SPOT.fullmatch(word)]
         files = [word for word in words if not _SPOT.fullmatch(word)]
+        for file in files:
+            if not Path(file).exists():
+                raise InputFileError(
+                    f"{file}: a pin is x,y or x,y,radius or a mask, and there is no such file"
+                )
         masks = tuple(Emphasis.read(file, target) for file in files)
         discs = [[float(part) for part in spot.split(",")] for spot in spots]
         return cls._made(target, discs, masks, keep_angle)
