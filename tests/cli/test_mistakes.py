@@ -149,6 +149,17 @@ BAD_OPTIONS: dict[str, tuple[list[str], str]] = {
         "--effort belongs to --method descent",
     ),
     "strength of nothing": (["--strength", "3"], "--strength needs --emphasis"),
+    "pin outside": (["--pin", "5000,5000"], "the pin at 5000,5000 lies outside the silhouette"),
+    "pin that is no file": (["--pin", "head.png"], "head.png"),
+    "pins of overlap": (
+        ["--objective", "overlap", "--pin", "9,9"],
+        "--pin belongs to --objective likeness or both",
+    ),
+    "pins of occupancy": (
+        ["--method", "occupancy", "--pin", "9,9"],
+        "--pin belongs to --method descent",
+    ),
+    "angle of nothing": (["--pin-angle"], "--pin-angle needs --pin"),
     "no such option": (["--clases", "IH4"], "--clases"),
 }
 

@@ -16,14 +16,17 @@ from orbiflow.escher.model import TileModel
 from orbiflow.escher.occupancy import OccupancySettings
 from orbiflow.escher.result import ClassFailure, TileResult
 from orbiflow.escher.search import Event, escherize, escherize_class
+from orbiflow.likeness.mutual import mutual_iou
 from orbiflow.silhouette.target import Target
 from orbiflow.tilings import CLASSES
+from outlines import animal
 
 BOOT = [[0, 0], [3, 0], [3.4, 1.2], [2.2, 1.5], [2.0, 2.8], [0.8, 2.5], [-0.3, 1.2]]
 QUICK = OccupancySettings(
     max_frequency=3, turns=3, finalists=2, iterations=15, affine_iterations=20, points=200
 )
 TARGET = Target.from_polygon(BOOT, y_down=True)
+SQUIRREL = animal("squirrel.dat")
 
 
 def crossed(*_: object, **__: object) -> TileModel:
@@ -228,21 +231,51 @@ def test_of_both_objectives_one_may_fail() -> None:
     overlap = DescentSettings.for_effort("fast")
     both = escherize_class(bar, "IH7", BothSettings(likeness, overlap))
     assert isinstance(both, TileResult)
-    assert [tile.objective for tile in both.family()] == ["overlap"]
+    assert {tile.objective for tile in both.family()} == {"overlap"}
+    assert all(tile.deformation is not None for tile in both.family())
 
 
-def test_both_objectives_are_shown_likeness_first() -> None:
-    likeness = BendingSettings(placements=20, held=4, finalists=1, rounds=4)
-    shares: list[float] = []
-    results, failures = escherize(
-        TARGET,
-        ["IH4", "IH1"],
-        BothSettings(likeness, DescentSettings.for_effort("fast")),
-        watch=lambda event: shares.append(event.share),
-    )
+def test_both_objectives_give_a_short_list_likeness_first() -> None:
+    likeness = BendingSettings(placements=40, held=8, finalists=3, rounds=6)
+    settings = BothSettings(likeness, DescentSettings.for_effort("fast"))
+    events: list[Event] = []
+    results, failures = escherize(SQUIRREL, ["IH4", "IH6"], settings, watch=events.append)
     assert not failures
-    assert [r.objective for r in results] == ["likeness"] * 2 + ["overlap"] * 2
+    assert max(event.share for event in events) <= 1
+    objectives = [r.objective for r in results]
+    assert objectives == sorted(objectives)  # alphabet is on our side
+    assert set(objectives) == {"likeness", "overlap"}
     for kind in ("likeness", "overlap"):
         scores = [r.score for r in results if r.objective == kind]
         assert scores == sorted(scores, reverse=True)
-    assert max(shares) <= 1
+    found = [
+        tile for e in events if isinstance(e.outcome, TileResult) for tile in e.outcome.family()
+    ]
+    assert len(found) >= len(results)
+    places = [(r.deformation or 0.0, r.metrics.iou) for r in found]
+    for r in results:
+        assert r.deformation is not None
+        beaten = any(d < r.deformation and iou > r.metrics.iou for d, iou in places)
+        assert r.front == (not beaten)
+        assert r.certificate.valid
+    assert results[objectives.index("overlap")].deformation != 0
+    alike = mutual_iou([r.normal_tile.polygon for r in results])
+    assert all(alike(i, j) < 0.9 for i in range(len(results)) for j in range(i))
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        BendingSettings(placements=80, held=20, finalists=8, rounds=6, multiples=(4,)),
+        DescentSettings.for_effort("fast"),
+    ],
+    ids=["likeness", "overlap"],
+)
+def test_several_of_a_class_differ(settings: BendingSettings | DescentSettings) -> None:
+    results, _ = escherize(SQUIRREL, ["IH4", "IH6"], settings, per_class=4)
+    for name in ("IH4", "IH6"):
+        own = [r for r in results if r.name == name]
+        assert 1 <= len(own) <= 4
+        alike = mutual_iou([r.normal_tile.polygon for r in own])
+        assert all(alike(i, j) < 0.9 for i in range(len(own)) for j in range(i))
+    assert len(results) > 2

@@ -57,6 +57,13 @@ REQUESTS = st.one_of(
     st.builds(
         EscherizeRequest,
         image=paths,
+        objective=st.sampled_from([None, "likeness", "both"]),
+        pin=st.lists(st.text(), min_size=1).map(tuple),
+        pin_angle=st.booleans(),
+    ),
+    st.builds(
+        EscherizeRequest,
+        image=paths,
         method=st.just("occupancy"),
         turns=st.none() | st.integers(),
         iterations=st.none() | st.integers(),
@@ -145,6 +152,13 @@ MISTAKES: dict[str, tuple[Any, str]] = {
     "null": ({**GOOD, "out": None}, "out must be a path, got None"),
     "infinite": ({**GOOD, "emphasis": "m", "strength": float("inf")}, "strength must be finite"),
     "range": ({**GOOD, "per_class": 0}, "per_class must be at least 1, got 0"),
+    "no pins": ({**GOOD, "pin": []}, "pin names no part; give x,y or x,y,radius, or a mask"),
+    "a pin as text": ({**GOOD, "pin": "9,9"}, "pin must be a list, each entry text or nothing"),
+    "an angle alone": ({**GOOD, "pin_angle": True}, "pin_angle needs pin"),
+    "pins of overlap": (
+        {**GOOD, "pin": ["9,9"], "objective": "overlap"},
+        "pin belongs to objective",
+    ),
     "two fields": ({**GOOD, "strength": 2.0}, "strength needs emphasis: the mask"),
     "deep": (
         {**GOOD, "image": {"path": "cat.png"}},

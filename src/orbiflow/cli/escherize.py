@@ -60,7 +60,8 @@ def escherize(
         Objective | None,
         typer.Option(
             help="Likeness: the silhouette bends until it is a tile, every limb kept. Overlap: the "
-            "tile covers the silhouette as it is. Default likeness.",
+            "tile covers the silhouette as it is. Both: a short list of the best compromises. Default "
+            "likeness.",
             show_default=False,
         ),
     ] = None,
@@ -78,6 +79,17 @@ def escherize(
             show_default=False,
         ),
     ] = None,
+    pin: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="What must keep its shape while the rest bends: x,y or x,y,radius in the input's "
+            "coordinates, or a mask, white where pinned; may be repeated.",
+            show_default=False,
+        ),
+    ] = None,
+    pin_angle: Annotated[
+        bool, typer.Option("--pin-angle", help="What is pinned keeps its angle, too.")
+    ] = False,
     per_class: Annotated[
         int, typer.Option(help="Tiles of each class, the best and others that differ from it.")
     ] = 1,
@@ -129,7 +141,8 @@ def escherize(
     """Find tiles that look like a silhouette and tile the plane, and prove it.
 
     Writes result.json and overview.png into the folder, and for each class a folder with tile.svg,
-    tiling.svg, tiling.png, overlay.png, field.png and model.safetensors.
+    tiling.svg, tiling.png, overlay.png, field.png and model.safetensors; after a search for both,
+    front.png, too.
     """
     names = None if classes.strip().lower() == "all" else re.split(r"[,\s]+", classes)
     request = EscherizeRequest(
@@ -142,6 +155,8 @@ def escherize(
         effort=effort.value if effort else None,
         emphasis=emphasis,
         strength=strength,
+        pin=tuple(pin) if pin else None,
+        pin_angle=pin_angle,
         per_class=per_class,
         max_frequency=max_frequency,
         seed=seed,

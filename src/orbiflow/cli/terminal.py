@@ -127,28 +127,27 @@ def _show_tiles(event: Finished) -> None:
 
 
 def _table(tiles: list[dict[str, Any]]) -> Table:
-    table = Table(title="Tiles, best first")
-    for column in (
-        "class",
-        "score",
-        "bent",
-        "IoU",
-        "recognised",
-        "certified",
-        "edges",
-        "s",
-    ):
-        table.add_column(column, justify="left" if column == "class" else "right", no_wrap=True)
+    both = any(tile["front"] is not None for tile in tiles)
+    table = Table(title="Tiles for likeness, then for overlap" if both else "Tiles, best first")
+    columns = ("score", "bent", "IoU", "recognised", "certified", "edges", "s")
+    if both:  # for 80 columns
+        columns = ("for", "deformation", "overlap", "front", "certified", "s")
+    table.add_column("class", no_wrap=True)
+    for column in columns:
+        table.add_column(column, justify="left" if column == "for" else "right", no_wrap=True)
     for tile in tiles:
         mismatch = tile["edge_mismatch"]
-        table.add_row(
-            f"{tile['class']} ({tile['group']})",
-            f"{tile['score']:.3f}",
-            "-" if tile["deformation"] is None else f"{tile['deformation']:.3f}",
-            f"{tile['iou']:.4f}",
-            f"{tile['recognised']:.3f}",
-            "yes" if tile["certified"] else "[red]NO[/]",
-            "-" if mismatch is None else f"{mismatch:.0e}",
-            f"{tile['seconds']:.1f}",
-        )
+        cells = {
+            "score": f"{tile['score']:.3f}",
+            "for": tile["objective"],
+            "bent": "-" if tile["deformation"] is None else f"{tile['deformation']:.3f}",
+            "IoU": f"{tile['iou']:.4f}",
+            "recognised": f"{tile['recognised']:.3f}",
+            "front": "yes" if tile["front"] else "near",
+            "certified": "yes" if tile["certified"] else "[red]NO[/]",
+            "edges": "-" if mismatch is None else f"{mismatch:.0e}",
+            "s": f"{tile['seconds']:.1f}",
+        }
+        cells |= {"deformation": cells["bent"], "overlap": cells["IoU"]}
+        table.add_row(f"{tile['class']} ({tile['group']})", *(cells[name] for name in columns))
     return table

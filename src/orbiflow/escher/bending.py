@@ -19,8 +19,10 @@ from orbiflow.escher.tile_space import TileSpace
 from orbiflow.geometry import best_similarity, complex_points, plane_points, signed_area
 from orbiflow.likeness.elastic import Elastic, Stiffness
 from orbiflow.likeness.fidelity import Fidelity, fidelity
+from orbiflow.likeness.pinned import Pinned
 from orbiflow.silhouette.emphasis import Emphasis
 from orbiflow.silhouette.mesh import triangulate
+from orbiflow.silhouette.pins import Pins
 from orbiflow.silhouette.sampling import Samples, sampled
 from orbiflow.silhouette.target import Target
 from orbiflow.symmetry.isometry import Array
@@ -89,6 +91,7 @@ def hands(
     stiffness: Stiffness | None = None,
     *,
     emphasis: Emphasis | None = None,
+    pins: Pins | None = None,
 ) -> tuple[Hand, Hand]:
     """The silhouette and its mirror image in the x axis, ready to be bent.
 
@@ -97,6 +100,7 @@ def hands(
         settings: of the search.
         stiffness: what deforming costs.
         emphasis: what is to bend less, by as much as it matters more.
+        pins: what is not to bend.
 
     Raises:
         OrbiflowError: for a silhouette that cannot be sampled or triangulated.
@@ -108,10 +112,12 @@ def hands(
 
     def elastic(points: Array, mirrored: bool) -> Elastic:
         mesh = triangulate(points)
-        stiff = None
-        if emphasis is not None:
-            stiff = emphasis.weight(mesh.points * ((1.0, -1.0) if mirrored else (1.0, 1.0)))
-        return Elastic(points, stiffness, stiff=stiff, mesh=mesh)
+        own = mesh.points * ((1.0, -1.0) if mirrored else (1.0, 1.0))
+        stiff = None if emphasis is None else emphasis.weight(own)
+        if pins is None:
+            return Elastic(points, stiffness, stiff=stiff, mesh=mesh)
+        parts, angle = pins.parts(own, mesh.triangles), pins.keep_angle
+        return Pinned(points, parts, stiffness, keep_angle=angle, stiff=stiff, mesh=mesh)
 
     def hand(points: Samples, mirrored: bool) -> Hand:
         coarse, fine = elastic(points.coarse, mirrored), elastic(points.fine, mirrored)

@@ -80,7 +80,8 @@ def held_on_tiles(body: Elastic, space: TileSpace, z: Complex, rounds: int) -> B
         rounds: of choosing rotations and solving.
     """
     condensed = body.condensed
-    parts = [_Reduced(condensed.outline, *space.matrices(k)) for k in range(space.count)]
+    low = condensed.low
+    parts = [_Reduced(condensed.outline, low, *space.matrices(k)) for k in range(space.count)]
     outline = np.empty((body.size, space.count), dtype=complex)
     for _ in range(rounds):
         forces = body.forces(z)
@@ -100,9 +101,12 @@ def held_on_tiles(body: Elastic, space: TileSpace, z: Complex, rounds: int) -> B
 class _Reduced:
     """The outline's equations in the parameters of one placement's tiles."""
 
-    def __init__(self, matrix: Array, real: Array, imaginary: Array) -> None:
+    def __init__(self, matrix: Array, low: Complex | None, real: Array, imaginary: Array) -> None:
         self.real, self.imaginary = real, imaginary
         own = real.T @ (matrix @ real) + imaginary.T @ (matrix @ imaginary)
+        if low is not None:
+            less = low.conj().T @ (real + 1j * imaginary)
+            own -= (less.conj().T @ less).real
         # IH1 does not care about the offset
         own[np.diag_indices_from(own)] += 1e-10 * np.trace(own) / len(own)
         self.factor = scipy.linalg.cho_factor(own, overwrite_a=True, check_finite=False)

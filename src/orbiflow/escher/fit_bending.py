@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-import scipy.optimize
 import torch
 
 from orbiflow.cancel import Cancel
@@ -19,8 +18,8 @@ from orbiflow.escher.model import TileModel
 from orbiflow.escher.placements import Complex
 from orbiflow.escher.prototiles import Prototiles
 from orbiflow.escher.tile_space import NearestTiles
-from orbiflow.geometry import best_similarity, complex_points, plane_points
-from orbiflow.likeness.overlap import Overlap
+from orbiflow.geometry import best_similarity, plane_points
+from orbiflow.likeness.overlap import Overlap, overlaid
 from orbiflow.silhouette.target import Target
 from orbiflow.symmetry.isometry import Array
 from orbiflow.threads import one_blas_thread
@@ -129,24 +128,9 @@ def placed_best(bent: Bent, overlap: Overlap) -> PlacedBent:
     """
     rest, points = bent.hand.fine.rest, bent.points
     center = points.mean()
-    factor = complex(best_similarity(points, rest))
     ring = bent.points[: bent.hand.fine.size] - center
-
-    def loss(x: Array) -> tuple[float, Array]:
-        own = factor * complex(np.exp(x[0] + 1j * x[1])) * ring
-        place = own + rest.mean() + x[2] + 1j * x[3]
-        value, slope = overlap.iou(plane_points(place))
-        pull = complex_points(slope)
-        turned = np.conj(own) * pull
-        gradient = [turned.real.sum(), turned.imag.sum(), pull.real.sum(), pull.imag.sum()]
-        return -value, -np.array(gradient)
-
-    found = scipy.optimize.minimize(
-        loss, np.zeros(4), jac=True, method="L-BFGS-B", options={"maxiter": 40}
-    )
-    scale = complex(factor * np.exp(found.x[0] + 1j * found.x[1]))
-    shift = complex(rest.mean() + found.x[2] + 1j * found.x[3] - scale * center)
-    return PlacedBent(bent, scale, shift)
+    factor, middle, _ = overlaid(ring, overlap, complex(best_similarity(points, rest)), rest.mean())
+    return PlacedBent(bent, factor, complex(middle - factor * center))
 
 
 def prototile(kind: IsohedralClass, placed: PlacedBent) -> Prototiles:

@@ -15,6 +15,7 @@ from orbiflow.escher.fit_descent import fit_descent
 from orbiflow.escher.occupancy import OccupancySettings, fit_occupancy
 from orbiflow.escher.starts import initial_poses
 from orbiflow.silhouette.emphasis import Emphasis
+from orbiflow.silhouette.pins import Pins
 from orbiflow.silhouette.soft_target import SoftTarget
 from orbiflow.silhouette.target import Target
 from orbiflow.tilings import CLASSES, IsohedralClass
@@ -62,6 +63,7 @@ def fit(
     settings: OneSettings,
     *,
     emphasis: Emphasis | None = None,
+    pins: Pins | None = None,
     per_class: int = 1,
     progress: Progress | None = None,
     cancel: Cancel | None = None,
@@ -73,6 +75,7 @@ def fit(
         kind: the class.
         settings: of the method.
         emphasis: what must survive; the occupancy method takes no notice.
+        pins: what must not bend; only the search for likeness takes notice.
         per_class: certified tiles that are wanted.
         progress: told how far it is.
         cancel: looked at before each step.
@@ -82,7 +85,7 @@ def fit(
         Cancelled: if it was told to stop.
     """
     if isinstance(settings, BendingSettings):
-        both = shared_hands(target, settings, emphasis)
+        both = shared_hands(target, settings, emphasis, pins)
         return fit_bending(
             target, kind, settings, both, per_class=per_class, progress=progress, cancel=cancel
         )
@@ -97,11 +100,13 @@ def fit(
     return Fit(model, len(initial_poses(kind, settings.turns)[0]), 0, model.size)
 
 
-def prepare(target: Target, settings: Settings, emphasis: Emphasis | None) -> None:
+def prepare(
+    target: Target, settings: Settings, emphasis: Emphasis | None, pins: Pins | None = None
+) -> None:
     """Compute what the fits of all classes share, so that forked processes find it done."""
     for _, part in parts(settings):
         if isinstance(part, BendingSettings):
-            shared_hands(target, part, emphasis)
+            shared_hands(target, part, emphasis, pins)
         elif isinstance(part, DescentSettings):
             _soft_target(target, emphasis)
 
@@ -112,15 +117,22 @@ def _soft_target(target: Target, emphasis: Emphasis | None) -> SoftTarget:
 
 
 def shared_hands(
-    target: Target, settings: BendingSettings, emphasis: Emphasis | None
+    target: Target,
+    settings: BendingSettings,
+    emphasis: Emphasis | None,
+    pins: Pins | None = None,
 ) -> tuple[Hand, Hand]:
     """The target's hands, made once for all classes."""
-    return _hands(target, settings.seed, settings.multiples, emphasis)
+    return _hands(target, settings.seed, settings.multiples, emphasis, pins)
 
 
 @lru_cache(maxsize=2)
 def _hands(
-    target: Target, seed: int, multiples: tuple[int, ...], emphasis: Emphasis | None
+    target: Target,
+    seed: int,
+    multiples: tuple[int, ...],
+    emphasis: Emphasis | None,
+    pins: Pins | None,
 ) -> tuple[Hand, Hand]:
     settings = BendingSettings(seed=seed, multiples=multiples)
-    return hands(target, settings, emphasis=emphasis)
+    return hands(target, settings, emphasis=emphasis, pins=pins)

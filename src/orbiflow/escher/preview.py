@@ -17,6 +17,7 @@ from orbiflow.escher.model import TileModel
 from orbiflow.escher.outline_starts import outline_starts
 from orbiflow.escher.result import TileResult, best_tiles
 from orbiflow.silhouette.emphasis import Emphasis
+from orbiflow.silhouette.pins import Pins
 from orbiflow.silhouette.target import Target
 from orbiflow.tilings import isohedral_class
 
@@ -35,6 +36,7 @@ def quick_bent_tile(
     names: Sequence[str],
     settings: BendingSettings,
     emphasis: Emphasis | None,
+    pins: Pins | None = None,
     *,
     cancel: Cancel | None = None,
 ) -> TileResult | None:
@@ -46,7 +48,7 @@ def quick_bent_tile(
         Cancelled: if it was told to stop.
     """
     kind = isohedral_class(next(name for name in PREFERRED if name in names))
-    both = shared_hands(target, settings, emphasis)
+    both = shared_hands(target, settings, emphasis, pins)
     try:
         found = fit_bending(target, kind, replace(settings, **SKETCH), both, cancel=cancel)
         return best_tiles(target, found._replace(enough=1), min_neck=settings.min_neck)[0]

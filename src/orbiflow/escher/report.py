@@ -15,6 +15,7 @@ from orbiflow import __version__
 from orbiflow.escher.methods import Settings, method_name, objective_name
 from orbiflow.escher.result import ClassFailure, TileResult
 from orbiflow.silhouette.emphasis import Emphasis
+from orbiflow.silhouette.pins import Pins
 from orbiflow.silhouette.target import Target
 from orbiflow.symmetry import CrystallographicGroup
 from orbiflow.symmetry.isometry import Array
@@ -40,10 +41,12 @@ def tile_json(result: TileResult) -> dict[str, Any]:
         "class": result.name,
         "score": result.score,
         "objective": result.objective,
+        "front": result.front,
         "metrics": {
             **result.metrics.as_dict(),
             "deformation": result.deformation,
             "bent_iou": result.bent_iou,
+            "pinned": result.pinned,
             "fidelity": None if result.fidelity is None else asdict(result.fidelity),
         },
         "recognisability": result.recognisability.as_dict(),
@@ -79,6 +82,7 @@ def report(
     seconds: float,
     workers: int,
     emphasis: Emphasis | None = None,
+    pins: Pins | None = None,
 ) -> dict[str, Any]:
     """The whole document, ready for JSON, tiles best first.
 
@@ -86,6 +90,7 @@ def report(
         seconds: wall-clock time of the search.
         workers: processes that were used.
         emphasis: the mask, if there was one.
+        pins: what was not to bend, if anything.
     """
     return {
         "schema_version": SCHEMA_VERSION,
@@ -107,6 +112,7 @@ def report(
         },
         "input": target.report(),
         "emphasis": None if emphasis is None else emphasis.report(),
+        "pins": None if pins is None else pins.report(),
         "tiles": [tile_json(result) for result in results],
         "failed": [{"class": f.name, "reason": f.reason} for f in failures],
     }

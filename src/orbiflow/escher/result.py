@@ -17,6 +17,7 @@ from orbiflow.escher.model import TileModel
 from orbiflow.escher.storage import SavedModel
 from orbiflow.likeness.fidelity import Fidelity
 from orbiflow.likeness.metrics import ShapeMetrics, compare, iou
+from orbiflow.likeness.pinned import Pinned
 from orbiflow.likeness.ranking import rank_score
 from orbiflow.likeness.recognition import Recognisability, Recogniser
 from orbiflow.likeness.thinnest import Thinnest, narrowest_neck
@@ -47,6 +48,9 @@ class TileResult:
     - `bent_iou`: IoU of the tile with it.
     - `deformation`, `fidelity`: what bending the silhouette costs, and what is left of its outline
       (docs/likeness.md).
+    - `pinned`: how far the worst pinned part's outline is from similar to what it was
+      (`likeness.pinned.Pinned.misfit`); None without pins.
+    - `front`: after a search for both, whether no tile that was found beats this one in both.
     - `others`: more tiles of the class, if they were asked for.
     """
 
@@ -69,6 +73,8 @@ class TileResult:
     rest: Array | None = None
     bent_iou: float | None = None
     deformation: float | None = None
+    pinned: float | None = None
+    front: bool | None = None
     others: tuple[TileResult, ...] = ()
 
     @property
@@ -169,6 +175,8 @@ def _with_bent(target: Target, result: TileResult, placed: PlacedBent) -> TileRe
     region = shapely.Polygon(outline)
     whole = region if region.is_valid else shapely.make_valid(region).buffer(0)
     tile = shapely.Polygon(result.tile.polygon)
+    body = placed.bent.hand.fine
+    outline_points = placed.bent.points[: body.size]
     return replace(
         result,
         objective="likeness",
@@ -177,6 +185,7 @@ def _with_bent(target: Target, result: TileResult, placed: PlacedBent) -> TileRe
         bent_iou=iou(whole, tile) if tile.is_valid else None,  # pyright: ignore[reportArgumentType]
         deformation=placed.bent.cost,
         fidelity=placed.bent.fidelity,
+        pinned=body.misfit(outline_points) if isinstance(body, Pinned) else None,
         model=replace(result.model, bending=_bending(placed, result.normal_tile)),
     )
 

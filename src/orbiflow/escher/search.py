@@ -9,27 +9,41 @@ from collections.abc import Callable, Generator, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from orbiflow.arguments import described, instance
 from orbiflow.cancel import Cancel, Cancelled
 from orbiflow.errors import CertificationError, OrbiflowError
 from orbiflow.escher.bending_settings import BendingSettings
+from orbiflow.escher.deformation import measured
 from orbiflow.escher.descent_settings import DescentSettings
-from orbiflow.escher.methods import OneSettings, Settings, fit, parts, prepare
+from orbiflow.escher.front import ALIKE, front_list
+from orbiflow.escher.methods import (
+    BothSettings,
+    OneSettings,
+    Settings,
+    fit,
+    parts,
+    prepare,
+    shared_hands,
+)
 from orbiflow.escher.occupancy import OccupancySettings
 from orbiflow.escher.preview import quick_bent_tile, quick_tile
 from orbiflow.escher.processes import process_context, work
 from orbiflow.escher.result import ClassFailure, TileResult, best_tiles
-from orbiflow.likeness.ranking import diverse, tile_similarity
+from orbiflow.likeness.mutual import mutual_iou
+from orbiflow.likeness.ranking import diverse
 from orbiflow.silhouette.emphasis import Emphasis
+from orbiflow.silhouette.pins import Pins
 from orbiflow.silhouette.target import Target
 from orbiflow.threads import one_thread
 from orbiflow.tilings import CLASSES, IsohedralClass, isohedral_class
 
+CANDIDATES = 3
+"""Tiles of each class, of either search, that a search for both chooses from at least."""
+
 INTERRUPTED = "interrupted"
 """The reason given for a class that was left undone."""
-
-ALIKE = 0.9
-"""Mutual IoU above which two tiles of a class are too much alike to be shown both."""
 
 Watcher = Callable[["Event"], None]
 Outcome = TileResult | ClassFailure
@@ -66,6 +80,7 @@ class Task:
     target: Target
     settings: Settings
     emphasis: Emphasis | None = None
+    pins: Pins | None = None
     per_class: int = 1
     force: bool = False
 
@@ -76,6 +91,12 @@ class Task:
                 f"settings must be of a method, got {described(self.settings)}; for a level of "
                 'effort: BendingSettings.for_effort("fast")'
             )
+        if self.pins is not None:
+            instance(self.pins, Pins, "pins", "Pins.read and Pins.at make one")
+            if not isinstance(self.settings, BendingSettings | BothSettings):
+                raise OrbiflowError(
+                    "pins belong to the search for likeness, where silhouettes bend"
+                )
 
 
 def escherize(
@@ -84,6 +105,7 @@ def escherize(
     settings: Settings | None = None,
     *,
     emphasis: Emphasis | None = None,
+    pins: Pins | None = None,
     per_class: int = 1,
     workers: int = 1,
     force: bool = False,
@@ -99,7 +121,9 @@ def escherize(
             (`DescentSettings`), for both (`BothSettings`), or of the paper's method
             (`OccupancySettings`).
         emphasis: what must survive.
-        per_class: tiles of each class at most, no two of them twins.
+        pins: what must not bend, in the search for likeness.
+        per_class: tiles of each class at most, no two of them with a mutual IoU of .9; in a search
+            for both, those of either kind that it chooses from, at least three.
         workers: processes; 1 stays in this process. A script that asks for more must do its work
             under `if __name__ == "__main__":`, as always with multiprocessing.
         force: return tiles that are not certified, too; their certificates say why.
@@ -109,10 +133,10 @@ def escherize(
             before each step of every fit.
 
     Returns:
-        Certified tiles, best first (`TileResult.score`; of `BothSettings` first those for
-        likeness), and the classes that gave none. The same seed gives the same tiles, whatever the
-        number of workers. If it was cancelled: what was found by then, and the other classes as
-        failures with the reason `INTERRUPTED`.
+        Certified tiles, best first (`TileResult.score`), and the classes that gave none. Of
+        `BothSettings` at most twelve tiles in all, those for likeness first: see `front_list`. The
+        same seed gives the same tiles, whatever the number of workers. If it was cancelled: what was
+        found by then, and the other classes as failures with the reason `INTERRUPTED`.
 
     Raises:
         OrbiflowError: for an unknown class, a setting out of range, or workers that die.
@@ -124,7 +148,7 @@ def escherize(
         if number < 1:
             raise OrbiflowError(f"{what} must be at least 1, got {number}")
     settings = BendingSettings() if settings is None else settings
-    task = Task(target, settings, emphasis, per_class, force)
+    task = Task(target, settings, emphasis, pins, per_class, force)
     cancel = cancel or Cancel()
     teller = _Teller(watch)
     count = min(workers, len(names))
@@ -139,7 +163,8 @@ def escherize(
                 for event in found:
                     teller.tell(event)
     teller.interrupted(names)
-    return teller.sorted(names)
+    results, failures = teller.sorted(names)
+    return front_list(results) if isinstance(settings, BothSettings) else results, failures
 
 
 def escherize_class(
@@ -148,6 +173,7 @@ def escherize_class(
     settings: Settings,
     *,
     emphasis: Emphasis | None = None,
+    pins: Pins | None = None,
     per_class: int = 1,
     force: bool = False,
     watch: Watcher | None = None,
@@ -158,7 +184,7 @@ def escherize_class(
     Raises:
         Cancelled: if it was told to stop.
     """
-    task = Task(target, settings, emphasis, per_class, force)
+    task = Task(target, settings, emphasis, pins, per_class, force)
     return _work_on(task, name, watch or _ignore, cancel or Cancel())
 
 
@@ -229,18 +255,26 @@ def _chosen_tiles(
     share: float,
 ) -> list[TileResult]:
     """The tiles of one fit that are shown, best first; `done` of the class's work was done before."""
+    both = isinstance(task.settings, BothSettings)
+    count = max(CANDIDATES, task.per_class) if both else task.per_class
     with one_thread():
         found = fit(
             task.target,
             kind,
             settings,
             emphasis=task.emphasis,
-            per_class=task.per_class,
+            pins=task.pins,
+            per_class=count,
             progress=lambda own, loss: watch(Event(kind.name, done + share * own, loss)),
             cancel=cancel,
         )
         tiles = best_tiles(task.target, found, force=task.force, min_neck=_min_neck(settings))
-    return [tiles[k] for k in _without_twins(tiles, task.per_class)]
+        chosen = [tiles[k] for k in _without_twins(tiles, count)]
+        if not isinstance(task.settings, BothSettings):
+            return chosen
+        hand, _ = shared_hands(task.target, task.settings.likeness, task.emphasis, task.pins)
+        cancel.check()
+        return [measured(tile, hand) for tile in chosen]
 
 
 def _min_neck(settings: OneSettings) -> float:
@@ -251,8 +285,9 @@ def _without_twins(tiles: Sequence[TileResult], count: int) -> list[int]:
     if count == 1 or len(tiles) == 1:
         return [0]
     sound = [k for k, tile in enumerate(tiles) if tile.certificate.simple]
-    alike = tile_similarity([tiles[k].tile.polygon for k in sound], [tiles[k].name for k in sound])
-    chosen = diverse([tiles[k].score for k in sound], count, alike, twin=ALIKE)
+    alike = mutual_iou([tiles[k].normal_tile.polygon for k in sound], ALIKE)
+    below = float(np.nextafter(ALIKE, 0))
+    chosen = diverse([tiles[k].score for k in sound], count, alike, twin=below)
     return [sound[k] for k in chosen] or [0]
 
 
@@ -262,7 +297,9 @@ def _preview(task: Task, names: Sequence[str], watch: Watcher, cancel: Cancel) -
     _, settings = parts(task.settings)[0]
     with one_thread():
         if isinstance(settings, BendingSettings):
-            tile = quick_bent_tile(task.target, names, settings, task.emphasis, cancel=cancel)
+            tile = quick_bent_tile(
+                task.target, names, settings, task.emphasis, task.pins, cancel=cancel
+            )
         elif isinstance(settings, DescentSettings) and settings.starts == "outline":
             tile = quick_tile(task.target, names, cancel=cancel)
     if tile is not None:
@@ -289,7 +326,7 @@ def _run_pool(
     cancel.check()
     if context.get_start_method() == "fork":
         with one_thread():
-            prepare(task.target, task.settings, task.emphasis)  # once, for all workers
+            prepare(task.target, task.settings, task.emphasis, task.pins)  # once, for all workers
     # classes with more lattice freedom take longer
     order = sorted(names, key=lambda name: -isohedral_class(name).stretch_dim)
     function = functools.partial(_work_on, task)

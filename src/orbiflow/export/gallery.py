@@ -15,11 +15,12 @@ from PIL import Image, ImageDraw, ImageFont
 from orbiflow.escher.processes import work
 from orbiflow.escher.result import TileResult
 from orbiflow.export.folder import TILE_FILES, overlay, write_tile_folder
+from orbiflow.figures.front import FrontPoint, front_png
 from orbiflow.figures.tilings import tiling_png
 from orbiflow.files import write_atomic
 from orbiflow.silhouette.target import Target
 
-RESULT, OVERVIEW = "result.json", "overview.png"
+RESULT, OVERVIEW, FRONT = "result.json", "overview.png", "front.png"
 _PANEL, _HEADER = 560, 60  # pixels
 
 
@@ -45,6 +46,33 @@ def write_gallery(
         for folder in folders
     ]
     write_atomic(out / OVERVIEW, overview_png(results, target, pictures))
+
+
+def write_front(
+    results: Sequence[TileResult], found: Iterable[TileResult], target: Target, out: Path
+) -> None:
+    """Write `front.png`: a list's tiles among all that were found, by deformation and overlap.
+
+    Raises:
+        OutputError: if the file cannot be written.
+    """
+    listed = {id(result.tile) for result in results}
+    others = [result for result in found if id(result.tile) not in listed]
+    points = [
+        FrontPoint(
+            result.deformation,
+            result.metrics.iou,
+            result.tile.polygon,
+            result.name,
+            result.objective,
+            id(result.tile) in listed,
+            bool(result.front),
+        )
+        for result in (*others, *results)
+        if result.deformation is not None
+    ]
+    if points:
+        write_atomic(out / FRONT, front_png(points, y_down=target.y_down))
 
 
 def _draw(
@@ -85,8 +113,9 @@ def written_files(folder: Path) -> set[str]:
         ours, classes = False, []
     if not ours:
         return set()
+    front = {FRONT} if document.get("objective") == "both" else set()
     inside = {f"{name}/{file}" for name in folder_names(classes) for file in TILE_FILES}
-    return {RESULT, OVERVIEW} | inside
+    return {RESULT, OVERVIEW} | front | inside
 
 
 def _measure(result: TileResult) -> str:

@@ -19,7 +19,13 @@ from orbiflow.escher import (
 )
 from orbiflow.escher.methods import Settings
 from orbiflow.escher.report import report
-from orbiflow.export.gallery import OVERVIEW, RESULT, write_gallery, written_files
+from orbiflow.export.gallery import (
+    OVERVIEW,
+    RESULT,
+    write_front,
+    write_gallery,
+    written_files,
+)
 from orbiflow.files import write_atomic
 from orbiflow.folders import ResultFolder
 from orbiflow.jobs.events import (
@@ -35,7 +41,7 @@ from orbiflow.jobs.events import (
 from orbiflow.jobs.records import RecordError
 from orbiflow.jobs.requests import EscherizeRequest
 from orbiflow.jobs.run import Sink
-from orbiflow.silhouette import Emphasis, Target
+from orbiflow.silhouette import Emphasis, Pins, Target
 from orbiflow.tilings import CLASSES, isohedral_class
 
 
@@ -52,22 +58,25 @@ def escherize(request: EscherizeRequest, tell: Sink, cancel: Cancel) -> Finished
         OrbiflowError: for anything that the user can mend.
     """
     begin = time.perf_counter()
+    found: list[TileResult] = []
     names = _class_names(request.classes)
     settings = _settings(request)
     workers = min(request.workers or os.cpu_count() or 1, len(names))
-    target, emphasis = _read(request)
+    target, emphasis, pins = _read(request)
     folder = ResultFolder(request.out, written_files)
-    for note in (*target.notes, *(emphasis.notes if emphasis else ())):
-        tell(Note(note))
+    for source in (target, emphasis, pins):
+        for note in source.notes if source else ():
+            tell(Note(note))
     results, failures = search.escherize(
         target,
         names,
         settings,
         emphasis=emphasis,
+        pins=pins,
         per_class=request.per_class,
         workers=workers,
         force=request.force,
-        watch=_Relay(names, tell),
+        watch=_Relay(names, tell, found),
         cancel=cancel,
     )
     document = report(
@@ -78,13 +87,16 @@ def escherize(request: EscherizeRequest, tell: Sink, cancel: Cancel) -> Finished
         seconds=time.perf_counter() - begin,
         workers=workers,
         emphasis=emphasis,
+        pins=pins,
     )
+    if document["objective"] == "both" and results:
+        tell(Note(_chosen(results, found)))
     interrupted = {failure.name for failure in failures if failure.reason == search.INTERRUPTED}
     # a first look at a class that was interrupted is less than an earlier run's tiles
     earlier = folder.has_a_run and (request.out / OVERVIEW).is_file()
     write = not earlier or any(result.name not in interrupted for result in results)
     if write:
-        _write(folder, document, results, target, workers, tell)
+        _write(folder, document, results, found, target, workers, tell)
     state: State = "done" if results else "nothing found"
     summary = {
         "folder": str(request.out),
@@ -97,9 +109,10 @@ def escherize(request: EscherizeRequest, tell: Sink, cancel: Cancel) -> Finished
 
 
 class _Relay:
-    """A search's events as a job's."""
+    """A search's events as a job's; all tiles of all classes go into `found`."""
 
-    def __init__(self, names: list[str], tell: Sink) -> None:
+    def __init__(self, names: list[str], tell: Sink, found: list[TileResult]) -> None:
+        self.found = found
         self.shares = dict.fromkeys(names, 0.0)
         self.tell = tell
         self.begin = time.perf_counter()
@@ -118,6 +131,7 @@ class _Relay:
         if isinstance(outcome, ClassFailure):
             self.tell(ClassFailed(name, outcome.reason))
         elif outcome is not None:
+            self.found += outcome.family()
             iou, certified = outcome.metrics.iou, outcome.certificate.valid
             self.tell(TileFound(name, iou, outcome.score, certified))
 
@@ -147,18 +161,22 @@ def _settings(request: EscherizeRequest) -> Settings:
     return descent if objective == "overlap" else BothSettings(bending, descent)
 
 
-def _read(request: EscherizeRequest) -> tuple[Target, Emphasis | None]:
+def _read(request: EscherizeRequest) -> tuple[Target, Emphasis | None, Pins | None]:
     target = Target.read(request.image, threshold=request.threshold, invert=request.invert)
-    if request.emphasis is None:
-        return target, None
-    strength = {} if request.strength is None else {"strength": request.strength}
-    return target, Emphasis.read(request.emphasis, target, **strength)
+    emphasis = pins = None
+    if request.emphasis is not None:
+        strength = {} if request.strength is None else {"strength": request.strength}
+        emphasis = Emphasis.read(request.emphasis, target, **strength)
+    if request.pin is not None:
+        pins = Pins.read(request.pin, target, keep_angle=request.pin_angle)
+    return target, emphasis, pins
 
 
 def _write(
     folder: ResultFolder,
     document: dict[str, Any],
     results: list[TileResult],
+    found: list[TileResult],
     target: Target,
     workers: int,
     tell: Sink,
@@ -168,10 +186,19 @@ def _write(
         if results:
             tell(Note("drawing"))
             write_gallery(results, target, staged, workers=workers)
+            if document["objective"] == "both":
+                write_front(results, found, target, staged)
         write_atomic(staged / RESULT, json.dumps(document, allow_nan=False))
         written = sorted(path.relative_to(staged) for path in staged.rglob("*") if path.is_file())
     for path in written:
         tell(Written(folder.path / path))
+
+
+def _chosen(results: list[TileResult], found: list[TileResult]) -> str:
+    front = sum(result.front is True for result in results)
+    text = f"{len(results)} of {len(found)} tiles are listed: {front} that no other beats in both "
+    text += "deformation and overlap"
+    return text if front == len(results) else f"{text}, {len(results) - front} near these"
 
 
 def _row(result: TileResult) -> dict[str, Any]:
@@ -180,6 +207,7 @@ def _row(result: TileResult) -> dict[str, Any]:
         "group": result.group_name,
         "objective": result.objective,
         "deformation": result.deformation,
+        "front": result.front,
         "score": result.score,
         "iou": result.metrics.iou,
         "dice": result.metrics.dice,

@@ -43,6 +43,8 @@ class EscherizeRequest(Request):
       tile overlaps the silhouette as it is) or "both"; of the descent.
     - `min_neck`: width of necks that a tile may have, in square roots of its area.
     - `emphasis`, `strength`: mask of what must survive, and how many times more it counts.
+    - `pin`: what must keep its shape, in the search for likeness: "x,y" or "x,y,radius" in the
+      input's coordinates, or the path of a mask. `pin_angle`: it keeps its angle, too.
     - `per_class`: tiles of each class at most. `force`: keep tiles that are not certified.
     - `workers`: processes, None for one a core.
     - `threshold`, `invert`: how the picture is read, None to find out.
@@ -59,6 +61,8 @@ class EscherizeRequest(Request):
     effort: Literal["fast", "normal", "best"] | None = None
     emphasis: Path | None = None
     strength: float | None = None
+    pin: tuple[str, ...] | None = None
+    pin_angle: bool = False
     per_class: int = 1
     max_frequency: int | None = None
     seed: int = 0
@@ -74,7 +78,7 @@ class EscherizeRequest(Request):
         if self.strength is not None and self.emphasis is None:
             raise RecordError("{strength} needs {emphasis}: the mask that it belongs to")
         if self.method == "occupancy":
-            for name in ("emphasis", "effort", "objective", "min_neck"):
+            for name in ("emphasis", "effort", "objective", "min_neck", "pin"):
                 if getattr(self, name) is not None:
                     raise RecordError(f"{{{name}}} belongs to {{method}} descent")
         else:
@@ -87,11 +91,20 @@ class EscherizeRequest(Request):
         likeness = self.method == "descent" and self.objective in (None, "likeness")
         if self.max_frequency is not None and likeness:
             raise RecordError("{max_frequency} belongs to {objective} overlap or both")
+        self._check_pins()
         if self.min_neck is not None and not 0 <= self.min_neck <= 0.2:
             raise RecordError(f"{{min_neck}} must be from 0 to 0.2, got {self.min_neck:g}")
         at_least_one(self, "workers")
         if self.threshold is not None and not 0 <= self.threshold <= 1:
             raise RecordError(f"{{threshold}} must lie between 0 and 1, got {self.threshold:g}")
+
+    def _check_pins(self) -> None:
+        if self.pin == ():
+            raise RecordError("{pin} names no part; give x,y or x,y,radius, or a mask")
+        if self.pin and self.objective == "overlap":
+            raise RecordError("{pin} belongs to {objective} likeness or both: nothing bends here")
+        if self.pin_angle and not self.pin:
+            raise RecordError("{pin_angle} needs {pin}: the part that keeps its angle")
 
 
 @dataclass(frozen=True)

@@ -331,6 +331,11 @@ class Condensed:
     follow: Array
     inverse: Array
 
+    @property
+    def low(self) -> Complex | None:
+        """(n, k), or None: the outline's matrix is `outline` less this times its adjoint."""
+        return None
+
     def forces(self, forces: Complex) -> Complex:
         """Forces (N, C) as forces (n, C) on the outline."""
         n = len(self.outline)

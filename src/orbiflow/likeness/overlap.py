@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy.optimize
 import shapely
+from numpy.typing import NDArray
 
 from orbiflow.arguments import numbers
 from orbiflow.errors import OrbiflowError
-from orbiflow.geometry import signed_area
+from orbiflow.geometry import complex_points, plane_points, signed_area
 from orbiflow.symmetry.isometry import Array
 
 MANY, COARSE = 1500, 2e-3
@@ -40,6 +42,9 @@ def boundary_iou(goal: shapely.Polygon, boundaries: Array) -> Array:
     common = shapely.area(shapely.intersection(polygons[good], goal))
     scores[good] = common / (shapely.area(polygons[good]) + goal.area - common)
     return scores
+
+
+Complex = NDArray[np.complex128]
 
 
 class Overlap:
@@ -99,3 +104,35 @@ class Overlap:
         sign = 1.0 if signed_area(ring) > 0 else -1.0
         normal = sign * np.stack([sides[:, 1], -sides[:, 0]], axis=-1)
         return early[:, None] * normal + np.roll(late[:, None] * normal, 1, axis=0)
+
+
+def overlaid(
+    ring: Complex, overlap: Overlap, factor: complex = 1.0, middle: complex = 0.0
+) -> tuple[complex, complex, float]:
+    """Lay a ring over a region by the similarity of largest IoU near a first one.
+
+    By L-BFGS on exact gradients.
+
+    Args:
+        ring: (n,) x + iy about the origin.
+        overlap: with the region.
+        factor, middle: of the first similarity, z -> factor z + middle.
+
+    Returns:
+        Factor and middle of the best one, and its IoU.
+    """
+
+    def loss(x: Array) -> tuple[float, Array]:
+        own = factor * complex(np.exp(x[0] + 1j * x[1])) * ring
+        place = own + middle + x[2] + 1j * x[3]
+        value, slope = overlap.iou(plane_points(place))
+        pull = complex_points(slope)
+        turned = np.conj(own) * pull
+        gradient = [turned.real.sum(), turned.imag.sum(), pull.real.sum(), pull.imag.sum()]
+        return -value, -np.array(gradient)
+
+    found = scipy.optimize.minimize(
+        loss, np.zeros(4), jac=True, method="L-BFGS-B", options={"maxiter": 40}
+    )
+    best = complex(factor * np.exp(found.x[0] + 1j * found.x[1]))
+    return best, complex(middle + found.x[2] + 1j * found.x[3]), -float(found.fun)

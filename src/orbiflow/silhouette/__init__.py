@@ -2,6 +2,7 @@
 
 from orbiflow.silhouette.emphasis import Emphasis
 from orbiflow.silhouette.frame import Frame
+from orbiflow.silhouette.pins import Pins
 from orbiflow.silhouette.readers import Reading, read_outline
 from orbiflow.silhouette.signed_distance import signed_distance
 from orbiflow.silhouette.soft_target import SoftTarget
@@ -10,6 +11,7 @@ from orbiflow.silhouette.target import Target
 __all__ = [
     "Emphasis",
     "Frame",
+    "Pins",
     "Reading",
     "SoftTarget",
     "Target",

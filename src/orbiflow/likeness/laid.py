@@ -1,0 +1,132 @@
+"""A silhouette laid onto a given outline: how it bends least, if its outline is to be that one.
+
+For shapes that were not found by bending. Points of the silhouette's outline slide along the other one
+and the energy is minimised: linear equations in how far each slides, and in the size of the other
+outline, in turn with the choice of rotations, as in `escher.co_deformation`. That starts from the
+correspondence of `corresponding`, so the outlines must lie over each other; what it ends with is a
+local minimum, and the energy an upper bound of the least one.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import scipy.linalg
+
+from orbiflow.geometry import arc_lengths, complex_points, plane_points, points_along
+from orbiflow.likeness.correspondence import corresponding
+from orbiflow.likeness.elastic import Array, Complex, Elastic
+
+STARTS = ((0.15, 0.5), (0.4, 1.0), (0.8, 2.0), (0.4, 4.0))
+"""Correspondences that are tried: `near` and `stretch` of `corresponding`."""
+
+TRIED, ROUNDS, SOFTENINGS, SOFT_ROUNDS = 3, 20, 4, 5
+"""Steps of each start, and of the best: with the energy, then with the one that forgives."""
+
+FAR = 2.0
+"""Spacings that a point may slide in one step."""
+
+CLOSE = 0.02
+"""Least distance along the outline of two points in a row, in spacings."""
+
+
+def laid_on(body: Elastic, ring: Array) -> Complex:
+    """The body bent so that its outline's points lie on a ring, in order.
+
+    Args:
+        body: the silhouette.
+        ring: (M, 2) simple, counter-clockwise, laid over the silhouette as it is.
+
+    Returns:
+        (N,) points of the body; the outline's lie on a copy of the ring about the origin whose size
+        suits the body best.
+    """
+    tried = [_begun(body, ring, near, stretch) for near, stretch in STARTS]
+    slide, z = min(tried, key=lambda shape: _objective(body, shape[1]))
+    for _ in range(ROUNDS):
+        slide, z = _step(body, slide, z)
+    for _ in range(SOFTENINGS):
+        soft = body.forgiving(z)
+        for _ in range(SOFT_ROUNDS):
+            slide, z = _step(soft, slide, z)
+    return z[:, 0]
+
+
+class _Slide(NamedTuple):
+    """Points at arc lengths `at` (n,) of a ring, which is made larger by `scale`."""
+
+    ring: Array
+    at: Array
+    scale: float
+
+    def points(self) -> Complex:
+        return self.scale * complex_points(points_along(self.ring, self.at))
+
+    def tangents(self) -> Complex:
+        sides = np.roll(self.ring, -1, axis=0) - self.ring
+        unit = complex_points(sides / np.linalg.norm(sides, axis=1, keepdims=True))
+        knots = arc_lengths(self.ring)
+        side = np.searchsorted(knots, self.at % knots[-1], side="right") - 1
+        return unit[np.clip(side, 0, len(unit) - 1)]
+
+
+def _begun(body: Elastic, ring: Array, near: float, stretch: float) -> tuple[_Slide, Complex]:
+    at = corresponding(plane_points(body.rest[: body.size]), ring, near, stretch)
+    slide = _Slide(ring, _parted(at, arc_lengths(ring)[-1]), 1.0)
+    z = body.pulled(body.rest[:, None], slide.points()[:, None], 600.0, 4)
+    for _ in range(TRIED):
+        slide, z = _step(body, slide, z)
+    return slide, z
+
+
+def _step(body: Elastic, slide: _Slide, z: Complex) -> tuple[_Slide, Complex]:
+    """Slide once, by half the way or less where all of it would cost more; the inside follows."""
+    condensed, forces = body.condensed, body.forces(z)
+    p, along = slide.points(), slide.scale * slide.tangents()
+    pull = condensed.forces(forces)[:, 0]
+    matrix, low = condensed.outline, condensed.low
+    product = matrix @ p.real + 1j * (matrix @ p.imag)
+    own = np.empty((len(p) + 1, len(p) + 1))
+    own[:-1, :-1] = matrix * (np.conj(along)[:, None] * along[None]).real
+    own[:-1, -1] = own[-1, :-1] = (np.conj(along) * product).real
+    own[-1, -1] = np.vdot(p, product).real
+    if low is not None:
+        less = low.conj().T @ np.concatenate([np.diag(along), p[:, None]], axis=1)
+        own -= (less.conj().T @ less).real
+        product -= low @ (low.conj().T @ p)
+    gap = pull - product
+    right = np.append((np.conj(along) * gap).real, np.vdot(p, gap).real)
+    own[np.diag_indices_from(own)] += 1e-8 * np.trace(own) / len(own)
+    way = scipy.linalg.solve(own, right, assume_a="pos", check_finite=False)
+    size = arc_lengths(slide.ring)[-1]
+    reach = FAR * size / len(p)
+    stay = condensed.whole(p[:, None], forces)
+    least = _objective(body, stay)
+    for share in (1.0, 0.5, 0.2, 0.05):
+        further = _Slide(
+            slide.ring,
+            _parted(slide.at + share * np.clip(way[:-1], -reach, reach), size),
+            slide.scale * (1 + share * float(np.clip(way[-1], -0.2, 0.2))),
+        )
+        moved = condensed.whole(further.points()[:, None], forces)
+        if _objective(body, moved) < least:
+            return further, moved
+    return slide, stay
+
+
+def _objective(body: Elastic, z: Complex) -> float:
+    """What the steps lower: the energy and the pose's."""
+    copy, _ = body._copies(z)
+    return float(body.energy(z)[0] + body.stiffness.pose * (abs(z - copy) ** 2).mean())
+
+
+def _parted(at: Array, size: float) -> Array:
+    """Places (n,) on a closed line, moved as little as it takes to be in order and some way apart."""
+    n = len(at)
+    spaced = np.arange(n) * (CLOSE * size / n)
+    turn = size - n * (CLOSE * size / n)  # what is left of a round
+    three = np.concatenate([at - spaced - turn, at - spaced, at - spaced + turn])
+    up = np.maximum.accumulate(three)
+    down = np.minimum.accumulate(three[::-1])[::-1]
+    return ((up + down) / 2)[n : 2 * n] + spaced
