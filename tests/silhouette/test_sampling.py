@@ -40,21 +40,23 @@ def spacing(ring: Array, count: int) -> float:
 @given(phase=phases)
 def test_coarse_and_fine_points_go_together(name: str, phase: float) -> None:
     ring = RINGS[name]
-    coarse, fine = sampled(ring, phase)
-    multiple = len(fine) // len(coarse)
-    assert len(fine) == multiple * len(coarse)
+    coarse, middle, fine = sampled(ring, phase)
     assert FEW <= len(coarse) <= MOST
     assert shapely.Polygon(coarse).is_valid
-    assert shapely.Polygon(fine).is_valid
-    apart = np.linalg.norm(fine[::multiple] - coarse, axis=1)
-    assert apart.max() <= 0.5 * spacing(ring, len(fine)) + 1e-9
+    for points in (middle, fine):
+        multiple = len(points) // len(coarse)
+        assert len(points) == multiple * len(coarse)
+        assert len(fine) % len(points) == 0
+        assert shapely.Polygon(points).is_valid
+        apart = np.linalg.norm(points[::multiple] - coarse, axis=1)
+        assert apart.max() <= 0.5 * spacing(ring, len(points)) + 1e-9
 
 
 @pytest.mark.parametrize("name", THICK)
 @given(phase=phases)
 def test_corners_stay_where_they_are(name: str, phase: float) -> None:
     ring = RINGS[name]
-    _, fine = sampled(ring, phase)
+    fine = sampled(ring, phase).fine
     step = spacing(ring, len(fine))
     corners = ring[important_vertices(ring, DETAIL)]
     apart = np.linalg.norm(fine[:, None] - corners[None], axis=2).min(axis=0)
@@ -94,7 +96,7 @@ def test_the_mirror_image_is_read_backwards(seed: int) -> None:
         assert np.array_equal(theirs[0], mine[0] * (1, -1))
         assert np.array_equal(theirs[1:], mine[:0:-1] * (1, -1))
         assert shapely.LinearRing(theirs).is_ccw
-    coarse, fine = other.samples
+    coarse, _, fine = other.samples
     apart = np.linalg.norm(fine[:: len(fine) // len(coarse)] - coarse, axis=1)
     assert apart.max() <= spacing(fine, len(fine))
 
@@ -114,6 +116,7 @@ def test_hairs_give_bodies_or_a_reason(ring: Array) -> None:
         both, said = (), str(error)
     assert not said or "too thin" in said or "too ragged" in said
     for hand in both:
-        for points, body in ((hand.samples.coarse, hand.coarse), (hand.samples.fine, hand.fine)):
+        bodies = (hand.coarse, hand.middle, hand.fine)
+        for points, body in zip(hand.samples, bodies, strict=True):
             assert shapely.Polygon(points).is_valid
             assert body.size == len(points)

@@ -43,8 +43,8 @@ FEWEST = 3
 class Pinned(Elastic):
     """A triangulated silhouette with parts that keep their shape.
 
-    `energy` holds what the parts cost; `forgiving_energy` is the body's without them, so that it
-    compares with that of bodies which are pinned elsewhere or nowhere.
+    `energy` and `lenient_energy` hold what the parts cost; `forgiving_energy` is the body's without
+    them, so that it compares with that of bodies which are pinned elsewhere or nowhere.
 
     Args:
         ring: (n, 2) outline, counter-clockwise; the first n points of the body.
@@ -82,9 +82,16 @@ class Pinned(Elastic):
 
     def energy(self, z: Complex) -> Array:
         """Energies (C,) of shapes (N, C) without the pose's, with the parts'."""
-        goals = self._goals(z)
-        own = [part.cost(z, goal) for part, goal in zip(self.parts, goals, strict=True)]
-        return super().energy(z) + np.sum(own, axis=0)
+        return super().energy(z) + self._held(z)
+
+    def lenient_energy(self, z: Complex) -> Array:
+        """As of `Elastic`, with the parts': placements that hold them are to be preferred."""
+        return super().lenient_energy(z) + self._held(z)
+
+    def _held(self, z: Complex) -> Array:
+        """What the parts cost (C,)."""
+        goals = zip(self.parts, self._goals(z), strict=True)
+        return np.sum([part.cost(z, goal) for part, goal in goals], axis=0)
 
     def misfit(self, outline: Complex) -> float | None:
         """How far the worst part of an outline (n,) is from similar to what it was, 0 to 1.
