@@ -120,13 +120,15 @@ def test_the_model_keeps_every_vertex() -> None:
 
 def test_finalists_are_in_order_and_told() -> None:
     told: list[float] = []
-    several = BendingSettings(placements=40, held=12, finalists=3, rounds=8, multiples=(4,))
+    several = BendingSettings(
+        placements=40, held=12, finalists=3, rounds=8, multiples=(4,), below=1
+    )
     found, dropped = bent_tiles(squirrel_hands(), CLASSES["IH4"], several, told.append)
     assert told == sorted(told)
     assert told[-1] == pytest.approx(1.0)
     scores = [bent.fidelity.score for bent in found]
     assert scores == sorted(scores, reverse=True)
-    assert 1 <= len(found) <= 6 - dropped
+    assert 1 <= len(found) <= 10 - dropped
     again, _ = bent_tiles(squirrel_hands(), CLASSES["IH4"], several)
     assert [bent.fidelity.score for bent in again] == scores
 
@@ -137,3 +139,15 @@ def test_more_rounds_cost_no_more() -> None:
     (more,), _ = bent_tiles([squirrel_hands()[0]], CLASSES["IH5"], settings)
     assert more.energy <= few.energy * 1.02
     assert SMALL.rounds < 40
+
+
+@pytest.mark.parametrize("name", ["IH4", "IH21"])
+def test_more_effort_never_scores_less(name: str) -> None:
+    found = [
+        bent_tiles(squirrel_hands(), CLASSES[name], BendingSettings.for_effort(effort))[0]
+        for effort in ("fast", "normal")
+    ]
+    fast, normal = ([bent.score(BendingSettings.min_neck) for bent in tiles] for tiles in found)
+    assert normal[0] >= fast[0]
+    assert normal == sorted(normal, reverse=True)
+    assert len(normal) > len(fast)

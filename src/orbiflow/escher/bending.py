@@ -20,6 +20,7 @@ from orbiflow.geometry import best_similarity, complex_points, plane_points, sig
 from orbiflow.likeness.elastic import Elastic, Stiffness
 from orbiflow.likeness.fidelity import Fidelity, fidelity
 from orbiflow.likeness.pinned import Pinned
+from orbiflow.likeness.thinnest import narrowest_neck, neck_factor
 from orbiflow.silhouette.emphasis import Emphasis
 from orbiflow.silhouette.mesh import triangulate
 from orbiflow.silhouette.pins import Pins
@@ -66,7 +67,8 @@ class Bent(NamedTuple):
     - `placement`: one, of the fine outline.
     - `relaxed`: (n,) the outline let go a little: bent as it would like to be near this tile.
     - `energy`, `displacement`: of deforming.
-    - `fidelity`: what is left of the outline; finalists are ordered by its score.
+    - `fidelity`: what is left of the outline.
+    - `neck`: width of the narrowest neck, in square roots of the area.
     """
 
     hand: Hand
@@ -78,6 +80,11 @@ class Bent(NamedTuple):
     energy: float
     displacement: float
     fidelity: Fidelity
+    neck: float
+
+    def score(self, min_neck: float) -> float:
+        """What finalists are ordered by: their fidelity's, less where a neck is too thin."""
+        return self.fidelity.score * neck_factor(self.neck, min_neck)
 
     @property
     def cost(self) -> float:
@@ -135,7 +142,7 @@ def bent_tiles(
     progress: Callable[[float], None] | None = None,
     cancel: Cancel | None = None,
 ) -> tuple[list[Bent], int]:
-    """The finalists of one class, best fidelity first, no two of them twins.
+    """The finalists of one class, best score first, no two of them twins.
 
     Args:
         both: of the target.
@@ -152,23 +159,33 @@ def bent_tiles(
     """
     told, cancel = progress or (lambda _share: None), cancel or Cancel()
     found: list[Bent] = []
-    dropped = 0
+    dropped = done = 0
     sides = both[:1] if mirror_closed(kind) else both
-    for number, hand in enumerate(sides):
-        cancel.check()
-        best = _best_placements(hand, kind, settings, cancel)
-        count = len(best.costs)
-        for k in range(count):
+    tasks = [(hand, own) for own in settings.searches() for hand in sides]
+    work = sum(own.starts for _, own in tasks)
+    for hand, own in tasks:
+        best = _best_placements(hand, kind, own, cancel)
+        for k in range(len(best.costs)):
             cancel.check()
-            own = best.take(np.array([k]))
-            bent = _detailed(hand, kind, own.placements, own.points, settings.rounds)
-            if bent is None:
-                dropped += 1
-            else:
-                found.append(bent)
-            told((number + 0.5 + 0.5 * (k + 1) / count) / len(sides))
-    found.sort(key=lambda bent: -bent.fidelity.score)
-    return found, dropped
+            one = best.take(np.array([k]))
+            bent = _detailed(hand, kind, one.placements, one.points, own.rounds)
+            found += [] if bent is None else [bent]
+            dropped += bent is None
+            told((done + own.starts * (0.5 + 0.5 * (k + 1) / len(best.costs))) / work)
+        done += own.starts
+    found.sort(key=lambda bent: -bent.score(settings.min_neck))
+    return _unlike(found), dropped
+
+
+def _unlike(found: Sequence[Bent]) -> list[Bent]:
+    """Without those that are twins of an earlier one."""
+    kept: list[Bent] = []
+    for bent in found:
+        n = bent.hand.fine.size
+        mine = [other for other in kept if other.hand.mirrored == bent.hand.mirrored]
+        if all(_apart(bent.points[:n], other.points[:n]) > TWIN for other in mine):
+            kept.append(bent)
+    return kept
 
 
 def _best_placements(
@@ -256,6 +273,7 @@ def _detailed(
         float(body.forgiving_energy(tiles.points)[0] / area),
         float(body.displacement(tiles.points)[0]),
         fidelity(body.rest[: body.size], ring),
+        narrowest_neck(polygon).share,
     )
 
 

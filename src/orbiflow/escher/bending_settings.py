@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from orbiflow.errors import OrbiflowError
@@ -11,7 +11,7 @@ from orbiflow.escher.efforts import settings_for
 
 @dataclass(frozen=True)
 class BendingSettings:
-    """Knobs of the search by co-deformation; the defaults are effort "normal".
+    """Knobs of the search by co-deformation; the defaults are effort "normal" without what is below.
 
     - `placements`: ways to lay the outline along the template's edges that are tried, a class.
     - `held`: of these, the best after the springs, whose energy is minimised among tiles.
@@ -20,6 +20,7 @@ class BendingSettings:
     - `finalists`: of what comes of it, the best that are worked out with all of the outline's detail,
       a class and hand.
     - `rounds`: steps of the minimisation for finalists.
+    - `below`: levels of effort below that are searched, too, so that more effort never finds less.
     - `multiples`: points of a tile for each point of the search, the first that holds the corners.
     - `min_neck`: width of necks below which a tile's score falls, in square roots of the area.
     - `seed`: moves the outline's points.
@@ -31,6 +32,7 @@ class BendingSettings:
     share: float = 0.3
     finalists: int = 5
     rounds: int = 20
+    below: int = 0
     multiples: tuple[int, ...] = (4, 6)
     min_neck: float = 0.01
     seed: int = 0
@@ -41,6 +43,8 @@ class BendingSettings:
                 raise OrbiflowError(f"{name} must be at least 1, got {getattr(self, name)}")
         if not 0 < self.share <= 1:
             raise OrbiflowError(f"share must be above 0, at most 1, got {self.share}")
+        if not 0 <= self.below <= 2:
+            raise OrbiflowError(f"below must be 0, 1 or 2, got {self.below}")
         if not self.multiples or min(self.multiples) < 1:
             raise OrbiflowError(f"multiples must be at least 1, got {self.multiples}")
         if not 0 <= self.min_neck <= 0.2:
@@ -57,25 +61,37 @@ class BendingSettings:
         """
         return settings_for(cls, EFFORTS, effort, changes)
 
+    def searches(self) -> tuple[BendingSettings, ...]:
+        """Those of the levels below, least first, and these: none with levels below.
+
+        >>> [own.starts for own in BendingSettings.for_effort("best").searches()]
+        [8, 32, 128]
+        """
+        below = (FAST, NORMAL)[: self.below]
+        return tuple(replace(self, below=0, **changes) for changes in (*below, {}))
+
+
+FAST = {
+    "placements": 80,
+    "held": 20,
+    "starts": 8,
+    "share": 0.15,
+    "finalists": 2,
+    "rounds": 12,
+}
+NORMAL = {name: getattr(BendingSettings(), name) for name in FAST}
+BEST = {
+    "placements": 1500,
+    "held": 300,
+    "starts": 128,
+    "share": 1.0,
+    "finalists": 12,
+    "rounds": 40,
+}
 
 EFFORTS: dict[str, dict[str, Any]] = {
-    "fast": {
-        "placements": 80,
-        "held": 20,
-        "starts": 8,
-        "share": 0.15,
-        "finalists": 2,
-        "rounds": 12,
-        "multiples": (4,),
-    },
-    "normal": {},
-    "best": {
-        "placements": 1500,
-        "held": 300,
-        "starts": 128,
-        "share": 1.0,
-        "finalists": 12,
-        "rounds": 40,
-    },
+    "fast": FAST,
+    "normal": {**NORMAL, "below": 1},
+    "best": {**BEST, "below": 2},
 }
 """What each level changes."""

@@ -100,8 +100,8 @@ def _fit(
     )
     if not found:
         raise CertificationError(f"{kind.name}: all tiles near the silhouette cross themselves")
-    enough = 2 if per_class == 1 else 3 * per_class
-    found = found[: enough + 2]  # some to spare, if one is not certified
+    enough = 1 if per_class == 1 else 3 * per_class
+    found = found[: enough + 1]  # one to spare, if one is not certified
     overlaps = [Overlap(target.normal * (1.0, -1.0 if hand.mirrored else 1.0)) for hand in both]
     placed = [placed_best(bent, overlaps[bent.hand.mirrored]) for bent in found]
     starts = Prototiles.joined([prototile(kind, one) for one in placed])

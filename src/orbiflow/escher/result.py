@@ -20,7 +20,7 @@ from orbiflow.likeness.metrics import ShapeMetrics, compare, iou
 from orbiflow.likeness.pinned import Pinned
 from orbiflow.likeness.ranking import rank_score
 from orbiflow.likeness.recognition import Recognisability, Recogniser
-from orbiflow.likeness.thinnest import Thinnest, narrowest_neck
+from orbiflow.likeness.thinnest import Thinnest, narrowest_neck, neck_factor
 from orbiflow.silhouette.target import Target
 from orbiflow.symmetry.isometry import Array
 from orbiflow.tilings import Certificate, Tile, certify
@@ -86,9 +86,9 @@ class TileResult:
             score = self.fidelity.score
         else:
             score = rank_score(self.metrics.iou, self.recognisability.score)
-        if self.thinnest is None or self.thinnest.share >= self.min_neck:
+        if self.thinnest is None:
             return score
-        return score * self.thinnest.share / self.min_neck
+        return score * neck_factor(self.thinnest.share, self.min_neck)
 
     def family(self) -> tuple[TileResult, ...]:
         """This tile and the others of its class."""

@@ -147,7 +147,7 @@ def escherize(
     for what, number in (("workers", workers), ("per_class", per_class)):
         if number < 1:
             raise OrbiflowError(f"{what} must be at least 1, got {number}")
-    settings = BendingSettings() if settings is None else settings
+    settings = BendingSettings.for_effort("normal") if settings is None else settings
     task = Task(target, settings, emphasis, pins, per_class, force)
     cancel = cancel or Cancel()
     teller = _Teller(watch)

@@ -61,6 +61,15 @@ class Thinnest(NamedTuple):
         return self.ends.mean(axis=0)
 
 
+def neck_factor(share: float, min_neck: float) -> float:
+    """What a score is multiplied by where the narrowest neck, in square roots of the area, is `share`.
+
+    >>> neck_factor(0.02, 0.01), neck_factor(0.002, 0.01)
+    (1.0, 0.2)
+    """
+    return 1.0 if share >= min_neck else share / min_neck
+
+
 def narrowest_neck(ring: ArrayLike) -> Thinnest:
     """The narrowest neck of a polygon; without a neck, the diameter of its largest disc.
 
