@@ -150,3 +150,14 @@ def flowless(name: str, bent: Bent, factor: complex, shift: complex) -> TileMode
     return TileModel(
         kind, max_frequency=0, prototiles=prototile(kind, PlacedBent(bent, factor, shift))
     )
+
+
+def limb(tilt: float = 0.0, length: float = 1.2) -> np.ndarray:
+    """A disc with a limb 0.3 wide."""
+    body = np.exp(1j * np.linspace(0.15, 2 * np.pi - 0.15, 180))
+    reach = np.linspace(0, length, 30)[1:]
+    sides = [np.cos(0.15) + reach + 0.15j * side for side in (-1, 1)]
+    tip = sides[0][-1] + 0.3j * np.linspace(0, 1, 8)[1:-1]
+    own = np.concatenate([sides[0], tip, sides[1][::-1]])
+    root = np.cos(0.15)
+    return np.concatenate([body, root + (own - root) * np.exp(1j * tilt)])

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from orbiflow.geometry import complex_points, resampled
 from orbiflow.likeness.fidelity import fidelity
-from outlines import animal
+from outlines import animal, limb
 
 SQUIRREL = complex_points(resampled(animal("squirrel.dat").normal, 240))
 
@@ -46,17 +46,6 @@ def test_a_bent_bar_is_better_than_a_notched_and_a_pinched_one() -> None:
     assert scores == sorted(scores, reverse=True)
     assert fidelity(rest, notched).notches > 3 * fidelity(rest, bent).notches
     assert fidelity(rest, pinched).necks > 0 == fidelity(rest, bent).necks
-
-
-def limb(tilt: float = 0.0, length: float = 1.2) -> NDArray[np.complex128]:
-    """A disc with a limb 0.3 wide."""
-    body = np.exp(1j * np.linspace(0.15, 2 * np.pi - 0.15, 180))
-    reach = np.linspace(0, length, 30)[1:]
-    sides = [np.cos(0.15) + reach + 0.15j * side for side in (-1, 1)]
-    tip = sides[0][-1] + 0.3j * np.linspace(0, 1, 8)[1:-1]
-    own = np.concatenate([sides[0], tip, sides[1][::-1]])
-    root = np.cos(0.15)
-    return np.concatenate([body, root + (own - root) * np.exp(1j * tilt)])
 
 
 def test_a_lost_limb_costs_more_than_a_bent_one() -> None:

@@ -1,5 +1,7 @@
-"""How much a tile is like a silhouette: overlap, recognisability, and the order of a list."""
+"""How much a tile is like a silhouette: overlap, fidelity, recognisability, and the order of a list."""
 
+from orbiflow.likeness.faithfulness import faithfulness
+from orbiflow.likeness.fidelity import Fidelity, fidelity
 from orbiflow.likeness.metrics import (
     Region,
     Shape,
@@ -23,6 +25,7 @@ from orbiflow.likeness.thinnest import (
 )
 
 __all__ = [
+    "Fidelity",
     "Overlap",
     "Recognisability",
     "Recogniser",
@@ -34,6 +37,8 @@ __all__ = [
     "compare",
     "dice",
     "diverse",
+    "faithfulness",
+    "fidelity",
     "hair_share",
     "hausdorff",
     "iou",
