@@ -1,0 +1,107 @@
+"""What each part of the search for likeness is worth: the same search without it.
+
+    python benchmarks/likeness_ablations.py [--quick] [NAME ...]
+
+For each change the mean, over goals and the classes IH4, IH5 and IH6, of the damage of the best tile
+(`orbiflow.likeness.fidelity`: smaller is better; 1 is a quarter of what parts a good tile from a poor one)
+and of the seconds of CPU. Damage is one measure for all, whatever energy the search minimises.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+from likeness_methods import silhouette
+
+from orbiflow.escher import BendingSettings, bending, corner_shifts
+from orbiflow.escher.co_deformation import TIGHTER, drawn_to_tiles
+from orbiflow.likeness.elastic import Stiffness
+from orbiflow.threads import one_blas_thread
+from orbiflow.tilings import CLASSES
+
+NAMES = ("bat_60", "camel_60", "octpus_94", "squirrel1_60")
+KINDS = ("IH4", "IH5", "IH6")
+PLAIN = BendingSettings()
+
+Change = tuple[BendingSettings, Stiffness, dict[str, Any]]
+
+
+def springs(stages: int) -> dict[str, Any]:
+    """Stages of tightening springs, 27 steps in all."""
+    strengths = TIGHTER if stages == len(TIGHTER) else tuple(np.geomspace(1.2, 3000.0, stages))
+    if stages == 1:
+        strengths = (3000.0,)
+    drawn = partial(drawn_to_tiles, strengths=strengths, rounds=27 // stages)
+    return {"bending.drawn_to_tiles": drawn}
+
+
+CHANGES: dict[str, Change] = {
+    "as it is": (PLAIN, Stiffness(), {}),
+    "corners not moved": (PLAIN, Stiffness(), {"corner_shifts.MOST_MOVES": 0}),
+    "all neighbours worked out": (replace(PLAIN, share=1.0), Stiffness(), {}),
+    "placements chosen rigidly": (replace(PLAIN, placements=32, held=32), Stiffness(), {}),
+    "springs in one stage": (PLAIN, Stiffness(), springs(1)),
+    "springs in three stages": (PLAIN, Stiffness(), springs(3)),
+    "nothing forgiven": (PLAIN, Stiffness(), {"bending.SOFTENINGS": 0}),
+    "half the points": (replace(PLAIN, multiples=(2,)), Stiffness(), {}),
+    "half as many more": (replace(PLAIN, multiples=(6,)), Stiffness(), {}),
+    "thin parts not salient": (PLAIN, Stiffness(salience=0.0), {}),
+    "outline not stiff": (PLAIN, Stiffness(stretch=1e-3), {}),
+    "outline no rod": (PLAIN, Stiffness(bend=1e-9), {}),
+    "no pull to the pose": (PLAIN, Stiffness(pose=1e-3), {}),
+}
+
+
+@contextmanager
+def changed(values: dict[str, Any]) -> Iterator[None]:
+    """Constants of the search's modules changed for a while."""
+    modules = {"bending": bending, "corner_shifts": corner_shifts}
+    places = {name: (modules[name.split(".")[0]], name.split(".")[1]) for name in values}
+    before = {name: getattr(*place) for name, place in places.items()}
+    try:
+        for name, value in values.items():
+            setattr(*places[name], value)
+        yield
+    finally:
+        for name, value in before.items():
+            setattr(*places[name], value)
+
+
+def measured(names: Sequence[str], change: Change) -> tuple[float, float]:
+    """Mean damage and seconds of CPU."""
+    settings, stiffness, values = change
+    damages = []
+    began = time.process_time()
+    with changed(values), one_blas_thread():
+        for name in names:
+            both = bending.hands(silhouette(name), settings, stiffness)
+            for kind in KINDS:
+                found, _ = bending.bent_tiles(both, CLASSES[kind], settings)
+                damages.append(min((bent.fidelity.damage for bent in found), default=np.nan))
+    return float(np.nanmean(damages)), (time.process_time() - began) / len(damages)
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("names", nargs="*")
+    parser.add_argument("--quick", action="store_true", help="one goal")
+    options = parser.parse_args()
+    names: Sequence[str] = options.names or (NAMES[1:2] if options.quick else NAMES)
+    print(f"{', '.join(names)}; {', '.join(KINDS)}\n{'':28}damage  CPU s a class")
+    for label, change in CHANGES.items():
+        damage, seconds = measured(names, change)
+        print(f"{label:28}{damage:6.2f}{seconds:9.2f}", flush=True)
+
+
+if __name__ == "__main__":
+    main()
