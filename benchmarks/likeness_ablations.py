@@ -3,8 +3,8 @@
     python benchmarks/likeness_ablations.py [--quick] [NAME ...]
 
 For each change the mean, over goals and the classes IH4, IH5 and IH6, of the damage of the best tile
-(`orbiflow.likeness.fidelity`: smaller is better; 1 is a quarter of what parts a good tile from a poor one)
-and of the seconds of CPU. Damage is one measure for all, whatever energy the search minimises.
+(`orbiflow.likeness.fidelity`: smaller is better; tiles of one silhouette differ by about 4) and of the
+seconds of CPU. Damage is one measure for all, whatever energy the search minimises.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Contact sheets of tiles: black silhouettes on white, of one area, upright, beside their targets.
 
     python benchmarks/likeness_sheets.py [--out FOLDER] [--effort fast|normal|best]
-        [--only nine|phylopic] [--quick] [NAME ...]
+        [--only nine|phylopic] [--methods METHOD ...] [--blocks N] [--quick] [NAME ...]
 
 FOLDER/nine.png has of each goal the target, the first tile of the search for overlap and of the search
 for likeness, of ARAP, of EST and of the trial; FOLDER/phylopic.png the first three of the twenty
@@ -68,6 +68,8 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("out/likeness"))
     parser.add_argument("--effort", choices=("fast", "normal", "best"), default="normal")
     parser.add_argument("--only", choices=("nine", "phylopic"))
+    parser.add_argument("--methods", nargs="+", choices=METHODS, help="columns beside the target")
+    parser.add_argument("--blocks", type=int, help="side by side")
     parser.add_argument("--quick", action="store_true", help="one goal, effort fast")
     options = parser.parse_args()
     torch.set_num_threads(1)
@@ -80,7 +82,9 @@ def main() -> None:
         wanted.append(("nine", list(GOALS), METHODS, 1))
     if not wanted or not (options.quick or options.names or options.only):
         wanted.append(("phylopic", phylopic_names(), ours, 2))
-    for file, names, methods, blocks in wanted:
+    for file, names, usual, usual_blocks in wanted:
+        methods = tuple(options.methods or usual)
+        blocks = options.blocks or usual_blocks
         rows = found(names, effort, options.out, methods)
         path = options.out / f"{file}.png"
         sheet(rows, ("target", *methods), blocks).save(path)
