@@ -15,6 +15,7 @@ from itertools import permutations
 from typing import NamedTuple
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 
 from orbiflow.cancel import Cancel
@@ -31,6 +32,9 @@ SPRINGS = 1500.0
 ROUNDS = 3
 """Steps of choosing rotations and solving, a neighbour."""
 
+CROSSED = 100.0
+"""Added to the cost of what crosses itself: more than anything sound costs."""
+
 BETTER = 0.998
 """A neighbour is taken if it costs less than this much of what there is."""
 
@@ -43,7 +47,7 @@ class Drawn(NamedTuple):
 
     - `placements`: C of them.
     - `points`: (N, C).
-    - `costs`: (C,) energy, springs and displacement together.
+    - `costs`: (C,) energy, springs and displacement together; `CROSSED` more of what crosses itself.
     """
 
     placements: Placements
@@ -120,9 +124,11 @@ def _drawn(
     for _ in range(ROUNDS):
         points = body.pulled(points, tiles(), SPRINGS, 1)
     apart = (abs(points[:n] - tiles()) ** 2).mean(axis=0)
-    area = np.maximum(signed_area(plane_points(points[:n].T)), 0.1)
+    rings = plane_points(points[:n].T)
+    area = np.maximum(signed_area(rings), 0.1)
     costs = (body.lenient_energy(points) + SPRINGS * apart) / area
     costs += pose * body.displacement(points)
+    costs[~shapely.is_valid(shapely.polygons(rings))] += CROSSED
     return Drawn(placements._replace(turns=space.turns), points, costs)
 
 
