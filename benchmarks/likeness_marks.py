@@ -7,7 +7,6 @@ silhouettes, on sheets without names, and for each of ours the values of `orbifl
 the energy and the displacement. All correlations are within silhouettes: each silhouette's mean is
 taken out of marks and values alike. The weights of the order are one over each value's usual spread:
 nothing but the choice of its parts was fitted to marks.
-Under `older` are tiles of two earlier searches, marked by others: no part was chosen by these.
 """
 
 from __future__ import annotations
@@ -19,20 +18,21 @@ from typing import Any
 import numpy as np
 from common import ROOT, Ring
 
-from orbiflow.escher.bending import POSE
+from orbiflow.likeness.elastic import POSE
 from orbiflow.likeness.fidelity import Fidelity
 
 Row = dict[str, Any]
 
 
 def _fidelity(row: Row) -> Fidelity:
-    return Fidelity(tuple(row["pieces"]), row["notches"], row["narrowed"], row["necks"])
+    own = (row["notches"], row["narrowed"], row["necks"], row["cost"])
+    return Fidelity(tuple(row["pieces"]), *own)
 
 
 VALUES: dict[str, Callable[[Row], float]] = {
-    "energy": lambda row: float(np.log(row["energy"])),
+    "energy": lambda row: float(np.log(row["cost"] - POSE * row["displacement"])),
     "displacement": lambda row: float(np.log(row["displacement"])),
-    "cost: both": lambda row: float(np.log(row["energy"] + POSE * row["displacement"])),
+    "cost: both": lambda row: float(np.log(row["cost"])),
     "small pieces": lambda row: float(np.log(row["pieces"][0])),
     "middle pieces": lambda row: float(np.log(row["pieces"][1])),
     "large pieces": lambda row: float(np.log(row["pieces"][2])),
@@ -56,7 +56,7 @@ def main() -> None:
     agree = np.corrcoef(within([a for a, _ in both]), within([b for _, b in both]))[0, 1]
     print(f"{sum(map(len, tiles.values()))} tiles; the judges with each other: {agree:.2f}")
 
-    ours = {name: [row for row in rows if "energy" in row] for name, rows in tiles.items()}
+    ours = {name: [row for row in rows if "cost" in row] for name, rows in tiles.items()}
     marks = {name: np.mean([row["marks"] for row in rows], axis=1) for name, rows in ours.items()}
     seen = within(list(marks.values()))
     best = np.mean([mark.max() for mark in marks.values()])
@@ -68,12 +68,6 @@ def main() -> None:
         correlation = np.corrcoef(within(list(own.values())), seen)[0, 1]
         first = np.mean([marks[name][np.argmin(own[name])] for name in own])
         print(f"{label:20}{correlation:10.2f}{first:24.2f}")
-
-    older: list[list[Row]] = list(document["older"].values())
-    damages = within([np.array([_fidelity(row).damage for row in rows]) for rows in older])
-    means = within([np.mean([row["marks"] for row in rows], axis=1) for rows in older])
-    correlation = np.corrcoef(damages, means)[0, 1]
-    print(f"\n{len(means)} older tiles, which the order has not seen: {correlation:.2f}")
 
     print("\nARAP's first tile: its mark, and that of the tile that we would put first")
     for name, rows in tiles.items():

@@ -137,7 +137,7 @@ def test_more_rounds_cost_no_more() -> None:
     few = bent_squirrel("IH5").bent
     settings = replace(SMALL, rounds=40)
     (more,), _ = bent_tiles([squirrel_hands()[0]], CLASSES["IH5"], settings)
-    assert more.energy <= few.energy * 1.02
+    assert more.fidelity.cost <= few.fidelity.cost * 1.02
     assert SMALL.rounds < 40
 
 

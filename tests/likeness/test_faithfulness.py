@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from orbiflow.errors import OrbiflowError
 from orbiflow.geometry import plane_points
-from orbiflow.likeness import faithfulness, fidelity
+from orbiflow.likeness import faithfulness
 from outlines import animal, bent_squirrel, limb
 
 SQUIRREL = np.asarray(animal("squirrel.dat").normal)
@@ -33,10 +33,9 @@ def test_a_mirror_image_may_be_asked_to_count() -> None:
 @pytest.mark.parametrize("name", ["IH1", "IH4", "IH6", "IH28"])
 def test_a_tile_is_judged_as_by_the_points_that_it_was_bent_by(name: str) -> None:
     case = bent_squirrel(name, False)
-    body = case.bent.hand.fine
-    known = fidelity(body.rest[: body.size], case.bent.points[: body.size])
+    known = case.bent.fidelity
     found = faithfulness(SQUIRREL, case.tile.polygon)
-    assert found.score == pytest.approx(known.score, abs=0.12)
+    assert known.score - 0.12 < found.score < known.score + 0.3  # points may lie better
 
 
 def test_a_lost_limb_costs_more_than_a_bent_one() -> None:

@@ -17,7 +17,7 @@ from orbiflow.escher.outline_starts import mirror_closed
 from orbiflow.escher.placements import Complex, Placements, best_placements
 from orbiflow.escher.tile_space import TileSpace
 from orbiflow.geometry import best_similarity, complex_points, plane_points, signed_area
-from orbiflow.likeness.elastic import Elastic, Stiffness
+from orbiflow.likeness.elastic import POSE, Elastic, Stiffness
 from orbiflow.likeness.fidelity import Fidelity, fidelity
 from orbiflow.likeness.pinned import Pinned
 from orbiflow.likeness.thinnest import narrowest_neck, neck_factor
@@ -28,9 +28,6 @@ from orbiflow.silhouette.sampling import Samples, sampled
 from orbiflow.silhouette.target import Target
 from orbiflow.symmetry.isometry import Array
 from orbiflow.tilings import IsohedralClass
-
-POSE = 4.0
-"""What a displacement weighs beside the energy, in the order of candidates."""
 
 TWIN = 2e-4
 """Mean squared distance of two bent outlines below which they are twins."""
@@ -66,8 +63,7 @@ class Bent(NamedTuple):
     - `linear`, `offset`: the map from the group's own frame, of `points`.
     - `placement`: one, of the fine outline.
     - `relaxed`: (n,) the outline let go a little: bent as it would like to be near this tile.
-    - `energy`, `displacement`: of deforming.
-    - `fidelity`: what is left of the outline.
+    - `fidelity`: what is left of the outline, and what bending costs.
     - `neck`: width of the narrowest neck, in square roots of the area.
     """
 
@@ -77,19 +73,12 @@ class Bent(NamedTuple):
     offset: Array
     placement: Placements
     relaxed: Complex
-    energy: float
-    displacement: float
     fidelity: Fidelity
     neck: float
 
     def score(self, min_neck: float) -> float:
         """What finalists are ordered by: their fidelity's, less where a neck is too thin."""
         return self.fidelity.score * neck_factor(self.neck, min_neck)
-
-    @property
-    def cost(self) -> float:
-        """The energy and the displacement together; smaller is better."""
-        return self.energy + POSE * self.displacement
 
 
 def hands(
@@ -270,9 +259,7 @@ def _detailed(
         tiles.offset[0],
         tiles.placements,
         body.pulled(tiles.points, tiles.points[: body.size], RELAXED, 3)[: body.size, 0],
-        float(body.forgiving_energy(tiles.points)[0] / area),
-        float(body.displacement(tiles.points)[0]),
-        fidelity(body.rest[: body.size], ring),
+        fidelity(body.rest[: body.size], ring, float(body.cost(tiles.points)[0])),
         narrowest_neck(polygon).share,
     )
 

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from orbiflow.escher.bending import POSE, Hand
+from orbiflow.escher.bending import Hand
 from orbiflow.escher.result import TileResult
-from orbiflow.geometry import orient, plane_points, signed_area
+from orbiflow.geometry import orient
 from orbiflow.likeness.laid import laid_on
 from orbiflow.symmetry.isometry import Array
 
 
 def deformation(hand: Hand, ring: Array) -> float:
-    """What it costs to bend a silhouette until its outline is a ring: as `Bent.cost`.
+    """What it costs to bend a silhouette until its outline is a ring: as `Elastic.cost`.
 
     The forgiving energy in areas of the bent silhouette, and its displacement, at the best laying
     that `likeness.laid.laid_on` finds: outline points correspond by dynamic programming, four times
@@ -24,9 +24,8 @@ def deformation(hand: Hand, ring: Array) -> float:
         ring: (M, 2) simple, in the normal form, laid over the silhouette.
     """
     body = hand.fine
-    z = laid_on(body, orient(ring, counter_clockwise=True))[:, None]
-    area = float(signed_area(plane_points(z[: body.size, 0])))
-    return float(body.forgiving_energy(z)[0] / area + POSE * body.displacement(z)[0])
+    z = laid_on(body, orient(ring, counter_clockwise=True))
+    return float(body.cost(z[:, None])[0])
 
 
 def measured(result: TileResult, hand: Hand) -> TileResult:

@@ -183,7 +183,7 @@ def _with_bent(target: Target, result: TileResult, placed: PlacedBent) -> TileRe
         rest=rest,
         bent=outline,
         bent_iou=iou(whole, tile) if tile.is_valid else None,  # pyright: ignore[reportArgumentType]
-        deformation=placed.bent.cost,
+        deformation=placed.bent.fidelity.cost,
         fidelity=placed.bent.fidelity,
         pinned=body.misfit(outline_points) if isinstance(body, Pinned) else None,
         model=replace(result.model, bending=_bending(placed, result.normal_tile)),

@@ -22,7 +22,7 @@ import scipy.sparse
 from numpy.typing import NDArray
 
 from orbiflow.errors import OrbiflowError
-from orbiflow.geometry import best_similarity, complex_points
+from orbiflow.geometry import best_similarity, complex_points, plane_points, signed_area
 from orbiflow.silhouette.mesh import Mesh, triangulate
 from orbiflow.silhouette.thickness import local_thickness
 
@@ -38,6 +38,9 @@ THICK = 0.25
 SALIENT = (0.5, 8.0)
 """Bounds of what thinness may multiply weights by."""
 
+
+POSE = 4.0
+"""What a displacement weighs beside the energy, in the order of shapes."""
 
 REWEIGHTINGS = 50
 """Steps to the rotations of least forgiving energy, at most."""
@@ -128,6 +131,11 @@ class Elastic:
         less than the same spread over all of the outline.
         """
         return self._forgiven(*self._forgiven_misfits(z))
+
+    def cost(self, z: Complex) -> Array:
+        """(C,) what shapes (N, C) cost: `forgiving_energy` in their areas, and the displacement."""
+        area = signed_area(plane_points(z[: self.size].T))
+        return self.forgiving_energy(z) / area + POSE * self.displacement(z)
 
     def lenient_energy(self, z: Complex) -> Array:
         """`forgiving_energy` (C,) at the rotations of least plain energy: never less, and quick."""

@@ -64,10 +64,9 @@ def faithfulness(silhouette: ArrayLike, shape: ArrayLike, *, mirror: bool = True
     for laying in rough[:TRIED]:
         factor, middle, _ = overlaid(laying.ring, overlap, laying.turn)
         z = laid_on(body, plane_points(factor * laying.ring + middle))[:, None]
-        cost = body.energy(z)[0] / signed_area(plane_points(z[: body.size, 0]))
-        found.append((float(cost), z[: body.size, 0]))
-    _, outline = min(found, key=lambda one: one[0])
-    return fidelity(body.rest[: body.size], outline)
+        found.append((float(body.cost(z)[0]), z[: body.size, 0]))
+    cost, outline = min(found, key=lambda one: one[0])
+    return fidelity(body.rest[: body.size], outline, cost)
 
 
 class _Laying(NamedTuple):

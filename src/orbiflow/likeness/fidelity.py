@@ -1,15 +1,17 @@
 """How much of a silhouette is left in its bent outline, as eyes see it: pose-blind, point by point.
 
-What people say of bent silhouettes goes with five things, none of which minds where a limb points
-(docs/likeness.md has the evidence), and a sixth keeps threads away that no cutter can make:
+What people say of bent silhouettes goes with six things, most of which do not mind where a limb points
+(docs/likeness.md has the evidence), and a seventh keeps threads away that no cutter can make:
 
 - `pieces`: how well pieces of the outline are kept, each compared after its own best motion
   (Procrustes; Gower, 1975), by the mean of the roots: a few pieces may be lost, the rest is to be
-  exact. Small pieces tell of corners and toes, middle ones of limbs and heads, large ones of the whole.
+  exact. Small pieces tell of corners and toes, middle ones of limbs and heads, large ones of the whole;
+  a piece counts by the root of the body's thickness there, a head more than a leg.
 - `notches`: where the space outside has become narrower than it was: slits, notches and folds that
   the silhouette does not have. The width is that of the largest disc outside that touches the outline
   (the outer medial axis; found as by Ma, Bae and Choi, 3D medial axis point approximation, 2012).
 - `narrowed`: the same inside: limbs and bodies grown thin.
+- `cost`: of bending (`Elastic.cost`): energy, and displacement from the pose.
 - `necks`: how much narrower the inside has become at its worst place beyond half: threads.
 
 Outlines are given point by point: this compares a shape with what it was bent from, not any two.
@@ -34,10 +36,10 @@ PIECES = (0.04, 0.15, 0.4)
 CLEAR = 0.02
 """Added to widths, in square roots of the area: below it, differences matter little."""
 
-USUAL = (0.12, 0.16, 0.13, 0.3, 0.037)
-"""Of the pieces, of notches and of what is narrowed: values in a tile of middling likeness."""
+USUAL = (0.12, 0.16, 0.13, 0.3, 0.037, 0.25)
+"""Of the pieces, of notches, of what is narrowed, of the cost: in a tile of middling likeness."""
 
-WEIGHTS = (6.5, 6.5, 6.5, 2.6, 2.3)
+WEIGHTS = (6.5, 6.5, 6.5, 2.6, 2.3, 6.5)
 """Of their logarithms: one over how much these differ between tiles of one silhouette."""
 
 LITTLE = 0.3
@@ -49,22 +51,23 @@ class Fidelity:
     """What bending left of an outline; all values from 0, smaller is better, but for `score`.
 
     - `pieces`: of three lengths, small to large.
-    - `notches`, `narrowed`, `necks`: see the module.
+    - `notches`, `narrowed`, `necks`, `cost`: see the module.
     """
 
     pieces: tuple[float, float, float]
     notches: float
     narrowed: float
     necks: float
+    cost: float
 
     @property
     def damage(self) -> float:
         """About 0 for a tile of middling likeness, smaller is better.
 
-        The sum of `necks` and of the first five values' logarithms, each relative to its usual value,
+        The sum of `necks` and of the others' logarithms, each relative to its usual value,
         with `LITTLE` added, and weighted.
         """
-        values = (*self.pieces, self.notches, self.narrowed)
+        values = (*self.pieces, self.notches, self.narrowed, self.cost)
         relative = [value / usual for value, usual in zip(values, USUAL, strict=True)]
         parts = [math.log((LITTLE + value) / (LITTLE + 1)) for value in relative]
         return self.necks + float(np.dot(WEIGHTS, parts))
@@ -78,32 +81,34 @@ class Fidelity:
         return 1 / (1 + math.exp(min(self.damage / 4, 700.0)))
 
 
-def fidelity(rest: Complex, bent: Complex) -> Fidelity:
+def fidelity(rest: Complex, bent: Complex, cost: float) -> Fidelity:
     """Compare an outline with what it was bent from.
 
     Args:
         rest, bent: (n,) x + iy, counter-clockwise, nearly evenly spaced; point k of the one became
             point k of the other.
+        cost: of bending, `Elastic.cost`.
 
     >>> square = np.array([0, 1, 2, 2 + 1j, 2 + 2j, 1 + 2j, 2j, 1j])
-    >>> fidelity(square, 3 * square * 1j + 7).score > 0.999
+    >>> fidelity(square, 3 * square * 1j + 7, 0.0).score > 0.999
     True
     """
     rest, bent = (z / np.sqrt(abs(signed_area(plane_points(z)))) for z in (rest, bent))
     weight = abs(np.roll(rest, -1) - rest)
     weight /= weight.sum()
-    outside, inside = (
-        np.log(_clearance(rest, inside=side) / _clearance(bent, inside=side))
-        for side in (False, True)
-    )
+    outside = np.log(_clearance(rest) / _clearance(bent))
+    thick = _clearance(rest, inside=True)
+    inside = np.log(thick / _clearance(bent, inside=True))
     small, middle, large = (
-        float(np.sqrt(_misfits(rest, bent, length)).mean()) for length in PIECES
+        float(np.average(np.sqrt(_misfits(rest, bent, length)), weights=np.sqrt(thick)))
+        for length in PIECES
     )
     return Fidelity(
         (small, middle, large),
         float((weight * np.maximum(outside, 0) ** 2).sum()),
         float((weight * np.maximum(inside, 0) ** 2).sum()),
         max(0.0, float(inside.max()) - math.log(2.0)),
+        cost,
     )
 
 
