@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -63,6 +64,16 @@ def _paths(scene: Scene, layer: Layer) -> list[Path]:
         else:
             paths.append(_path(*_points_and_codes(item)))
     return paths
+
+
+def curves_path(curves: Iterable[Curve]) -> Path:
+    """Several curves as one path of matplotlib's, filled together."""
+    from matplotlib.path import Path
+
+    parts = [_points_and_codes(curve) for curve in curves]
+    if not parts:
+        return Path(np.zeros((0, 2)))
+    return _path(*(np.concatenate(part) for part in zip(*parts, strict=True)))
 
 
 def _path(points: Array, codes: Array) -> Path:

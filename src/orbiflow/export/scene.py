@@ -19,6 +19,10 @@ Role = Literal["paper", "tiles", "cut", "mark"]
 """What a layer is for: a background, filled tiles, lines to cut or draw, marks to measure by."""
 
 
+INK = "currentColor"
+"""A colour in a motif's styles: the one that shows on the copy's own, which its layer says."""
+
+
 class Box(NamedTuple):
     """A rectangle in mm."""
 

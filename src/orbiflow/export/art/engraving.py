@@ -1,0 +1,2 @@
+def engraved(tile, strokes, around): return ()
+def eyes(tile, given): return ()
