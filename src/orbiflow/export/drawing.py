@@ -24,11 +24,15 @@ def drawn(scene: Scene, *, least_width: float = 0.0) -> Figure:
 
     Args:
         least_width: of strokes in mm, so that hairlines show on a screen.
+
+    Raises:
+        OrbiflowError: for artwork.
     """
     from matplotlib.collections import PathCollection
     from matplotlib.figure import Figure
     from matplotlib.patches import Rectangle
 
+    scene.require_plain()
     figure = Figure(figsize=(scene.width / INCH, scene.height / INCH))
     figure.patch.set_facecolor("white")
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))

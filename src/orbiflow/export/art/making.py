@@ -8,7 +8,7 @@ import numpy as np
 
 from orbiflow.cancel import Cancel
 from orbiflow.export.art.engraving import engraved, eyes
-from orbiflow.export.art.motif import Motif, Part, paint_motif
+from orbiflow.export.art.motif import paint_motif
 from orbiflow.export.art.page import ArtPage, art_page
 from orbiflow.export.art.paint import Grid, Paint
 from orbiflow.export.art.picture import FRINGE, Picture, carried_picture
@@ -16,7 +16,7 @@ from orbiflow.export.art.raster import render_page
 from orbiflow.export.art.settings import ArtSettings
 from orbiflow.export.art.source import ArtTile
 from orbiflow.export.curves import Curve
-from orbiflow.export.scene import Style
+from orbiflow.export.scene import Motif, Part, Style
 from orbiflow.figures.palette import palette
 from orbiflow.symmetry.isometry import Array
 
@@ -59,6 +59,7 @@ def artwork(
     *,
     picture: Picture | None = None,
     drawing: Motif | None = None,
+    notes: tuple[str, ...] = (),
 ) -> Artwork:
     """Prepare a picture of a tiling with something on its tiles.
 
@@ -66,7 +67,7 @@ def artwork(
         tile: see `read_art_tile`.
         settings: see `ArtSettings`.
         picture: colours over the silhouette, see `read_picture`.
-        drawing: carried already, see `read_drawing`.
+        drawing: carried already; `read_over` gives either, and `notes`.
 
     Raises:
         OrbiflowError: for a picture or an eye where there is no map of the silhouette, an eye outside
@@ -77,12 +78,12 @@ def artwork(
         tile.require_map()
     page = art_page(tile.given, settings)
     parts: tuple[Part, ...] = () if drawing is None else drawing.parts
-    around = eyes(tile, settings.eyes)
+    around = eyes(tile, settings.eyes, palette(settings.palette))
     if settings.engrave is not None:
         parts += engraved(tile, settings.engrave, around)
     parts += tuple(part for eye in around for part in eye.parts)
-    notes = (*tile.notes, *(picture.notes if picture else ()), *page.notes)
-    return Artwork(tile, settings, page, picture, Motif(parts), notes)
+    said = (*tile.notes, *notes, *page.notes)
+    return Artwork(tile, settings, page, picture, Motif(parts), said)
 
 
 def render_artwork(art: Artwork, *, cancel: Cancel | None = None) -> np.ndarray:
@@ -97,24 +98,35 @@ def render_artwork(art: Artwork, *, cancel: Cancel | None = None) -> np.ndarray:
 def render_on(art: Artwork, page: ArtPage, *, cancel: Cancel | None = None) -> np.ndarray:
     """As `render_artwork`, of another part of the same plane."""
     settings, chosen = art.settings, palette(art.settings.palette)
-    grid = Grid.over(art.page.tile.polygon, FINER * art.page.scale, art.page.count)
+    grid = raster_grid(art)
     coloured = painted(art, grid).coloured(chosen, art.page.count)
-    return render_page(
-        page, grid, coloured, chosen.paper, samples=settings.samples, cancel=cancel
-    )
+    return render_page(page, grid, coloured, chosen.paper, samples=settings.samples, cancel=cancel)
+
+
+def raster_grid(art: Artwork) -> Grid:
+    """The tile's raster, as fine as the page asks for."""
+    return Grid.over(art.page.tile.polygon, FINER * art.page.scale, art.page.count)
+
+
+def picture_paint(art: Artwork, grid: Grid) -> Paint:
+    """The tile's raster with nothing but the picture."""
+    paint = Paint(grid)
+    if art.picture is None:
+        return paint
+    depth = grid.depth(art.page.tile.polygon)
+    paint.lay(*carried_picture(art.picture, art.tile.carried, grid))
+    fringe = FRINGE * art.picture.pixel * grid.density
+    # not where it would take a thin tile's whole width
+    paint.bleed(depth, min(max(fringe, 1.0), 0.25 * float(depth.max())))
+    return paint
 
 
 def painted(art: Artwork, grid: Grid) -> Paint:
     """The tile's raster."""
     polygon = art.page.tile.polygon
-    paint, depth = Paint(grid), grid.depth(polygon)
-    if art.picture is not None:
-        paint.lay(*carried_picture(art.picture, art.tile.carried, grid))
-        fringe = FRINGE * art.picture.pixel * grid.density
-        # not where it would take a thin tile's whole width
-        paint.bleed(depth, min(max(fringe, 1.0), 0.25 * float(depth.max())))
+    paint = picture_paint(art, grid)
     paint_motif(paint, art.motif)
-    paint.bleed(depth, 1.0)
+    paint.bleed(grid.depth(polygon), 1.0)
     if art.outline > 0:
         paint_motif(paint, outlined(polygon, art.outline / art.page.scale, art))
     return paint

@@ -1,17 +1,15 @@
-"""What is drawn on a tile in curves: a list of parts, from the bottom up, in the tile's units."""
+"""What is drawn on a tile in curves, as pixels of the tile's raster."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
 from itertools import groupby
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from orbiflow.export.art.paint import Grid, Paint
-from orbiflow.export.curves import Curve
 from orbiflow.export.drawing import curves_path
-from orbiflow.export.scene import INK, Style
+from orbiflow.export.scene import INK, Motif, Part
 from orbiflow.symmetry.isometry import Array
 
 if TYPE_CHECKING:
@@ -19,44 +17,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 DOTS = 100
-
-
-class Part(NamedTuple):
-    """Curves drawn as one.
-
-    - `curves`: closed ones are filled, holes run the other way.
-    - `style`: fill and stroke; `INK` is a colour that shows on the tile's own. Widths are in the
-      tile's units.
-    - `opacity`: 0 to 1.
-    """
-
-    curves: tuple[Curve, ...]
-    style: Style
-    opacity: float = 1.0
-
-    @property
-    def inked(self) -> bool:
-        return INK in (self.style.fill, self.style.stroke)
-
-    def moved(self, linear: Array, offset: Array) -> Part:
-        """Under a map p -> linear p + offset."""
-        scale = float(np.sqrt(abs(np.linalg.det(linear))))
-        return Part(
-            tuple(curve.moved(linear, offset) for curve in self.curves),
-            self.style._replace(width=self.style.width * scale),
-            self.opacity,
-        )
-
-
-@dataclass(frozen=True, eq=False)
-class Motif:
-    """Parts from the bottom up."""
-
-    parts: tuple[Part, ...] = ()
-
-    def moved(self, linear: Array, offset: Array) -> Motif:
-        """As `Part.moved`."""
-        return replace(self, parts=tuple(part.moved(linear, offset) for part in self.parts))
 
 
 def paint_motif(paint: Paint, motif: Motif) -> None:

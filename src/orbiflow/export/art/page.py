@@ -51,6 +51,11 @@ class ArtPage:
         """Pixels a unit."""
         return float(np.sqrt(abs(np.linalg.det(self.linear))))
 
+    @property
+    def shown(self) -> float:
+        """How many tiles the picture has room for, by area."""
+        return self.width * self.height / (self.scale**2 * abs(self.tile.signed_area))
+
     def rings(self) -> Array:
         """(M, N, 2) the copies in pixels."""
         return self.copies.images(self.tile.polygon) @ self.linear.T + self.offset
@@ -105,7 +110,9 @@ def art_page(given: ExportTile, settings: ArtSettings) -> ArtPage:
     return _page(tile, colours, found.linear, offset, (found.width, found.height), (said,))
 
 
-def laid(page: ArtPage, given: ExportTile, settings: ArtSettings, across: int, down: int) -> ArtPage:
+def laid(
+    page: ArtPage, given: ExportTile, settings: ArtSettings, across: int, down: int
+) -> ArtPage:
     """A page that shows a repeating cell's plane over `across` x `down` cells, made anew."""
     colours = _Colours(given.tile, settings.colour)
     size = page.width * across, page.height * down

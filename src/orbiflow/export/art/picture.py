@@ -131,10 +131,7 @@ def _places(carried: CarriedTile, grid: Grid) -> Array:
     # along a run only x changes
     start = offset[own] + linear[own, :, 1] * (found.row + 0.5)[:, None]
     places = np.stack(
-        [
-            found.spread(start[:, k]) + found.spread(linear[own, k, 0]) * columns
-            for k in (0, 1)
-        ],
+        [found.spread(start[:, k]) + found.spread(linear[own, k, 0]) * columns for k in (0, 1)],
         axis=-1,
     )
     return places.reshape(grid.height, grid.width, 2)

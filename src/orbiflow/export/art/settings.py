@@ -23,7 +23,6 @@ SMALLEST_TILE = 8.0
 """In pixels: smaller ones show nothing."""
 
 
-
 @dataclass(frozen=True)
 class ArtSettings:
     """All lengths in pixels.
