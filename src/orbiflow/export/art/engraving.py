@@ -18,7 +18,7 @@ from orbiflow.figures.palette import Palette
 from orbiflow.geometry import arc_lengths, best_similarity, complex_points, resampled
 from orbiflow.symmetry.isometry import Array
 
-USUAL_EYE = 0.026
+USUAL_EYE = 0.032
 """Radius of an eye in square roots of the tile's area."""
 
 CLEAR = 1.7
@@ -104,7 +104,7 @@ def engraved(tile: ArtTile, strokes: Strokes, around: tuple[Eye, ...] = ()) -> t
     return (Part(tuple(Curve.polyline(ring, closed=True) for ring in rings), Style(INK)),)
 
 
-def _hatch(body: Body, reach: float = 0.36, spacing: float = 0.017) -> list[Array]:
+def _hatch(body: Body, reach: float = 0.32, spacing: float = 0.017) -> list[Array]:
     """Ticks inwards from the outline as on a woodcut: long in the shade, short in the light.
 
     None is longer than `reach`.

@@ -11,7 +11,7 @@ from orbiflow.export.art.engraving import engraved, eyes
 from orbiflow.export.art.motif import paint_motif
 from orbiflow.export.art.page import ArtPage, art_page
 from orbiflow.export.art.paint import Grid, Paint
-from orbiflow.export.art.picture import FRINGE, Picture, carried_picture
+from orbiflow.export.art.picture import Picture, carried_picture
 from orbiflow.export.art.raster import render_page
 from orbiflow.export.art.settings import ArtSettings
 from orbiflow.export.art.source import ArtTile
@@ -113,11 +113,8 @@ def picture_paint(art: Artwork, grid: Grid) -> Paint:
     paint = Paint(grid)
     if art.picture is None:
         return paint
-    depth = grid.depth(art.page.tile.polygon)
-    paint.lay(*carried_picture(art.picture, art.tile.carried, grid))
-    fringe = FRINGE * art.picture.pixel * grid.density
-    # not where it would take a thin tile's whole width
-    paint.bleed(depth, min(max(fringe, 1.0), 0.25 * float(depth.max())))
+    paint.lay(*carried_picture(art.picture, art.tile, grid))
+    paint.bleed(grid.depth(art.page.tile.polygon), 1.0)
     return paint
 
 

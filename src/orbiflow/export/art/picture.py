@@ -8,11 +8,12 @@ from pathlib import Path
 import numpy as np
 import torch
 from PIL import Image
+from scipy.ndimage import distance_transform_edt
 
 from orbiflow.errors import InputFileError
 from orbiflow.escher.carried import CarriedTile
 from orbiflow.export.art.paint import Grid
-from orbiflow.export.art.runs import runs, triangle_sides
+from orbiflow.export.art.runs import polygon_sides, runs, triangle_sides
 from orbiflow.export.art.source import ArtTile, Covered
 from orbiflow.silhouette.readers.raster import deep_channel, open_image, upright
 from orbiflow.symmetry.isometry import Array
@@ -22,6 +23,9 @@ SAME_ASPECT = 0.01
 
 FRINGE = 1.5
 """Pixels of the picture along the outline that its background may have mixed with."""
+
+THIN = 4.0
+"""Pixels of the silhouette farther than that from what the fringe leaves are kept: thin limbs."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,24 +93,48 @@ def _decode(path: Path, image: Image.Image) -> tuple[Image.Image, tuple[str, ...
     return turned.convert("RGBA"), tuple(notes)
 
 
-def carried_picture(picture: Picture, carried: CarriedTile, grid: Grid) -> tuple[Array, Array]:
-    """The picture on the tile's raster.
+def carried_picture(picture: Picture, tile: ArtTile, grid: Grid) -> tuple[Array, Array]:
+    """The picture on the tile's raster; its colours go on a little beyond the outline.
 
     Returns:
         Colours (height, width, 3) times their opacity, and the opacity (height, width).
     """
     small = picture.reduced(1 / grid.density)
-    places = _places(carried, grid)
+    places = _places(tile.carried, grid)
     low, high = small.covered.low, small.covered.high
     at = torch.from_numpy(((places - low) / (high - low) * 2 - 1).astype(np.float32))
     straight = np.asarray(small.image, dtype=np.float32) / 255
     straight[..., :3] *= straight[..., 3:]
+    straight = _spread(straight, (tile.outline - low) / (high - low) * small.image.size)
     values = torch.from_numpy(np.ascontiguousarray(straight.transpose(2, 0, 1)))[None]
     found = torch.nn.functional.grid_sample(
         values, at[None], mode="bilinear", padding_mode="border", align_corners=False
     )[0]
     result = found.permute(1, 2, 0).numpy()
     return result[..., :3], result[..., 3]
+
+
+def _spread(colours: Array, outline: Array) -> Array:
+    """Colours (height, width, 4) that from just inside an outline in pixels go on outside it.
+
+    So neither the background of a cut-out nor what it mixed with along the outline shows.
+    """
+    height, width = colours.shape[:2]
+    found = runs(polygon_sides(outline), 0, height, width)
+    inside = found.spread(found.label >= 0).reshape(height, width)
+    # beyond the picture is outside, too
+    depth = np.asarray(distance_transform_edt(np.pad(inside, 1)))[1:-1, 1:-1]
+    kept = depth > FRINGE
+    if kept.any():
+        kept |= (depth > 1) & (np.asarray(distance_transform_edt(~kept)) > THIN)
+    else:
+        kept = inside
+    if not kept.any():
+        return colours
+    rows, columns = np.asarray(
+        distance_transform_edt(~kept, return_distances=False, return_indices=True)
+    )
+    return colours[rows, columns]
 
 
 def _places(carried: CarriedTile, grid: Grid) -> Array:
