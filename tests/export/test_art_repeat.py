@@ -38,7 +38,11 @@ def test_lattices_with_a_rectangle_are_hardly_stretched(name: str) -> None:
 @pytest.mark.parametrize("turn", [0.0, 0.3, -1.2])
 @pytest.mark.parametrize(
     ("lattice", "cells"),
-    [([[1.0, 0.0], [0.0, 0.7]], 1), ([[1.0, 0.5], [0.0, 0.75**0.5]], 2), ([[2.0, 1.0], [0, 0.4]], 2)],
+    [
+        ([[1.0, 0.0], [0.0, 0.7]], 1),
+        ([[1.0, 0.5], [0.0, 0.75**0.5]], 2),
+        ([[2.0, 1.0], [0, 0.4]], 2),
+    ],
 )
 def test_known_lattices(lattice, cells: int, turn: float) -> None:
     basis = rotation_matrix(turn) @ np.array(lattice)

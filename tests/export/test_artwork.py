@@ -25,7 +25,7 @@ def settings(**options) -> ArtSettings:
 
 def owners(art: Artwork, points: np.ndarray) -> np.ndarray:
     """Which copy each point of the page lies in, by shapely."""
-    tree = shapely.STRtree(shapely.polygons(art.page.rings()))
+    tree = shapely.STRtree(np.asarray(shapely.polygons(art.page.rings())))
     point, copy = tree.query(shapely.points(points), predicate="intersects")
     found = np.full(len(points), -1)
     found[point] = copy
@@ -78,7 +78,7 @@ def test_a_checkerboard_is_carried(name: str) -> None:
     # a pixel of the page is a few of the picture's: away from the squares' sides and the tile's
     into = np.stack([x, y]) * 6 / longer % 1
     clear = (abs(into - 0.5) < 0.3).all(axis=0)
-    rings = shapely.linearrings(art.page.rings())[copy]
+    rings = np.asarray(shapely.linearrings(art.page.rings()))[copy]
     clear &= shapely.distance(shapely.points(points), rings) > 3
     assert clear.sum() > 500
     np.testing.assert_allclose(made[row, column][clear], parity[clear], atol=0.02)
@@ -109,7 +109,6 @@ def test_the_map_onto_the_raster_has_no_fold() -> None:
     grid = raster_grid(art)
     places = _places(tile.carried, grid)
     depth = grid.depth(art.page.tile.polygon)
-    down, right = (np.diff(places, axis=k)[:-1, :-1] for k in (0, 1))
     down, right = np.diff(places, axis=0)[:, :-1], np.diff(places, axis=1)[:-1]
     turn = right[..., 0] * down[..., 1] - right[..., 1] * down[..., 0]
     inside = depth[:-1, :-1] > 2

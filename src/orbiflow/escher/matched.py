@@ -30,8 +30,8 @@ def matched(silhouette: Array, polygon: Array) -> Bending:
     """A map without folds from a silhouette to a tile that lies over it.
 
     Points of the outlines are matched in order, near ones with near ones (dynamic programming over
-    both outlines, from the two points that are nearest); the inside follows harmonically and is
-    untangled.
+    both outlines, from the two points that are nearest); the inside follows harmonically and
+    is untangled.
 
     Args:
         silhouette: outline (N, 2) in the target's normal form.
@@ -102,15 +102,14 @@ def _shares(mesh: Mesh, ring: Array) -> Array:
 
 
 def _harmonic(mesh: Mesh, outline: Array) -> Array:
-    """(N, 2) the mesh's points, each inner one in the middle of its neighbours."""
+    """(N, 2) the mesh's points moved: those inside by the mean of how their neighbours are."""
     count, fixed = len(mesh.points), len(outline)
-    ends = np.concatenate([mesh.triangles[:, [0, 1]], mesh.triangles[:, [1, 2]]])
-    ends = np.concatenate([ends, mesh.triangles[:, [2, 0]]])
+    ends = np.concatenate([mesh.triangles[:, [k, (k + 1) % 3]] for k in range(3)])
     links = sparse.coo_array((np.ones(len(ends)), ends.T), shape=(count, count)).tocsr()
     links = links + links.T
-    laplacian = sparse.diags_array(np.asarray(links.sum(axis=1)).ravel()) - links
-    laplacian = sparse.csr_array(laplacian)
+    laplacian = sparse.csr_array(sparse.diags_array(np.asarray(links.sum(axis=1)).ravel()) - links)
+    moved = outline - mesh.points[:fixed]
     inner = spsolve(
-        sparse.csc_matrix(laplacian[fixed:, fixed:]), -(laplacian[fixed:, :fixed] @ outline)
+        sparse.csc_array(laplacian[fixed:, fixed:]), -(laplacian[fixed:, :fixed] @ moved)
     )
-    return np.concatenate([outline, np.asarray(inner).reshape(-1, 2)])
+    return mesh.points + np.concatenate([moved, np.asarray(inner).reshape(-1, 2)])

@@ -55,8 +55,9 @@ class Body:
 
     @cached_property
     def _slope(self) -> tuple[Array, Array]:
-        down, right = np.gradient(gaussian_filter(self._depth, 6.0))
-        return right, down
+        # along x, along y
+        smooth = gaussian_filter(self._depth, 6.0)
+        return np.gradient(smooth, axis=1), np.gradient(smooth, axis=0)
 
     def depth(self, points: Array) -> Array:
         """(...) how far inside points (..., 2) lie; 0 outside."""
