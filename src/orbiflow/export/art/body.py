@@ -9,7 +9,6 @@ import numpy as np
 from scipy.ndimage import distance_transform_edt, gaussian_filter, map_coordinates
 
 from orbiflow.export.art.paint import Grid
-from orbiflow.export.art.runs import polygon_sides, runs
 from orbiflow.geometry import resampled, signed_area
 from orbiflow.symmetry.isometry import Array
 
@@ -49,9 +48,7 @@ class Body:
     @cached_property
     def _depth(self) -> Array:
         grid = self._grid
-        found = runs(polygon_sides(grid.texels(self.ring)), 0, grid.height, grid.width)
-        inside = found.spread(found.label >= 0).reshape(grid.height, grid.width)
-        return np.asarray(distance_transform_edt(inside)) / grid.density
+        return np.asarray(distance_transform_edt(grid.inside(self.ring))) / grid.density
 
     @cached_property
     def _slope(self) -> tuple[Array, Array]:

@@ -114,7 +114,7 @@ def picture_paint(art: Artwork, grid: Grid) -> Paint:
     if art.picture is None:
         return paint
     paint.lay(*carried_picture(art.picture, art.tile, grid))
-    paint.bleed(grid.depth(art.page.tile.polygon), 1.0)
+    paint.bleed(grid.inside(art.page.tile.polygon))
     return paint
 
 
@@ -122,8 +122,9 @@ def painted(art: Artwork, grid: Grid) -> Paint:
     """The tile's raster."""
     polygon = art.page.tile.polygon
     paint = picture_paint(art, grid)
-    paint_motif(paint, art.motif)
-    paint.bleed(grid.depth(polygon), 1.0)
+    if art.motif.parts:
+        paint_motif(paint, art.motif)
+        paint.bleed(grid.inside(polygon))
     if art.outline > 0:
         paint_motif(paint, outlined(polygon, art.outline / art.page.scale, art))
     return paint

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import distance_transform_edt
+from numpy.typing import NDArray
+from scipy.ndimage import binary_dilation
 
 from orbiflow.export.art.runs import polygon_sides, runs
 from orbiflow.figures.palette import Palette
@@ -14,8 +15,12 @@ from orbiflow.symmetry.isometry import Array
 MARGIN = 3
 """Texels around the tile."""
 
-MOST_TEXELS = 36_000_000
+MOST_TEXELS = 20_000_000
 """Of the rasters of all colours together."""
+
+
+_AROUND = ((-1, -1), (-1, 1), (1, -1), (1, 1), (-1, 0), (1, 0), (0, -1), (0, 1))
+"""The neighbours of a texel, those that share a side last: theirs is what counts."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,12 +49,10 @@ class Grid:
         """Where points (..., 2) of the tile's units lie."""
         return (points - self.corner) * self.density
 
-    def depth(self, ring: Array) -> Array:
-        """(height, width) how many texels inside the ring each is; 0 outside."""
-        sides = polygon_sides(self.texels(ring))
-        found = runs(sides, 0, self.height, self.width)
-        inside = found.spread(found.label >= 0).reshape(self.height, self.width)
-        return np.asarray(distance_transform_edt(inside))
+    def inside(self, ring: Array) -> NDArray[np.bool_]:
+        """(height, width) which texels have their middle in the ring."""
+        found = runs(polygon_sides(self.texels(ring)), 0, self.height, self.width)
+        return found.spread(found.label >= 0).reshape(self.height, self.width)
 
 
 class Paint:
@@ -78,17 +81,17 @@ class Paint:
         """One colour over all, (height, width)."""
         self.lay(alpha[..., None] * rgb_of(colour).astype(np.float32), alpha)
 
-    def bleed(self, depth: Array, least: float) -> None:
-        """What lies less than `least` texels inside becomes what lies nearest farther in.
-
-        So the fringe of a cut-out does not show, and nothing of what is outside is blended in.
-        """
-        kept = depth >= least
-        if not kept.any():
-            return
-        nearest = distance_transform_edt(~kept, return_distances=False, return_indices=True)
-        rows, columns = np.asarray(nearest)
-        self.values = self.values[rows, columns]
+    def bleed(self, inside: NDArray[np.bool_]) -> None:
+        """The texels around become what lies next to them inside: all that lookups blend in."""
+        known = inside.copy()
+        for _ in range(MARGIN - 1):
+            rows, columns = np.nonzero(binary_dilation(known, np.ones((3, 3))) & ~known)
+            for down, right in _AROUND:
+                there = rows + down, columns + right
+                near = known[there]
+                own = rows[near], columns[near]
+                self.values[own] = self.values[there[0][near], there[1][near]]
+            known[rows, columns] = True
 
     def coloured(self, palette: Palette, colours: int) -> Array:
         """(colours, height, width, 3) the raster in each colour of the palette."""
