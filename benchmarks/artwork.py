@@ -22,9 +22,9 @@ from orbiflow.export.art import (
     artwork,
     read_art_tile,
     render_artwork,
-    write_artwork,
 )
 from orbiflow.export.art.picture import Picture
+from orbiflow.export.art.writing import png_of
 
 
 def main() -> None:
@@ -48,15 +48,14 @@ def row(tile: ArtTile, name: str, settings: ArtSettings, picture: Picture | None
     start = time.perf_counter()
     art = artwork(tile, settings, picture=picture)
     ready = time.perf_counter()
-    render_artwork(art)
+    pixels = render_artwork(art)
     rendered = time.perf_counter()
-    content = write_artwork(art, ".png")
+    content = png_of(pixels, settings.dpi)
     end = time.perf_counter()
-    whole = end - rendered - (rendered - ready)
     name = f"{name}, {art.page.width} x {art.page.height}"
     print(
         f"{name:34} {art.page.shown:>6.0f} {ready - start:>9.2f} {rendered - ready:>9.2f} "
-        f"{whole:>6.2f} {len(content) / 1e6:>6.1f}"
+        f"{end - rendered:>6.2f} {len(content) / 1e6:>6.1f}"
     )
 
 

@@ -15,6 +15,7 @@ from orbiflow.escher.storage import SavedModel
 from orbiflow.export.art.picture import Picture
 from orbiflow.export.art.source import ArtTile
 from orbiflow.export.result_file import ExportTile
+from orbiflow.silhouette.frame import Frame
 from outlines import animal, bent_squirrel, flowless
 
 EYE = (210.0, 190.0)
@@ -29,6 +30,15 @@ def squirrel(name: str) -> ArtTile:
     carried = CarriedTile.from_bent(own.bent, own.factor, own.shift, own.tile, target.frame)
     assert carried.bending is not None
     return ArtTile(ExportTile(carried.tile, target.y_down, f"squirrel-{name}"), carried)
+
+
+def upside_down(tile: ArtTile) -> ArtTile:
+    """The same with y up: what was at the top of a picture still is."""
+    flip, frame = np.diag([1.0, -1.0]), tile.carried.frame
+    turned = tile.carried.tile.transformed(flip, np.zeros(2))
+    own = Frame(flip @ frame.linear, flip @ frame.offset, frame.kind)
+    carried = CarriedTile(turned, own, tile.carried.bending)
+    return ArtTile(ExportTile(turned, False, tile.given.name), carried)
 
 
 def picture(image: Image.Image, tile: ArtTile) -> Picture:

@@ -193,6 +193,8 @@ def test_gradients_and_what_is_left_out(tmp_path: Path) -> None:
     [
         ('<svg viewBox="0 0 10 99"><rect width="3" height="3"/></svg>', "must have its aspect"),
         ("<svg><g/></svg>", "draws nothing that is filled or stroked"),
+        ('<svg><rect x="-1e300" width="1e301" height="3"/></svg>', "reaches much too far"),
+        ('<svg><path d="M0 0 L9e7 0 L9e7 9e7 Z"/></svg>', "too intricate to be carried"),
         ("<svg><rect", "not well-formed XML"),
         ("<html/>", "not an <svg> drawing"),
         ('<!DOCTYPE a [<!ENTITY b "c">]><svg/>', "entities are not read"),

@@ -8,7 +8,7 @@ import shapely
 from PIL import Image
 from scipy.ndimage import binary_erosion
 
-from artworks import EYE, checkerboard, face, flat, picture, size_of, squirrel
+from artworks import EYE, checkerboard, face, flat, picture, size_of, squirrel, upside_down
 from orbiflow.export.art import ArtSettings, artwork, render_artwork
 from orbiflow.export.art.making import Artwork, raster_grid
 from orbiflow.export.art.picture import _places
@@ -168,3 +168,27 @@ def test_outlines_part_tiles_of_one_colour() -> None:
     shown = middles[((middles > 2) & (middles < (478, 318))).all(axis=1)]
     columns, rows = shown.astype(int).T
     assert np.abs(made[rows, columns] - edge).max() < 80
+
+
+@pytest.mark.parametrize("name", ["IH4", "IH6"])
+def test_a_silhouette_with_y_up_is_drawn_the_same_way_up(name: str) -> None:
+    tile = squirrel(name)
+    turned = upside_down(tile)
+    image = checkerboard(tile).image
+    image.paste(Image.new("RGBA", (200, 90), "red"), (30, 20))
+    options = {"outline": 2.0, "tile_size": 190}
+    made = [
+        render_artwork(artwork(own, settings(**options), picture=picture(image, own)))
+        for own in (tile, turned)
+    ]
+    apart = np.abs(made[0].astype(int) - made[1])
+    assert apart.mean() < 3  # their rasters lie a fraction of a texel apart
+    assert (apart > 80).mean() < 0.002
+    eyes = [
+        artwork(own, settings(eyes=((EYE[0], y),))).motif.parts
+        for own, y in ((tile, EYE[1]), (turned, -EYE[1]))
+    ]
+    for first, second in zip(*eyes, strict=True):
+        points = second.curves[0].pieces[:, 0] * (1, -1)
+        middle = first.curves[0].pieces[:, 0].mean(axis=0)
+        np.testing.assert_allclose(points.mean(axis=0), middle, atol=1e-6)

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import shapely
 import svgelements
+from shapely.errors import GEOSException
 
 from orbiflow.errors import InputFileError
 from orbiflow.export.art.source import ArtTile
@@ -31,6 +32,13 @@ LONGEST = 1 / 150
 MOST_CARRIED = 400_000
 """Points in all that are carried."""
 
+FARTHEST = 1e6
+"""How far out a drawing may reach, in sizes of the silhouette."""
+
+
+class TooFar(Exception):
+    """A path reaches beyond `FARTHEST`."""
+
 
 def read_drawing(path: Path, tile: ArtTile) -> tuple[Motif, tuple[str, ...]]:
     """The drawing in an SVG file, carried onto the tile, in its units; and notes.
@@ -54,9 +62,13 @@ def read_drawing(path: Path, tile: ArtTile) -> tuple[Motif, tuple[str, ...]]:
     for shape in drawing.shapes:
         try:
             parts += _parts(shape, drawing, carry)
-        except (TooManyPoints, TooTangled) as error:
+        except TooFar as error:
             raise InputFileError(
-                f"{path}: the drawing is too intricate to be carried; simplify its paths"
+                f"{path}: a path reaches much too far beyond the page; delete or shorten it"
+            ) from error
+        except (TooManyPoints, TooTangled, GEOSException) as error:
+            raise InputFileError(
+                f"{path}: the drawing is too intricate to be carried, or much too long; simplify it"
             ) from error
     if not parts:
         raise InputFileError(f"{path}: draws nothing that is filled or stroked")
@@ -93,9 +105,17 @@ class _Carry:
         self.tolerance = FLATNESS * size / self.scale
         self.count = 0
 
+    def check(self, points: Array) -> None:
+        """Raises `TooFar` for points of the drawing that nobody sees."""
+        if not (np.abs(points) < FARTHEST * self.size / self.scale).all():  # NaN, too
+            raise TooFar
+
     def __call__(self, points: Array, *, closed: bool) -> Array:
         here = points @ self.linear.T + self.offset
         line = shapely.LinearRing(here) if closed else shapely.LineString(here)
+        # before any is made
+        if line.length / (LONGEST * self.size) > MOST_CARRIED:
+            raise TooManyPoints
         fine = shapely.get_coordinates(shapely.segmentize(line, LONGEST * self.size))
         self.count += len(fine)
         if self.count > MOST_CARRIED:
@@ -107,6 +127,8 @@ def _parts(shape: DrawnShape, drawing: Drawing, carry: _Carry) -> list[Part]:
     paint = shape.paint
     if paint.get("visibility") in ("hidden", "collapse"):
         return []
+    reach = np.concatenate([path.reach() for path in shape.paths] or [np.zeros((1, 2))])
+    carry.check(reach)
     lines = [(path.flatten(carry.tolerance), path) for path in shape.paths]
     if sum(len(points) for points, _ in lines) > MAX_POINTS:
         raise TooManyPoints

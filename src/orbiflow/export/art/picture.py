@@ -101,11 +101,10 @@ def carried_picture(picture: Picture, tile: ArtTile, grid: Grid) -> tuple[Array,
     """
     small = picture.reduced(1 / grid.density)
     places = _places(tile.carried, grid)
-    low, high = small.covered.low, small.covered.high
-    at = torch.from_numpy(((places - low) / (high - low) * 2 - 1).astype(np.float32))
+    at = torch.from_numpy((small.covered.shares(places) * 2 - 1).astype(np.float32))
     straight = np.asarray(small.image, dtype=np.float32) / 255
     straight[..., :3] *= straight[..., 3:]
-    straight = _spread(straight, (tile.outline - low) / (high - low) * small.image.size)
+    straight = _spread(straight, small.covered.shares(tile.outline) * small.image.size)
     values = torch.from_numpy(np.ascontiguousarray(straight.transpose(2, 0, 1)))[None]
     found = torch.nn.functional.grid_sample(
         values, at[None], mode="bilinear", padding_mode="border", align_corners=False

@@ -30,6 +30,14 @@ class Covered(NamedTuple):
     low: Array
     high: Array
     name: str
+    y_down: bool = True
+
+    def shares(self, points: Array) -> Array:
+        """Points (..., 2) as shares of the picture's width and height, from its upper left corner."""
+        found = (points - self.low) / (self.high - self.low)
+        if not self.y_down:
+            found[..., 1] = 1 - found[..., 1]
+        return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,10 +80,11 @@ class ArtTile:
         frame = self.carried.frame
         if frame.size is None:
             ring = self.outline
-            return Covered(ring.min(axis=0), ring.max(axis=0), "the silhouette's bounding box")
+            name = "the silhouette's bounding box"
+            return Covered(ring.min(axis=0), ring.max(axis=0), name, frame.y_down)
         low = np.array(frame.corner)
         name = "the drawing's page" if frame.kind == "svg" else "the silhouette's picture"
-        return Covered(low, low + frame.size, name)
+        return Covered(low, low + frame.size, name, frame.y_down)
 
 
 def read_art_tile(path: str | Path, which: str | int = 1) -> ArtTile:
@@ -94,7 +103,9 @@ def read_art_tile(path: str | Path, which: str | int = 1) -> ArtTile:
     given = read_result(path, which)
     names = folder_names(str(entry["class"]) for entry in document["tiles"])
     model = file.parent / names[(given.rank or 1) - 1] / MODEL
-    saved = load_saved(model) if model.is_file() else None
+    # the folder is named after the class: a name that is none leads nowhere
+    known = given.tile.isohedral_class != "" and model.is_file()
+    saved = load_saved(model) if known else None
     if saved is not None and saved.frame is not None and saved.bending is not None:
         carried = CarriedTile(given.tile, saved.frame, saved.bending)
         _check_same(carried, model)
@@ -133,7 +144,9 @@ def _silhouette(document: dict[str, Any]) -> Target:
         )
     target = Target.read(source)
     # one that was read with a threshold of its own, or painted over since
-    if len(target.outline) != own.get("vertices") or not np.isclose(target.area, own.get("area")):
+    area = own.get("area")
+    same = isinstance(area, int | float) and np.isclose(target.area, area)
+    if not same or len(target.outline) != own.get("vertices"):
         raise InputFileError(
             f"the run saved no map, and {source} is not the silhouette that it was; search again"
         )

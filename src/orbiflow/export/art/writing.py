@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 
+import numpy as np
 from PIL import Image
 
 from orbiflow.cancel import Cancel
@@ -24,8 +25,11 @@ def write_artwork(art: Artwork, ending: str, *, cancel: Cancel | None = None) ->
     """
     if ending.lower() == ".svg":
         return write_svg(art_scene(art))
-    image = Image.fromarray(render_artwork(art, cancel=cancel))
+    return png_of(render_artwork(art, cancel=cancel), art.settings.dpi)
+
+
+def png_of(pixels: np.ndarray, dpi: float) -> bytes:
+    """Pixels (height, width, 3) as a PNG that says how large they are."""
     buffer = io.BytesIO()
-    dpi = art.settings.dpi
-    image.save(buffer, "PNG", dpi=(dpi, dpi), compress_level=5)
+    Image.fromarray(pixels).save(buffer, "PNG", dpi=(dpi, dpi), compress_level=5)
     return buffer.getvalue()
