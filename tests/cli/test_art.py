@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import re
 import struct
 import zlib
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +14,9 @@ from PIL import Image
 
 from artworks import EYE, size_of, squirrel, write_run
 from orbiflow.cancel import Cancel
+from orbiflow.figures.palette import PALETTES
 from orbiflow.jobs import ArtRequest, Finished, Note, Written, run
+from orbiflow.silhouette import Target
 
 
 @pytest.fixture(name="result", scope="module")
@@ -161,3 +165,35 @@ def test_a_cancelled_job_writes_nothing(result: Path, tmp_path: Path) -> None:
     request = ArtRequest(result=result, out=tmp_path / "a.png", size="60x40")
     assert run(request, cancel=cancel).state == "cancelled"
     assert list(tmp_path.iterdir()) == []
+
+
+DOCS = (Path(__file__).parents[2] / "docs" / "artwork.md").read_text(encoding="utf-8")
+
+
+def test_the_page_of_documentation_names_every_option_and_palette(orbiflow) -> None:
+    offered = set(re.findall(r"--[a-z][a-z-]+", orbiflow("art", "--help").out)) - {"--help"}
+    assert len(offered) > 12
+    assert offered <= set(re.findall(r"--[a-z][a-z-]+", DOCS))
+    assert set(PALETTES) <= set(re.findall(r"`([a-z-]+)`", DOCS))
+
+
+def test_the_snippet_of_the_documentation(tmp_path: Path, monkeypatch) -> None:
+    (snippet,) = re.findall(r"```python\n(.*?)```", DOCS, flags=re.DOTALL)
+    monkeypatch.chdir(tmp_path)
+    write_run(tmp_path / "out" / "barbet", "IH6")
+    low, high = squirrel("IH6").covered[:2]
+    box = " ".join(str(value) for value in (*low, *(high - low)))
+    (tmp_path / "examples" / "artwork").mkdir(parents=True)
+    drawing = f'<svg viewBox="{box}"><circle cx="{EYE[0]}" cy="{EYE[1]}" r="20"/></svg>'
+    (tmp_path / "examples" / "artwork" / "barbet.svg").write_text(drawing)
+    names: dict[str, Any] = {}
+    exec(compile(snippet, "artwork.md", "exec"), names)
+    assert names["pixels"].shape == (600, 900, 3)
+
+
+def test_the_example_lies_over_its_silhouette() -> None:
+    examples = Path(__file__).parents[2] / "examples"
+    (box,) = re.findall('viewBox="([^"]+)"', (examples / "artwork" / "barbet.svg").read_text())
+    frame = Target.read(examples / "silhouettes" / "barbet.svg").frame
+    assert frame.size is not None
+    assert [float(value) for value in box.split()] == [*frame.corner, *frame.size]

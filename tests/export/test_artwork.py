@@ -109,7 +109,7 @@ def test_the_map_onto_the_raster_has_no_fold() -> None:
     art = artwork(tile, PAGE, picture=flat(tile, "white"))
     grid = raster_grid(art)
     places = _places(tile.carried, grid)
-    whole = binary_erosion(grid.inside(art.page.tile.polygon), iterations=2)
+    whole = np.asarray(binary_erosion(grid.inside(art.page.tile.polygon), iterations=2), dtype=bool)
     down, right = np.diff(places, axis=0)[:, :-1], np.diff(places, axis=1)[:-1]
     turn = right[..., 0] * down[..., 1] - right[..., 1] * down[..., 0]
     inside = whole[:-1, :-1]

@@ -85,7 +85,8 @@ class Paint:
         """The texels around become what lies next to them inside: all that lookups blend in."""
         known = inside.copy()
         for _ in range(MARGIN - 1):
-            rows, columns = np.nonzero(binary_dilation(known, np.ones((3, 3))) & ~known)
+            wider = np.asarray(binary_dilation(known, np.ones((3, 3))), dtype=bool)
+            rows, columns = np.nonzero(wider & ~known)
             for down, right in _AROUND:
                 there = rows + down, columns + right
                 near = known[there]
