@@ -106,7 +106,7 @@ def art_page(given: ExportTile, settings: ArtSettings) -> ArtPage:
     said = f"the cell that repeats is {found.width} x {found.height} pixels and holds {tiles:.0f} tiles"
     if abs(found.turn) > 0.05:
         said += f"; the tiling is turned by {found.turn:.1f} degrees"
-    said += "; " + _strain_said(found.strain)
+    said += "; " + _strain_said(found.strain, exact=found.exact)
     return _page(tile, colours, found.linear, offset, (found.width, found.height), (said,))
 
 
@@ -119,11 +119,13 @@ def laid(
     return _page(given.tile, colours, page.linear, page.offset, size, ())
 
 
-def _strain_said(strain: float) -> str:
+def _strain_said(strain: float, *, exact: bool) -> str:
     if strain < 1e-9:
         return "nothing is stretched"
     share = f"{100 * strain:.2g} %" if strain >= 5e-5 else "less than 0.01 %"
-    return f"to be a rectangle of whole pixels it is stretched by {share}"
+    if exact:
+        return f"whole pixels stretch it by {share}"
+    return f"it is stretched by {share} to be a rectangle"
 
 
 def _scale(tile: Tile, settings: ArtSettings) -> float:

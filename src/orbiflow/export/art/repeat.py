@@ -37,6 +37,7 @@ class Rectangle(NamedTuple):
     - `cells`: how many lattice cells it holds.
     - `strain`: how much longer one direction became than another, from 0.
     - `turn`: of the lattice, in degrees, -45 to 45.
+    - `exact`: whether the lattice has the rectangle: then whole pixels alone make the strain.
     """
 
     linear: Array
@@ -45,6 +46,7 @@ class Rectangle(NamedTuple):
     cells: int
     strain: float
     turn: float
+    exact: bool
 
 
 def rectangle(lattice: Array, scale: float, tolerance: float, *, flipped: bool) -> Rectangle:
@@ -76,9 +78,10 @@ def rectangle(lattice: Array, scale: float, tolerance: float, *, flipped: bool) 
     along, up = pair[:, 0], pair[:, 1]
     width, height = _whole(float(np.hypot(*along)), float(np.hypot(*up)), scale)
     linear = np.diag([float(width), float(height)]) @ np.linalg.inv(pair)
+    exact = _strain(_squared(pair)) <= EXACT
     turn = math.degrees(math.atan2(along[1], along[0]))
     flip = np.diag([1.0, -1.0 if flipped else 1.0])
-    return Rectangle(linear @ flip, width, height, cells, _strain(linear), -turn)
+    return Rectangle(linear @ flip, width, height, cells, _strain(linear), -turn, exact)
 
 
 def _best_pair(lattice: Array, tolerance: float) -> tuple[Array, int] | None:
