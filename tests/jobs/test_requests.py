@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from orbiflow.errors import OrbiflowError
 from orbiflow.jobs import (
+    ArtRequest,
     DensityFitRequest,
     DensityPlotRequest,
     DensitySampleRequest,
@@ -67,6 +68,21 @@ REQUESTS = st.one_of(
         method=st.just("occupancy"),
         turns=st.none() | st.integers(),
         iterations=st.none() | st.integers(),
+    ),
+    st.builds(
+        ArtRequest,
+        result=paths,
+        out=st.none() | names.map(lambda name: Path(name + ".png")),
+        tile=st.text(),
+        picture=st.none() | paths,
+        tile_size=st.none() | st.text(),
+        repeat=st.booleans(),
+        colour=st.sampled_from([None, "aspect", "neighbour", "one"]),
+        engrave=st.booleans(),
+        strokes=st.sampled_from([None, "hatch", "echoes", "feathers"]),
+        eyes=st.lists(st.text()).map(tuple),
+        dpi=st.none() | st.floats(1, 10_000),
+        force=st.booleans(),
     ),
     st.builds(
         DensityFitRequest,

@@ -1,5 +1,14 @@
 """Files that people take away: vector export in millimetres, artwork, and the folder of a search."""
 
+from orbiflow.export.art import (
+    ArtSettings,
+    Artwork,
+    artwork,
+    read_art_tile,
+    read_over,
+    render_artwork,
+    write_artwork,
+)
 from orbiflow.export.curves import Curve
 from orbiflow.export.dxf_writer import write_dxf
 from orbiflow.export.exporting import Exported, export, scenes, write_scene
@@ -15,6 +24,8 @@ from orbiflow.export.svg import tile_svg, tiling_svg
 from orbiflow.export.svg_writer import write_svg
 
 __all__ = [
+    "ArtSettings",
+    "Artwork",
     "Curve",
     "ExportSettings",
     "ExportTile",
@@ -23,12 +34,17 @@ __all__ = [
     "Scene",
     "Style",
     "Uses",
+    "artwork",
     "export",
     "overview_png",
+    "read_art_tile",
+    "read_over",
     "read_result",
+    "render_artwork",
     "scenes",
     "tile_svg",
     "tiling_svg",
+    "write_artwork",
     "write_dxf",
     "write_gallery",
     "write_json",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,11 +24,15 @@ def drawn(scene: Scene, *, least_width: float = 0.0) -> Figure:
 
     Args:
         least_width: of strokes in mm, so that hairlines show on a screen.
+
+    Raises:
+        OrbiflowError: for artwork.
     """
     from matplotlib.collections import PathCollection
     from matplotlib.figure import Figure
     from matplotlib.patches import Rectangle
 
+    scene.require_plain()
     figure = Figure(figsize=(scene.width / INCH, scene.height / INCH))
     figure.patch.set_facecolor("white")
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
@@ -63,6 +68,16 @@ def _paths(scene: Scene, layer: Layer) -> list[Path]:
         else:
             paths.append(_path(*_points_and_codes(item)))
     return paths
+
+
+def curves_path(curves: Iterable[Curve]) -> Path:
+    """Several curves as one path of matplotlib's, filled together."""
+    from matplotlib.path import Path
+
+    parts = [_points_and_codes(curve) for curve in curves]
+    if not parts:
+        return Path(np.zeros((0, 2)))
+    return _path(*(np.concatenate(part) for part in zip(*parts, strict=True)))
 
 
 def _path(points: Array, codes: Array) -> Path:

@@ -87,12 +87,7 @@ def scenes(
         As `export`.
     """
     given = ExportTile.of(tile)
-    certificate = certify(given.tile)
-    if not certificate.valid and not force:
-        raise CertificationError(
-            f"{given.name} is not certified ({'; '.join(certificate.reasons)}), so it is not "
-            "exported; --force exports it, marked so"
-        )
+    certificate = require_certified(given, force=force)
     placed = layout(given.tile, settings, y_down=given.y_down)
     notes = (*placed.notes, *_neck_notes(placed))
     made = [_described(scene, given, settings, certificate) for scene in _made(placed, settings)]
@@ -101,6 +96,21 @@ def scenes(
         first = 0 if settings.cut == "pieces" else len(made) - 1
         made[first:] = [calibrated(scene) for scene in made[first:]]
     return made, notes
+
+
+def require_certified(given: ExportTile, *, force: bool) -> Certificate:
+    """The tile's certificate.
+
+    Raises:
+        CertificationError: if it is not valid and `force` is not set.
+    """
+    certificate = certify(given.tile)
+    if not certificate.valid and not force:
+        raise CertificationError(
+            f"{given.name} is not certified ({'; '.join(certificate.reasons)}), so it is not "
+            "exported; --force exports it, marked so"
+        )
+    return certificate
 
 
 def _made(placed: Layout, settings: ExportSettings) -> list[Scene]:

@@ -62,6 +62,40 @@ def size(text: str) -> tuple[float, float]:
     return _checked(width, text, zero=False), _checked(height, text, zero=False)
 
 
+def pixels(text: str, dpi: float, *, zero: bool = False) -> float:
+    """`text` in pixels: a number of them, or a length at `dpi` pixels an inch.
+
+    Raises:
+        OrbiflowError: as `length`.
+
+    >>> pixels("400", 300), pixels("1.5px", 300), pixels("25.4mm", 300)
+    (400.0, 1.5, 300.0)
+    """
+    found = re.fullmatch(rf"\s*({_NUMBER})\s*(px)?\s*", text, flags=re.IGNORECASE)
+    if found is None:
+        return length(text, zero=zero) * dpi / MILLIMETRES["in"]
+    return _checked(float(found[1]), text, zero=zero)
+
+
+def pixel_size(text: str, dpi: float) -> tuple[int, int]:
+    """Width and height of a picture in whole pixels, such as 3000x2000 or 300x200mm.
+
+    Raises:
+        OrbiflowError: as `size`.
+
+    >>> pixel_size("3000x2000", 300), pixel_size("1x2in", 100)
+    ((3000, 2000), (100, 200))
+    """
+    whole = re.fullmatch(r"\s*(\d{1,9})\s*(?:px)?\s*[x×]\s*(\d{1,9})\s*(?:px)?\s*", text)
+    if whole:
+        return int(whole[1]), int(whole[2])
+    if not re.search("[a-wyz]", text, flags=re.IGNORECASE):
+        raise OrbiflowError(f"{text!r} is no size in pixels; write two whole numbers, as 3000x2000")
+    width, height = size(text)
+    per = dpi / MILLIMETRES["in"]
+    return max(1, round(width * per)), max(1, round(height * per))
+
+
 def _unit(unit: str, number: str, text: str) -> float:
     if not unit:
         raise OrbiflowError(f"{text!r} has no unit; write {number}mm, {number}cm or {number}in")

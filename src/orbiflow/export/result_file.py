@@ -62,9 +62,7 @@ def read_result(path: str | Path, which: str | int = 1) -> ExportTile:
     Raises:
         InputFileError: if there is no such file, it is none of orbiflow's, or holds no such tile.
     """
-    path = as_path(path, "the result")
-    file = path / RESULT if path.is_dir() else path
-    document = _read(file, path)
+    file, document = read_document(path)
     try:
         entries = document["tiles"]
         names = [str(entry["class"]) for entry in entries]
@@ -80,7 +78,17 @@ def read_result(path: str | Path, which: str | int = 1) -> ExportTile:
     return ExportTile(tile, y_down, f"{source}-{names[index]}", index + 1)
 
 
-def _read(file: Path, given: Path) -> dict[str, Any]:
+def read_document(path: str | Path) -> tuple[Path, dict[str, Any]]:
+    """The result.json of a run, and what it holds: an object with `tiles`.
+
+    Args:
+        path: the run's folder, or its result.json.
+
+    Raises:
+        InputFileError: if there is no such file, or it is none of orbiflow's.
+    """
+    given = as_path(path, "the result")
+    file = given / RESULT if given.is_dir() else given
     try:
         if file.stat().st_size > MOST_BYTES:
             raise InputFileError(f"{file}: {file.stat().st_size:,} bytes is too large for a result")
@@ -97,7 +105,7 @@ def _read(file: Path, given: Path) -> dict[str, Any]:
         raise InputFileError(f"{file}: not JSON: {error}") from error
     if not isinstance(document, dict) or "tiles" not in document:
         raise InputFileError(f"{file}: not a result of orbiflow escherize: it names no tiles")
-    return document
+    return file, document
 
 
 def _index(names: list[str], which: str | int, file: Path) -> int:

@@ -12,11 +12,16 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from orbiflow.errors import OrbiflowError
 from orbiflow.export.curves import Curve
 from orbiflow.symmetry.isometry import Array
 
 Role = Literal["paper", "tiles", "cut", "mark"]
 """What a layer is for: a background, filled tiles, lines to cut or draw, marks to measure by."""
+
+
+INK = "currentColor"
+"""A colour in a motif's styles: the one that shows on the copy's own, which its layer says."""
 
 
 class Box(NamedTuple):
@@ -42,6 +47,68 @@ class Style(NamedTuple):
     fill: str | None = None
     stroke: str | None = None
     width: float = 0.0
+
+
+class Part(NamedTuple):
+    """Curves drawn as one.
+
+    - `curves`: closed ones are filled; holes run the other way.
+    - `style`: fill and stroke; `INK` is a colour that shows on the copy's own.
+    - `opacity`: 0 to 1.
+    """
+
+    curves: tuple[Curve, ...]
+    style: Style
+    opacity: float = 1.0
+
+    @property
+    def inked(self) -> bool:
+        """Whether it is drawn in ink."""
+        return INK in (self.style.fill, self.style.stroke)
+
+    def moved(self, linear: Array, offset: Array) -> Part:
+        """Under a map p -> linear p + offset."""
+        scale = float(np.sqrt(abs(np.linalg.det(linear))))
+        return Part(
+            tuple(curve.moved(linear, offset) for curve in self.curves),
+            self.style._replace(width=self.style.width * scale),
+            self.opacity,
+        )
+
+
+class Raster(NamedTuple):
+    """A picture of pixels: `png` is the file, its pixel (x, y) lies at linear (x, y) + offset."""
+
+    png: bytes
+    size: tuple[int, int]
+    linear: Array
+    offset: Array
+
+    def moved(self, linear: Array, offset: Array) -> Raster:
+        """Under a map p -> linear p + offset."""
+        return self._replace(linear=linear @ self.linear, offset=linear @ self.offset + offset)
+
+
+@dataclass(frozen=True, eq=False)
+class Motif:
+    """What is drawn on every copy of a tile: a symbol of many parts.
+
+    - `parts`: from the bottom up.
+    - `rasters`: under them.
+    - `within`: the symbol that cuts it off, if any.
+    """
+
+    parts: tuple[Part, ...] = ()
+    rasters: tuple[Raster, ...] = ()
+    within: str | None = None
+
+    def moved(self, linear: Array, offset: Array) -> Motif:
+        """Under a map p -> linear p + offset."""
+        return Motif(
+            tuple(part.moved(linear, offset) for part in self.parts),
+            tuple(raster.moved(linear, offset) for raster in self.rasters),
+            self.within,
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,6 +148,7 @@ class Layer:
     - `name`: as people read it, such as "colour 1" or "cut".
     - `items`: curves, and copies of symbols.
     - `clipped`: whether to show it within the scene's `window` alone.
+    - `ink`: the colour of `INK` in motifs, where it holds copies of them.
     """
 
     name: str
@@ -88,6 +156,7 @@ class Layer:
     style: Style
     items: tuple[Curve | Uses, ...]
     clipped: bool = False
+    ink: str | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,6 +183,7 @@ class Scene:
     - `width`, `height`: in mm.
     - `layers`: from the bottom up.
     - `symbols`: closed curves by name, for `Uses`.
+    - `motifs`: drawings by name, for `Uses`; SVG alone has them.
     - `window`: where clipped layers show, default all of the page.
     - `title`, `notes`: in words, for the file's metadata.
     - `prototile`: (N, 2) polygon of the tile that `tiles` are copies of, in mm.
@@ -130,14 +200,29 @@ class Scene:
     prototile: Array | None = None
     tiles: tuple[PlacedTile, ...] = ()
     facts: dict[str, Any] = field(default_factory=dict)
+    motifs: dict[str, Motif] = field(default_factory=dict)
 
     @property
     def clip(self) -> Box:
         """The window."""
         return self.window or Box(0.0, 0.0, self.width, self.height)
 
+    def require_plain(self) -> None:
+        """Nothing, if symbols are single curves.
+
+        Raises:
+            OrbiflowError: if there are motifs, which SVG alone can hold.
+        """
+        if self.motifs:
+            raise OrbiflowError("artwork is written as SVG, or rendered as PNG")
+
     def curves(self, layer: Layer) -> Iterator[Curve]:
-        """Every curve of a layer, copies of symbols among them."""
+        """Every curve of a layer, copies of symbols among them.
+
+        Raises:
+            OrbiflowError: for artwork, as `require_plain`.
+        """
+        self.require_plain()
         for item in layer.items:
             if isinstance(item, Uses):
                 yield from item.curves(self.symbols[item.symbol])

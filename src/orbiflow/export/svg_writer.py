@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import math
 from collections.abc import Iterator
 from xml.sax.saxutils import escape, quoteattr
@@ -9,7 +10,7 @@ from xml.sax.saxutils import escape, quoteattr
 import numpy as np
 
 from orbiflow.export.curves import Curve
-from orbiflow.export.scene import Box, Layer, Scene, Style, Uses
+from orbiflow.export.scene import Box, Layer, Motif, Scene, Style, Uses
 
 _HEADER = """<?xml version="1.0" encoding="UTF-8"?>
 <svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink" \
@@ -35,7 +36,7 @@ def write_svg(scene: Scene, *, decimals: int = 3) -> str:
         parts.append(_layer_start(layer))
         for item in layer.items:
             if isinstance(item, Uses):
-                parts.extend(_uses(item, scene.symbols[item.symbol], number))
+                parts.extend(_uses(item, _reach(scene, item.symbol), number))
             else:
                 parts.append(f'    <path d="{path_data(item, number)}"/>\n')
         parts.append("  </g>\n")
@@ -86,9 +87,48 @@ def _definitions(scene: Scene, number: _Numbers) -> str:
     parts = []
     for name, curve in scene.symbols.items():
         parts.append(f'    <path id="{name}" d="{path_data(curve, number)}"/>\n')
+    for name, motif in scene.motifs.items():
+        parts.append(_motif(name, motif, number))
     if any(layer.clipped for layer in scene.layers):
         parts.append(f'    <clipPath id="window">{_rectangle(scene.clip, number)}</clipPath>\n')
     return "  <defs>\n" + "".join(parts) + "  </defs>\n" if parts else ""
+
+
+def _motif(name: str, motif: Motif, number: _Numbers) -> str:
+    """A group that is drawn once and used by every copy."""
+    parts, clip = [], ""
+    if motif.within is not None:
+        clip = f' clip-path="url(#within-{name})"'
+        parts.append(
+            f'    <clipPath id="within-{name}"><use xlink:href="#{motif.within}"/></clipPath>\n'
+        )
+    parts.append(f'    <g id="{name}"{clip}>\n')
+    for raster in motif.rasters:
+        (a, c), (b, d) = raster.linear.tolist()
+        e, f = raster.offset.tolist()
+        place = ",".join(f"{value:.9g}" for value in (a, b, c, d, e, f))
+        data = base64.b64encode(raster.png).decode("ascii")
+        width, height = raster.size
+        parts.append(
+            f'      <image width="{width}" height="{height}" transform="matrix({place})" '
+            f'preserveAspectRatio="none" xlink:href="data:image/png;base64,{data}"/>\n'
+        )
+    for part in motif.parts:
+        path = "".join(path_data(curve, number) for curve in part.curves)
+        opacity = f' opacity="{part.opacity:.3g}"' if part.opacity < 1 else ""
+        parts.append(f'      <path{style_attributes(part.style)}{opacity} d="{path}"/>\n')
+    return "".join(parts) + "    </g>\n"
+
+
+def _reach(scene: Scene, name: str) -> float:
+    """How far from its origin a symbol or motif reaches, in mm."""
+    if name in scene.symbols:
+        curves = [scene.symbols[name]]
+    elif (within := scene.motifs[name].within) is not None:
+        curves = [scene.symbols[within]]
+    else:
+        curves = [curve for part in scene.motifs[name].parts for curve in part.curves]
+    return max((float(np.abs(curve.bounds()).max()) for curve in curves), default=1.0)
 
 
 def _rectangle(box: Box, number: _Numbers) -> str:
@@ -100,9 +140,10 @@ def _layer_start(layer: Layer) -> str:
     name = quoteattr(layer.name)
     key = quoteattr(layer.name.replace(" ", "-"))
     clip = ' clip-path="url(#window)"' if layer.clipped else ""
+    ink = f' color="{layer.ink}"' if layer.ink else ""
     return (
         f'  <g id={key} inkscape:groupmode="layer" inkscape:label={name}'
-        f"{clip}{style_attributes(layer.style)}>\n"
+        f"{clip}{ink}{style_attributes(layer.style)}>\n"
     )
 
 
@@ -115,9 +156,8 @@ def style_attributes(style: Style) -> str:
     return text + f' stroke="{style.stroke}" stroke-width="{width}" stroke-linejoin="round"'
 
 
-def _uses(uses: Uses, symbol: Curve, number: _Numbers) -> Iterator[str]:
+def _uses(uses: Uses, reach: float, number: _Numbers) -> Iterator[str]:
     """A line a copy; the matrix has as many decimals as keep the symbol's far end in its place."""
-    reach = float(np.abs(symbol.bounds()).max())
     fine = _Numbers(number.decimals + max(1, math.ceil(math.log10(max(reach, 1.0)))))
     # columns first, as SVG has them
     aspects = [",".join(fine(value) for value in linear.T.ravel()) for linear in uses.linear]

@@ -19,6 +19,16 @@ class Palette(NamedTuple):
         turn, place = divmod(index, len(self.colours))
         return _mixed(self.colours[place], self.paper, 0.5**turn)
 
+    def ink(self, index: int) -> str:
+        """What lines on colour number `index` are drawn in: of outline and paper the one that shows.
+
+        >>> PALETTES["delft"].ink(0), PALETTES["delft"].ink(1)
+        ('#14263a', '#ffffff')
+        """
+        fill = _lightness(self.fill(index))
+        dark, light = _lightness(self.outline), _lightness(self.paper)
+        return self.outline if abs(fill - dark) >= abs(light - fill) else self.paper
+
 
 PALETTES: dict[str, Palette] = {
     "delft": Palette(("#f4ecdc", "#1d4e79", "#8ab6d9", "#d98a2b"), "#14263a", "#ffffff"),
@@ -31,6 +41,16 @@ PALETTES: dict[str, Palette] = {
     "okabe-ito": Palette(
         ("#f0e442", "#0072b2", "#e69f00", "#56b4e9", "#d55e00", "#cc79a7"), "#1a1a1a", "#ffffff"
     ),
+    "earth": Palette(("#ecdcb9", "#6b3018", "#c9a23f", "#55707a"), "#24180f", "#f8f1e0"),
+    "sea": Palette(("#d9efe9", "#0f4c5c", "#4fa8a0", "#f2c879"), "#082a33", "#fbfdfc"),
+    "dusk": Palette(("#f7dcc6", "#33265c", "#c4506e", "#9fa4d8"), "#1d1433", "#fff6ef"),
+    "forest": Palette(("#ebe6c4", "#1c4733", "#9dbb5c", "#b05a20"), "#10281c", "#fbfaf0"),
+    "pastel": Palette(("#ffffff", "#5f8fc8", "#dba9cd", "#f4dc8c"), "#4a4f6a", "#f4f0f8"),
+    "festival": Palette(("#f7c548", "#b3202c", "#157f86", "#f4efe2"), "#2a1216", "#fffaf0"),
+    "woodcut": Palette(("#f3e9d6", "#1f1b18", "#b5452c", "#a79a84"), "#120e0c", "#fcf7ea"),
+    "moss": Palette(("#eef0d5", "#36442a", "#a9b565", "#b5726d"), "#20270f", "#fcfdf3"),
+    "clay": Palette(("#f4e0d0", "#54261f", "#d58559", "#8aa9b8"), "#2c1410", "#fff8f2"),
+    "print": Palette(("#f7f5ef", "#26241f", "#9a968b", "#5f5b52"), "#151310", "#fbfaf6"),
 }
 """By name. The first four of each differ by at least 0.1 in OKLab under every dichromacy (tested).
 
@@ -59,3 +79,10 @@ def palette(name: str | Palette) -> Palette:
 def _mixed(colour: str, paper: str, share: float) -> str:
     pairs = [(int(colour[i : i + 2], 16), int(paper[i : i + 2], 16)) for i in (1, 3, 5)]
     return "#" + "".join(f"{round(share * a + (1 - share) * b):02x}" for a, b in pairs)
+
+
+def _lightness(colour: str) -> float:
+    """About as light as it looks, 0 to 1."""
+    weights = (0.2126, 0.7152, 0.0722)
+    parts = (int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5))
+    return sum(w * part**2.2 for w, part in zip(weights, parts, strict=True)) ** (1 / 2.2)

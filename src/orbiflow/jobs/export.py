@@ -35,7 +35,7 @@ def export(request: ExportRequest, tell: Sink, cancel: Cancel) -> Finished:
     settings = _settings(request)
     tile = read_result(request.result, request.tile)
     out = request.out or Path(f"{tile.name}.{settings.format}")
-    _check_place(out)
+    check_place(out)
     tell(Progress(0.0, "laying out"))
     found, notes = scenes(tile, settings, force=request.force)
     contents: list[str | bytes] = []
@@ -63,7 +63,7 @@ def export(request: ExportRequest, tell: Sink, cancel: Cancel) -> Finished:
     return Finished("done", summary)
 
 
-def _check_place(out: Path) -> None:
+def check_place(out: Path) -> None:
     """Before the work; a device must not be replaced by a file."""
     if out.is_dir():
         raise OutputError(f"cannot write {out}: it is a folder; give a file's name in it")

@@ -153,6 +153,54 @@ class ExportRequest(Request):
 
 
 @dataclass(frozen=True)
+class ArtRequest(Request):
+    """Carry a picture onto a tile and repeat it over the plane; see `orbiflow art --help`.
+
+    Sizes are text: pixels such as "3000x2000" and "400", or lengths such as "300x200mm" and "40mm".
+
+    - `result`: a search's folder, or its result.json. `tile`: a class or a rank.
+    - `out`: a .png or .svg; None for one named after the tile in the working directory.
+    - `picture`: over the silhouette: an image, or an SVG drawing.
+    - `engrave`, `strokes`: draw lines inside the tile; strokes of a kind.
+    - `eyes`: each "x,y" or "x,y,radius" in the silhouette's coordinates.
+    - others: as in `orbiflow.export.ArtSettings`; None is its default.
+    """
+
+    KIND = "art"
+
+    result: Path
+    out: Path | None = None
+    tile: str = "1"
+    picture: Path | None = None
+    size: str | None = None
+    tile_size: str | None = None
+    repeat: bool = False
+    tolerance: float | None = None
+    palette: str | None = None
+    colour: Literal["aspect", "neighbour", "one"] | None = None
+    outline: str | None = None
+    engrave: bool = False
+    strokes: Literal["hatch", "echoes", "feathers"] | None = None
+    eyes: tuple[str, ...] = ()
+    dpi: float | None = None
+    force: bool = False
+
+    def check(self) -> None:
+        if self.dpi is not None and not 1 <= self.dpi <= 10_000:
+            raise RecordError(f"{{dpi}} must be from 1 to 10000, got {self.dpi:g}")
+        if self.tolerance is not None and not 0 <= self.tolerance <= 0.2:
+            raise RecordError(f"{{tolerance}} must be from 0 to 0.2, got {self.tolerance:g}")
+        if self.repeat and self.size is not None:
+            raise RecordError(
+                "{size} is the page's; the cell of {repeat} has its own, which {tile_size} decides"
+            )
+        if self.tolerance is not None and not self.repeat:
+            raise RecordError("{tolerance} belongs to {repeat}")
+        if self.out is not None and self.out.suffix.lower() not in (".png", ".svg"):
+            raise RecordError(f"{{out}} must end in .png or .svg, got {self.out.name}")
+
+
+@dataclass(frozen=True)
 class DensityFitRequest(Request):
     """Fit a density to a table; see `orbiflow density fit --help`.
 
@@ -257,6 +305,7 @@ REQUESTS: dict[str, type[Request]] = {
     for kind in (
         EscherizeRequest,
         ExportRequest,
+        ArtRequest,
         DensityFitRequest,
         DensityScoreRequest,
         DensitySampleRequest,

@@ -1,6 +1,7 @@
 """The shapes that an SVG drawing shows, with their transforms, found by a walk of its elements."""
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from xml.etree.ElementTree import Element
@@ -33,12 +34,32 @@ _TOKEN = re.compile(r"[A-Za-z]|\.?\d+")
 _LENGTH = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)(e[-+]?\d+)?(px|pt|pc|mm|cm|in|%)?", re.IGNORECASE)
 
 
+PAINT = (
+    "fill",
+    "stroke",
+    "stroke-width",
+    "fill-opacity",
+    "stroke-opacity",
+    "color",
+    "visibility",
+)
+"""Properties of paint that elements have from those around them."""
+
+
 @dataclass(frozen=True)
 class DrawnShape:
-    """The sub-paths of one element, in user units of the drawing, and how they are filled."""
+    """The sub-paths of one element, in user units of the drawing, and how they are filled.
+
+    - `paint`: of `PAINT`, what the element or one around it says.
+    - `opacity`: of all the groups that it is in.
+    - `scale`: user units of the drawing for one of the element's own.
+    """
 
     paths: list[SubPath]
     fill_rule: str
+    paint: Mapping[str, str] = field(default_factory=dict)
+    opacity: float = 1.0
+    scale: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -49,6 +70,8 @@ class _Place:
     viewport: tuple[float, float]  # what percentages refer to
     fill_rule: str = "nonzero"
     depth: int = 0
+    paint: Mapping[str, str] = field(default_factory=dict)
+    opacity: float = 1.0
 
 
 @dataclass
@@ -115,6 +138,8 @@ class Drawing:
             matrix=place.matrix @ self._transform(element, properties, place),
             fill_rule=properties.get("fill-rule", place.fill_rule).lower(),
             depth=place.depth + 1,
+            paint={**place.paint, **{key: properties[key] for key in PAINT if key in properties}},
+            opacity=place.opacity * _share(properties.get("opacity")),
         )
         if element.tag in _GROUPS:
             self._visit_group(element, place)
@@ -177,7 +202,8 @@ class Drawing:
             paths = sub_paths(svgelements.Path(shape), place.matrix[:2])
         except _BAD_VALUE as exc:
             raise self._refuse(element, "its geometry cannot be read; redraw or delete it") from exc
-        self.shapes.append(DrawnShape(paths, place.fill_rule))
+        scale = float(abs(np.linalg.det(place.matrix[:2, :2])) ** 0.5)
+        self.shapes.append(DrawnShape(paths, place.fill_rule, place.paint, place.opacity, scale))
 
     def _transform(
         self, element: Element, properties: dict[str, str], place: _Place
@@ -215,6 +241,16 @@ class Drawing:
     def _refuse(self, element: Element, reason: str) -> InputFileError:
         name = f" id={element.get('id', '')[:40]!a}" if element.get("id") else ""
         return InputFileError(f"{self.path}: <{element.tag}{name}>: {reason}")
+
+
+def _share(text: str | None) -> float:
+    """An opacity, 0 to 1; what cannot be read is opaque."""
+    try:
+        value = float(text.strip().removesuffix("%")) if text else 1.0
+    except ValueError:
+        return 1.0
+    value = value / 100 if text and text.strip().endswith("%") else value
+    return min(max(value, 0.0), 1.0) if value == value else 1.0
 
 
 def _as_array(matrix: svgelements.Matrix) -> NDArray[np.float64]:

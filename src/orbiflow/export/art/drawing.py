@@ -1,0 +1,213 @@
+"""A drawing over the silhouette, in curves: an SVG read within bounds and carried onto the tile."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import shapely
+import svgelements
+from shapely.errors import GEOSException
+
+from orbiflow.errors import InputFileError
+from orbiflow.export.art.source import ArtTile
+from orbiflow.export.curves import Curve
+from orbiflow.export.scene import Motif, Part, Style
+from orbiflow.geometry import orient, polygons_in
+from orbiflow.silhouette.readers.fill_rule import TooTangled, fill
+from orbiflow.silhouette.readers.reading import check_file, read_bytes
+from orbiflow.silhouette.readers.svg import MAX_BYTES
+from orbiflow.silhouette.readers.svg_paths import MAX_POINTS, SubPath, TooManyPoints
+from orbiflow.silhouette.readers.svg_shapes import Drawing, DrawnShape
+from orbiflow.silhouette.readers.svg_xml import parse_xml
+from orbiflow.symmetry.isometry import Array
+
+SAME_ASPECT = 0.01
+FLATNESS = 1 / 4000
+"""How far flattened curves may be from the drawing's, in sizes of the silhouette."""
+
+LONGEST = 1 / 150
+"""Longest straight piece before it is carried, in sizes of the silhouette: lines bend with the tile."""
+
+MOST_CARRIED = 400_000
+"""Points in all that are carried."""
+
+FARTHEST = 1e6
+"""How far out a drawing may reach, in sizes of the silhouette."""
+
+
+class TooFar(Exception):
+    """A path reaches beyond `FARTHEST`."""
+
+
+def read_drawing(path: Path, tile: ArtTile) -> tuple[Motif, tuple[str, ...]]:
+    """The drawing in an SVG file, carried onto the tile, in its units; and notes.
+
+    Fills and strokes are kept, gradients become one colour; texts, pictures and clips are left out.
+
+    Args:
+        tile: with a map.
+
+    Raises:
+        InputFileError: for a file over 16 MB, one that is no SVG or cannot be understood, one of
+            another aspect than the silhouette's, and one that draws nothing.
+    """
+    check_file(path)
+    drawing = Drawing(path, parse_xml(path, read_bytes(path, MAX_BYTES)))
+    drawing.collect()
+    linear, offset = _onto(path, drawing, tile)
+    size = float(np.sqrt(abs(tile.carried.tile.signed_area)))
+    carry = _Carry(tile, linear, offset, size)
+    parts: list[Part] = []
+    for shape in drawing.shapes:
+        try:
+            parts += _parts(shape, drawing, carry)
+        except TooFar as error:
+            raise InputFileError(
+                f"{path}: a path reaches much too far beyond the page; delete or shorten it"
+            ) from error
+        except (TooManyPoints, TooTangled, GEOSException) as error:
+            raise InputFileError(
+                f"{path}: the drawing is too intricate to be carried, or much too long; simplify it"
+            ) from error
+    if not parts:
+        raise InputFileError(f"{path}: draws nothing that is filled or stroked")
+    left = [f"{count} {name}" for name, count in drawing.others.items()]
+    notes = (f"left out {' and '.join(left)} of the drawing",) if left else ()
+    return Motif(tuple(parts)), notes
+
+
+def _onto(path: Path, drawing: Drawing, tile: ArtTile) -> tuple[Array, Array]:
+    """From the drawing's user units to the silhouette's coordinates."""
+    covered = tile.covered
+    if drawing.box is None:
+        return np.eye(2), np.zeros(2)
+    low, high = np.array(drawing.box[:2]), np.array(drawing.box[2:])
+    own, there = high - low, covered.high - covered.low
+    if abs(own[0] * there[1] / (own[1] * there[0]) - 1) > SAME_ASPECT:
+        raise InputFileError(
+            f"{path}: the drawing is {own[0]:.6g} x {own[1]:.6g} and {covered.name} is "
+            f"{there[0]:.6g} x {there[1]:.6g}; a drawing covers all of that and must have its aspect "
+            "within 1 %, so draw over a copy of it"
+        )
+    flip = np.array([1.0, 1.0 if tile.given.y_down else -1.0])
+    scale = there / own * flip
+    start = covered.low if tile.given.y_down else np.array([covered.low[0], covered.high[1]])
+    return np.diag(scale), start - scale * low
+
+
+class _Carry:
+    """From the drawing to the tile, point by point."""
+
+    def __init__(self, tile: ArtTile, linear: Array, offset: Array, size: float) -> None:
+        self.tile, self.linear, self.offset, self.size = tile, linear, offset, size
+        self.scale = float(np.sqrt(abs(np.linalg.det(linear))))
+        self.tolerance = FLATNESS * size / self.scale
+        self.count = 0
+
+    def check(self, points: Array) -> None:
+        """Raises `TooFar` for points of the drawing that nobody sees."""
+        if not (np.abs(points) < FARTHEST * self.size / self.scale).all():  # NaN, too
+            raise TooFar
+
+    def __call__(self, points: Array, *, closed: bool) -> Array:
+        here = points @ self.linear.T + self.offset
+        line = shapely.LinearRing(here) if closed else shapely.LineString(here)
+        # before any is made
+        if line.length / (LONGEST * self.size) > MOST_CARRIED:
+            raise TooManyPoints
+        fine = shapely.get_coordinates(shapely.segmentize(line, LONGEST * self.size))
+        self.count += len(fine)
+        if self.count > MOST_CARRIED:
+            raise TooManyPoints
+        return self.tile.carried.forward(fine[:-1] if closed else fine)
+
+
+def _parts(shape: DrawnShape, drawing: Drawing, carry: _Carry) -> list[Part]:
+    paint = shape.paint
+    if paint.get("visibility") in ("hidden", "collapse"):
+        return []
+    reach = np.concatenate([path.reach() for path in shape.paths] or [np.zeros((1, 2))])
+    carry.check(reach)
+    lines = [(path.flatten(carry.tolerance), path) for path in shape.paths]
+    if sum(len(points) for points, _ in lines) > MAX_POINTS:
+        raise TooManyPoints
+    found = []
+    filled, share = _colour(paint.get("fill", "#000000"), paint, drawing)
+    if filled is not None:
+        region = fill([points for points, _ in lines if len(points) > 2], shape.fill_rule)
+        curves = [
+            _ring(carry, ring, outer=k == 0)
+            for polygon in polygons_in(region)
+            for k, ring in enumerate([polygon.exterior, *polygon.interiors])
+        ]
+        opacity = shape.opacity * share * _number(paint.get("fill-opacity"), 1.0)
+        if curves and opacity > 0:
+            found.append(Part(tuple(curves), Style(filled), opacity))
+    stroked, share = _colour(paint.get("stroke", "none"), paint, drawing)
+    width = _number(paint.get("stroke-width"), 1.0) * shape.scale * carry.scale
+    opacity = shape.opacity * share * _number(paint.get("stroke-opacity"), 1.0)
+    if stroked is not None and width > 0 and opacity > 0:
+        curves = [_line(carry, points, path) for points, path in lines if len(points) > 1]
+        found.append(Part(tuple(curves), Style(None, stroked, width), opacity))
+    return found
+
+
+def _ring(carry: _Carry, ring: shapely.LinearRing, *, outer: bool) -> Curve:
+    points = carry(shapely.get_coordinates(ring)[:-1], closed=True)
+    # holes run the other way: they are holes under every rule
+    return Curve.polyline(orient(points, counter_clockwise=outer), closed=True)
+
+
+def _line(carry: _Carry, points: Array, path: SubPath) -> Curve:
+    closed = path.closed and len(points) > 2
+    if closed and np.allclose(points[0], points[-1]):
+        points = points[:-1]
+    closed = closed and len(points) > 2
+    return Curve.polyline(carry(points, closed=closed), closed=closed)
+
+
+def _colour(text: str, paint: object, drawing: Drawing) -> tuple[str | None, float]:
+    """A paint as #rrggbb, None for none; and how opaque it is."""
+    text = text.strip()
+    if text.lower() in ("none", "transparent", ""):
+        return None, 0.0
+    if text.lower() == "currentcolor" and isinstance(paint, dict):
+        text = str(paint.get("color", "#000000"))
+    if text.startswith("url("):
+        return _gradient(text, drawing)
+    try:
+        colour = svgelements.Color(text[:60])
+        red, green, blue = (int(getattr(colour, name)) for name in ("red", "green", "blue"))
+        return f"#{red:02x}{green:02x}{blue:02x}", float(colour.opacity or 0.0)
+    except (ValueError, TypeError, AttributeError):
+        return "#000000", 1.0
+
+
+def _gradient(text: str, drawing: Drawing) -> tuple[str | None, float]:
+    """The mean of a gradient's stops."""
+    element = drawing.by_id.get(text[4:].split(")")[0].strip("'\"# "))
+    for _ in range(5):  # gradients may refer to each other for their stops
+        if element is None or any(child.tag == "stop" for child in element):
+            break
+        element = drawing.by_id.get(element.get("href", "").strip().removeprefix("#"))
+    if element is None:
+        return None, 0.0
+    stops = [drawing.styles.properties(child) for child in element if child.tag == "stop"]
+    colours = [_colour(stop.get("stop-color", "#000000"), {}, drawing)[0] for stop in stops]
+    known = [[int(c[i : i + 2], 16) for i in (1, 3, 5)] for c in colours if c is not None]
+    if not known:
+        return None, 0.0
+    red, green, blue = np.mean(known, axis=0).round().astype(int)
+    return f"#{red:02x}{green:02x}{blue:02x}", 1.0
+
+
+def _number(text: str | None, usual: float) -> float:
+    """A length in user units or a share; what cannot be read is the usual one."""
+    if text is None:
+        return usual
+    try:
+        value = float(svgelements.Length(text.strip()[:40]).value(ppi=96, relative_length=1.0))
+    except (ValueError, TypeError, AttributeError):
+        return usual
+    return value if np.isfinite(value) and 0 <= value < 1e6 else usual

@@ -1,0 +1,228 @@
+"""Lines inside a tile that has no picture: hatching, echoes of the outline, feathers; and eyes."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import shapely
+from scipy.ndimage import median_filter
+
+from orbiflow.errors import OrbiflowError
+from orbiflow.export.art.body import Along, Body, shade, stroke
+from orbiflow.export.art.settings import Strokes
+from orbiflow.export.art.source import ArtTile
+from orbiflow.export.curves import Curve
+from orbiflow.export.scene import INK, Part, Style
+from orbiflow.figures.palette import Palette
+from orbiflow.geometry import arc_lengths, best_similarity, complex_points, resampled
+from orbiflow.symmetry.isometry import Array
+
+USUAL_EYE = 0.032
+"""Radius of an eye in square roots of the tile's area."""
+
+CLEAR = 1.7
+"""Radii about an eye that lines keep out of."""
+
+
+class Eye(NamedTuple):
+    """An eye on the tile: its middle, radius and what is drawn, in the tile's units."""
+
+    middle: Array
+    radius: float
+    parts: tuple[Part, ...]
+
+
+def eyes(tile: ArtTile, given: tuple[tuple[float, ...], ...], palette: Palette) -> tuple[Eye, ...]:
+    """Eyes where the silhouette has them, carried onto the tile, round.
+
+    Args:
+        tile: with a map, if any are given.
+        given: (x, y) or (x, y, radius) in the silhouette's coordinates.
+        palette: whose paper and outline they are drawn in.
+
+    Raises:
+        OrbiflowError: for one outside the silhouette.
+    """
+    return tuple(_eye(tile, eye, palette) for eye in given)
+
+
+def _eye(tile: ArtTile, given: tuple[float, ...], palette: Palette) -> Eye:
+    x, y = given[:2]
+    outline = shapely.Polygon(tile.outline)
+    if not outline.contains(shapely.Point(x, y)):
+        left, top, right, bottom = outline.bounds
+        raise OrbiflowError(
+            f"the eye at {x:g},{y:g} lies outside the silhouette, which reaches from "
+            f"{left:.4g},{top:.4g} to {right:.4g},{bottom:.4g}"
+        )
+    polygon = shapely.Polygon(tile.carried.tile.polygon)
+    size = float(np.sqrt(polygon.area))
+    here = np.array([x, y])
+    middle = tile.carried.forward(here)
+    room = 0.75 * float(polygon.exterior.distance(shapely.Point(middle)))
+    reach = 0.5 * USUAL_EYE * size
+    around = reach * np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]])
+    moved = tile.carried.forward(here + around) - middle
+    # which way it looks, and how much larger things are there
+    factor = complex(best_similarity(complex_points(around), complex_points(moved)))
+    radius = USUAL_EYE * size if len(given) < 3 else given[2] * abs(factor)
+    radius = min(radius, room)
+    up = -1.0 if tile.given.y_down else 1.0
+    glint = np.array([-0.3, 0.35 * up])
+    turn = factor / abs(factor)
+    spot = complex(*glint) * turn
+    disc = _circle(middle, radius)
+    pupil = _circle(middle, 0.58 * radius)
+    light = _circle(middle + radius * np.array([spot.real, spot.imag]) * 0.9, 0.2 * radius)
+    edge = Style(palette.paper, palette.outline, 0.2 * radius)
+    parts = (
+        Part((disc,), edge),
+        Part((pupil,), Style(palette.outline)),
+        Part((light,), Style(palette.paper)),
+    )
+    return Eye(middle, radius, parts)
+
+
+def _circle(middle: Array, radius: float) -> Curve:
+    turns = 2 * np.pi * np.arange(48) / 48
+    ring = middle + radius * np.stack([np.cos(turns), np.sin(turns)], axis=1)
+    return Curve.polyline(ring, closed=True)
+
+
+def engraved(tile: ArtTile, strokes: Strokes, around: tuple[Eye, ...] = ()) -> tuple[Part, ...]:
+    """Lines of one kind in ink, thin where it is deep or light, that keep clear of the eyes."""
+    polygon = tile.carried.tile.polygon
+    size = float(np.sqrt(abs(tile.carried.tile.signed_area)))
+    flip = np.array([1.0, 1.0 if tile.given.y_down else -1.0])
+    body = Body(polygon * flip / size)
+    rings = {"hatch": _hatch, "echoes": _echoes, "feathers": _feathers}[strokes](body)
+    rings = [ring * flip * size for ring in rings]
+    for eye in around:
+        far = CLEAR * eye.radius
+        rings = [ring for ring in rings if np.hypot(*(ring - eye.middle).T).min() > far]
+    return (Part(tuple(Curve.polyline(ring, closed=True) for ring in rings), Style(INK)),)
+
+
+def _hatch(body: Body, reach: float = 0.32, spacing: float = 0.017) -> list[Array]:
+    """Ticks inwards from the outline as on a woodcut: long in the shade, short in the light.
+
+    None is longer than `reach`.
+    """
+    count = int(arc_lengths(body.ring)[-1] / spacing)
+    along = Along(body, count)
+    dark = shade(along.normals)
+    half = median_filter(along.half, 9, mode="wrap")  # no single spikes out of notches
+    length = np.minimum(half, 1.15 * along.half) * (0.22 + 0.62 * dark)
+    # around a point of a neighbour they fan out: short, or they make a star
+    bend = np.roll(along.normals, -1, axis=0) - np.roll(along.normals, 1, axis=0)
+    length /= 1 + 0.05 * np.hypot(*bend.T) / (2 * spacing)
+    length = np.minimum(length, reach) * (0.82 + 0.18 * _wobble(count, 1))
+    lean = np.deg2rad(24 + 6 * _wobble(count, 2))
+    cos, sin = np.cos(lean), np.sin(lean)
+    n = along.normals
+    way = np.stack([cos * n[:, 0] - sin * n[:, 1], sin * n[:, 0] + cos * n[:, 1]], axis=1)
+    share = np.linspace(0, 1, 9)
+    found = []
+    for k in range(count):
+        if length[k] < 0.016:
+            continue
+        # bends towards the normal on its way in
+        path = along.points[k] + length[k] * (
+            share[:, None] * way[k] + 0.35 * (share**2)[:, None] * (n[k] - way[k])
+        )
+        if body.depth(path[2:]).min() <= 0.002:
+            continue
+        width = (0.0045 + 0.0065 * dark[k]) * (1 - share) ** 0.8 + 0.0006
+        found.append(stroke(path, width))
+    return found
+
+
+def _echoes(body: Body) -> list[Array]:
+    """The outline again, farther and farther in: thick in the shade, fading in the light."""
+    found: list[Array] = []
+    shape = shapely.Polygon(body.ring)
+    depth, gap = 0.018, 0.017
+    while depth < 0.92 * body.thickest:
+        inner = shape.buffer(-depth, join_style="round", quad_segs=6)
+        for part in shapely.get_parts(inner):
+            found += _echo(body, part, depth)
+        depth, gap = depth + gap, gap * 1.13
+    return found
+
+
+def _echo(body: Body, part: shapely.Polygon, depth: float) -> list[Array]:
+    ring = shapely.get_coordinates(part.exterior)[:-1]
+    total = arc_lengths(ring)[-1] if len(ring) > 2 else 0.0
+    if total < 0.12:
+        return []
+    count = max(24, int(total / 0.008))
+    points = resampled(ring, count)
+    fade = 1 - depth / body.thickest
+    dark = shade(body.inward(points))
+    # in the light only the first lines run on
+    width = 0.0085 * fade**0.7 * np.clip(1.25 * dark + 1.1 * fade - 0.85, 0, 1)
+    width = _smooth(width, 5)
+    return [stroke(points[own], width[own]) for own in _arcs(width > 0.0012)]
+
+
+def _feathers(body: Body) -> list[Array]:
+    """Rows of scallops that follow the body from one end to the other."""
+    found = []
+    axis = body.axis
+    across = np.array([-axis[1], axis[0]])
+    place = body.ring @ np.stack([axis, across], axis=1)
+    low, high = place.min(axis=0), place.max(axis=0)
+    row, column = 0.062, 0.072
+    for i, u in enumerate(np.arange(low[0], high[0], row)):
+        for v in np.arange(low[1] + (i % 2) * column / 2, high[1], column):
+            point = u * axis + v * across
+            found += _scallop(body, point, column)
+    return found + _hatch(body, reach=0.035, spacing=0.022)
+
+
+def _scallop(body: Body, point: Array, size: float) -> list[Array]:
+    depth = float(body.depth(point))
+    if depth < 0.02:
+        return []
+    # along the outline near it, along the body deep inside
+    normal = body.inward(point)
+    tangent = np.array([-normal[1], normal[0]])
+    tangent *= np.sign(tangent @ body.axis) or 1.0
+    deep = min(depth / body.thickest, 1.0)
+    way = tangent * (1 - deep) + body.axis * (0.35 + deep)
+    way /= np.linalg.norm(way)
+    side = np.array([-way[1], way[0]])
+    radius = min(0.52 * size, 1.1 * depth)
+    turns = np.deg2rad(np.linspace(-82, 82, 15))
+    path = point + radius * (0.9 * np.cos(turns)[:, None] * way + np.sin(turns)[:, None] * side)
+    dark = float(shade(normal[None])[0]) * (1 - deep) + 0.5 * deep
+    width = (0.0035 + 0.0065 * dark) * np.cos(turns * 0.98) ** 0.7 + 0.0008
+    if body.depth(path).min() < 0.006:
+        return []
+    quill = point + np.linspace(-0.25, 0.55, 5)[:, None] * radius * way
+    thin = (0.002 + 0.003 * dark) * np.linspace(1, 0.2, 5)
+    return [stroke(path, width), stroke(quill, thin)]
+
+
+def _wobble(count: int, seed: int) -> Array:
+    """(count,) numbers from -1 to 1 that look like a hand's, the same every time."""
+    k = np.arange(count) + 1000.0 * seed
+    return 2 * np.modf(np.abs(np.sin(12.9898 * k) * 43758.5453))[0] - 1
+
+
+def _smooth(values: Array, reach: int) -> Array:
+    kernel = np.hanning(2 * reach + 3)
+    padded = np.concatenate([values[-reach - 1 :], values, values[: reach + 1]])
+    return np.convolve(padded, kernel / kernel.sum(), mode="valid")
+
+
+def _arcs(kept: np.ndarray) -> list[np.ndarray]:
+    """Indices of each run of true entries round a ring, in order; all of it twice-closed if whole."""
+    count = len(kept)
+    if kept.all():
+        return [np.append(np.arange(count), 0)]
+    start = int(np.argmin(kept))
+    order = (np.arange(count) + start) % count
+    change = np.flatnonzero(np.diff(kept[order].astype(int), prepend=0, append=0))
+    return [order[a:b] for a, b in zip(change[::2], change[1::2], strict=True) if b - a >= 4]

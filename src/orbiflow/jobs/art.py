@@ -1,0 +1,127 @@
+"""Artwork on a tiling: the job of an `ArtRequest`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from orbiflow.cancel import Cancel
+from orbiflow.errors import OrbiflowError
+from orbiflow.export.art.making import Artwork, artwork
+from orbiflow.export.art.over import read_over
+from orbiflow.export.art.settings import ArtSettings
+from orbiflow.export.art.source import ArtTile, read_art_tile
+from orbiflow.export.art.writing import write_artwork
+from orbiflow.export.exporting import require_certified
+from orbiflow.export.lengths import pixel_size, pixels
+from orbiflow.files import write_atomic
+from orbiflow.jobs.events import Finished, Note, Progress, Written
+from orbiflow.jobs.export import check_place
+from orbiflow.jobs.records import RecordError
+from orbiflow.jobs.requests import ArtRequest
+from orbiflow.jobs.run import Sink
+
+
+def art(request: ArtRequest, tell: Sink, cancel: Cancel) -> Finished:
+    """Write the picture.
+
+    Returns:
+        `summary`: the `file`, its `width` and `height` in pixels, how many `tiles` it shows, the
+        `class`, the `tile_size` in pixels.
+
+    Raises:
+        OrbiflowError: for anything that the user can mend.
+        Cancelled: if it was told to stop; nothing is written.
+    """
+    settings = _settings(request)
+    tile = read_art_tile(request.result, request.tile)
+    require_certified(tile.given, force=request.force)
+    out = request.out or Path(f"{tile.given.name}.png")
+    check_place(out)
+    tell(Progress(0.0, "laying out"))
+    made = _prepared(request, tile, settings)
+    cancel.check()
+    tell(Progress(0.2, "drawing"))
+    content = write_artwork(made, out.suffix, cancel=cancel)
+    cancel.check()
+    path = write_atomic(out, content)
+    for note in made.notes:
+        tell(Note(note))
+    tell(Note(_said(made, path)))
+    tell(Written(path))
+    page = made.page
+    summary = {
+        "file": str(path),
+        "width": page.width,
+        "height": page.height,
+        "tiles": page.shown,
+        "class": page.tile.isohedral_class,
+        "tile_size": page.tile_size,
+    }
+    return Finished("done", summary)
+
+
+def _prepared(request: ArtRequest, tile: ArtTile, settings: ArtSettings) -> Artwork:
+    if request.picture is None:
+        return artwork(tile, settings)
+    tile.require_map()
+    over = read_over(request.picture, tile)
+    return artwork(tile, settings, picture=over.picture, drawing=over.drawing, notes=over.notes)
+
+
+def _said(made: Artwork, path: Path) -> str:
+    page = made.page
+    return (
+        f"written {path}: {page.width} x {page.height} pixels, {page.shown:.0f} tiles of "
+        f"{page.tile.isohedral_class}, {page.tile_size:.0f} pixels each"
+    )
+
+
+def _settings(request: ArtRequest) -> ArtSettings:
+    asked: dict[str, Any] = {
+        name: value
+        for name in ("tolerance", "palette", "colour", "dpi")
+        if (value := getattr(request, name)) is not None
+    }
+    dpi = request.dpi or ArtSettings.dpi
+    if request.engrave or request.strokes:
+        asked["engrave"] = request.strokes or "hatch"
+    asked["repeat"] = request.repeat
+    try:
+        if request.size is not None:
+            asked["size"] = _named("size", pixel_size, request.size, dpi)
+        if request.tile_size is not None:
+            asked["tile_size"] = _named("tile_size", pixels, request.tile_size, dpi)
+        if request.outline is not None:
+            none = request.outline.strip().lower() == "none"
+            asked["outline"] = 0.0 if none else _outline(request.outline, dpi)
+        asked["eyes"] = tuple(_eye(text) for text in request.eyes)
+        return ArtSettings(**asked)
+    except RecordError:
+        raise
+    except OrbiflowError as error:
+        raise RecordError(str(error).replace("{", "(").replace("}", ")")) from error
+
+
+def _named(name: str, read: Any, text: str, dpi: float) -> Any:
+    try:
+        return read(text, dpi)
+    except OrbiflowError as error:
+        raise RecordError(f"{{{name}}} {str(error).replace('{', '(')}") from error
+
+
+def _outline(text: str, dpi: float) -> float:
+    return _named("outline", lambda given, per: pixels(given, per, zero=True), text, dpi)
+
+
+def _eye(text: str) -> tuple[float, ...]:
+    try:
+        parts = tuple(float(part) for part in text.split(","))
+    except ValueError:
+        parts = ()
+    if len(parts) not in (2, 3):
+        raise RecordError(
+            f"{{eyes}} {text!a:.60} is no place; write x,y or x,y,radius in the silhouette's "
+            "coordinates"
+        )
+    return parts

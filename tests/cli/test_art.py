@@ -1,0 +1,199 @@
+"""`orbiflow art`: files written, mistakes answered with status 2 and one sentence."""
+
+from __future__ import annotations
+
+import re
+import struct
+import zlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from artworks import EYE, size_of, squirrel, write_run
+from orbiflow.cancel import Cancel
+from orbiflow.figures.palette import PALETTES
+from orbiflow.jobs import ArtRequest, Finished, Note, Written, run
+from orbiflow.silhouette import Target
+
+
+@pytest.fixture(name="result", scope="module")
+def result_fixture(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_run(tmp_path_factory.mktemp("runs") / "squirrel", "IH6")
+
+
+@pytest.fixture(name="picture", scope="module")
+def picture_fixture(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("pictures") / "red.png"
+    Image.new("RGB", size_of(squirrel("IH6"), 200), "#c02040").save(path)
+    return path
+
+
+SMALL = ("--size", "120x80", "--tile-size", "60")
+
+
+def test_a_picture(result: Path, picture: Path, tmp_path: Path, orbiflow) -> None:
+    out = tmp_path / "tiles.png"
+    outcome = orbiflow("art", result, "--picture", picture, "--outline", "none", *SMALL, "-o", out)
+    assert outcome.status == 0, outcome.err
+    assert f"written {out}: 120 x 80 pixels" in outcome.out
+    with Image.open(out) as made:
+        assert made.info["dpi"] == pytest.approx((300, 300), abs=0.1)
+        assert (np.asarray(made) == (0xC0, 0x20, 0x40)).all()
+
+
+def test_engraving_with_an_eye_as_svg(result: Path, tmp_path: Path, orbiflow) -> None:
+    out = tmp_path / "tiles.svg"
+    eye = f"{EYE[0]},{EYE[1]},20"
+    outcome = orbiflow("art", result, "--engrave", "--eye", eye, *SMALL, "-o", out)
+    assert outcome.status == 0, outcome.err
+    assert "currentColor" in out.read_text()
+
+
+def test_a_repeat_says_its_size(result: Path, tmp_path: Path, orbiflow) -> None:
+    out = tmp_path / "cell.png"
+    options = ("--repeat", "--tile-size", "30", "--colour", "aspect", "--palette", "sea")
+    outcome = orbiflow("art", result, *options, "-o", out)
+    assert outcome.status == 0, outcome.err
+    with Image.open(out) as image:
+        width, height = image.size
+    assert f"the cell that repeats is {width} x {height} pixels" in outcome.out
+
+
+def test_the_default_name(result: Path, tmp_path: Path, orbiflow, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert orbiflow("art", result, *SMALL).status == 0
+    assert [path.name for path in tmp_path.iterdir()] == ["squirrel-IH6.png"]
+
+
+def png_that_says(width: int, height: int) -> bytes:
+    def chunk(name: bytes, data: bytes) -> bytes:
+        crc = struct.pack(">I", zlib.crc32(name + data))
+        return struct.pack(">I", len(data)) + name + data + crc
+
+    header = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
+    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", b"") + chunk(b"IEND", b"")
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--size", "0x100"), "a picture's side in pixels must be from 1 to 30000, got 0"),
+        (("--size", "30000x30000"), "is too large; at most 100 megapixels are made"),
+        (("--size", "999999999x2"), "must be from 1 to 30000"),
+        (("--size", "big"), "--size 'big' is no width and height"),
+        (("--size", "300.5x200"), "write two whole numbers, as 3000x2000"),
+        (("--tile-size", "0"), "--tile-size '0' must be above 0"),
+        (("--tile-size", "1"), "tile_size must be from 8"),
+        (("--tile-size", "9", "--size", "9000x9000"), "the most is 20000: choose larger tiles"),
+        (("--palette", "neon"), "unknown palette 'neon'; there are delft"),
+        (("--outline", "thick"), "--outline 'thick' is no length"),
+        (("--eye", "5,5"), "the eye at 5,5 lies outside the silhouette, which reaches from"),
+        (("--eye", "here"), "--eye 'here' is no place; write x,y or x,y,radius"),
+        (("--eye", "nan,1"), "an eye's x must be"),
+        (("--eye", "210,190,-3"), "an eye's radius must be at least 0"),
+        (("--repeat", "--size", "30x30"), "--size is the page's; the cell of --repeat has its own"),
+        (("--tolerance", "0.1"), "--tolerance belongs to --repeat"),
+        (("--repeat", "--tolerance", "2"), "--tolerance must be from 0 to 0.2"),
+        (("--repeat", "--tile-size", "30000"), "the cell that repeats is too large"),
+        (("--tile", "IH1"), "holds no tile of IH1"),
+        (("--picture", "gone.png"), "gone.png: no such file"),
+        (("--dpi", "0"), "--dpi must be from 1 to 10000"),
+    ],
+)
+def test_mistakes(options, message: str, result: Path, tmp_path: Path, orbiflow) -> None:
+    outcome = orbiflow("art", result, *options, "-o", tmp_path / "out.png")
+    assert outcome.status == 2
+    assert message in outcome.err
+    assert "Traceback" not in outcome.err
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"", "the file is empty"),
+        (b"\x89PNG\r\n\x1a\nrubbish", "damaged or cut short"),
+        (b"MZ rubbish", "damaged or cut short, or it is none"),
+        (png_that_says(60_000, 60_000), "at most 40 megapixels are read"),
+        (png_that_says(40, 90), "damaged|the picture is 40 x 90 pixels and the silhouette's"),
+    ],
+)
+def test_pictures_that_are_refused(
+    content: bytes, message: str, result: Path, tmp_path: Path, orbiflow
+) -> None:
+    path = tmp_path / "picture.png"
+    path.write_bytes(content)
+    outcome = orbiflow("art", result, "--picture", path, "-o", tmp_path / "out.png")
+    assert outcome.status == 2
+    assert any(part in outcome.err for part in message.split("|")), outcome.err
+    assert not (tmp_path / "out.png").exists()
+
+
+def test_a_picture_of_another_aspect(result: Path, tmp_path: Path, orbiflow) -> None:
+    path = tmp_path / "square.png"
+    Image.new("RGB", (300, 300)).save(path)
+    outcome = orbiflow("art", result, "--picture", path, "-o", tmp_path / "out.png")
+    assert outcome.status == 2
+    assert "the picture is 300 x 300 pixels and the silhouette's bounding box is" in outcome.err
+    assert "within 1 %" in outcome.err
+
+
+@pytest.mark.parametrize("out", ["tiles.pdf", "tiles"])
+def test_other_endings(out: str, result: Path, tmp_path: Path, orbiflow) -> None:
+    outcome = orbiflow("art", result, "-o", tmp_path / out)
+    assert outcome.status == 2
+    assert f"--out must end in .png or .svg, got {out}" in outcome.err
+
+
+def test_the_job_tells_what_it_did(result: Path, tmp_path: Path) -> None:
+    events = []
+    request = ArtRequest(result=result, out=tmp_path / "a.png", size="60x40", tile_size="40")
+    finished = run(request, events.append)
+    assert isinstance(finished, Finished)
+    assert finished.summary["width"] == 60
+    assert finished.summary["class"] == "IH6"
+    assert [event.path for event in events if isinstance(event, Written)] == [tmp_path / "a.png"]
+    assert any(isinstance(event, Note) for event in events)
+
+
+def test_a_cancelled_job_writes_nothing(result: Path, tmp_path: Path) -> None:
+    cancel = Cancel()
+    cancel.cancel()
+    request = ArtRequest(result=result, out=tmp_path / "a.png", size="60x40")
+    assert run(request, cancel=cancel).state == "cancelled"
+    assert list(tmp_path.iterdir()) == []
+
+
+DOCS = (Path(__file__).parents[2] / "docs" / "artwork.md").read_text(encoding="utf-8")
+
+
+def test_the_page_of_documentation_names_every_option_and_palette(orbiflow) -> None:
+    offered = set(re.findall(r"--[a-z][a-z-]+", orbiflow("art", "--help").out)) - {"--help"}
+    assert len(offered) > 12
+    assert offered <= set(re.findall(r"--[a-z][a-z-]+", DOCS))
+    assert set(PALETTES) <= set(re.findall(r"`([a-z-]+)`", DOCS))
+
+
+def test_the_snippet_of_the_documentation(tmp_path: Path, monkeypatch) -> None:
+    (snippet,) = re.findall(r"```python\n(.*?)```", DOCS, flags=re.DOTALL)
+    monkeypatch.chdir(tmp_path)
+    write_run(tmp_path / "out" / "barbet", "IH6")
+    low, high = squirrel("IH6").covered[:2]
+    box = " ".join(str(value) for value in (*low, *(high - low)))
+    (tmp_path / "examples" / "artwork").mkdir(parents=True)
+    drawing = f'<svg viewBox="{box}"><circle cx="{EYE[0]}" cy="{EYE[1]}" r="20"/></svg>'
+    (tmp_path / "examples" / "artwork" / "barbet.svg").write_text(drawing)
+    names: dict[str, Any] = {}
+    exec(compile(snippet, "artwork.md", "exec"), names)
+    assert names["pixels"].shape == (600, 900, 3)
+
+
+def test_the_example_lies_over_its_silhouette() -> None:
+    examples = Path(__file__).parents[2] / "examples"
+    (box,) = re.findall('viewBox="([^"]+)"', (examples / "artwork" / "barbet.svg").read_text())
+    frame = Target.read(examples / "silhouettes" / "barbet.svg").frame
+    assert frame.size is not None
+    assert [float(value) for value in box.split()] == [*frame.corner, *frame.size]
