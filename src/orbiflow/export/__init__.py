@@ -4,8 +4,10 @@ from orbiflow.export.curves import Curve
 from orbiflow.export.dxf_writer import write_dxf
 from orbiflow.export.exporting import Exported, export, scenes, write_scene
 from orbiflow.export.folder import write_tile_folder
-from orbiflow.export.gallery import overview_png, write_gallery
+from orbiflow.export.gallery import write_gallery
+from orbiflow.export.index_page import index_page
 from orbiflow.export.json_writer import write_json
+from orbiflow.export.overview import overview_png
 from orbiflow.export.pdf_writer import write_pdf
 from orbiflow.export.png_writer import write_png
 from orbiflow.export.result_file import ExportTile, read_result
@@ -24,6 +26,7 @@ __all__ = [
     "Style",
     "Uses",
     "export",
+    "index_page",
     "overview_png",
     "read_result",
     "scenes",

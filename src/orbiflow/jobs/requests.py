@@ -46,6 +46,7 @@ class EscherizeRequest(Request):
     - `pin`: what must keep its shape, in the search for likeness: "x,y" or "x,y,radius" in the
       input's coordinates, or the path of a mask. `pin_angle`: it keeps its angle, too.
     - `per_class`: tiles of each class at most. `force`: keep tiles that are not certified.
+    - `figures`: draw the flow of each tile that one made, too (`field.png`).
     - `workers`: processes, None for one a core.
     - `threshold`, `invert`: how the picture is read, None to find out.
     """
@@ -68,6 +69,7 @@ class EscherizeRequest(Request):
     seed: int = 0
     turns: int | None = None
     iterations: int | None = None
+    figures: bool = False
     workers: int | None = None
     threshold: float | None = None
     invert: bool | None = None
