@@ -9,6 +9,7 @@ import typer
 from rich.markup import escape
 
 from orbiflow import __version__
+from orbiflow.cli.animate import animate
 from orbiflow.cli.classes import classes
 from orbiflow.cli.console import errors
 from orbiflow.cli.density import density
@@ -30,6 +31,7 @@ app = typer.Typer(
 )
 app.command()(escherize)
 app.command()(export)
+app.command()(animate)
 app.command()(classes)
 app.add_typer(density)
 
@@ -48,7 +50,9 @@ def _global(
 
 def _option(field: str) -> str:
     """What a field of a request is called here."""
-    return {"count": "-n", "purpose": "--for"}.get(field, "--" + field.replace("_", "-"))
+    return {"count": "-n", "purpose": "--for", "animation": "--kind"}.get(
+        field, "--" + field.replace("_", "-")
+    )
 
 
 def main() -> None:

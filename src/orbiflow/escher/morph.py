@@ -4,12 +4,16 @@ Both tiles fall into triangles that correspond. Every vertex of the tiling is a 
 with positive weights (mean value coordinates; Floater, 2003); and on a torus any such weights give a
 plane drawing again (Tutte, 1963; Gortler, Gotsman and Thurston, 2006). So the weights are interpolated,
 not the places (Floater and Gotsman, How to morph tilings injectively, 1999), and the places solved for:
-two unknowns an orbit of vertices, for weights that the group leaves as they are give places that it does.
+two unknowns an orbit of vertices, for weights that the group leaves as they are give such places.
+
+Where the group has no rotation, walks by such weights may drift, and the torus would have to change.
+There weights along the drift are tilted, by an exponential, until it stops: they stay positive.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 import shapely
@@ -28,6 +32,12 @@ ROUNDS = 12
 
 STIFF = 1e4
 """How much more the edges pull than the inside where they are to be straight."""
+
+TILTS, BALANCED, TINY = 12, 1e-9, 1e-4
+"""Steps in which weights are tilted until nothing drifts; what counts as that; a step to learn by."""
+
+EVEN = 24
+"""Places at which the other way is measured, so that all moves evenly."""
 
 CHECKED = 48
 """Places between the two tiles at which the straight way is looked at."""
@@ -119,11 +129,32 @@ class _Weights:
     def points(self, share: float) -> Array:
         """(n, 2) the outline at a share of the way."""
         weights = self.first ** (1 - share) * self.last**share
-        weights /= _sums(weights, self.sides, self.orbits)
-        return self.orbits.spread(self._solved(weights))[: len(self.own.points)]
+        ways = _open_ways(self.own)
+        i, j = self.sides.T
+        along = (self.guess[j] - self.guess[i]) @ ways.T
+        tilt = np.zeros(len(ways))
+        solution, force = self._solved(weights, ways)
+        steps: Array | None = None
+        for _ in range(TILTS):
+            if np.abs(force).max(initial=0.0) < BALANCED:
+                break
+            if steps is None:
+                nearby = [
+                    self._solved(weights * np.exp(along @ (tilt + way)), ways)[1] - force
+                    for way in TINY * np.eye(len(ways))
+                ]
+                steps = np.linalg.inv(np.stack(nearby, axis=1) / TINY)
+            tilt = tilt - steps @ force
+            solution, force = self._solved(weights * np.exp(along @ tilt), ways)
+        return self.orbits.spread(solution)[: len(self.own.points)]
 
-    def _solved(self, weights: Array) -> Array:
-        """(N, 2) places in which each orbit is the mean of its neighbours."""
+    def _solved(self, weights: Array, ways: Array) -> tuple[Array, Array]:
+        """(N, 2) places in which each orbit is the mean of its neighbours, but for a force.
+
+        The force (k,), along the ways that the group leaves open, is what such weights lack to keep
+        the whole in its place: walks by them drift. It is the same on all, none where all balances.
+        """
+        weights = weights / _sums(weights, self.sides, self.orbits)
         guess, orbits = self.guess, self.orbits
         i, j = self.sides.T
         free = np.flatnonzero((orbits.source == np.arange(len(orbits.source))) & ~orbits.fixed)
@@ -144,23 +175,28 @@ class _Weights:
         np.add.at(right, row, -np.einsum("eij,ej->ei", back, there - orbits.shift[i]))
         matrix = _block_matrix(blocks, rows, columns, len(free))
         solution = guess.copy()
-        solution[free] = _bordered(matrix, right, guess[free], _open_ways(self.own))
-        return solution
+        solution[free], force = _bordered(matrix, right, guess[free], ways)
+        return solution, force
 
 
-def _bordered(matrix: csc_array, right: Array, guess: Array, ways: Array) -> Array:
-    """The solution whose mean, along the ways (k, 2) that the group leaves open, is the guess's."""
+def _bordered(matrix: csc_array, right: Array, guess: Array, ways: Array) -> tuple[Array, Array]:
+    """The solution whose mean, along the ways (k, 2) that the group leaves open, is the guess's.
+
+    And the force (k,) on all that this takes.
+    """
     size, border = right.size, np.tile(ways, (1, len(right)))
     whole, value = matrix, right.ravel()
     if len(ways):
         whole = bmat([[matrix, border.T], [border, None]], format="csc")
         value = np.concatenate([value, border @ guess.ravel()])
-    return np.asarray(spsolve(csc_array(whole), value))[:size].reshape(-1, 2)
+    solved = np.asarray(spsolve(csc_array(whole), value))
+    return solved[:size].reshape(-1, 2), solved[size:]
 
 
 def _block_matrix(blocks: Array, rows: Array, columns: Array, count: int) -> csc_array:
-    r = np.repeat(2 * rows[:, None, None], 4, axis=1).reshape(-1, 2, 2) + [[0, 0], [1, 1]]
-    c = np.repeat(2 * columns[:, None, None], 4, axis=1).reshape(-1, 2, 2) + [[0, 1], [0, 1]]
+    """(2 count, 2 count), of blocks (E, 2, 2) in block rows and columns (E,), those that meet added."""
+    r = 2 * rows[:, None] + (0, 0, 1, 1)
+    c = 2 * columns[:, None] + (0, 1, 0, 1)
     entries = (blocks.ravel(), (r.ravel(), c.ravel()))
     return csc_array(coo_array(entries, shape=(2 * count, 2 * count)))
 
@@ -214,8 +250,8 @@ def _mean_values(points: Array, triangles: NDArray[np.int64], sides: NDArray[np.
 
 def _evenly(weights: _Weights) -> Array:
     """How far the outline has moved, 0 to 1, at even shares of the weights' way."""
-    found = [weights.points(float(s)) for s in np.linspace(0, 1, CHECKED + 1)]
-    steps = [np.sqrt(((b - a) ** 2).sum(axis=1).mean()) for a, b in zip(found, found[1:])]
+    found = [weights.points(float(s)) for s in np.linspace(0, 1, EVEN + 1)]
+    steps = [np.sqrt(((b - a) ** 2).sum(axis=1).mean()) for a, b in pairwise(found)]
     far = np.concatenate([[0], np.cumsum(steps)])
     return far / far[-1]
 

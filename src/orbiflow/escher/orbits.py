@@ -63,7 +63,7 @@ class Orbits:
         )
 
     def spread(self, points: Array) -> Array:
-        """(N, 2) vertices, of which those that are sources, or fixed, are taken from `points` (N, 2)."""
+        """(N, 2) vertices; those that are sources, or fixed, are taken from `points` (N, 2)."""
         images = np.einsum("nij,nj->ni", self.linear, points[self.source]) + self.shift
         return np.where(self.fixed[:, None], points, images)
 

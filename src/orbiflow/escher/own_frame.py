@@ -23,7 +23,7 @@ class OwnFrame:
     - `kind`: the class.
     - `points`: (N, 2) the polygon in the own frame, from corner 0 on.
     - `starts`: indices of the corners in it, increasing from 0.
-    - `linear`, `offset`: (2, 2) and (2,): a point p of the own frame is linear p + offset in the tile's.
+    - `linear`, `offset`: (2, 2) and (2,): a point p of the own frame lies at linear p + offset.
     """
 
     kind: IsohedralClass

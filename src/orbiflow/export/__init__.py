@@ -1,5 +1,6 @@
 """Files that people take away: vector export in millimetres, artwork, and the folder of a search."""
 
+from orbiflow.export.animation import AnimationSettings, animate, animation
 from orbiflow.export.curves import Curve
 from orbiflow.export.dxf_writer import write_dxf
 from orbiflow.export.exporting import Exported, export, scenes, write_scene
@@ -17,6 +18,7 @@ from orbiflow.export.svg import tile_svg, tiling_svg
 from orbiflow.export.svg_writer import write_svg
 
 __all__ = [
+    "AnimationSettings",
     "Curve",
     "ExportSettings",
     "ExportTile",
@@ -25,6 +27,8 @@ __all__ = [
     "Scene",
     "Style",
     "Uses",
+    "animate",
+    "animation",
     "export",
     "index_page",
     "overview_png",

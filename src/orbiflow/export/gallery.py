@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import functools
 import json
-from collections import Counter
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
@@ -14,6 +13,7 @@ from orbiflow.escher.result import ClassFailure, TileResult
 from orbiflow.export.folder import FIGURE_FILES, TILE_FILES, figure_files, write_tile_folder
 from orbiflow.export.index_page import index_page
 from orbiflow.export.overview import overview_png
+from orbiflow.export.result_file import folder_names
 from orbiflow.figures.front import FrontPoint, front_png
 from orbiflow.files import write_atomic
 from orbiflow.silhouette.target import Target
@@ -102,20 +102,6 @@ def _draw(
     write_tile_folder(
         results[index], target, folders[index], colours=colours[index], figures=figures
     )
-
-
-def folder_names(classes: Iterable[str]) -> list[str]:
-    """Of results of these classes; further tiles of a class are IH4-2, IH4-3 and so on.
-
-    >>> folder_names(["IH4", "IH6", "IH4"])
-    ['IH4', 'IH6', 'IH4-2']
-    """
-    seen: Counter[str] = Counter()
-    names = []
-    for name in classes:
-        seen[name] += 1
-        names.append(name if seen[name] == 1 else f"{name}-{seen[name]}")
-    return names
 
 
 def written_files(folder: Path) -> set[str]:

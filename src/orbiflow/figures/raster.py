@@ -217,9 +217,26 @@ def palette_png(picture: Image.Image, colours: Sequence[str]) -> bytes:
         picture: of these colours and their mixtures; others become the nearest.
         colours: 1 to 256 of them, as #rrggbb.
     """
-    base = np.array([rgb(colour) for colour in dict.fromkeys(colours)], dtype=float)
+    buffer = io.BytesIO()
+    limited(picture, colours).save(buffer, "PNG", compress_level=6)
+    return buffer.getvalue()
+
+
+def limited(picture: Image.Image, colours: Sequence[str], steps: int = 7) -> Image.Image:
+    """An RGB picture with a palette: these colours, and so many steps between any two of them.
+
+    Pictures of the same colours have the same palette.
+    """
+    return picture.quantize(
+        palette=_chart(tuple(dict.fromkeys(colours)), steps), dither=Image.Dither.NONE
+    )
+
+
+@lru_cache(maxsize=16)
+def _chart(colours: tuple[str, ...], most: int) -> Image.Image:
+    base = np.array([rgb(colour) for colour in colours], dtype=float)
     pairs = list(combinations(range(len(base)), 2))
-    steps = min(7, (256 - len(base)) // len(pairs)) if pairs else 0
+    steps = min(most, (256 - len(base)) // len(pairs)) if pairs else 0
     share = np.arange(1, steps + 1)[:, None] / (steps + 1)
     mixed = [base[a] + share * (base[b] - base[a]) for a, b in pairs if steps]
     between = np.concatenate([np.zeros((0, 3)), *mixed])
@@ -228,9 +245,7 @@ def palette_png(picture: Image.Image, colours: Sequence[str]) -> bytes:
     table: NDArray[np.int64] = np.rint(np.concatenate([base, between[~near]])).astype(np.int64)
     chart = Image.new("P", (1, 1))
     chart.putpalette(table.ravel().tolist())
-    buffer = io.BytesIO()
-    picture.quantize(palette=chart, dither=Image.Dither.NONE).save(buffer, "PNG", compress_level=6)
-    return buffer.getvalue()
+    return chart
 
 
 def rgb(colour: str) -> tuple[int, int, int]:

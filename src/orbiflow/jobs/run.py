@@ -17,6 +17,7 @@ Sink = Callable[[Event], None]
 _MODULES = {
     "escherize": "escherize",
     "export": "export",
+    "animate": "animate",
     "density-fit": "density_fit",
     "density-score": "density_use",
     "density-sample": "density_use",
