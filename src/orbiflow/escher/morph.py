@@ -39,7 +39,7 @@ TILTS, BALANCED, TINY = 12, 1e-9, 1e-4
 EVEN = 24
 """Places at which the other way is measured, so that all moves evenly."""
 
-CHECKED = 48
+CHECKED = 96
 """Places between the two tiles at which the straight way is looked at."""
 
 

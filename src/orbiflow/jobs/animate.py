@@ -6,11 +6,11 @@ from pathlib import Path
 from typing import Any
 
 from orbiflow.cancel import Cancel
-from orbiflow.errors import OutputError
 from orbiflow.export.animation import AnimationSettings, animation
 from orbiflow.export.result_file import read_result
 from orbiflow.files import write_atomic
 from orbiflow.jobs.events import Finished, Note, Progress, Written
+from orbiflow.jobs.place import check_place
 from orbiflow.jobs.requests import AnimateRequest
 from orbiflow.jobs.run import Sink
 
@@ -28,7 +28,7 @@ def animate(request: AnimateRequest, tell: Sink, cancel: Cancel) -> Finished:
     settings = _settings(request)
     tile = read_result(request.result, request.tile)
     out = request.out or Path(f"{tile.name}-{settings.kind}.{settings.format}")
-    _check_place(out)
+    check_place(out)
 
     def told(share: float) -> None:
         cancel.check()
@@ -63,13 +63,3 @@ def _settings(request: AnimateRequest) -> AnimationSettings:
     if request.out is not None:
         asked["format"] = request.out.suffix.lower().lstrip(".")
     return AnimationSettings(kind=request.animation, **asked)
-
-
-def _check_place(out: Path) -> None:
-    """Before the work; a device must not be replaced by a file."""
-    if out.is_dir():
-        raise OutputError(f"cannot write {out}: it is a folder; give a file's name in it")
-    if out.exists() and not out.is_file():
-        raise OutputError(f"cannot write {out}: it is not a file; choose another name")
-    if not out.parent.is_dir():
-        raise OutputError(f"cannot write {out}: there is no folder {out.parent}; create it first")

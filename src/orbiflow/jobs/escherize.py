@@ -19,6 +19,7 @@ from orbiflow.escher import (
 )
 from orbiflow.escher.methods import Settings
 from orbiflow.escher.report import report
+from orbiflow.export.folder import figure_files
 from orbiflow.export.gallery import (
     OVERVIEW,
     RESULT,
@@ -188,6 +189,10 @@ def _write(
     with folder.replaced() as staged:
         if results:
             tell(Note("drawing"))
+            if figures and not any(map(figure_files, results)):
+                tell(
+                    Note("no flow made these tiles, so there is none to draw: the silhouette bent")
+                )
             write_gallery(
                 results,
                 target,
