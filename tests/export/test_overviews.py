@@ -112,6 +112,17 @@ def test_what_is_not_certified_says_so(target: Target, flowed: TileResult) -> No
     assert "Not certified: it <overlaps> itself." in page.words
 
 
+def test_after_a_search_for_both_the_page_says_what_for(
+    target: Target, bent: TileResult, flowed: TileResult
+) -> None:
+    both = [replace(bent, front=True), replace(flowed, front=False)]
+    page = Page(index_page(both, target, ["IH4", "IH6"]))
+    assert "found for likeness: no other beats it in both" in page.words
+    assert "found for overlap: near the best" in page.words
+    assert {"href": "front.png"} in page.all("a")
+    assert {"href": "front.png"} not in Page(index_page([bent], target, ["IH4"])).all("a")
+
+
 def test_measures_have_words(bent: TileResult, flowed: TileResult) -> None:
     for result in (bent, flowed):
         for measure in measures(result):

@@ -47,7 +47,9 @@ def index_page(
     """
     name = PurePath(target.source).name
     extra = figures or [()] * len(results)
-    parts = [_head(name, target, len(results)), _contents(results, folders)]
+    compared = any(result.front is not None for result in results)
+    head = _head(name, target, len(results), compared=compared)
+    parts = [head, _contents(results, folders)]
     for k, (result, folder) in enumerate(zip(results, folders, strict=True)):
         parts.append(_article(result, folder, k + 1, name, tuple(extra[k])))
     if failures:
@@ -60,10 +62,11 @@ def index_page(
     return "".join(parts)
 
 
-def _head(name: str, target: Target, count: int) -> str:
+def _head(name: str, target: Target, count: int, *, compared: bool) -> str:
     style = resources.files("orbiflow.export").joinpath("index_page.css").read_text("utf-8")
     title = html.escape(f"Tiles that look like {name}")
     tiles = "One tile" if count == 1 else f"{count} tiles, best first"
+    front = ', by deformation and overlap: <a href="front.png">front.png</a>' if compared else ""
     return f"""<!DOCTYPE html>
 <html lang="en">
 <head>
@@ -80,7 +83,7 @@ def _head(name: str, target: Target, count: int) -> str:
 <div>
 <h1>{title}</h1>
 <p>{tiles}. Everything in numbers: <a href="result.json">result.json</a>; on one sheet:
-<a href="overview.png">overview.png</a>.</p>
+<a href="overview.png">overview.png</a>{front}.</p>
 </div>
 </header>
 <main>
@@ -121,7 +124,7 @@ def _article(result: TileResult, folder: str, rank: int, name: str, extra: tuple
         for file in (*TILE_FILES, *extra)
     )
     return f"""<article id="{folder}">
-<h2>{rank}. {html.escape(folder)} <span>wallpaper group {html.escape(result.group_name)}</span></h2>
+<h2>{rank}. {html.escape(folder)} <span>wallpaper group {html.escape(result.group_name)}{_aim(result)}</span></h2>
 {_proof(result)}
 <div class="pictures">
 {_tiling(result, folder, name)}
@@ -136,6 +139,13 @@ def _article(result: TileResult, folder: str, rank: int, name: str, extra: tuple
 {links}</ul>
 </article>
 """
+
+
+def _aim(result: TileResult) -> str:
+    if result.front is None:
+        return ""
+    rest = "no other beats it in both" if result.front else "near the best"
+    return f", found for {result.objective}: {rest}"
 
 
 def _proof(result: TileResult) -> str:

@@ -25,7 +25,11 @@ def measures(result: TileResult) -> list[Measure]:
                 "Deformation",
                 f"{result.deformation:.3f}",
                 _word(
-                    result.deformation, (0.1, "little"), (0.2, "some"), (0.35, "much"), "very much"
+                    result.deformation,
+                    (0.1, "bent a little"),
+                    (0.2, "bent somewhat"),
+                    (0.35, "bent much"),
+                    "bent very much",
                 ),
                 "What bending the silhouette into the tile costs; 0 is the silhouette itself.",
             )
