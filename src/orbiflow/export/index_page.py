@@ -124,7 +124,7 @@ def _article(result: TileResult, folder: str, rank: int, name: str, extra: tuple
         for file in (*TILE_FILES, *extra)
     )
     return f"""<article id="{folder}">
-<h2>{rank}. {html.escape(folder)} <span>wallpaper group {html.escape(result.group_name)}{_aim(result)}</span></h2>
+<h2>{rank}. {html.escape(folder)} <span>{_group_and_aim(result)}</span></h2>
 {_proof(result)}
 <div class="pictures">
 {_tiling(result, folder, name)}
@@ -141,11 +141,12 @@ def _article(result: TileResult, folder: str, rank: int, name: str, extra: tuple
 """
 
 
-def _aim(result: TileResult) -> str:
+def _group_and_aim(result: TileResult) -> str:
+    group = f"wallpaper group {html.escape(result.group_name)}"
     if result.front is None:
-        return ""
+        return group
     rest = "no other beats it in both" if result.front else "near the best"
-    return f", found for {result.objective}: {rest}"
+    return f"{group}, found for {result.objective}: {rest}"
 
 
 def _proof(result: TileResult) -> str:
