@@ -26,7 +26,7 @@ from orbiflow.silhouette import Target
 from orbiflow.tilings import CLASSES
 
 DOCS = Path(__file__).parents[2] / "docs"
-FILES = {"tile.svg", "tiling.svg", "tiling.png", "overlay.png", "field.png", "model.safetensors"}
+FILES = {"tile.svg", "tiling.svg", "tiling.png", "overlay.png", "model.safetensors"}
 FEW = ["--method", "occupancy", "--iterations", 8, "--turns", 1, "--max-frequency", 2]
 
 # a shape in pixels with nothing symmetric about it
@@ -65,7 +65,13 @@ def document_fixture(folder: Path) -> dict[str, Any]:
 
 def test_all_files_are_there(folder: Path) -> None:
     out = folder / "new" / "out"
-    assert {p.name for p in out.iterdir()} == {"IH4", "IH6", "overview.png", "result.json"}
+    assert {p.name for p in out.iterdir()} == {
+        "IH4",
+        "IH6",
+        "index.html",
+        "overview.png",
+        "result.json",
+    }
     for name in ("IH4", "IH6"):
         assert {p.name for p in (out / name).iterdir()} == FILES
 
@@ -112,17 +118,14 @@ def test_the_model_reproduces_the_polygon(folder: Path, document: dict[str, Any]
 def test_pictures_open(folder: Path) -> None:
     out = folder / "new" / "out"
     for name in ("IH4", "IH6"):
-        for file, width in {"tiling.png": 1800, "overlay.png": 1600}.items():
+        for file, width in {"tiling.png": 1600, "overlay.png": 1200}.items():
             with Image.open(out / name / file) as image:
                 image.load()
                 assert image.width == width
                 assert len(image.getcolors(2**24) or []) > 2
-        with Image.open(out / name / "field.png") as image:
-            image.load()
-            assert min(image.size) >= 400
     with Image.open(out / "overview.png") as image:
         image.load()
-        assert image.width == 4 * 560
+        assert image.width == 1920
 
 
 def test_drawings_parse(folder: Path, document: dict[str, Any]) -> None:
@@ -142,9 +145,8 @@ def test_drawings_parse(folder: Path, document: dict[str, Any]) -> None:
 def test_a_run_on_a_polygon_with_y_up(tmp_path: Path, orbiflow) -> None:
     path = tmp_path / "boot.json"
     path.write_text(json.dumps(BOOT))
-    outcome = orbiflow(
-        "escherize", path, "-o", tmp_path / "o", "--classes", "28", "--workers", 1, *FEW
-    )
+    options = ["--classes", "28", "--workers", 1, "--figures", *FEW]
+    outcome = orbiflow("escherize", path, "-o", tmp_path / "o", *options)
     assert outcome.status == 0
     assert "overview.png first" in outcome.out
     document = json.loads((tmp_path / "o" / "result.json").read_text(encoding="utf-8"))
@@ -153,6 +155,12 @@ def test_a_run_on_a_polygon_with_y_up(tmp_path: Path, orbiflow) -> None:
     tile, goal = shapely.Polygon(entry["polygon"]), shapely.Polygon(BOOT)
     iou = tile.intersection(goal).area / tile.union(goal).area
     assert iou == pytest.approx(entry["metrics"]["iou"], abs=1e-9)
+    assert {p.name for p in (tmp_path / "o" / "IH28").iterdir()} == FILES | {"field.png"}
+    with Image.open(tmp_path / "o" / "IH28" / "field.png") as image:
+        image.load()
+        assert min(image.size) >= 400
+    # a run without figures takes the place of one with them
+    assert orbiflow("escherize", path, "-o", tmp_path / "o", *options[:4], *FEW).status == 0
     assert {p.name for p in (tmp_path / "o" / "IH28").iterdir()} == FILES
 
 
@@ -224,10 +232,15 @@ def test_a_second_run_takes_the_place_of_the_first(
     run = ("escherize", path, "--workers", 1, *FEW)
     assert orbiflow(*run, "-o", out, "--classes", "IH4,IH6").status == 0
     assert orbiflow(*run, "-o", out, "--classes", "IH4").status == 0
-    assert {p.name for p in out.iterdir()} == {"IH4", "overview.png", "result.json"}
+    assert {p.name for p in out.iterdir()} == {"IH4", "index.html", "overview.png", "result.json"}
     monkeypatch.chdir(out)
     assert orbiflow(*run, "-o", ".", "--classes", "IH6").status == 0
-    assert {p.name for p in Path().iterdir()} == {"IH6", "overview.png", "result.json"}
+    assert {p.name for p in Path().iterdir()} == {
+        "IH6",
+        "index.html",
+        "overview.png",
+        "result.json",
+    }
     before = (out / "result.json").read_bytes()
     monkeypatch.setattr(methods, "fit_occupancy", lambda *_, **__: crossed())
     none = orbiflow(*run, "-o", out, "--classes", "IH21")

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from orbiflow.errors import OrbiflowError
 from orbiflow.jobs import (
+    AnimateRequest,
     ArtRequest,
     DensityFitRequest,
     DensityPlotRequest,
@@ -37,6 +38,17 @@ measures = st.sampled_from(["natural", "square", "uniform"])
 spaces = st.sampled_from(["torus", "sphere", "klein-bottle", "projective-plane"])
 
 REQUESTS = st.one_of(
+    st.builds(
+        AnimateRequest,
+        result=paths,
+        out=st.none() | st.sampled_from(["a.gif", "b.SVG", "c.mp4"]).map(Path),
+        tile=st.text(),
+        animation=st.sampled_from(["morph", "bend", "grow"]),
+        seconds=st.none() | st.floats(0.5, 120),
+        size=st.none() | st.integers(32, 2000).map(lambda half: 2 * half),
+        palette=st.none() | st.text(),
+        force=st.booleans(),
+    ),
     st.builds(
         EscherizeRequest,
         image=paths,

@@ -54,14 +54,14 @@ def test_a_search(workers: int, tmp_path: Path) -> None:
     written = {event.path for event in events if isinstance(event, Written)}
     assert written == {tmp_path / "out" / name for name in files(tmp_path / "out")}
     expected = {f"{name}/{file}" for name in ("IH4", "IH6") for file in TILE_FILES}
-    assert files(tmp_path / "out") == expected | {"result.json", "overview.png"}
+    assert files(tmp_path / "out") == expected | {"index.html", "result.json", "overview.png"}
 
 
 def test_a_second_run_takes_the_place_of_the_first(tmp_path: Path) -> None:
     run(boot_request(tmp_path, "IH4", "IH6"))
     out = tmp_path / "out"
     run(boot_request(tmp_path, "IH4"))
-    assert {p.name for p in out.iterdir()} == {"IH4", "overview.png", "result.json"}
+    assert {p.name for p in out.iterdir()} == {"IH4", "index.html", "overview.png", "result.json"}
     (out / "IH4" / "notes.txt").write_text("mine")
     before = (out / "result.json").read_bytes()
     with pytest.raises(OrbiflowError, match=r"holds IH4/notes.txt, which orbiflow did not write"):
@@ -141,12 +141,12 @@ def test_a_first_look_alone_is_kept_unless_there_is_more(tmp_path: Path) -> None
 
     assert [tile["class"] for tile in cancelled().summary["tiles"]] == ["IH6"]
     out = tmp_path / "out"
-    assert {p.name for p in out.iterdir()} == {"IH6", "overview.png", "result.json"}
+    assert {p.name for p in out.iterdir()} == {"IH6", "index.html", "overview.png", "result.json"}
     assert run(dataclasses.replace(request, classes=("IH4",))).state == "done"
     finished = cancelled()
     assert not finished.summary["written"]
     assert finished.summary["tiles"] == []
-    assert {p.name for p in out.iterdir()} == {"IH4", "overview.png", "result.json"}
+    assert {p.name for p in out.iterdir()} == {"IH4", "index.html", "overview.png", "result.json"}
 
 
 def test_a_fit_that_is_cancelled_writes_nothing(tmp_path: Path) -> None:

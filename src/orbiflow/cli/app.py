@@ -9,6 +9,7 @@ import typer
 from rich.markup import escape
 
 from orbiflow import __version__
+from orbiflow.cli.animate import animate
 from orbiflow.cli.art import art
 from orbiflow.cli.classes import classes
 from orbiflow.cli.console import errors
@@ -32,6 +33,7 @@ app = typer.Typer(
 app.command()(escherize)
 app.command()(export)
 app.command()(art)
+app.command()(animate)
 app.command()(classes)
 app.add_typer(density)
 
@@ -50,7 +52,7 @@ def _global(
 
 def _option(field: str) -> str:
     """What a field of a request is called here."""
-    return {"count": "-n", "purpose": "--for", "eyes": "--eye"}.get(
+    return {"count": "-n", "purpose": "--for", "eyes": "--eye", "animation": "--kind"}.get(
         field, "--" + field.replace("_", "-")
     )
 

@@ -121,6 +121,10 @@ def escherize(
         int | None,
         typer.Option(help="Occupancy: steps of the fit, default 200.", show_default=False),
     ] = None,
+    figures: Annotated[
+        bool,
+        typer.Option("--figures", help="Draw the flow of each tile that one made: field.png."),
+    ] = False,
     workers: Annotated[
         int | None, typer.Option(help="Processes; default one a core.", show_default=False)
     ] = None,
@@ -140,8 +144,8 @@ def escherize(
 ) -> None:
     """Find tiles that look like a silhouette and tile the plane, and prove it.
 
-    Writes result.json and overview.png into the folder, and for each class a folder with tile.svg,
-    tiling.svg, tiling.png, overlay.png, field.png and model.safetensors; after a search for both,
+    Writes result.json, overview.png and index.html into the folder, and for each class a folder with
+    tile.svg, tiling.svg, tiling.png, overlay.png and model.safetensors; after a search for both,
     front.png, too.
     """
     names = None if classes.strip().lower() == "all" else re.split(r"[,\s]+", classes)
@@ -162,6 +166,7 @@ def escherize(
         seed=seed,
         turns=turns,
         iterations=iterations,
+        figures=figures,
         workers=workers,
         threshold=threshold,
         invert=invert,

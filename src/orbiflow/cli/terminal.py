@@ -113,7 +113,7 @@ def _show_tiles(event: Finished) -> None:
         # a path broken over two lines cannot be copied
         output.print(
             f"written to {folder} in {summary['seconds']:.0f} s; look at "
-            f"{folder / 'overview.png'} first",
+            f"{folder / 'overview.png'} first, or open {folder / 'index.html'}",
             soft_wrap=True,
         )
         return

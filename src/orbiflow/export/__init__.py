@@ -1,5 +1,6 @@
 """Files that people take away: vector export in millimetres, artwork, and the folder of a search."""
 
+from orbiflow.export.animation import AnimationSettings, animate, animation
 from orbiflow.export.art import (
     ArtSettings,
     Artwork,
@@ -13,8 +14,10 @@ from orbiflow.export.curves import Curve
 from orbiflow.export.dxf_writer import write_dxf
 from orbiflow.export.exporting import Exported, export, scenes, write_scene
 from orbiflow.export.folder import write_tile_folder
-from orbiflow.export.gallery import overview_png, write_gallery
+from orbiflow.export.gallery import write_gallery
+from orbiflow.export.index_page import index_page
 from orbiflow.export.json_writer import write_json
+from orbiflow.export.overview import overview_png
 from orbiflow.export.pdf_writer import write_pdf
 from orbiflow.export.png_writer import write_png
 from orbiflow.export.result_file import ExportTile, read_result
@@ -24,6 +27,7 @@ from orbiflow.export.svg import tile_svg, tiling_svg
 from orbiflow.export.svg_writer import write_svg
 
 __all__ = [
+    "AnimationSettings",
     "ArtSettings",
     "Artwork",
     "Curve",
@@ -34,8 +38,11 @@ __all__ = [
     "Scene",
     "Style",
     "Uses",
+    "animate",
+    "animation",
     "artwork",
     "export",
+    "index_page",
     "overview_png",
     "read_art_tile",
     "read_over",

@@ -13,19 +13,16 @@ from orbiflow.figures.field import field_png
 from orbiflow.figures.tilings import overlay_png, tiling_png
 from orbiflow.files import make_folder, write_atomic
 from orbiflow.silhouette.target import Target
-from orbiflow.tilings import colouring
+from orbiflow.tilings import Colouring, colouring
 
-TILE_FILES = (
-    "tile.svg",
-    "tiling.svg",
-    "tiling.png",
-    "overlay.png",
-    "field.png",
-    "model.safetensors",
-)
+TILE_FILES = ("tile.svg", "tiling.svg", "tiling.png", "overlay.png", "model.safetensors")
+"""What every class's folder holds."""
+
+FIGURE_FILES = ("field.png",)
+"""What it holds besides if figures were asked for, as far as there is something to show."""
 
 
-def overlay(result: TileResult, target: Target, *, label: str = "", width_px: int = 1600) -> bytes:
+def overlay(result: TileResult, target: Target, *, label: str = "", width_px: int = 1200) -> bytes:
     """PNG of a tile and its silhouette: how it bent, or what is missing and added."""
     y_down = target.y_down
     label = label or result.name
@@ -39,15 +36,31 @@ def overlay(result: TileResult, target: Target, *, label: str = "", width_px: in
     )
 
 
-def write_tile_folder(result: TileResult, target: Target, folder: Path) -> list[Path]:
+def figure_files(result: TileResult) -> tuple[str, ...]:
+    """Which of the `FIGURE_FILES` there are: no flow moves a tile that the silhouette bent to."""
+    return () if result.objective == "likeness" else FIGURE_FILES
+
+
+def write_tile_folder(
+    result: TileResult,
+    target: Target,
+    folder: Path,
+    *,
+    colours: Colouring | None = None,
+    figures: bool = False,
+) -> list[Path]:
     """Write the `TILE_FILES`.
+
+    Args:
+        colours: of the tiling, default `colouring(result.tile)`.
+        figures: write the `FIGURE_FILES`, too; they take much longer.
 
     Raises:
         OutputError: if a file cannot be written.
     """
     make_folder(folder)
     y_down = target.y_down
-    colours = colouring(result.tile)
+    colours = colours or colouring(result.tile)
     title = f"{target.source.rsplit('/', 1)[-1]}, {result.name} ({result.group_name})"
     if not result.certificate.valid:
         title += ", NOT CERTIFIED"
@@ -62,8 +75,5 @@ def write_tile_folder(result: TileResult, target: Target, folder: Path) -> list[
         ),
         "model.safetensors": result.model.to_bytes,
     }
-    if result.objective == "likeness":  # no flow moves it
-        del contents["field.png"]
-    return [
-        write_atomic(folder / name, contents[name]()) for name in TILE_FILES if name in contents
-    ]
+    names = (*TILE_FILES, *(figure_files(result) if figures else ()))
+    return [write_atomic(folder / name, contents[name]()) for name in names]

@@ -4,48 +4,62 @@ from __future__ import annotations
 
 import contextlib
 import functools
-import io
 import json
-from collections import Counter
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from PIL import Image, ImageDraw, ImageFont
-
 from orbiflow.escher.processes import work
-from orbiflow.escher.result import TileResult
-from orbiflow.export.folder import TILE_FILES, overlay, write_tile_folder
+from orbiflow.escher.result import ClassFailure, TileResult
+from orbiflow.export.folder import FIGURE_FILES, TILE_FILES, figure_files, write_tile_folder
+from orbiflow.export.index_page import index_page
+from orbiflow.export.overview import overview_png
+from orbiflow.export.result_file import folder_names
 from orbiflow.figures.front import FrontPoint, front_png
-from orbiflow.figures.tilings import tiling_png
 from orbiflow.files import write_atomic
 from orbiflow.silhouette.target import Target
+from orbiflow.tilings import Colouring, colouring
 
-RESULT, OVERVIEW, FRONT = "result.json", "overview.png", "front.png"
-_PANEL, _HEADER = 560, 60  # pixels
+RESULT, OVERVIEW, INDEX, FRONT = "result.json", "overview.png", "index.html", "front.png"
 
 
 def write_gallery(
-    results: Sequence[TileResult], target: Target, out: Path, *, workers: int = 1
+    results: Sequence[TileResult],
+    target: Target,
+    out: Path,
+    *,
+    failures: Sequence[ClassFailure] = (),
+    figures: bool = False,
+    workers: int = 1,
 ) -> None:
-    """Write each class's folder and `overview.png`, in `workers` processes.
+    """Write each class's folder, `overview.png` and `index.html`.
+
+    Args:
+        results: best first, at least one.
+        target: of the search.
+        out: a folder.
+        failures: classes without a tile, to be named in the page.
+        figures: write the figures, too.
+        workers: processes that draw figures; the pictures alone are drawn in less time than it takes to
+            start one.
 
     Raises:
         OutputError: if a file cannot be written.
     """
-    folders = [out / name for name in folder_names([result.name for result in results])]
-    draw = functools.partial(_draw, results, target, folders)
-    if workers == 1 or len(results) == 1:
+    names = folder_names([result.name for result in results])
+    folders = [out / name for name in names]
+    colours = [colouring(result.tile) for result in results]
+    draw = functools.partial(_draw, results, target, folders, colours, figures)
+    if workers == 1 or len(results) == 1 or not figures:
         for k in range(len(results)):
             draw(k)
     else:
         with contextlib.closing(work(draw, range(len(results)), workers)) as news:
             for _ in news:
                 pass
-    pictures = [
-        tuple((folder / name).read_bytes() for name in ("overlay.png", "tiling.png"))
-        for folder in folders
-    ]
-    write_atomic(out / OVERVIEW, overview_png(results, target, pictures))
+    write_atomic(out / OVERVIEW, overview_png(results, target, colours))
+    extra = [figure_files(result) if figures else () for result in results]
+    page = index_page(results, target, names, failures=failures, figures=extra)
+    write_atomic(out / INDEX, page)
 
 
 def write_front(
@@ -79,25 +93,15 @@ def _draw(
     results: Sequence[TileResult],
     target: Target,
     folders: Sequence[Path],
+    colours: Sequence[Colouring],
+    figures: bool,
     index: int,
     *_: object,
 ) -> None:
     """The folder of one result; in a worker process, too."""
-    write_tile_folder(results[index], target, folders[index])
-
-
-def folder_names(classes: Iterable[str]) -> list[str]:
-    """Of results of these classes; further tiles of a class are IH4-2, IH4-3 and so on.
-
-    >>> folder_names(["IH4", "IH6", "IH4"])
-    ['IH4', 'IH6', 'IH4-2']
-    """
-    seen: Counter[str] = Counter()
-    names = []
-    for name in classes:
-        seen[name] += 1
-        names.append(name if seen[name] == 1 else f"{name}-{seen[name]}")
-    return names
+    write_tile_folder(
+        results[index], target, folders[index], colours=colours[index], figures=figures
+    )
 
 
 def written_files(folder: Path) -> set[str]:
@@ -114,54 +118,6 @@ def written_files(folder: Path) -> set[str]:
     if not ours:
         return set()
     front = {FRONT} if document.get("objective") == "both" else set()
-    inside = {f"{name}/{file}" for name in folder_names(classes) for file in TILE_FILES}
-    return {RESULT, OVERVIEW} | front | inside
-
-
-def _measure(result: TileResult) -> str:
-    if result.deformation is None:
-        return f"recognised {result.recognisability.score:.2f}"
-    return f"bent {result.deformation:.2f}"
-
-
-def overview_png(
-    results: Sequence[TileResult],
-    target: Target,
-    pictures: Sequence[Sequence[bytes]] | None = None,
-) -> bytes:
-    """PNG of all tiles, best first: each over its target, and its tiling.
-
-    Args:
-        results: of one search.
-        target: of the search.
-        pictures: overlay and tiling of each result as PNGs, if they are at hand.
-    """
-    columns = min(3, len(results))
-    rows = -(-len(results) // columns)
-    sheet = Image.new("RGB", (columns * 2 * _PANEL, rows * (_PANEL + _HEADER)), "white")
-    pen = ImageDraw.Draw(sheet)
-    font = ImageFont.load_default(size=30)
-    for i, result in enumerate(results):
-        left, top = (i % columns) * 2 * _PANEL, (i // columns) * (_PANEL + _HEADER)
-        proof = "certified" if result.certificate.valid else "NOT CERTIFIED"
-        title = (
-            f"{result.name}  {result.group_name}    {_measure(result)}    "
-            f"IoU {result.metrics.iou:.3f}    {proof}"
-        )
-        pen.text((left + 24, top + 14), title, fill="#1a1a1a", font=font)
-        both = (
-            pictures[i]
-            if pictures is not None
-            else (
-                overlay(result, target, width_px=900),
-                tiling_png(result.tile, y_down=target.y_down, width_px=900),
-            )
-        )
-        for j, picture in enumerate(both):
-            panel = Image.open(io.BytesIO(picture)).convert("RGB")
-            panel.thumbnail((_PANEL - 24, _PANEL - 24), Image.Resampling.LANCZOS)
-            x = left + j * _PANEL + (_PANEL - panel.width) // 2
-            sheet.paste(panel, (x, top + _HEADER + (_PANEL - panel.height) // 2))
-    buffer = io.BytesIO()
-    sheet.save(buffer, "PNG", compress_level=4)
-    return buffer.getvalue()
+    files = (*TILE_FILES, *FIGURE_FILES)
+    inside = {f"{name}/{file}" for name in folder_names(classes) for file in files}
+    return {RESULT, OVERVIEW, INDEX} | front | inside

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -29,12 +31,14 @@ class ExportTile:
     - `y_down`: whether y points down there, as in images.
     - `name`: such as "turtle-IH4", for titles and file names.
     - `rank`: its place in the run's list, from 1; None if it is not out of one.
+    - `model`: the file of its map, which may be absent; None if it is not out of a folder.
     """
 
     tile: Tile
     y_down: bool = False
     name: str = "tile"
     rank: int | None = None
+    model: Path | None = None
 
     @classmethod
     def of(cls, tile: ExportTile | TileResult | Tile) -> ExportTile:
@@ -75,7 +79,22 @@ def read_result(path: str | Path, which: str | int = 1) -> ExportTile:
         tile = _tile(entries[index])
     except (KeyError, TypeError, ValueError, IndexError) as error:
         raise InputFileError(f"{file}: tile {index + 1} cannot be read: {error}") from error
-    return ExportTile(tile, y_down, f"{source}-{names[index]}", index + 1)
+    model = file.parent / folder_names(names)[index] / "model.safetensors"
+    return ExportTile(tile, y_down, f"{source}-{names[index]}", index + 1, model)
+
+
+def folder_names(classes: Iterable[str]) -> list[str]:
+    """Of results of these classes; further tiles of a class are IH4-2, IH4-3 and so on.
+
+    >>> folder_names(["IH4", "IH6", "IH4"])
+    ['IH4', 'IH6', 'IH4-2']
+    """
+    seen: Counter[str] = Counter()
+    names = []
+    for name in classes:
+        seen[name] += 1
+        names.append(name if seen[name] == 1 else f"{name}-{seen[name]}")
+    return names
 
 
 def read_document(path: str | Path) -> tuple[Path, dict[str, Any]]:

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
 
 import numpy as np
 
-from orbiflow.figures.canvas import captioned_axes, fill_rings, png_bytes, strip_text
+from orbiflow.figures.captioned import arrow, caption, captioned, dashes, strip_middle
+from orbiflow.figures.raster import Raster, rgb
 from orbiflow.symmetry.isometry import Array
 from orbiflow.tilings import Tile
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.colors import Colormap
 
 TILE, GHOST, ARROW = "#d7dee6", "#9a8c7a", "#b0413e"
 STILL = 0.06
 """Distance, in square roots of the area, up to which no arrow is drawn."""
+
+FAR = 0.3
+"""Distance at which the outline has the ramp's last colour."""
+
+_STEPS = 11
+_LINE, _GHOST = 0.0042, 0.0022  # widths of lines, as shares of the picture's
 
 
 def bending_png(
@@ -24,7 +27,7 @@ def bending_png(
     rest: Array,
     bent: Array,
     *,
-    width_px: int = 1600,
+    width_px: int = 1200,
     y_down: bool = False,
     label: str = "",
 ) -> bytes:
@@ -39,36 +42,74 @@ def bending_png(
         y_down: whether the y axis points down, as in images.
         label: in front of the legend, default the class.
     """
-    text = label or tile.isohedral_class or ""
-    figure, axes, strip = captioned_axes(
-        [rest, bent, tile.polygon], width_px, y_down=y_down, text=text
-    )
-    fill_rings(axes, [tile.polygon], TILE, "none", 0)
+    text = label or tile.isohedral_class or " "
+    raster = bending_raster(tile, rest, bent, width_px=width_px, y_down=y_down, text=text)
+    _legend(raster)
+    return raster.png()
+
+
+def bending_raster(
+    tile: Tile,
+    rest: Array,
+    bent: Array,
+    *,
+    width_px: int,
+    y_down: bool = False,
+    text: str = "",
+    thick: float = 1.0,
+) -> Raster:
+    """The picture of `bending_png` without its legend; and without a strip for an empty `text`.
+
+    `thick`: factor of all lines' widths, for small pictures.
+    """
+    raster = captioned([rest, bent, tile.polygon], width_px, y_down=y_down, text=text)
+    raster.fill([tile.polygon], TILE)
     size = float(np.sqrt(abs(tile.signed_area)))
     moved = np.linalg.norm(bent - rest, axis=1) / size
-    closed = np.concatenate([rest, rest[:1]])
-    axes.plot(*closed.T, color=GHOST, linewidth=1.3, linestyle=(0, (4, 3)), zorder=2)
-    colours = _outline(axes, bent, moved)
-    _arrows(axes, rest, bent, moved, size)
-    _legend(strip, colours)
-    return png_bytes(figure)
+    unit = thick * width_px
+    _ghost(raster, np.concatenate([rest, rest[:1]]), unit)
+    _arrows(raster, rest, bent, moved, size, _GHOST * unit)
+    values = np.clip((moved + np.roll(moved, -1)) / 2 / FAR, 0, 1)
+    steps = np.rint(values * (_STEPS - 1)).astype(int)
+    for step, run in sorted(_runs(bent, steps), key=lambda item: item[0]):
+        raster.line(run, RAMP[step], _LINE * unit)
+    return raster
 
 
-def _outline(axes: Axes, bent: Array, moved: Array) -> Colormap:
-    from matplotlib.collections import LineCollection
-    from matplotlib.colors import LinearSegmentedColormap
-
-    colours = LinearSegmentedColormap.from_list("moved", ["#1d4e79", "#d98a2b", ARROW])
-    segments = np.stack([bent, np.roll(bent, -1, axis=0)], axis=1)
-    values = np.clip((moved + np.roll(moved, -1)) / 2 / 0.3, 0, 1)
-    lines = LineCollection(
-        list(segments), colors=colours(values), linewidths=2.6, capstyle="round", zorder=4
+def _ramp(stops: tuple[str, ...], count: int) -> tuple[str, ...]:
+    """So many colours from the first stop to the last, evenly through all."""
+    values = np.array([rgb(stop) for stop in stops], dtype=float)
+    places = np.linspace(0, len(stops) - 1, count)
+    mixed = [np.interp(places, np.arange(len(stops)), values[:, k]) for k in range(3)]
+    return tuple(
+        f"#{red:02x}{green:02x}{blue:02x}"
+        for red, green, blue in np.rint(mixed).astype(int).T.tolist()
     )
-    axes.add_collection(lines)
-    return colours
 
 
-def _arrows(axes: Axes, rest: Array, bent: Array, moved: Array, size: float) -> None:
+RAMP = _ramp(("#1d4e79", "#d98a2b", ARROW), _STEPS)
+"""Of the outline, from where it stayed to where it moved far."""
+
+
+def _runs(ring: Array, steps: Array) -> Iterator[tuple[int, Array]]:
+    """The sides of a ring (n, 2) by their steps (n,) of the ramp: neighbours of one step together."""
+    starts = np.flatnonzero(steps != np.roll(steps, 1))
+    if not len(starts):
+        yield int(steps[0]), np.concatenate([ring, ring[:1]])
+        return
+    for first, last in zip(starts, np.roll(starts, -1), strict=True):
+        count = (last - first - 1) % len(ring) + 2
+        yield int(steps[first]), ring[(first + np.arange(count)) % len(ring)]
+
+
+def _ghost(raster: Raster, points: Array, unit: float) -> None:
+    for piece in dashes(raster.to_pixels(points), 0.009 * unit, 0.006 * unit):
+        raster.line(piece, GHOST, _GHOST * unit, pixels=True)
+
+
+def _arrows(
+    raster: Raster, rest: Array, bent: Array, moved: Array, size: float, width: float
+) -> None:
     """Where the outline went, at points some way apart that went far."""
     taken: list[int] = []
     for k in np.argsort(-moved):
@@ -78,20 +119,18 @@ def _arrows(axes: Axes, rest: Array, bent: Array, moved: Array, size: float) -> 
         if not any(near):
             taken.append(int(k))
     for k in taken:
-        axes.annotate(
-            "",
-            xy=tuple(bent[k]),
-            xytext=tuple(rest[k]),
-            arrowprops={"arrowstyle": "-|>", "color": GHOST, "lw": 1.2, "shrinkA": 0, "shrinkB": 2},
-            zorder=3,
-        )
+        arrow(raster, rest[k], bent[k], GHOST, width)
 
 
-def _legend(strip: Axes, colours: Colormap) -> None:
-    strip.plot([0.47, 0.52], [0.5, 0.5], color=GHOST, linewidth=1.3, linestyle=(0, (4, 3)))
-    strip_text(strip, 0.53, "as it was")
-    extent = (0.70, 0.80, 0.38, 0.62)
-    strip.imshow(np.linspace(0, 1, 64)[None], extent=extent, aspect="auto", cmap=colours)
-    strip_text(strip, 0.81, "moved, little to far")
-    strip.set_xlim(0, 1)  # imshow moves the limits
-    strip.set_ylim(0, 1)
+def _legend(raster: Raster) -> None:
+    y, wide = strip_middle(raster), raster.width
+    sample = np.array([[0.47 * wide, y], [0.52 * wide, y]])
+    for piece in dashes(sample, 0.009 * wide, 0.006 * wide):
+        raster.line(piece, GHOST, _GHOST * wide, pixels=True)
+    caption(raster, 0.53, "as it was")
+    edges, high = np.linspace(0.68, 0.78, _STEPS + 1) * wide, 0.009 * wide
+    for k, colour in enumerate(RAMP):
+        left, right = edges[k], edges[k + 1]
+        ring = [[left, y - high], [right, y - high], [right, y + high], [left, y + high]]
+        raster.fill_pixels(np.array(ring), colour)
+    caption(raster, 0.79, "moved, little to far")

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 import shapely
 from numpy.typing import ArrayLike
@@ -11,33 +9,26 @@ from shapely.geometry.base import BaseGeometry
 
 from orbiflow.arguments import instance, numbers
 from orbiflow.errors import OrbiflowError
-from orbiflow.figures.canvas import (
-    blank_figure,
-    captioned_axes,
-    fill_geometry,
-    fill_rings,
-    plane_axes,
-    png_bytes,
-    strip_text,
-)
+from orbiflow.figures.captioned import caption, captioned, strip_middle
 from orbiflow.figures.palette import DEFAULT_PALETTE, Palette, palette
+from orbiflow.figures.raster import Raster
 from orbiflow.figures.window import default_window
-from orbiflow.symmetry.isometry import Array
-from orbiflow.tilings import Colouring, Tile, colouring, patch
-from orbiflow.tilings.patch import Window
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+from orbiflow.tilings import Colouring, Tile, colouring, copies_meeting
+from orbiflow.tilings.patch import Window, checked_window
 
 COMMON, MISSING, ADDED = "#c9d3dc", "#d95f02", "#2b6cb0"
 """Fills of the overlay: in both, in the target only, in the tile only."""
+
+
+DOTS = 200 / 72
+"""Pixels of a point, where widths are given in points."""
 
 
 def tiling_png(
     tile: Tile,
     window: Window | None = None,
     *,
-    width_px: int = 1800,
+    width_px: int = 1600,
     palette_name: str | Palette = DEFAULT_PALETTE,
     colours: Colouring | None = None,
     outline_pt: float = 0.8,
@@ -57,28 +48,47 @@ def tiling_png(
             empty or holds too many tiles.
     """
     instance(tile, Tile, "the tile", "Tile(polygon, group) makes one")
+    return tiling_raster(
+        tile,
+        window,
+        width_px=width_px,
+        palette_name=palette_name,
+        colours=colours,
+        outline_px=outline_pt * DOTS,
+        y_down=y_down,
+    ).png()
+
+
+def tiling_raster(
+    tile: Tile,
+    window: Window | None = None,
+    *,
+    width_px: int,
+    palette_name: str | Palette = DEFAULT_PALETTE,
+    colours: Colouring | None = None,
+    outline_px: float = 2.0,
+    y_down: bool = False,
+) -> Raster:
+    """The picture of `tiling_png`, to be drawn on or to be made an image; outline in pixels."""
     chosen = palette(palette_name)
     colours = colours or colouring(tile)
-    window = window or default_window(tile)
-    groups: list[list[Array]] = [[] for _ in range(colours.count)]
-    for element in patch(tile, window):
-        groups[colours.colour(element)].append(element(tile.polygon))
-    height = round(width_px * (window[3] - window[1]) / (window[2] - window[0]))
-    figure = blank_figure(width_px, height, chosen.paper)
-    axes = plane_axes(figure, window, y_down=y_down)
-    for number, rings in enumerate(groups):
-        fill = chosen.fill(number)
-        # without an outline, a line in the tile's own colour closes the seams of antialiasing
-        edge, width = (chosen.outline, outline_pt) if outline_pt > 0 else (fill, 0.4)
-        fill_rings(axes, rings, fill, edge, width)
-    return png_bytes(figure)
+    window = checked_window(window or default_window(tile))
+    raster = Raster(window, width_px, y_down=y_down, paper=chosen.paper)
+    copies = copies_meeting(tile, window)
+    rings, own = copies.images(tile.polygon), colours.colours(copies)
+    for number in range(colours.count):
+        raster.fill(list(rings[own == number]), chosen.fill(number))
+    if outline_px > 0:
+        for ring in rings:
+            raster.line(ring, chosen.outline, outline_px, closed=True)
+    return raster
 
 
 def overlay_png(
     tile: Tile,
     target: ArrayLike | BaseGeometry,
     *,
-    width_px: int = 1600,
+    width_px: int = 1200,
     y_down: bool = False,
     label: str = "",
 ) -> bytes:
@@ -96,23 +106,38 @@ def overlay_png(
     common = shapely.intersection(shape, goal)
     overlap = common.area / shapely.union(shape, goal).area
     text = f"{label or tile.isohedral_class}  IoU {overlap:.3f}".strip()
+    raster = overlay_raster(tile, goal, width_px=width_px, y_down=y_down, text=text)
+    _legend(raster)
+    return raster.png()
+
+
+def overlay_raster(
+    tile: Tile,
+    target: ArrayLike | BaseGeometry,
+    *,
+    width_px: int,
+    y_down: bool = False,
+    text: str = "",
+) -> Raster:
+    """The picture of `overlay_png` without its legend; and without a strip for an empty `text`."""
+    shape, goal = _clean(shapely.Polygon(tile.polygon)), _target(target)
     bounds = np.array(goal.bounds).reshape(2, 2)
-    figure, axes, strip = captioned_axes([tile.polygon, bounds], width_px, y_down=y_down, text=text)
-    fill_geometry(axes, common, COMMON)
-    fill_geometry(axes, shapely.difference(goal, shape), MISSING)
-    fill_geometry(axes, shapely.difference(shape, goal), ADDED)
-    fill_rings(axes, [tile.polygon], "none", "#1a1a1a", 1.6)
-    _legend(strip)
-    return png_bytes(figure)
+    raster = captioned([tile.polygon, bounds], width_px, y_down=y_down, text=text)
+    raster.fill_geometry(shapely.intersection(shape, goal), COMMON)
+    raster.fill_geometry(shapely.difference(goal, shape), MISSING)
+    raster.fill_geometry(shapely.difference(shape, goal), ADDED)
+    raster.line(tile.polygon, "#1a1a1a", max(1.0, 0.0028 * width_px), closed=True)
+    return raster
 
 
-def _legend(strip: Axes) -> None:
-    from matplotlib.patches import Rectangle
-
+def _legend(raster: Raster) -> None:
     entries = [("in both", COMMON, 0.40), ("missing", MISSING, 0.58), ("added", ADDED, 0.76)]
+    y, high = strip_middle(raster), 0.014 * raster.width
     for name, colour, x in entries:
-        strip.add_patch(Rectangle((x, 0.32), 0.03, 0.36, facecolor=colour, edgecolor="none"))
-        strip_text(strip, x + 0.04, name)
+        left, right = x * raster.width, (x + 0.03) * raster.width
+        ring = [[left, y - high], [right, y - high], [right, y + high], [left, y + high]]
+        raster.fill_pixels(np.array(ring), colour)
+        caption(raster, x + 0.04, name)
 
 
 def _target(target: ArrayLike | BaseGeometry) -> BaseGeometry:

@@ -25,6 +25,7 @@ from orbiflow.jobs.events import (
 from orbiflow.jobs.process import Job, start
 from orbiflow.jobs.records import RecordError
 from orbiflow.jobs.requests import (
+    AnimateRequest,
     ArtRequest,
     DensityFitRequest,
     DensityPlotRequest,
@@ -39,6 +40,7 @@ from orbiflow.jobs.requests import (
 from orbiflow.jobs.run import Sink, run
 
 __all__ = [
+    "AnimateRequest",
     "ArtRequest",
     "Cancel",
     "ClassFailed",

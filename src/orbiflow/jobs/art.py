@@ -16,7 +16,7 @@ from orbiflow.export.exporting import require_certified
 from orbiflow.export.lengths import pixel_size, pixels
 from orbiflow.files import write_atomic
 from orbiflow.jobs.events import Finished, Note, Progress, Written
-from orbiflow.jobs.export import check_place
+from orbiflow.jobs.place import check_place
 from orbiflow.jobs.records import RecordError
 from orbiflow.jobs.requests import ArtRequest
 from orbiflow.jobs.run import Sink

@@ -19,6 +19,7 @@ from orbiflow.escher import (
 )
 from orbiflow.escher.methods import Settings
 from orbiflow.escher.report import report
+from orbiflow.export.folder import figure_files
 from orbiflow.export.gallery import (
     OVERVIEW,
     RESULT,
@@ -95,8 +96,10 @@ def escherize(request: EscherizeRequest, tell: Sink, cancel: Cancel) -> Finished
     # a first look at a class that was interrupted is less than an earlier run's tiles
     earlier = folder.has_a_run and (request.out / OVERVIEW).is_file()
     write = not earlier or any(result.name not in interrupted for result in results)
+    # processes are for figures alone; 0 is without
+    figures = workers if request.figures else 0
     if write:
-        _write(folder, document, results, found, target, workers, tell)
+        _write(folder, document, results, failures, found, target, figures, tell)
     state: State = "done" if results else "nothing found"
     summary = {
         "folder": str(request.out),
@@ -176,16 +179,28 @@ def _write(
     folder: ResultFolder,
     document: dict[str, Any],
     results: list[TileResult],
+    failures: list[ClassFailure],
     found: list[TileResult],
     target: Target,
-    workers: int,
+    figures: int,
     tell: Sink,
 ) -> None:
-    """All files. No cancelling here: what was found is to be kept."""
+    """All files, figures by so many processes. No cancelling: what was found is to be kept."""
     with folder.replaced() as staged:
         if results:
             tell(Note("drawing"))
-            write_gallery(results, target, staged, workers=workers)
+            if figures and not any(map(figure_files, results)):
+                tell(
+                    Note("no flow made these tiles, so there is none to draw: the silhouette bent")
+                )
+            write_gallery(
+                results,
+                target,
+                staged,
+                failures=failures,
+                figures=figures > 0,
+                workers=max(1, figures),
+            )
             if document["objective"] == "both":
                 write_front(results, found, target, staged)
         write_atomic(staged / RESULT, json.dumps(document, allow_nan=False))

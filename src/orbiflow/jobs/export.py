@@ -6,13 +6,14 @@ from pathlib import Path
 from typing import Any
 
 from orbiflow.cancel import Cancel
-from orbiflow.errors import OrbiflowError, OutputError
+from orbiflow.errors import OrbiflowError
 from orbiflow.export.exporting import Exported, scenes, sheet_names, write_scene
 from orbiflow.export.lengths import length, size
 from orbiflow.export.result_file import read_result
 from orbiflow.export.settings import FORMATS, ExportSettings, preset_values
 from orbiflow.files import write_atomic
 from orbiflow.jobs.events import Finished, Note, Progress, Written
+from orbiflow.jobs.place import check_place
 from orbiflow.jobs.records import RecordError
 from orbiflow.jobs.requests import ExportRequest
 from orbiflow.jobs.run import Sink
@@ -61,16 +62,6 @@ def export(request: ExportRequest, tell: Sink, cancel: Cancel) -> Finished:
         "tile_size": settings.tile_size,
     }
     return Finished("done", summary)
-
-
-def check_place(out: Path) -> None:
-    """Before the work; a device must not be replaced by a file."""
-    if out.is_dir():
-        raise OutputError(f"cannot write {out}: it is a folder; give a file's name in it")
-    if out.exists() and not out.is_file():
-        raise OutputError(f"cannot write {out}: it is not a file; choose another name")
-    if not out.parent.is_dir():
-        raise OutputError(f"cannot write {out}: there is no folder {out.parent}; create it first")
 
 
 def _said(done: Exported, settings: ExportSettings, name: str) -> str:

@@ -46,6 +46,7 @@ class EscherizeRequest(Request):
     - `pin`: what must keep its shape, in the search for likeness: "x,y" or "x,y,radius" in the
       input's coordinates, or the path of a mask. `pin_angle`: it keeps its angle, too.
     - `per_class`: tiles of each class at most. `force`: keep tiles that are not certified.
+    - `figures`: draw the flow of each tile that one made, too (`field.png`).
     - `workers`: processes, None for one a core.
     - `threshold`, `invert`: how the picture is read, None to find out.
     """
@@ -68,6 +69,7 @@ class EscherizeRequest(Request):
     seed: int = 0
     turns: int | None = None
     iterations: int | None = None
+    figures: bool = False
     workers: int | None = None
     threshold: float | None = None
     invert: bool | None = None
@@ -201,6 +203,44 @@ class ArtRequest(Request):
 
 
 @dataclass(frozen=True)
+class AnimateRequest(Request):
+    """Write an animation of a tile; see `orbiflow animate --help`.
+
+    - `result`: a search's folder, or its result.json. `tile`: a class or a rank.
+    - `out`: the file, .gif, .mp4 or .svg; None for a GIF named after the tile in the working directory.
+    - `animation`: "morph" (a tiling with straight edges becomes the tile's), "bend" (the silhouette
+      bends into the tile, then its tiling grows) or "grow".
+    - `seconds`, `fps`, `size`, `palette`: of the loop; None is the default of
+      `orbiflow.export.AnimationSettings`.
+    """
+
+    KIND = "animate"
+
+    result: Path
+    out: Path | None = None
+    tile: str = "1"
+    animation: Literal["morph", "bend", "grow"] = "morph"
+    seconds: float | None = None
+    fps: float | None = None
+    size: int | None = None
+    palette: str | None = None
+    force: bool = False
+
+    def check(self) -> None:
+        ending = "" if self.out is None else self.out.suffix.lower()
+        if self.out is not None and ending not in (".gif", ".mp4", ".svg"):
+            raise RecordError(f"{{out}} must end in .gif, .mp4 or .svg, got {self.out.name!r}")
+        if self.seconds is not None and not 0.5 <= self.seconds <= 120:
+            raise RecordError(f"{{seconds}} must be from 0.5 to 120, got {self.seconds:g}")
+        if self.fps is not None and not 1 <= self.fps <= 60:
+            raise RecordError(f"{{fps}} must be from 1 to 60, got {self.fps:g}")
+        if self.fps is not None and ending == ".svg":
+            raise RecordError("{fps} belongs to .gif and .mp4: an SVG moves evenly")
+        if self.size is not None and (not 64 <= self.size <= 4000 or self.size % 2):
+            raise RecordError(f"{{size}} must be an even number from 64 to 4000, got {self.size}")
+
+
+@dataclass(frozen=True)
 class DensityFitRequest(Request):
     """Fit a density to a table; see `orbiflow density fit --help`.
 
@@ -306,6 +346,7 @@ REQUESTS: dict[str, type[Request]] = {
         EscherizeRequest,
         ExportRequest,
         ArtRequest,
+        AnimateRequest,
         DensityFitRequest,
         DensityScoreRequest,
         DensitySampleRequest,

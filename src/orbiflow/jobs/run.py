@@ -18,6 +18,7 @@ _MODULES = {
     "escherize": "escherize",
     "export": "export",
     "art": "art",
+    "animate": "animate",
     "density-fit": "density_fit",
     "density-score": "density_use",
     "density-sample": "density_use",

@@ -1,0 +1,64 @@
+"""How long the pictures of a run take: nine classes, one core, CPU time.
+
+    OMP_NUM_THREADS=1 python benchmarks/figures.py [silhouette] [--figures]
+
+Start-up (imports) and the search are not counted.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from orbiflow.escher import BendingSettings, escherize
+from orbiflow.export.folder import overlay
+from orbiflow.export.gallery import write_gallery
+from orbiflow.export.overview import overview_png
+from orbiflow.export.svg import tile_svg, tiling_svg
+from orbiflow.figures.tilings import tiling_png
+from orbiflow.silhouette import Target
+from orbiflow.tilings import colouring
+
+TURTLE = Path(__file__).parents[1] / "examples" / "silhouettes" / "turtle.png"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("silhouette", nargs="?", default=TURTLE)
+    parser.add_argument(
+        "--figures", action="store_true", help="the rest, too, as the command has it"
+    )
+    given = parser.parse_args()
+    target = Target.read(given.silhouette)
+    results, _ = escherize(target, settings=BendingSettings.for_effort("fast"), workers=1)
+    colours = [colouring(result.tile) for result in results]
+    both = list(zip(results, colours, strict=True))
+    print(f"{len(results)} tiles of {target.source}; CPU seconds for all of them")
+    y_down = target.y_down
+    row("colouring", lambda: [colouring(result.tile) for result in results])
+    row("tile.svg", lambda: [tile_svg(r.tile, y_down=y_down) for r in results])
+    row("tiling.svg", lambda: [tiling_svg(r.tile, y_down=y_down, colours=c) for r, c in both])
+    row("tiling.png", lambda: [tiling_png(r.tile, y_down=y_down, colours=c) for r, c in both])
+    row("overlay.png", lambda: [overlay(r, target) for r in results])
+    row("model", lambda: [r.model.to_bytes() for r in results])
+    row("overview.png", lambda: overview_png(results, target, colours))
+    with tempfile.TemporaryDirectory() as folder:
+        out = Path(folder)
+        row("the whole folder", lambda: write_gallery(results, target, out, figures=given.figures))
+
+
+def row(name: str, draw: Callable[[], object]) -> None:
+    """Print the least CPU time of three."""
+    times = []
+    for _ in range(3):
+        begin = time.process_time()
+        draw()
+        times.append(time.process_time() - begin)
+    print(f"  {name:<18} {min(times):6.2f}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,160 @@
+"""From a tile to an animation."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from orbiflow.arguments import number, whole
+from orbiflow.arguments import path as as_path
+from orbiflow.errors import CertificationError, OrbiflowError
+from orbiflow.escher.result import TileResult
+from orbiflow.escher.storage import SavedModel, load_saved
+from orbiflow.export.motion import Motion
+from orbiflow.export.motion_kinds import KINDS, Kind, bend, grow, morph
+from orbiflow.export.motion_pictures import require_ffmpeg, write_gif, write_mp4
+from orbiflow.export.motion_svg import write_motion_svg
+from orbiflow.export.result_file import ExportTile
+from orbiflow.export.timeline import frames
+from orbiflow.figures.palette import DEFAULT_PALETTE, palette
+from orbiflow.files import write_atomic
+from orbiflow.tilings import Tile, certify
+
+Format = Literal["gif", "mp4", "svg"]
+FORMATS: tuple[Format, ...] = ("gif", "mp4", "svg")
+
+MOST_FRAMES = 2400
+
+
+@dataclass(frozen=True)
+class AnimationSettings:
+    """How a tile is animated.
+
+    - `format`: of the file.
+    - `kind`: "morph" (a tiling with straight edges becomes the tile's), "bend" (the silhouette bends
+      into the tile, then its tiling grows) or "grow" (the tiling grows around one tile).
+    - `seconds`: of the loop, there and back.
+    - `fps`: pictures a second; an SVG has none.
+    - `size`: width in pixels, an even number; the height is two thirds of it.
+    - `palette`: of the fills.
+
+    Raises:
+        OrbiflowError: for a setting that cannot be used, by its name.
+
+    >>> AnimationSettings(kind="grow", seconds=3).size
+    800
+    """
+
+    format: Format = "gif"
+    kind: Kind = "morph"
+    seconds: float = 6.0
+    fps: float = 24.0
+    size: int = 800
+    palette: str = DEFAULT_PALETTE
+
+    def __post_init__(self) -> None:
+        for name, known in (("format", FORMATS), ("kind", KINDS)):
+            value = getattr(self, name)
+            if value not in known:
+                raise OrbiflowError(f"{name} must be one of {', '.join(known)}, got {value!r}")
+        number(self.seconds, "seconds", 0.5, 120)
+        number(self.fps, "fps", 1, 60)
+        whole(self.size, "size", 64, 4000)
+        if self.size % 2:
+            raise OrbiflowError(f"size must be even, which videos need, got {self.size}")
+        palette(self.palette)
+        if self.format != "svg" and self.seconds * self.fps > MOST_FRAMES:
+            raise OrbiflowError(
+                f"{self.seconds:g} seconds of {self.fps:g} pictures are more than {MOST_FRAMES}; "
+                "choose fewer seconds or a lower fps"
+            )
+
+
+def animate(
+    tile: ExportTile | TileResult | Tile,
+    out: str | Path,
+    settings: AnimationSettings | None = None,
+    *,
+    force: bool = False,
+) -> Path:
+    """Write an animation of a tile.
+
+    Args:
+        tile: see `read_result`.
+        out: the file; the settings' format counts, not its ending.
+        settings: see `AnimationSettings`.
+        force: take a tile that is not certified.
+
+    Raises:
+        CertificationError: for a tile that is not certified.
+        OrbiflowError: for settings that cannot be met, in words.
+        OutputError: if the file cannot be written.
+    """
+    out = as_path(out, "the file to animate to")
+    return write_atomic(out, animation(tile, settings, force=force))
+
+
+def animation(
+    tile: ExportTile | TileResult | Tile,
+    settings: AnimationSettings | None = None,
+    *,
+    force: bool = False,
+    told: Callable[[float], None] = lambda _: None,
+) -> bytes | str:
+    """The content of the file.
+
+    Args:
+        told: told the share of the work done; what it raises ends it.
+
+    Raises:
+        As `animate`.
+    """
+    settings = settings or AnimationSettings()
+    if settings.format == "mp4":
+        require_ffmpeg()  # before the work
+    given, colours = ExportTile.of(tile), palette(settings.palette)
+    certificate = certify(given.tile)
+    if not certificate.valid and not force:
+        raise CertificationError(
+            f"{given.name} is not certified ({'; '.join(certificate.reasons)}), so it is not "
+            "animated; --force animates it"
+        )
+    made = motion(tile, settings)
+    told(0.0)
+    loop = frames(settings.seconds, settings.fps)
+    match settings.format:
+        case "svg":
+            title = f"{given.name}: {made.what}"
+            name = f"{given.name}-{settings.kind}"
+            return write_motion_svg(made, colours, seconds=settings.seconds, name=name, title=title)
+        case "gif":
+            return write_gif(made, colours, loop, told)
+        case "mp4":
+            return write_mp4(made, colours, loop, settings.fps, told)
+
+
+def motion(tile: ExportTile | TileResult | Tile, settings: AnimationSettings) -> Motion:
+    """What moves, before it is a file.
+
+    Raises:
+        OrbiflowError: if the tile has not what the kind needs.
+    """
+    given = ExportTile.of(tile)
+    match settings.kind:
+        case "morph":
+            steady = settings.format == "svg"
+            return morph(given.tile, settings.size, y_down=given.y_down, steady=steady)
+        case "grow":
+            return grow(given.tile, settings.size, y_down=given.y_down)
+        case "bend":
+            return bend(given.tile, _saved(tile), settings.size, y_down=given.y_down)
+
+
+def _saved(tile: ExportTile | TileResult | Tile) -> SavedModel | None:
+    if isinstance(tile, TileResult):
+        return tile.model
+    if isinstance(tile, ExportTile) and tile.model is not None and tile.model.is_file():
+        return load_saved(tile.model)
+    return None

@@ -1,0 +1,136 @@
+"""`overview.png`: all tiles of a search on one sheet, for a first look."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from pathlib import PurePath
+from typing import NamedTuple
+
+from PIL import Image, ImageDraw
+
+from orbiflow.escher.result import TileResult
+from orbiflow.figures.bending import bending_raster
+from orbiflow.figures.captioned import window_of
+from orbiflow.figures.raster import Raster, font
+from orbiflow.figures.tilings import overlay_raster, tiling_raster
+from orbiflow.silhouette.target import Target
+from orbiflow.tilings import Colouring
+from orbiflow.tilings.patch import Window
+
+INK, FAINT, WARNING = "#1a1a1a", "#5b6570", "#b0413e"
+
+# pixels of a sheet 1920 wide: at 1440, a laptop's width, the smallest words are 19 high
+_WIDTH, _MARGIN, _GAP = 1920, 40, 36
+_HEADER, _FOOT = 190, 176
+_TITLE, _NAME, _WORDS = 46, 34, 26
+_THUMB = 156
+
+
+class _Place(NamedTuple):
+    left: int
+    top: int
+    width: int
+
+
+def overview_png(
+    results: Sequence[TileResult], target: Target, colours: Sequence[Colouring] | None = None
+) -> bytes:
+    """PNG of all tiles, best first: each one's tiling, large, and beside its name what bent.
+
+    1920 pixels wide (1320 for a single tile), legible at 1440.
+
+    Args:
+        results: of one search, at least one.
+        target: of the search.
+        colours: of each tiling, if they are at hand.
+    """
+    columns = {1: 1, 2: 2, 4: 2}.get(len(results), 3)
+    width = 1320 if columns == 1 else _WIDTH
+    cell = (width - 2 * _MARGIN - (columns - 1) * _GAP) // columns
+    height = round(cell / 1.5) + _FOOT
+    rows = -(-len(results) // columns)
+    sheet = Image.new("RGB", (width, _HEADER + rows * (height + _GAP)), "white")
+    pen = ImageDraw.Draw(sheet)
+    _header(sheet, pen, target, len(results))
+    for k, result in enumerate(results):
+        row, column = divmod(k, columns)
+        place = _Place(_MARGIN + column * (cell + _GAP), _HEADER + row * (height + _GAP), cell)
+        _write_words(pen, result, place, k + 1)
+        own = colours[k] if colours else None
+        tiling = tiling_raster(
+            result.tile, width_px=cell, colours=own, outline_px=1.4, y_down=target.y_down
+        )
+        sheet.paste(tiling.image(), (place.left, place.top))
+        thumb = _thumbnail(_small(result, target))
+        sheet.paste(thumb, (place.left + (_THUMB - thumb.width) // 2, _below(place)))
+    buffer = io.BytesIO()
+    sheet.save(buffer, "PNG", compress_level=4)
+    return buffer.getvalue()
+
+
+def verdict(result: TileResult) -> str:
+    """How far a tile is from its silhouette, in a few words.
+
+    After a search for likeness what bending cost; else how well the silhouette is recognised.
+    """
+    if result.deformation is None:
+        how = f"recognised {result.recognisability.score:.2f}"
+    else:
+        how = f"bent {result.deformation:.2f}"
+    return f"{how}    IoU {result.metrics.iou:.2f}    score {result.score:.2f}"
+
+
+def _header(sheet: Image.Image, pen: ImageDraw.ImageDraw, target: Target, count: int) -> None:
+    window = window_of([target.outline])
+    small = Raster(window, _fitting(window), y_down=target.y_down)
+    small.fill([target.outline], INK)
+    picture = _thumbnail(small)
+    sheet.paste(picture, (_MARGIN, (_HEADER - picture.height) // 2))
+    left, middle = _MARGIN + picture.width + 28, _HEADER // 2
+    name = PurePath(target.source).name
+    pen.text((left, middle - 6), name, INK, font(_TITLE), anchor="ls")
+    tiles = "1 tile" if count == 1 else f"{count} tiles, best first"
+    text = f"{tiles}: each one's tiling, and below it the silhouette in its place"
+    pen.text((left, middle + 40), text, FAINT, font(_WORDS), anchor="ls")
+
+
+def _below(place: _Place) -> int:
+    """Where the part below the tiling begins."""
+    return place.top + round(place.width / 1.5) + 14
+
+
+def _write_words(pen: ImageDraw.ImageDraw, result: TileResult, place: _Place, rank: int) -> None:
+    below = _below(place)
+    left = place.left + _THUMB + 22
+    name = f"{rank}.  {result.name}  ({result.group_name})"
+    pen.text((left, below + 34), name, INK, font(_NAME), anchor="ls")
+    pen.text((left, below + 76), verdict(result), INK, font(_WORDS), anchor="ls")
+    valid = result.certificate.valid
+    words = "certified to tile the plane" if valid else "NOT CERTIFIED"
+    if result.front is not None:
+        words = f"for {result.objective}, {words.split(' to')[0]}"
+    colour = FAINT if valid else WARNING
+    pen.text((left, below + 114), words, colour, font(_WORDS), anchor="ls")
+
+
+def _small(result: TileResult, target: Target) -> Raster:
+    """A tile and its silhouette, without a legend."""
+    tile, y_down = result.tile, target.y_down
+    if result.bent is None or result.rest is None:
+        width = _fitting(window_of([tile.polygon, target.outline]))
+        return overlay_raster(tile, target.outline, width_px=width, y_down=y_down)
+    width = _fitting(window_of([result.rest, result.bent, tile.polygon]))
+    return bending_raster(tile, result.rest, result.bent, width_px=width, y_down=y_down, thick=3.5)
+
+
+def _fitting(window: Window) -> int:
+    """The width in pixels at which a window fits beside its words; more if it is very long."""
+    aspect = (window[2] - window[0]) / (window[3] - window[1])
+    return max(16, round(_THUMB * min(1.0, aspect)), round(17 * aspect))
+
+
+def _thumbnail(raster: Raster) -> Image.Image:
+    picture = raster.image()
+    picture.thumbnail((_THUMB, _THUMB))
+    return picture

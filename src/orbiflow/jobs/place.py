@@ -1,0 +1,21 @@
+"""Where a job's one file goes, looked at before the work."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from orbiflow.errors import OutputError
+
+
+def check_place(out: Path) -> None:
+    """Nothing, if a file can be written there; a device must not be replaced by one.
+
+    Raises:
+        OutputError: if it is a folder or a device, or its folder is not there.
+    """
+    if out.is_dir():
+        raise OutputError(f"cannot write {out}: it is a folder; give a file's name in it")
+    if out.exists() and not out.is_file():
+        raise OutputError(f"cannot write {out}: it is not a file; choose another name")
+    if not out.parent.is_dir():
+        raise OutputError(f"cannot write {out}: there is no folder {out.parent}; create it first")
