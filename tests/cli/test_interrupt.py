@@ -35,19 +35,20 @@ FIRST_IS_SHORT = (
     "    return whole(target, kind, own, progress, **options)\n"
     "methods.fit_occupancy = fit\n"
 )
-# workers that hear nothing, and all the time in the world for them
+# workers that hear nothing, and all the time in the world for them; each says so in one write, or
+# two who speak at once would make one line
 DEAF = (
-    "import time\n"
+    "import os, time\n"
     "from orbiflow.cancel import Cancel\n"
     "from orbiflow.escher import methods, processes\n"
     "def fit(*_, **__):\n"
-    "    print('deaf', flush=True)\n"
+    "    os.write(1, b'deaf\\n')\n"
     "    time.sleep(1e6)\n"
     "methods.fit_occupancy, processes.GRACE = fit, 1e6\n"
     "tell = Cancel.cancel\n"
     "def cancel(self):\n"
     "    tell(self)\n"
-    "    print('told', flush=True)\n"
+    "    os.write(1, b'told\\n')\n"
     "Cancel.cancel = cancel\n"
 )
 
