@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import scipy.optimize
+import scipy.sparse
+import scipy.sparse.linalg
 from numpy.typing import NDArray
 
 from orbiflow.errors import OrbiflowError
@@ -25,7 +29,8 @@ def unfolded(mesh: Mesh, points: Array) -> Array:
 
     Foldover-free maps in few steps (Garanzha, Kaporin, Kudryavtseva, Protais, Ray and Sokolov,
     SIGGRAPH 2021): the distortion |J|^2 / det J of each triangle, with det J bounded away from 0 by a
-    parameter that shrinks, is minimised by L-BFGS. Points on the outline stay where they are.
+    parameter that shrinks, is minimised by L-BFGS; if that fails, again from points each in the
+    middle of its neighbours. Points on the outline stay where they are.
 
     Args:
         mesh: the triangles at rest.
@@ -39,7 +44,16 @@ def unfolded(mesh: Mesh, points: Array) -> Array:
     """
     if not folded(mesh, points).any():
         return points
-    work = _Distortion(mesh, points)
+    for start in (points, _spread(mesh, points)):  # where the one is too tangled, the other is not
+        found = _untangled(_Distortion(mesh, start))
+        if found is not None:
+            return found
+    raise OrbiflowError(
+        "the silhouette cannot be carried to this tile without folds: parts of it are too thin"
+    )
+
+
+def _untangled(work: _Distortion) -> Array | None:
     x = work.start
     for _ in range(STAGES):
         found = scipy.optimize.minimize(
@@ -50,9 +64,23 @@ def unfolded(mesh: Mesh, points: Array) -> Array:
         if smallest > 0:
             return work.points(x)
         work.sharpen(smallest)
-    raise OrbiflowError(
-        "the silhouette cannot be carried to this tile without folds: parts of it are too thin"
-    )
+    return None
+
+
+def _spread(mesh: Mesh, points: Array) -> Array:
+    """Inner points in the middle of their neighbours (Tutte, 1963)."""
+    fixed, count = mesh.size + len(mesh.sides), len(points)
+    i, j = (np.concatenate([mesh.triangles[:, k] for k in turn]) for turn in ((0, 1, 2), (1, 2, 0)))
+    ones = np.ones(2 * len(i))
+    pairs = (np.concatenate([i, j]), np.concatenate([j, i]))
+    touching: Any = scipy.sparse.csr_matrix((ones, pairs), shape=(count, count))
+    degree: Any = scipy.sparse.diags(np.asarray(touching.sum(axis=1)).ravel())
+    laplacian: Any = (degree - touching).tocsc()[fixed:]
+    spread = points.copy()
+    right = -(laplacian[:, :fixed] @ points[:fixed])
+    inner: Any = scipy.sparse.linalg.spsolve(laplacian[:, fixed:].tocsc(), right)
+    spread[fixed:] = inner
+    return spread
 
 
 class _Distortion:
