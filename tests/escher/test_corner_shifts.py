@@ -18,7 +18,6 @@ from strategies import seeds
 
 RING = resampled(animal("squirrel.dat").normal, 60)
 BODY = Elastic(RING)
-POSE = 4.0
 
 
 def at_rest(body: Elastic, count: int) -> np.ndarray:
@@ -69,9 +68,7 @@ def test_corners_find_back_to_a_tile(name: str, seed: int) -> None:
     away = own._replace(
         lengths=own.lengths + lengths[way], starts=(own.starts + starts[way]) % body.size
     )
-    found = shifted(
-        body, CLASSES[name], away, at_rest(body, 1), [Stage(1, 1)], share=1.0, pose=POSE
-    )
+    found = shifted(body, CLASSES[name], away, at_rest(body, 1), [Stage(1, 1)], share=1.0)
     assert (found.placements.lengths == own.lengths).all()
     assert found.placements.starts == own.starts
 
@@ -81,9 +78,9 @@ def test_corners_find_back_to_a_tile(name: str, seed: int) -> None:
 def test_no_placement_becomes_worse(name: str, share: float) -> None:
     kind = CLASSES[name]
     placements = best_placements(kind, complex_points(RING), 12)
-    stay = shifted(BODY, kind, placements, at_rest(BODY, 12), [], share=share, pose=POSE)
+    stay = shifted(BODY, kind, placements, at_rest(BODY, 12), [], share=share)
     stages = [Stage(2, 12), Stage(1, 3)]
-    gone = shifted(BODY, kind, placements, at_rest(BODY, 12), stages, share=share, pose=POSE)
+    gone = shifted(BODY, kind, placements, at_rest(BODY, 12), stages, share=share)
     assert len(gone.costs) <= 3
     assert (np.diff(gone.costs) >= 0).all()
     assert gone.costs[0] <= stay.costs[0]
@@ -105,6 +102,5 @@ def test_it_can_be_cancelled() -> None:
             at_rest(BODY, 2),
             [Stage(1, 2)],
             share=1.0,
-            pose=POSE,
             cancel=cancel,
         )

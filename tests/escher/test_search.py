@@ -14,6 +14,7 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.escher import BendingSettings, BothSettings, DescentSettings, methods
 from orbiflow.escher.model import TileModel
 from orbiflow.escher.occupancy import OccupancySettings
+from orbiflow.escher.preview import SKETCH
 from orbiflow.escher.result import ClassFailure, TileResult
 from orbiflow.escher.search import Event, escherize, escherize_class
 from orbiflow.likeness.mutual import mutual_iou
@@ -279,3 +280,21 @@ def test_several_of_a_class_differ(settings: BendingSettings | DescentSettings) 
         alike = mutual_iou([r.normal_tile.polygon for r in own])
         assert all(alike(i, j) < 0.9 for i in range(len(own)) for j in range(i))
     assert len(results) > 2
+
+
+def test_more_effort_never_scores_less() -> None:
+    """Through the search itself, also where several tiles of a class are asked for."""
+    for per_class in (1, 2):
+        scores = []
+        for effort in ("fast", "normal"):
+            settings = BendingSettings.for_effort(effort)
+            tile = escherize_class(SQUIRREL, "IH5", settings, per_class=per_class)
+            assert isinstance(tile, TileResult)
+            scores.append(tile.score)
+        assert scores[1] >= scores[0]
+
+
+def test_a_first_look_is_one_small_search() -> None:
+    own = replace(BendingSettings.for_effort("best"), **SKETCH)
+    assert own.searches() == (own,)
+    assert own.finalists == own.starts == 1

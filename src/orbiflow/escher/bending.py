@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Iterable, Sequence
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 import shapely
@@ -43,6 +43,9 @@ RELAXED = 1500.0
 
 SOFTENINGS = 6
 """Times that finalists are minimised anew with the forgiving energy."""
+
+
+Item = TypeVar("Item")
 
 
 class Hand(NamedTuple):
@@ -130,6 +133,8 @@ def bent_tiles(
     settings: BendingSettings,
     progress: Callable[[float], None] | None = None,
     cancel: Cancel | None = None,
+    *,
+    wanted: int = 1,
 ) -> tuple[list[Bent], int]:
     """The finalists of one class, best score first, no two of them twins.
 
@@ -139,6 +144,7 @@ def bent_tiles(
         settings: of the search.
         progress: told the share of the work done.
         cancel: looked at before each step.
+        wanted: finalists of each hand at least, if there are as many.
 
     Returns:
         The finalists, and how many were dropped because they cross themselves.
@@ -150,7 +156,7 @@ def bent_tiles(
     found: list[Bent] = []
     dropped = done = 0
     sides = both[:1] if mirror_closed(kind) else both
-    tasks = [(hand, own) for own in settings.searches() for hand in sides]
+    tasks = [(hand, own) for own in settings.searches(wanted) for hand in sides]
     work = sum(own.starts for _, own in tasks)
     for hand, own in tasks:
         best = _best_placements(hand, kind, own, cancel)
@@ -163,18 +169,12 @@ def bent_tiles(
             told((done + own.starts * (0.5 + 0.5 * (k + 1) / len(best.costs))) / work)
         done += own.starts
     found.sort(key=lambda bent: -bent.score(settings.min_neck))
-    return _unlike(found), dropped
 
+    def twins(a: Bent, b: Bent) -> bool:
+        n = a.hand.fine.size
+        return a.hand is b.hand and _apart(a.points[:n], b.points[:n]) <= TWIN
 
-def _unlike(found: Sequence[Bent]) -> list[Bent]:
-    """Without those that are twins of an earlier one."""
-    kept: list[Bent] = []
-    for bent in found:
-        n = bent.hand.fine.size
-        mine = [other for other in kept if other.hand.mirrored == bent.hand.mirrored]
-        if all(_apart(bent.points[:n], other.points[:n]) > TWIN for other in mine):
-            kept.append(bent)
-    return kept
+    return _unlike(found, len(found), twins), dropped
 
 
 def _best_placements(
@@ -187,9 +187,7 @@ def _best_placements(
     if middle is not fine:
         placements, points = _finer(coarse, middle, placements, points)
         stages = [Stage(2, settings.starts), Stage(1, 2 * settings.finalists)]
-        drawn = shifted(
-            middle, kind, placements, points, stages, share=share, pose=POSE, cancel=cancel
-        )
+        drawn = shifted(middle, kind, placements, points, stages, share=share, cancel=cancel)
         drawn = drawn.take(np.arange(min(len(drawn.costs), settings.finalists)))
         placements, points = _finer(middle, fine, drawn.placements, drawn.points)
         stages = [Stage(1, settings.finalists)]
@@ -200,7 +198,7 @@ def _best_placements(
             Stage(2, 2 * settings.finalists),
             Stage(1, settings.finalists),
         ]
-    return shifted(fine, kind, placements, points, stages, share=share, pose=POSE, cancel=cancel)
+    return shifted(fine, kind, placements, points, stages, share=share, cancel=cancel)
 
 
 def _best_coarse(
@@ -217,7 +215,12 @@ def _best_coarse(
     tiles = held_on_tiles(body, TileSpace(kind, picked), z[:, chosen], FIRST_ROUNDS)
     costs, sound = _costs(body, tiles.points)
     order = np.lexsort((costs, ~sound))
-    fresh = np.array(_without_twins(body, tiles.points, order, settings.starts), dtype=np.int64)
+    outlines = tiles.points[: body.size].T
+
+    def twins(a: int, b: int) -> bool:
+        return _apart(outlines[a], outlines[b]) <= TWIN
+
+    fresh = np.array(_unlike(order.tolist(), settings.starts, twins), dtype=np.int64)
     return tiles.placements.take(fresh), tiles.points[:, fresh]
 
 
@@ -272,14 +275,14 @@ def _costs(body: Elastic, z: Complex) -> tuple[Array, NDArray[np.bool_]]:
     return body.energy(z) / np.maximum(area, 0.1) + POSE * body.displacement(z), sound
 
 
-def _without_twins(body: Elastic, z: Complex, order: NDArray[np.int64], count: int) -> list[int]:
-    kept: list[int] = []
-    for k in order:
-        apart = [_apart(z[: body.size, k], z[: body.size, other]) for other in kept]
-        if min(apart, default=1.0) > TWIN:
-            kept.append(int(k))
+def _unlike(items: Iterable[Item], count: int, twins: Callable[[Item, Item], bool]) -> list[Item]:
+    """The first `count` items at most, without twins of earlier ones."""
+    kept: list[Item] = []
+    for item in items:
         if len(kept) == count:
             break
+        if not any(twins(item, other) for other in kept):
+            kept.append(item)
     return kept
 
 

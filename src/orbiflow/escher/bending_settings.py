@@ -61,14 +61,21 @@ class BendingSettings:
         """
         return settings_for(cls, EFFORTS, effort, changes)
 
-    def searches(self) -> tuple[BendingSettings, ...]:
+    def searches(self, wanted: int = 1) -> tuple[BendingSettings, ...]:
         """Those of the levels below, least first, and these: none with levels below.
+
+        Args:
+            wanted: finalists at least, for which each gets twice as many starts at least.
 
         >>> [own.starts for own in BendingSettings.for_effort("best").searches()]
         [8, 32, 128]
         """
         below = (FAST, NORMAL)[: self.below]
-        return tuple(replace(self, below=0, **changes) for changes in (*below, {}))
+        each = [replace(self, below=0, **changes) for changes in (*below, {})]
+        return tuple(own if own.finalists >= wanted else own._with(wanted) for own in each)
+
+    def _with(self, finalists: int) -> BendingSettings:
+        return replace(self, finalists=finalists, starts=max(self.starts, 2 * finalists))
 
 
 FAST = {

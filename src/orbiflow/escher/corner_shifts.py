@@ -22,7 +22,7 @@ from orbiflow.cancel import Cancel
 from orbiflow.escher.placements import Complex, Integers, Placements
 from orbiflow.escher.tile_space import TileSpace
 from orbiflow.geometry import plane_points, signed_area
-from orbiflow.likeness.elastic import Elastic
+from orbiflow.likeness.elastic import POSE, Elastic
 from orbiflow.symmetry.isometry import Array
 from orbiflow.tilings import IsohedralClass
 
@@ -78,7 +78,6 @@ def shifted(
     stages: Sequence[Stage],
     *,
     share: float,
-    pose: float,
     cancel: Cancel | None = None,
 ) -> Drawn:
     """Move the corners of each placement until no neighbour is better.
@@ -90,14 +89,13 @@ def shifted(
         points: (N, C) shapes to start from.
         stages: one after the other.
         share: of all neighbours that are worked out, those of the nearest tiles.
-        pose: what a displacement weighs beside the energy.
         cancel: looked at before each move.
 
     Returns:
         The placements that are left, best first, no two the same.
     """
     cancel = cancel or Cancel()
-    drawn = _drawn(body, kind, placements, points, pose)
+    drawn = _drawn(body, kind, placements, points)
     for stage in stages:
         drawn = _distinct(drawn, stage.keep)
         live = np.arange(len(drawn.costs))
@@ -106,14 +104,12 @@ def shifted(
             owners, options = _neighbours(body, kind, drawn, live, stage.step, share)
             if not len(owners):
                 break
-            tried = _drawn(body, kind, options, drawn.points[:, owners], pose)
+            tried = _drawn(body, kind, options, drawn.points[:, owners])
             live = _take_better(drawn, owners, tried)
     return _distinct(drawn, len(drawn.costs))
 
 
-def _drawn(
-    body: Elastic, kind: IsohedralClass, placements: Placements, points: Complex, pose: float
-) -> Drawn:
+def _drawn(body: Elastic, kind: IsohedralClass, placements: Placements, points: Complex) -> Drawn:
     space, n = TileSpace(kind, placements), body.size
     if space.glides:
         space.turn(space.best_turns(points[:n].T))
@@ -127,7 +123,7 @@ def _drawn(
     rings = plane_points(points[:n].T)
     area = np.maximum(signed_area(rings), 0.1)
     costs = (body.lenient_energy(points) + SPRINGS * apart) / area
-    costs += pose * body.displacement(points)
+    costs += POSE * body.displacement(points)
     costs[~shapely.is_valid(shapely.polygons(rings))] += CROSSED
     return Drawn(placements._replace(turns=space.turns), points, costs)
 

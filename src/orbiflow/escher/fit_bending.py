@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -93,14 +92,17 @@ def _fit(
     cancel: Cancel | None,
 ) -> Fit:
     told = progress or (lambda _share, _loss: None)
-    finalists = max(settings.finalists, 3 * per_class)
-    settings = replace(settings, finalists=finalists, starts=max(settings.starts, 2 * finalists))
+    enough = 1 if per_class == 1 else 3 * per_class
     found, dropped = bent_tiles(
-        both, kind, settings, lambda share: told(0.9 * share, float("nan")), cancel
+        both,
+        kind,
+        settings,
+        lambda share: told(0.9 * share, float("nan")),
+        cancel,
+        wanted=enough,
     )
     if not found:
         raise CertificationError(f"{kind.name}: all tiles near the silhouette cross themselves")
-    enough = 1 if per_class == 1 else 3 * per_class
     found = found[: enough + 1]  # one to spare, if one is not certified
     overlaps = [Overlap(target.normal * (1.0, -1.0 if hand.mirrored else 1.0)) for hand in both]
     placed = [placed_best(bent, overlaps[bent.hand.mirrored]) for bent in found]

@@ -27,7 +27,15 @@ PREFERRED = ("IH6", "IH5", "IH4", "IH2", "IH3", "IH7", "IH21", "IH28", "IH1")
 POINTS = 60
 
 
-SKETCH = {"placements": 60, "held": 6, "starts": 1, "share": 0.1, "finalists": 1, "rounds": 10}
+SKETCH = {
+    "placements": 60,
+    "held": 6,
+    "starts": 1,
+    "share": 0.1,
+    "finalists": 1,
+    "rounds": 10,
+    "below": 0,
+}
 """Settings of a first look for likeness."""
 
 

@@ -52,11 +52,10 @@ def faithfulness(silhouette: ArrayLike, shape: ArrayLike, *, mirror: bool = True
     """
     own, other = _ring(silhouette, "the silhouette"), _ring(shape, "the shape")
     body, overlap = _body(own.tobytes())
-    layings = [_Laying(0.0, 1.0, hand) for hand in _hands(other, mirror=mirror)]
-    turns = np.exp(2j * np.pi * np.arange(TURNS) / TURNS)
+    turns = np.exp(2j * np.pi * np.arange(TURNS) / TURNS).tolist()
     rough = [
-        _Laying(overlap.iou(plane_points(turn * laying.ring))[0], complex(turn), laying.ring)
-        for laying in layings
+        _Laying(overlap.iou(plane_points(turn * ring))[0], turn, ring)
+        for ring in _hands(other, mirror=mirror)
         for turn in turns
     ]
     rough.sort(key=lambda laying: -laying.iou)
