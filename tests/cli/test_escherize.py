@@ -215,7 +215,7 @@ def test_help_and_version(orbiflow, orbiflow_process) -> None:
 
 def test_help_does_not_import_torch() -> None:
     code = (
-        "import sys; sys.argv = ['orbiflow', 'escherize', '--help']\n"
+        "import sys; sys.argv = ['orbiflow', 'export', '--help']\n"
         "from orbiflow.cli.app import main\n"
         "try: main()\n"
         "except SystemExit: pass\n"

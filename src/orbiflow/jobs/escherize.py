@@ -29,6 +29,7 @@ from orbiflow.export.gallery import (
 )
 from orbiflow.files import write_atomic
 from orbiflow.folders import ResultFolder
+from orbiflow.jobs.asked import given
 from orbiflow.jobs.events import (
     ClassFailed,
     Finished,
@@ -148,11 +149,7 @@ def _class_names(classes: tuple[str, ...] | None) -> list[str]:
 
 
 def _settings(request: EscherizeRequest) -> Settings:
-    asked: dict[str, Any] = {
-        name: value
-        for name in ("max_frequency", "turns", "iterations")
-        if (value := getattr(request, name)) is not None
-    }
+    asked = given(request, ("max_frequency", "turns", "iterations"))
     if request.method == "occupancy":
         return OccupancySettings(seed=request.seed, **asked)
     effort, objective = request.effort or "normal", request.objective or "likeness"
