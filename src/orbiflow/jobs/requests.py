@@ -302,6 +302,8 @@ class DensitySampleRequest(Request):
 class DensityPlotRequest(Request):
     """Draw a density; see `orbiflow density plot --help`.
 
+    - `out`: a folder, or a .pdf that gets a page a figure.
+    - `format`, `width`: of the figures; a width, "single", "double" or such as "85mm", is for print.
     - `center`: angles in the middle of a torus' pictures, such as "180,180".
     """
 
@@ -312,6 +314,8 @@ class DensityPlotRequest(Request):
     data: Path | None = None
     columns: tuple[str, ...] | None = None
     coastlines: Path | None = None
+    format: Literal["png", "pdf", "svg"] | None = None
+    width: str | None = None
     measure: Measure = "natural"
     scale: Literal["auto", "linear", "log"] = "auto"
     center: str | None = None
