@@ -36,6 +36,7 @@ class Purpose(StrEnum):
 
     LASER = "laser"
     PRINT = "print"
+    PAPER = "paper"
     WEB = "web"
     PLOTTER = "plotter"
 
@@ -60,7 +61,10 @@ def export(
     tile_size: Annotated[
         str | None, option("Longer side of the tile's smallest rectangle; default 40mm.")
     ] = None,
-    area: Annotated[str | None, option("The page; default 300x200mm.")] = None,
+    area: Annotated[
+        str | None,
+        option("The page; default 300x200mm. Also single or double, a journal's columns."),
+    ] = None,
     cut: Annotated[
         Cut | None,
         option("None: every tile drawn. Skeleton: shared edges once. Pieces: tiles apart."),

@@ -112,6 +112,19 @@ def column_width(text: str) -> str | float:
     return width
 
 
+def page_size(text: str) -> tuple[float, float]:
+    """As `size`; a journal's "single" or "double" column is two thirds as high as wide.
+
+    Raises:
+        OrbiflowError: as `size`.
+
+    >>> page_size("double"), page_size("3x2cm")
+    ((180.0, 120.0), (30.0, 20.0))
+    """
+    width = COLUMNS.get(text.strip().lower())
+    return size(text) if width is None else (width, round(width / 1.5, 1))
+
+
 def _unit(unit: str, number: str, text: str) -> float:
     if not unit:
         raise OrbiflowError(f"{text!r} has no unit; write {number}mm, {number}cm or {number}in")

@@ -19,7 +19,7 @@ from orbiflow.escher import (
 )
 from orbiflow.escher.methods import Settings
 from orbiflow.escher.report import report
-from orbiflow.export.folder import figure_files
+from orbiflow.export.folder import FIELD_FILES, figure_files
 from orbiflow.export.gallery import (
     OVERVIEW,
     RESULT,
@@ -186,7 +186,7 @@ def _write(
     with folder.replaced() as staged:
         if results:
             tell(Note("drawing"))
-            if figures and not any(map(figure_files, results)):
+            if figures and not any(FIELD_FILES[0] in figure_files(result) for result in results):
                 tell(
                     Note("no flow made these tiles, so there is none to draw: the silhouette bent")
                 )

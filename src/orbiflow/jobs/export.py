@@ -9,7 +9,7 @@ from typing import Any
 
 from orbiflow.cancel import Cancel
 from orbiflow.export.exporting import Exported, scenes, sheet_names, write_scene
-from orbiflow.export.lengths import length, size
+from orbiflow.export.lengths import length, page_size, size
 from orbiflow.export.result_file import read_result
 from orbiflow.export.settings import FORMATS, ExportSettings
 from orbiflow.files import write_atomic
@@ -22,7 +22,6 @@ from orbiflow.jobs.run import Sink
 
 LENGTHS = ("tile_size", "tolerance", "warn_neck")
 LENGTHS_OR_ZERO = ("kerf", "clearance", "spacing")
-SIZES = ("area", "bed")
 
 
 def export(request: ExportRequest, tell: Sink, cancel: Cancel) -> Finished:
@@ -97,6 +96,6 @@ def _settings(request: ExportRequest) -> ExportSettings:
 def _lengths(request: ExportRequest) -> dict[str, Any]:
     readers: dict[str, Callable[[str], Any]] = dict.fromkeys(LENGTHS, length)
     readers |= dict.fromkeys(LENGTHS_OR_ZERO, partial(length, zero=True))
-    readers |= dict.fromkeys(SIZES, size)
+    readers |= {"area": page_size, "bed": size}
     asked = given(request, readers)
     return {name: read_as(name, readers[name], text) for name, text in asked.items()}
