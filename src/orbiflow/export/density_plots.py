@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import torch
 from numpy.typing import ArrayLike
@@ -83,6 +83,13 @@ class PlotSettings:
         return Sheet.column("single" if self.width is None else self.width, self.format)
 
 
+class Plotted(NamedTuple):
+    """The files that were written, and the figures' captions."""
+
+    files: tuple[Path, ...]
+    captions: tuple[str, ...]
+
+
 @one_thread()
 def plot_density(
     density: SymmetricDensity | DensityEstimator | str | Path,
@@ -91,7 +98,7 @@ def plot_density(
     *,
     data: ArrayLike | None = None,
     told: Callable[[float, str], None] = lambda *_: None,
-) -> tuple[tuple[Path, ...], tuple[str, ...]]:
+) -> Plotted:
     """Draw the density on its square, the flow, samples beside the data, and the surface to turn.
 
     All is drawn before anything is written. Of a torus of more or fewer than two angles: samples alone,
@@ -105,9 +112,6 @@ def plot_density(
         data: (N, k) in the space's own units, to be drawn beside the samples.
         told: told the share of the work done and what is drawn; what it raises ends it.
 
-    Returns:
-        The files, and the figures' captions.
-
     Raises:
         OrbiflowError: for settings or data that do not fit the density.
         InputFileError: if there is no density to read.
@@ -119,7 +123,7 @@ def plot_density(
     if single:
         pictures = plots.pictures(Sheet.column(settings.width or "single", "pdf"), told)
         made = list(pictures.values())
-        return (write_atomic(out, pdf_pages(made)),), tuple(_words(made))
+        return Plotted((write_atomic(out, pdf_pages(made)),), _words(made))
     make_folder(out)
     sheet = settings.sheet
     pictures = plots.pictures(sheet, told)
@@ -130,7 +134,7 @@ def plot_density(
         told(0.75, f"drawing {PAGE}")
         contents[PAGE] = plots.page()
     paths = write_set(out, PICTURES, contents)
-    return tuple(paths), tuple(_words(list(pictures.values())))
+    return Plotted(tuple(paths), _words(pictures.values()))
 
 
 def is_one_file(out: Path) -> bool:
@@ -270,5 +274,5 @@ def _content(name: str, picture: Picture) -> bytes:
     return few_colours(content) if few else content
 
 
-def _words(pictures: Sequence[Picture]) -> list[str]:
-    return [f"{picture.title}. {picture.caption}".strip() for picture in pictures]
+def _words(pictures: Iterable[Picture]) -> tuple[str, ...]:
+    return tuple(f"{picture.title}. {picture.caption}".strip() for picture in pictures)

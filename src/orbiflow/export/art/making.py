@@ -52,6 +52,12 @@ class Artwork:
         width = self.settings.outline
         return max(1.0, self.page.tile_size / OUTLINE) if width is None else width
 
+    def _repr_png_(self) -> bytes:
+        """What a notebook shows."""
+        from orbiflow.export.art.writing import png_of  # which writes what is made here
+
+        return png_of(render_artwork(self), self.settings.dpi)
+
 
 def artwork(
     tile: ArtTile,
