@@ -46,9 +46,10 @@ class Exported:
         """On all sheets; one that is cut where sheets meet counts on each."""
         return sum(len(scene.tiles) for scene in self.scenes)
 
-    def _repr_svg_(self) -> str:
-        """What a notebook shows: the first sheet."""
-        return write_svg(self.scenes[0])
+    def _repr_png_(self) -> bytes:
+        """What a notebook shows: the first sheet, some 600 pixels wide."""
+        sheet = self.scenes[0]
+        return write_png(sheet, dpi=600 * 25.4 / max(sheet.width, sheet.height))
 
 
 def export(

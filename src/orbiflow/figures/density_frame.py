@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import textwrap
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from orbiflow.figures.density_axes import ANGLE_AXES, INK, LETTER, View
@@ -38,16 +39,23 @@ class Framed(NamedTuple):
     side: float
 
 
-def framed(sheet: Sheet, view: View | None, label: str = "", *, room: Room | None = None) -> Framed:
+def framed(
+    sheet: Sheet,
+    view: View | None,
+    label: str = "",
+    ticks: Sequence[str] = ("0.00",),
+    *,
+    room: Room | None = None,
+) -> Framed:
     """A square with a colour bar beside it.
 
     Args:
         sheet: whose width all of it has.
         view: of the square, whose ticks and labels need room; None where there are none.
-        label: of the bar; in print a long one takes more lines.
+        label, ticks: of the bar; in print a long label takes more lines.
         room: in place of what sheet and view ask for.
     """
-    room = room or (_printed(sheet, view, label) if sheet.printed else SCREEN)
+    room = room or (_printed(sheet, view, label, ticks) if sheet.printed else SCREEN)
     side = sheet.width - sheet.em * (room.left + room.right)
     height = side + sheet.em * (room.below + room.above)
     figure = sheet.figure(height)
@@ -82,7 +90,7 @@ def side_by_side(sheet: Sheet, view: View) -> tuple[Figure, tuple[Axes, Axes], f
     return figure, (first, second), side
 
 
-def _printed(sheet: Sheet, view: View | None, label: str) -> Room:
+def _printed(sheet: Sheet, view: View | None, label: str, ticks: Sequence[str]) -> Room:
     """No more than ticks, labels and places of cone points take."""
     if view is None:
         left, below, above = 0.4, 0.6, 0.6
@@ -90,9 +98,10 @@ def _printed(sheet: Sheet, view: View | None, label: str) -> Room:
         left, below, above = 5.4, 3.8, 0.8
     else:
         left, below, above = 1.0, 2.8, 2.8
-    side = sheet.width - sheet.em * (left + 8.0)
-    lines = len(bar_label_lines(sheet, label, side))
-    return Room(left, below, 6.0 + 1.25 * lines, above, 1.4, 1.1)
+    gap, bar = 1.4, 1.1
+    right = gap + bar + 1.4 + max(map(len, ticks), default=0) * LETTER * sheet.small / sheet.text
+    lines = len(bar_label_lines(sheet, label, sheet.width - sheet.em * (left + right + 2.5)))
+    return Room(left, below, right + 0.4 + 1.25 * lines, above, gap, bar)
 
 
 def bar_label_lines(sheet: Sheet, label: str, side: float) -> list[str]:

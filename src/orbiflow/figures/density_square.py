@@ -97,7 +97,7 @@ def density_picture(
     areas = space.log_area(midpoints(space, count)).exp().numpy().reshape(count, count)
     shade = shading(values, areas, log=takes_logarithms(density, measure, scale))
     label = bar_label(shade, space, measure)
-    frame = framed(sheet, view, label)
+    frame = framed(sheet, view, label, [tick.text for tick in bar_ticks(shade)])
     image = frame.axes.imshow(
         shade.places(values).T, extent=(0, 1, 0, 1), origin="lower", cmap=COLOURS,
         interpolation="bicubic", vmin=0, vmax=1,

@@ -30,6 +30,7 @@ SMALL = 0.9
 
 _INCH = 25.4
 _SCREEN_DPI = 200
+_NOTEBOOK_DPI = 144
 _FULL = 8.0
 """Inches of the figure that widths of lines are meant for."""
 
@@ -157,7 +158,7 @@ class Picture:
 
     def _repr_png_(self) -> bytes:
         """What a notebook shows."""
-        sheet = replace(self.sheet, format="png", dpi=min(self.sheet.dpi, _SCREEN_DPI))
+        sheet = replace(self.sheet, format="png", dpi=min(self.sheet.dpi, _NOTEBOOK_DPI))
         return sheet.file(self.figure)
 
 
