@@ -131,6 +131,21 @@ def axis_label(view: View, column: int) -> str:
     return f"{column_name(view, column)} ({unit_of(view.space)})"
 
 
+def fitted(label: str, side: float, sheet: Sheet) -> str:
+    """The label of an axis of so many inches, in print no longer than that.
+
+    >>> fitted("a name that goes on and on (degrees)", 1.5, Sheet.column())
+    'a name that g… (degrees)'
+    """
+    room = int(side / (LETTER * sheet.em))
+    if not sheet.printed or len(label) <= room:
+        return label
+    name, opening, unit = label.rpartition(" (")
+    ending = opening + unit if room - len(unit) > 8 else ""
+    room -= len(ending)
+    return (name if len(name) <= room else f"{name[: room - 1]}…") + ending
+
+
 def angle_axis(view: View, axis: int) -> tuple[str, list[float], list[str]]:
     """Label, places and texts of the ticks of one axis, for a space that `ANGLE_AXES` has."""
     return ANGLE_AXES[view.space.name](view, axis)
@@ -197,8 +212,10 @@ def dress(
     if space.name in ANGLE_AXES:
         label, at, texts = angle_axis(view, 0)
         axes.set_xticks(at, apart(at, texts, side, sheet))
+        label = fitted(label, side, sheet)
         axes.set_xlabel(label, fontsize=size, color=INK, parse_math=False)
         label, at, texts = angle_axis(view, 1)
+        label = fitted(label, side, sheet)
         axes.set_yticks(at, texts if upward else [""] * len(at))
         if upward:
             axes.set_ylabel(label, fontsize=size, color=INK, labelpad=0.2 * size, parse_math=False)

@@ -13,11 +13,10 @@ from orbiflow.density.models.symmetric import SymmetricDensity
 from orbiflow.errors import OrbiflowError
 from orbiflow.figures.density_axes import (
     INK,
-    LETTER,
     View,
     angle_axis,
     apart,
-    column_name,
+    fitted,
     space_title,
     unit_of,
     view_of,
@@ -217,7 +216,7 @@ def _label(axes: Axes, view: View, row: int, column: int, grid: _Grid) -> None:
     axes.set_xticks(at, _thin(at, texts, grid, row == dim - 1, column == dim - 1))
     if row == dim - 1:
         axes.set_xlabel(
-            _short(label, view, column, grid), fontsize=size, color=INK, parse_math=False
+            fitted(label, grid.side, grid.sheet), fontsize=size, color=INK, parse_math=False
         )
     if row == column:
         axes.set_yticks([])
@@ -226,16 +225,9 @@ def _label(axes: Axes, view: View, row: int, column: int, grid: _Grid) -> None:
     axes.set_ylim(0, 1)
     axes.set_yticks(at, _thin(at, texts, grid, column == 0, row == 1, upward=True))
     if column == 0:
-        axes.set_ylabel(_short(label, view, row, grid), fontsize=size, color=INK, parse_math=False)
-
-
-def _short(label: str, view: View, column: int, grid: _Grid) -> str:
-    """A label that a printed panel has room for: without the unit, or cut off, if need be."""
-    room = int(grid.side / (LETTER * grid.text / 72))
-    if not grid.sheet.printed or len(label) <= room:
-        return label
-    name = column_name(view, column)
-    return name if len(name) <= room else f"{name[: room - 1]}…"
+        axes.set_ylabel(
+            fitted(label, grid.side, grid.sheet), fontsize=size, color=INK, parse_math=False
+        )
 
 
 def _thin(

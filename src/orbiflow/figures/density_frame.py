@@ -100,8 +100,12 @@ def _printed(sheet: Sheet, view: View | None, label: str, ticks: Sequence[str]) 
         left, below, above = 1.0, 2.8, 2.8
     gap, bar = 1.4, 1.1
     right = gap + bar + 1.4 + max(map(len, ticks), default=0) * LETTER * sheet.small / sheet.text
-    lines = len(bar_label_lines(sheet, label, sheet.width - sheet.em * (left + right + 2.5)))
-    return Room(left, below, right + 0.4 + 1.25 * lines, above, gap, bar)
+    for lines in range(1, 6):  # each takes room from the square, and so from the lines
+        room = Room(left, below, right + 0.4 + 1.25 * lines, above, gap, bar)
+        side = sheet.width - sheet.em * (room.left + room.right)
+        if len(bar_label_lines(sheet, label, side)) <= lines:
+            break
+    return room
 
 
 def bar_label_lines(sheet: Sheet, label: str, side: float) -> list[str]:
