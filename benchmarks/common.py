@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -12,9 +13,11 @@ import scipy.optimize
 import shapely
 from numpy.typing import NDArray
 
-from orbiflow.escher.bending import bent_tiles, hands
+from orbiflow.escher.bending import bent_tiles
 from orbiflow.escher.bending_settings import BendingSettings
+from orbiflow.escher.hands import hands
 from orbiflow.geometry import orient, plane_points
+from orbiflow.likeness.thinnest import least_neck
 from orbiflow.silhouette import Target
 from orbiflow.threads import one_blas_thread
 from orbiflow.tilings import CLASSES
@@ -79,15 +82,16 @@ def likeness_tiles(target: Target, effort: str) -> list[LikenessTile]:
     """Tiles of all classes by the search for likeness, best first: the only place that calls it."""
     settings = BendingSettings.for_effort(effort)
     both = hands(target, settings)
+    wide = least_neck(target.normal, settings.min_neck)
     found = []
     for name, kind in CLASSES.items():
         with one_blas_thread():
-            bents, _ = bent_tiles(both, kind, settings)
+            bents, _ = bent_tiles(both, kind, replace(settings, min_neck=wide))
         for bent in bents:
             n = bent.hand.fine.size
             flip = (1.0, -1.0 if bent.hand.mirrored else 1.0)
             ring, source = (plane_points(z[:n]) * flip for z in (bent.points, bent.hand.fine.rest))
-            found.append((-bent.fidelity.score, LikenessTile(name, orient(ring), orient(source))))
+            found.append((-bent.score(wide), LikenessTile(name, orient(ring), orient(source))))
     found.sort(key=lambda one: one[0])
     return [tile for _, tile in found]
 

@@ -23,8 +23,8 @@ from likeness_methods import silhouette
 
 from orbiflow.escher import BendingSettings, bending, corner_shifts
 from orbiflow.escher.co_deformation import TIGHTER, drawn_to_tiles
+from orbiflow.escher.hands import FIRM, SOFT, hands
 from orbiflow.likeness import fidelity
-from orbiflow.likeness.elastic import Stiffness
 from orbiflow.likeness.fidelity import USUAL
 from orbiflow.threads import one_blas_thread
 from orbiflow.tilings import CLASSES
@@ -33,7 +33,7 @@ NAMES = ("bat_60", "camel_60", "octpus_94", "squirrel1_60")
 KINDS = ("IH4", "IH5", "IH6")
 PLAIN = BendingSettings()
 
-Change = tuple[BendingSettings, Stiffness, dict[str, Any]]
+Change = tuple[BendingSettings, dict[str, Any]]
 
 
 def springs(stages: int) -> dict[str, Any]:
@@ -45,20 +45,29 @@ def springs(stages: int) -> dict[str, Any]:
     return {"bending.drawn_to_tiles": drawn}
 
 
+def stiff(**values: Any) -> dict[str, Any]:
+    """Another stiffness of the search."""
+    return {"bending.FIRM": replace(FIRM, **values)}
+
+
 CHANGES: dict[str, Change] = {
-    "as it is": (PLAIN, Stiffness(), {}),
-    "corners not moved": (PLAIN, Stiffness(), {"corner_shifts.MOST_MOVES": 0}),
-    "all neighbours worked out": (replace(PLAIN, share=1.0), Stiffness(), {}),
-    "placements chosen rigidly": (replace(PLAIN, placements=32, held=32), Stiffness(), {}),
-    "springs in one stage": (PLAIN, Stiffness(), springs(1)),
-    "springs in three stages": (PLAIN, Stiffness(), springs(3)),
-    "nothing forgiven": (PLAIN, Stiffness(), {"bending.SOFTENINGS": 0}),
-    "half the points": (replace(PLAIN, multiples=(2,)), Stiffness(), {}),
-    "half as many more": (replace(PLAIN, multiples=(6,)), Stiffness(), {}),
-    "thin parts not salient": (PLAIN, Stiffness(salience=0.0), {}),
-    "outline not stiff": (PLAIN, Stiffness(stretch=1e-3), {}),
-    "outline no rod": (PLAIN, Stiffness(bend=1e-9), {}),
-    "no pull to the pose": (PLAIN, Stiffness(pose=1e-3), {}),
+    "as it is": (PLAIN, {}),
+    "corners not moved": (PLAIN, {"corner_shifts.MOST_MOVES": 0}),
+    "all neighbours worked out": (replace(PLAIN, share=1.0), {}),
+    "placements chosen rigidly": (replace(PLAIN, placements=32, held=32), {}),
+    "springs in one stage": (PLAIN, springs(1)),
+    "springs in three stages": (PLAIN, springs(3)),
+    "half the points": (replace(PLAIN, multiples=(2,)), {}),
+    "half as many more": (replace(PLAIN, multiples=(6,)), {}),
+    "never soft": (PLAIN, {"bending.SOFT": FIRM}),
+    "always soft": (PLAIN, {"bending.FIRM": SOFT}),
+    "thin parts as stiff": (PLAIN, stiff(salience=0.0)),
+    "thin parts stiffer": (PLAIN, stiff(salience=0.5)),
+    "thin parts softer still": (PLAIN, stiff(salience=-1.0)),
+    "outline not stiff": (PLAIN, stiff(stretch=1e-3)),
+    "outline no rod": (PLAIN, stiff(bend=1e-9)),
+    "pose pulled as before": (PLAIN, stiff(pose=3.0)),
+    "pose pulled five times more": (PLAIN, stiff(pose=300.0)),
 }
 
 
@@ -79,7 +88,7 @@ def changed(values: dict[str, Any]) -> Iterator[None]:
 
 def damage(bent: bending.Bent) -> float:
     """Of a tile, by as many points whatever it was bent with; the cost, of another energy, left out."""
-    body, few = bent.hand.fine, 2 * bent.hand.coarse.size
+    body, few = bent.hand.fine, 2 * len(bent.hand.samples.coarse)
     every = slice(0, body.size, body.size // few)
     return fidelity(
         body.rest[: body.size][every], bent.points[: body.size][every], USUAL[-1]
@@ -88,12 +97,12 @@ def damage(bent: bending.Bent) -> float:
 
 def measured(names: Sequence[str], change: Change) -> tuple[float, float]:
     """Mean damage and seconds of CPU."""
-    settings, stiffness, values = change
+    settings, values = change
     damages = []
     began = time.process_time()
     with changed(values), one_blas_thread():
         for name in names:
-            both = bending.hands(silhouette(name), settings, stiffness)
+            both = hands(silhouette(name), settings)
             for kind in KINDS:
                 found, _ = bending.bent_tiles(both, CLASSES[kind], settings)
                 damages.append(damage(found[0]) if found else np.nan)

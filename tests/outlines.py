@@ -8,10 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from orbiflow.escher.bending import Bent, Hand, bent_tiles, hands
+from orbiflow.escher.bending import Bent, bent_tiles
 from orbiflow.escher.bending_settings import BendingSettings
 from orbiflow.escher.boundary import extract_tile
 from orbiflow.escher.fit_bending import PlacedBent, placed_best, prototile
+from orbiflow.escher.hands import Hand, hands
 from orbiflow.escher.model import TileModel
 from orbiflow.geometry import plane_points, signed_area
 from orbiflow.likeness.overlap import Overlap

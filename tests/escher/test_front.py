@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from orbiflow.escher import BendingSettings
-from orbiflow.escher.bending import hands
 from orbiflow.escher.deformation import deformation, measured
 from orbiflow.escher.fit_bending import fit_bending
 from orbiflow.escher.front import behind, front_list
+from orbiflow.escher.hands import hands
 from orbiflow.escher.result import TileResult, best_tiles
 from orbiflow.tilings import CLASSES
 from outlines import animal

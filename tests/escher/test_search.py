@@ -225,7 +225,7 @@ def test_settings_of_no_method_are_refused(wrong: object) -> None:
 
 
 def test_of_both_objectives_one_may_fail() -> None:
-    bar = Target.from_polygon([[0, 0], [30, 0], [30, 1], [0, 1]])
+    bar = Target.from_polygon([[0, 0], [60, 0], [60, 1], [0, 1]])
     likeness = BendingSettings(placements=20, held=4, starts=1, finalists=1, rounds=4)
     alone = escherize_class(bar, "IH7", likeness)
     assert isinstance(alone, ClassFailure)

@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from orbiflow.errors import OrbiflowError
-from orbiflow.escher.bending import hands
 from orbiflow.escher.bending_settings import BendingSettings
+from orbiflow.escher.hands import FIRM, hands
 from orbiflow.geometry import resampled, ring_length
 from orbiflow.silhouette import Target
 from orbiflow.silhouette.sampling import (
@@ -116,7 +116,6 @@ def test_hairs_give_bodies_or_a_reason(ring: Array) -> None:
         both, said = (), str(error)
     assert not said or "too thin" in said or "too ragged" in said
     for hand in both:
-        bodies = (hand.coarse, hand.middle, hand.fine)
-        for points, body in zip(hand.samples, bodies, strict=True):
+        for points, body in zip(hand.samples, hand.bodies(FIRM), strict=True):
             assert shapely.Polygon(points).is_valid
             assert body.size == len(points)

@@ -13,19 +13,14 @@ from orbiflow.cancel import Cancel
 from orbiflow.escher.bending_settings import BendingSettings
 from orbiflow.escher.co_deformation import drawn_to_tiles, held_on_tiles
 from orbiflow.escher.corner_shifts import Drawn, Stage, shifted
+from orbiflow.escher.hands import FIRM, SOFT, Bodies, Hand
 from orbiflow.escher.outline_starts import mirror_closed
 from orbiflow.escher.placements import Complex, Placements, best_placements
 from orbiflow.escher.tile_space import TileSpace
-from orbiflow.geometry import best_similarity, complex_points, plane_points, signed_area
-from orbiflow.likeness.elastic import POSE, Elastic, Stiffness
+from orbiflow.geometry import best_similarity, plane_points, signed_area
+from orbiflow.likeness.elastic import Elastic, Stiffness
 from orbiflow.likeness.fidelity import Fidelity, fidelity
-from orbiflow.likeness.pinned import Pinned
 from orbiflow.likeness.thinnest import narrowest_neck, neck_factor
-from orbiflow.silhouette.emphasis import Emphasis
-from orbiflow.silhouette.mesh import triangulate
-from orbiflow.silhouette.pins import Pins
-from orbiflow.silhouette.sampling import Samples, sampled
-from orbiflow.silhouette.target import Target
 from orbiflow.symmetry.isometry import Array
 from orbiflow.tilings import IsohedralClass
 
@@ -41,21 +36,7 @@ FOLLOWING = 60.0
 RELAXED = 1500.0
 """Strength of the springs that keep a relaxed outline near its tile."""
 
-SOFTENINGS = 6
-"""Times that finalists are minimised anew with the forgiving energy."""
-
-
 Item = TypeVar("Item")
-
-
-class Hand(NamedTuple):
-    """A silhouette or its mirror image, sampled and made elastic, coarse to fine."""
-
-    mirrored: bool
-    samples: Samples
-    coarse: Elastic
-    middle: Elastic
-    fine: Elastic
 
 
 class Bent(NamedTuple):
@@ -82,49 +63,6 @@ class Bent(NamedTuple):
     def score(self, min_neck: float) -> float:
         """What finalists are ordered by: their fidelity's, less where a neck is too thin."""
         return self.fidelity.score * neck_factor(self.neck, min_neck)
-
-
-def hands(
-    target: Target,
-    settings: BendingSettings,
-    stiffness: Stiffness | None = None,
-    *,
-    emphasis: Emphasis | None = None,
-    pins: Pins | None = None,
-) -> tuple[Hand, Hand]:
-    """The silhouette and its mirror image in the x axis, ready to be bent.
-
-    Args:
-        target: the silhouette.
-        settings: of the search.
-        stiffness: what deforming costs.
-        emphasis: what is to bend less, by as much as it matters more.
-        pins: what is not to bend.
-
-    Raises:
-        OrbiflowError: for a silhouette that cannot be sampled or triangulated.
-    """
-    phase = float(np.random.default_rng(settings.seed).random()) if settings.seed else 0.0
-    samples = sampled(np.asarray(target.normal), phase, settings.multiples)
-    # read backwards from the same first point: every k-th fine point stays beside a coarse one
-    mirror = Samples(*(np.roll(part[::-1], 1, axis=0) * (1.0, -1.0) for part in samples))
-
-    def elastic(points: Array, mirrored: bool) -> Elastic:
-        mesh = triangulate(points)
-        own = mesh.points * ((1.0, -1.0) if mirrored else (1.0, 1.0))
-        stiff = None if emphasis is None else emphasis.weight(own)
-        if pins is None:
-            return Elastic(points, stiffness, stiff=stiff, mesh=mesh)
-        parts, angle = pins.parts(own, mesh.triangles), pins.keep_angle
-        return Pinned(points, parts, stiffness, keep_angle=angle, stiff=stiff, mesh=mesh)
-
-    def hand(points: Samples, mirrored: bool) -> Hand:
-        coarse, fine = elastic(points.coarse, mirrored), elastic(points.fine, mirrored)
-        same = len(points.middle) == len(points.fine)
-        middle = fine if same else elastic(points.middle, mirrored)
-        return Hand(mirrored, points, coarse, middle, fine)
-
-    return hand(samples, False), hand(mirror, True)
 
 
 def bent_tiles(
@@ -159,15 +97,13 @@ def bent_tiles(
     tasks = [(hand, own) for own in settings.searches(wanted) for hand in sides]
     work = sum(own.starts for _, own in tasks)
     for hand, own in tasks:
-        best = _best_placements(hand, kind, own, cancel)
-        for k in range(len(best.costs)):
-            cancel.check()
-            one = best.take(np.array([k]))
-            bent = _detailed(hand, kind, one.placements, one.points, own.rounds)
-            found += [] if bent is None else [bent]
-            dropped += bent is None
-            told((done + own.starts * (0.5 + 0.5 * (k + 1) / len(best.costs))) / work)
-        done += own.starts
+        sound, crossed = _finalists(hand, FIRM, kind, own, cancel)
+        if 2 * len(sound) < own.finalists:
+            told((done + 0.5 * own.starts) / work)
+            more, also = _finalists(hand, SOFT, kind, own, cancel)
+            sound, crossed = sound + more, crossed + also
+        found, dropped, done = found + sound, dropped + crossed, done + own.starts
+        told(done / work)
     found.sort(key=lambda bent: -bent.score(settings.min_neck))
 
     def twins(a: Bent, b: Bent) -> bool:
@@ -177,12 +113,31 @@ def bent_tiles(
     return _unlike(found, len(found), twins), dropped
 
 
+def _finalists(
+    hand: Hand,
+    stiffness: Stiffness,
+    kind: IsohedralClass,
+    settings: BendingSettings,
+    cancel: Cancel,
+) -> tuple[list[Bent], int]:
+    """The best of one hand and stiffness worked out, and how many of them cross themselves."""
+    bodies = hand.bodies(stiffness)
+    best = _best_placements(bodies, kind, settings, cancel)
+    found: list[Bent] = []
+    for k in range(len(best.costs)):
+        cancel.check()
+        one = best.take(np.array([k]))
+        bent = _detailed(hand, bodies.fine, kind, one, settings.rounds)
+        found += [] if bent is None else [bent]
+    return found, len(best.costs) - len(found)
+
+
 def _best_placements(
-    hand: Hand, kind: IsohedralClass, settings: BendingSettings, cancel: Cancel
+    bodies: Bodies, kind: IsohedralClass, settings: BendingSettings, cancel: Cancel
 ) -> Drawn:
     """Placements of the fine outline whose tiles cost least: few points, then more and more."""
-    coarse, middle, fine = hand.coarse, hand.middle, hand.fine
-    placements, points = _best_coarse(hand, kind, settings)
+    coarse, middle, fine = bodies
+    placements, points = _best_coarse(coarse, kind, settings)
     share = settings.share
     if middle is not fine:
         placements, points = _finer(coarse, middle, placements, points)
@@ -202,11 +157,10 @@ def _best_placements(
 
 
 def _best_coarse(
-    hand: Hand, kind: IsohedralClass, settings: BendingSettings
+    body: Elastic, kind: IsohedralClass, settings: BendingSettings
 ) -> tuple[Placements, Complex]:
     """Placements whose tiles cost least, with these: few points, all placements side by side."""
-    body = hand.coarse
-    outline = complex_points(hand.samples.coarse)
+    outline = body.rest[: body.size]
     placements = best_placements(kind, outline, settings.placements)
     z, space = drawn_to_tiles(body, kind, placements)
     rough, _ = _costs(body, z)
@@ -241,14 +195,10 @@ def _finer(
 
 
 def _detailed(
-    hand: Hand, kind: IsohedralClass, placement: Placements, points: Complex, rounds: int
+    hand: Hand, body: Elastic, kind: IsohedralClass, one: Drawn, rounds: int
 ) -> Bent | None:
-    """A placement of the fine outline worked out, from points (N, 1); None if it crosses itself."""
-    body = hand.fine
-    space = TileSpace(kind, placement)
-    tiles = held_on_tiles(body, space, points, rounds)
-    for _ in range(SOFTENINGS):
-        tiles = held_on_tiles(body.forgiving(tiles.points), space, tiles.points, 6)
+    """One placement of the fine outline worked out with a body; None if it crosses itself."""
+    tiles = held_on_tiles(body, TileSpace(kind, one.placements), one.points, rounds)
     ring = tiles.points[: body.size, 0]
     polygon = plane_points(ring)
     area = float(signed_area(polygon))
@@ -262,7 +212,7 @@ def _detailed(
         tiles.offset[0],
         tiles.placements,
         body.pulled(tiles.points, tiles.points[: body.size], RELAXED, 3)[: body.size, 0],
-        fidelity(body.rest[: body.size], ring, float(body.cost(tiles.points)[0])),
+        fidelity(body.rest[: body.size], ring, float(hand.fine.cost(tiles.points)[0])),
         narrowest_neck(polygon).share,
     )
 
@@ -272,7 +222,9 @@ def _costs(body: Elastic, z: Complex) -> tuple[Array, NDArray[np.bool_]]:
     rings = plane_points(z[: body.size].T)
     area = signed_area(rings)
     sound = np.asarray(shapely.is_valid(shapely.polygons(rings))) & (area > 0.1)
-    return body.energy(z) / np.maximum(area, 0.1) + POSE * body.displacement(z), sound
+    return body.energy(z) / np.maximum(area, 0.1) + body.stiffness.pose * body.displacement(
+        z
+    ), sound
 
 
 def _unlike(items: Iterable[Item], count: int, twins: Callable[[Item, Item], bool]) -> list[Item]:

@@ -22,7 +22,8 @@ class BendingSettings:
     - `rounds`: steps of the minimisation for finalists.
     - `below`: levels of effort below that are searched, too, so that more effort never finds less.
     - `multiples`: points of a tile for each point of the search, the first that holds the corners.
-    - `min_neck`: width of necks below which a tile's score falls, in square roots of the area.
+    - `min_neck`: width of necks below which a tile's score falls, in square roots of the area; if
+      above 0, a part of the silhouette's own narrowest if more, see `likeness.thinnest.least_neck`.
     - `seed`: moves the outline's points.
     """
 

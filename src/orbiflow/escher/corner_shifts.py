@@ -22,7 +22,7 @@ from orbiflow.cancel import Cancel
 from orbiflow.escher.placements import Complex, Integers, Placements
 from orbiflow.escher.tile_space import TileSpace
 from orbiflow.geometry import plane_points, signed_area
-from orbiflow.likeness.elastic import POSE, Elastic
+from orbiflow.likeness.elastic import Elastic
 from orbiflow.symmetry.isometry import Array
 from orbiflow.tilings import IsohedralClass
 
@@ -123,7 +123,7 @@ def _drawn(body: Elastic, kind: IsohedralClass, placements: Placements, points: 
     rings = plane_points(points[:n].T)
     area = np.maximum(signed_area(rings), 0.1)
     costs = (body.lenient_energy(points) + SPRINGS * apart) / area
-    costs += POSE * body.displacement(points)
+    costs += body.stiffness.pose * body.displacement(points)
     costs[~shapely.is_valid(shapely.polygons(rings))] += CROSSED
     return Drawn(placements._replace(turns=space.turns), points, costs)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from orbiflow.escher.bending import Hand
+from orbiflow.escher.hands import Hand
 from orbiflow.escher.result import TileResult
 from orbiflow.geometry import orient
 from orbiflow.likeness.laid import laid_on

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -10,15 +11,17 @@ import torch
 
 from orbiflow.cancel import Cancel
 from orbiflow.errors import CertificationError
-from orbiflow.escher.bending import Bent, Hand, bent_tiles
+from orbiflow.escher.bending import Bent, bent_tiles
 from orbiflow.escher.bending_settings import BendingSettings
 from orbiflow.escher.fit import Fit, Progress
+from orbiflow.escher.hands import Hand
 from orbiflow.escher.model import TileModel
 from orbiflow.escher.placements import Complex
 from orbiflow.escher.prototiles import Prototiles
 from orbiflow.escher.tile_space import NearestTiles
 from orbiflow.geometry import best_similarity, plane_points
 from orbiflow.likeness.overlap import Overlap, overlaid
+from orbiflow.likeness.thinnest import least_neck
 from orbiflow.silhouette.target import Target
 from orbiflow.symmetry.isometry import Array
 from orbiflow.threads import one_blas_thread
@@ -93,6 +96,7 @@ def _fit(
 ) -> Fit:
     told = progress or (lambda _share, _loss: None)
     enough = 1 if per_class == 1 else 3 * per_class
+    settings = replace(settings, min_neck=least_neck(target.normal, settings.min_neck))
     found, dropped = bent_tiles(
         both,
         kind,

@@ -6,12 +6,12 @@ from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 from orbiflow.cancel import Cancel
-from orbiflow.escher.bending import Hand, hands
 from orbiflow.escher.bending_settings import BendingSettings
 from orbiflow.escher.descent_settings import DescentSettings
 from orbiflow.escher.fit import Fit, Progress
 from orbiflow.escher.fit_bending import fit_bending
 from orbiflow.escher.fit_descent import fit_descent
+from orbiflow.escher.hands import Hand, hands
 from orbiflow.escher.occupancy import OccupancySettings, fit_occupancy
 from orbiflow.escher.starts import initial_poses
 from orbiflow.silhouette.emphasis import Emphasis

@@ -59,7 +59,7 @@ def quick_bent_tile(
     both = shared_hands(target, settings, emphasis, pins)
     try:
         found = fit_bending(target, kind, replace(settings, **SKETCH), both, cancel=cancel)
-        return best_tiles(target, found._replace(enough=1), min_neck=settings.min_neck)[0]
+        return best_tiles(target, found._replace(enough=1))[0]
     except CertificationError:
         return None
 

@@ -33,6 +33,7 @@ from orbiflow.escher.processes import process_context, work
 from orbiflow.escher.result import ClassFailure, TileResult, best_tiles
 from orbiflow.likeness.mutual import mutual_iou
 from orbiflow.likeness.ranking import diverse
+from orbiflow.likeness.thinnest import least_neck
 from orbiflow.silhouette.emphasis import Emphasis
 from orbiflow.silhouette.pins import Pins
 from orbiflow.silhouette.target import Target
@@ -268,7 +269,7 @@ def _chosen_tiles(
             progress=lambda own, loss: watch(Event(kind.name, done + share * own, loss)),
             cancel=cancel,
         )
-        tiles = best_tiles(task.target, found, force=task.force, min_neck=_min_neck(settings))
+        tiles = best_tiles(task.target, found, force=task.force, min_neck=_min_neck(task, settings))
         chosen = [tiles[k] for k in _without_twins(tiles, count)]
         if not isinstance(task.settings, BothSettings):
             return chosen
@@ -277,7 +278,9 @@ def _chosen_tiles(
         return [measured(tile, hand) for tile in chosen]
 
 
-def _min_neck(settings: OneSettings) -> float:
+def _min_neck(task: Task, settings: OneSettings) -> float:
+    if isinstance(settings, BendingSettings):
+        return least_neck(task.target.normal, settings.min_neck)
     return 0.0 if isinstance(settings, OccupancySettings) else settings.min_neck
 
 

@@ -35,7 +35,7 @@ COTANGENTS = (0.05, 40.0)
 THICK = 0.25
 """Radius of a part that is not thin, in square roots of the area; a disc has 0.56."""
 
-SALIENT = (0.5, 8.0)
+SALIENT = (0.25, 8.0)
 """Bounds of what thinness may multiply weights by."""
 
 
@@ -53,7 +53,7 @@ class Stiffness:
     - `stretch`: of the outline, per unit of its length and squared strain.
     - `bend`: of the outline, per unit of its length and squared change of curvature.
     - `salience`: power of the thinness by which areas of thin parts weigh more: with 0 a leg of half
-      the width weighs half as much a length, with 1 the same.
+      the width weighs half as much a length, with 1 the same; below 0 thin parts give way first.
     - `pose`: of the mean squared distance from the silhouette's best similar copy.
     - `forgiven`: strain, and angle of a kink in radians, beyond which `forgiving_energy` forgives.
     """

@@ -33,6 +33,12 @@ APART = 0.1
 WIDE = 0.5
 """Width beyond which nothing is a neck, in square roots of the area."""
 
+PINCHED = 0.25
+"""Part of the silhouette's narrowest neck below which a tile's looks cut through."""
+
+SOUND = 0.05
+"""Width above which no neck does, in square roots of the area."""
+
 STEP = 0.0125
 """Distance of points on the outline, in square roots of the area: how exact tapering parts are."""
 
@@ -68,6 +74,21 @@ def neck_factor(share: float, min_neck: float) -> float:
     (1.0, 0.2)
     """
     return 1.0 if share >= min_neck else share / min_neck
+
+
+def least_neck(silhouette: ArrayLike, min_neck: float) -> float:
+    """How wide the necks of a silhouette's tiles should be, in square roots of the area.
+
+    `min_neck`, or `PINCHED` times the silhouette's own narrowest but at most `SOUND`, if that is more;
+    0 if `min_neck` is 0.
+
+    >>> bar = [[0.0, 0.0], [20.0, 0.0], [20.0, 0.2], [0.0, 0.2]]
+    >>> least_neck(bar, 0.01), least_neck(bar, 0.1), least_neck(bar, 0.0)
+    (0.025, 0.1, 0.0)
+    """
+    if not min_neck:
+        return 0.0
+    return max(min_neck, min(PINCHED * narrowest_neck(silhouette).share, SOUND))
 
 
 def narrowest_neck(ring: ArrayLike) -> Thinnest:
