@@ -68,7 +68,9 @@ def art(
     ] = None,
     palette: Annotated[
         str | None,
-        _option("earth, sea, dusk, forest, pastel, festival, woodcut, moss, clay, print and more."),
+        _option(
+            "A name: earth, sea, dusk, festival, ... or your own: e76f51,2a9d8f,outline=1b2f38."
+        ),
     ] = None,
     colour: Annotated[
         Colour | None,
