@@ -13,6 +13,8 @@ PAGE = HERE / "README.md"
 SHEET = HERE / "contact-sheet.webp"
 COLUMNS, CELL, GAP = 5, (300, 225), 8
 QUALITY = 76
+ZOOM = 1.45
+"""How much nearer the contact sheet goes than it must, so that animals can be told."""
 
 HEAD = """# Gallery
 
@@ -60,12 +62,12 @@ def contact_sheet(entries: list[Entry]) -> None:
         missing = COLUMNS - (len(entries) - row * COLUMNS) if row == rows - 1 else 0
         left = column * step[0] + missing * step[0] // 2
         sheet.paste(_middle(entry), (left, row * step[1]))
-    sheet.save(SHEET, quality=QUALITY, method=6)
+    sheet.save(SHEET, quality=QUALITY - 4, method=6)
 
 
 def _middle(entry: Entry) -> Image.Image:
     image = Image.open(entry.picture).convert("RGB")
-    scale = max(CELL[0] / image.width, CELL[1] / image.height)
+    scale = ZOOM * max(CELL[0] / image.width, CELL[1] / image.height)
     size = (round(image.width * scale), round(image.height * scale))
     small = image.resize(size, Image.Resampling.LANCZOS)
     left, top = (small.width - CELL[0]) // 2, (small.height - CELL[1]) // 2
