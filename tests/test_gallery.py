@@ -4,23 +4,20 @@ from __future__ import annotations
 
 import re
 import shlex
-import sys
 from pathlib import Path
 
 import pytest
 import typer
 from PIL import Image
 
+from gallery_page import PAGE, SHEET, page, shown
+from gallery_table import FREE, Entry, read_table
 from orbiflow.cli.app import app
 from orbiflow.figures.palette import palette
 from orbiflow.tilings import CLASSES
 
 ROOT = Path(__file__).parents[1]
 GALLERY = ROOT / "docs" / "gallery"
-sys.path.insert(0, str(GALLERY))
-
-from page import PAGE, SHEET, page, shown  # noqa: E402
-from table import FREE, Entry, read_table  # noqa: E402
 
 ENTRIES = read_table()
 MOST_BYTES = 250_000

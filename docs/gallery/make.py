@@ -8,9 +8,9 @@ import shutil
 import sys
 from pathlib import Path
 
+from gallery_page import PAGE, compress, contact_sheet, page, shown
+from gallery_table import HERE, ROOT, Entry, read_table
 from orbiflow.cli.app import app
-from page import PAGE, compress, contact_sheet, page, shown
-from table import HERE, ROOT, Entry, read_table
 
 
 def make(entry: Entry) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from PIL import Image, ImageDraw
 
-from table import HERE, Entry
+from gallery_table import HERE, Entry
 
 PAGE = HERE / "README.md"
 SHEET = HERE / "contact-sheet.webp"
