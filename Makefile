@@ -4,7 +4,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
 
-.PHONY: demo test lint bench clean
+.PHONY: demo test lint bench gallery clean
 
 demo: $(VENV)/.installed
 	$(BIN)/orbiflow escherize examples/silhouettes/turtle.png --out out/demo
@@ -28,6 +28,9 @@ bench: $(VENV)/.installed-dev
 	$(BIN)/python benchmarks/density_nll.py --quick || test $$? -eq 2 # its data are not here
 	$(BIN)/python benchmarks/density_rna.py --quick || test $$? -eq 2
 	$(BIN)/python benchmarks/density_unoriented.py --quick
+
+gallery: $(VENV)/.installed
+	$(BIN)/python docs/gallery/make.py
 
 clean:
 	rm -rf $(VENV) out

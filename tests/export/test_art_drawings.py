@@ -218,3 +218,15 @@ def test_long_lines_bend_with_the_tile(name: str, tmp_path: Path) -> None:
     ends = tile.carried.forward(np.array([[300.0, 250.0], [700.0, 250.0]]))
     np.testing.assert_allclose([curve.start, curve.end], ends, atol=1e-9)
     assert len(curve.pieces) > 40
+
+
+def test_current_colour_is_ink(tmp_path: Path) -> None:
+    body = f"""<circle cx="{EYE[0]}" cy="{EYE[1]}" r="40" fill="currentColor"/>
+    <path d="M 300 400 L 500 300" fill="none" stroke="currentcolor" stroke-width="9"/>
+    <path d="M 300 400 L 500 300 L 600 400" fill="currentColor" color="#203040"/>"""
+    art = drawn("IH4", body, tmp_path)
+    assert [part.inked for part in art.motif.parts] == [True, True, False]
+    assert art.motif.parts[2].style.fill == "#203040"
+    chosen = palette(art.settings.palette)
+    inks = {layer.ink for layer in art_scene(art).layers} - {None}
+    assert inks == {chosen.outline, chosen.paper}

@@ -80,3 +80,32 @@ def test_names() -> None:
     assert palette(own) is own
     with pytest.raises(OrbiflowError, match="okabe-ito"):
         palette("puce")
+
+
+def test_spelt_out() -> None:
+    own = palette("#E76F51, 2a9d8f,paper=fffdf8")
+    assert own.colours == ("#e76f51", "#2a9d8f")
+    assert own.paper == "#fffdf8"
+    assert palette("e76f51,outline=010203").outline == "#010203"
+    assert palette("e76f51").paper == "#ffffff"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "e76f5",
+        "e76f51,",
+        "e76f51,frame=000000",
+        "paper=ffffff",
+        "outline=0,e76f51",
+        ",".join(["000000"] * 25),
+    ],
+)
+def test_misspelt(text: str) -> None:
+    with pytest.raises(OrbiflowError, match="palette"):
+        palette(text)
+
+
+def test_one_of_each() -> None:
+    with pytest.raises(OrbiflowError, match="once"):
+        palette("e76f51,paper=ffffff,paper=000000")

@@ -17,7 +17,11 @@ Result = Annotated[
 ]
 Tile = Annotated[str, typer.Option(help="A class, such as IH4, or a rank; 1 is best.")]
 Palette = Annotated[
-    str | None, typer.Option(help=f"Of tiles: {', '.join(PALETTES)}.", show_default=False)
+    str | None,
+    typer.Option(
+        help=f"Of tiles: {', '.join(PALETTES)}; or your own, as e76f51,2a9d8f,outline=1b2f38.",
+        show_default=False,
+    ),
 ]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import NamedTuple
 
 from orbiflow.errors import OrbiflowError
@@ -58,22 +59,60 @@ PALETTES: dict[str, Palette] = {
 """
 
 DEFAULT_PALETTE = "delft"
+MOST_COLOURS = 24
+"""Of a palette that is spelt out."""
+
+
+_HEX = re.compile(r"#?([0-9a-fA-F]{6})")
 
 
 def palette(name: str | Palette) -> Palette:
-    """The palette called `name`; a `Palette` is returned as it is.
+    """The palette called `name`, or one spelt out; a `Palette` is returned as it is.
+
+    Args:
+        name: one of `PALETTES`; or colours rrggbb with commas between, and perhaps `outline=rrggbb`
+            (else a dark shade of the darkest) and `paper=rrggbb` (else white) among them.
 
     Raises:
-        OrbiflowError: for an unknown name.
+        OrbiflowError: for an unknown name, and what is no colour.
 
     >>> palette("ink").fill(1)
     '#2b2b2b'
+    >>> palette("e76f51,2a9d8f,paper=fffdf8")
+    Palette(colours=('#e76f51', '#2a9d8f'), outline='#113f39', paper='#fffdf8')
     """
     if isinstance(name, Palette):
         return name
-    if name not in PALETTES:
-        raise OrbiflowError(f"unknown palette {name!r}; there are {', '.join(PALETTES)}")
-    return PALETTES[name]
+    if name in PALETTES:
+        return PALETTES[name]
+    if "," in name or "=" in name or _HEX.fullmatch(name):
+        return _spelt(name)
+    raise OrbiflowError(
+        f"unknown palette {name[:60]!r}; there are {', '.join(PALETTES)}, and your own: colours such "
+        "as e76f51,2a9d8f,outline=1b2f38,paper=fffdf8"
+    )
+
+
+def _spelt(text: str) -> Palette:
+    colours: list[str] = []
+    named: dict[str, str] = {}
+    for part in text.split(","):
+        name, _, value = part.strip().rpartition("=")
+        found = _HEX.fullmatch(value.strip())
+        if found is None or name not in ("", "outline", "paper") or name in named:
+            raise OrbiflowError(
+                f"palette: {part.strip()[:40]!r} is no colour; write rrggbb, outline=rrggbb or "
+                "paper=rrggbb (each of these once), such as e76f51,2a9d8f,outline=1b2f38"
+            )
+        colour = "#" + found[1].lower()
+        if name:
+            named[name] = colour
+        else:
+            colours.append(colour)
+    if not 1 <= len(colours) <= MOST_COLOURS:
+        raise OrbiflowError(f"a palette has 1 to {MOST_COLOURS} colours, got {len(colours)}")
+    dark = _mixed(min(colours, key=_lightness), "#000000", 0.4)
+    return Palette(tuple(colours), named.get("outline", dark), named.get("paper", "#ffffff"))
 
 
 def _mixed(colour: str, paper: str, share: float) -> str:

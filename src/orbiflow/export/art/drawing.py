@@ -12,7 +12,7 @@ from shapely.errors import GEOSException
 from orbiflow.errors import InputFileError
 from orbiflow.export.art.source import ArtTile
 from orbiflow.export.curves import Curve
-from orbiflow.export.scene import Motif, Part, Style
+from orbiflow.export.scene import INK, Motif, Part, Style
 from orbiflow.geometry import orient, polygons_in
 from orbiflow.silhouette.readers.fill_rule import TooTangled, fill
 from orbiflow.silhouette.readers.reading import check_file, read_bytes
@@ -44,6 +44,7 @@ def read_drawing(path: Path, tile: ArtTile) -> tuple[Motif, tuple[str, ...]]:
     """The drawing in an SVG file, carried onto the tile, in its units; and notes.
 
     Fills and strokes are kept, gradients become one colour; texts, pictures and clips are left out.
+    `currentColor`, where no `color` is said, is the ink that shows on each tile.
 
     Args:
         tile: with a map.
@@ -168,12 +169,15 @@ def _line(carry: _Carry, points: Array, path: SubPath) -> Curve:
 
 
 def _colour(text: str, paint: object, drawing: Drawing) -> tuple[str | None, float]:
-    """A paint as #rrggbb, None for none; and how opaque it is."""
+    """A paint as #rrggbb or `INK`, None for none; and how opaque it is."""
     text = text.strip()
     if text.lower() in ("none", "transparent", ""):
         return None, 0.0
-    if text.lower() == "currentcolor" and isinstance(paint, dict):
-        text = str(paint.get("color", "#000000"))
+    if text.lower() == "currentcolor":
+        text = str(paint.get("color", INK)) if isinstance(paint, dict) else INK
+        # no colour is said: the one that shows on the tile
+        if text.lower() == INK.lower():
+            return INK, 1.0
     if text.startswith("url("):
         return _gradient(text, drawing)
     try:
@@ -195,7 +199,8 @@ def _gradient(text: str, drawing: Drawing) -> tuple[str | None, float]:
         return None, 0.0
     stops = [drawing.styles.properties(child) for child in element if child.tag == "stop"]
     colours = [_colour(stop.get("stop-color", "#000000"), {}, drawing)[0] for stop in stops]
-    known = [[int(c[i : i + 2], 16) for i in (1, 3, 5)] for c in colours if c is not None]
+    plain = [colour for colour in colours if colour not in (None, INK)]
+    known = [[int(str(colour)[i : i + 2], 16) for i in (1, 3, 5)] for colour in plain]
     if not known:
         return None, 0.0
     red, green, blue = np.mean(known, axis=0).round().astype(int)

@@ -1,0 +1,119 @@
+"""The gallery's table and page are consistent: files, licences, classes and commands."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+import typer
+from PIL import Image
+
+from gallery_page import PAGE, SHEET, page, shown
+from gallery_table import FREE, Entry, read_table
+from orbiflow.cli.app import app
+from orbiflow.figures.palette import palette
+from orbiflow.tilings import CLASSES
+
+ROOT = Path(__file__).parents[1]
+GALLERY = ROOT / "docs" / "gallery"
+
+ENTRIES = read_table()
+MOST_BYTES = 250_000
+MOST_IN_ALL = 6_000_000
+
+each = pytest.mark.parametrize("entry", ENTRIES, ids=lambda entry: entry.name)
+
+
+def test_enough_of_them_in_every_class() -> None:
+    assert len(ENTRIES) >= 24
+    assert {entry.tile for entry in ENTRIES} == set(CLASSES)
+    assert sum(bool(entry.drawing) for entry in ENTRIES) >= 16
+    assert len({entry.name for entry in ENTRIES}) == len(ENTRIES)
+    assert len({entry.silhouette for entry in ENTRIES}) == len(ENTRIES)
+
+
+@each
+def test_files_are_there(entry: Entry) -> None:
+    assert (ROOT / entry.silhouette).is_file()
+    if entry.drawing:
+        assert (ROOT / entry.drawing).is_file()
+    assert entry.picture.stat().st_size <= MOST_BYTES
+    width, height = (int(side) for side in entry.size.split("x"))
+    with Image.open(entry.picture) as image:
+        assert image.size == (width, height)
+    assert entry.picture.with_suffix(".svg").is_file() == entry.svg
+
+
+@each
+def test_licences_are_named(entry: Entry) -> None:
+    source = entry.source
+    assert source.licence in FREE
+    assert entry.image
+    assert source.by
+    assert source.url.startswith("https://")
+    # MIT asks for its text
+    assert source.text or source.licence != "MIT"
+    assert not source.text or (GALLERY / source.text).is_file()
+
+
+@each
+def test_commands_parse(entry: Entry) -> None:
+    for words in entry.commands():
+        read = parsed(words)
+        if words[0] == "art":
+            assert palette(read["palette"] or "earth").colours
+            assert read["tile"] in ("1", entry.tile)
+
+
+def parsed(words: list[str]) -> dict[str, str]:
+    """What the real command line makes of a command."""
+    command = typer.main.get_command(app)
+    context = command.make_context("orbiflow", list(words), resilient_parsing=False)
+    name, own, rest = command.resolve_command(context, words)  # type: ignore[attr-defined]
+    assert own is not None, name
+    return own.make_context(name, rest, parent=context).params
+
+
+def test_nothing_is_left_over() -> None:
+    used = {(ROOT / entry.silhouette).name for entry in ENTRIES}
+    assert {file.name for file in (GALLERY / "silhouettes").iterdir()} <= used
+    used = {Path(entry.drawing).name for entry in ENTRIES}
+    assert {file.name for file in (GALLERY / "drawings").iterdir()} <= used
+    used = {entry.name for entry in ENTRIES}
+    assert {file.stem for file in (GALLERY / "pictures").iterdir()} == used
+    used = {Path(entry.source.text).name for entry in ENTRIES}
+    assert {file.name for file in (GALLERY / "licences").iterdir()} <= used
+
+
+def test_the_page_is_the_table() -> None:
+    text = PAGE.read_text(encoding="utf-8")
+    assert text == page(ENTRIES), "run python docs/gallery/make.py --page"
+    commands = re.findall(r"^    orbiflow (.*)$", text, flags=re.MULTILINE)
+    assert len(commands) == sum(len(entry.commands()) for entry in ENTRIES)
+    for line, words in zip(
+        commands, (words for entry in ENTRIES for words in entry.commands()), strict=True
+    ):
+        assert shlex.split(line) == words
+        assert f"orbiflow {line}" == shown(words)
+
+
+def test_small_enough() -> None:
+    assert SHEET.is_file()
+    files = [
+        file for file in GALLERY.rglob("*") if file.is_file() and "__pycache__" not in str(file)
+    ]
+    assert sum(file.stat().st_size for file in files) <= MOST_IN_ALL
+
+
+def test_a_source_that_is_not_there(tmp_path: Path) -> None:
+    table = tmp_path / "gallery.toml"
+    table.write_text(
+        '[source.a]\nname="a"\nby="b"\nurl="c"\nlicence="MIT"\n[[entry]]\nname="owl"\nsource="z"\n'
+    )
+    with pytest.raises(ValueError, match="'z'"):
+        read_table(table)
+    table.write_text(table.read_text().replace('"z"', '"a"'))
+    with pytest.raises(ValueError, match="owl"):
+        read_table(table)
