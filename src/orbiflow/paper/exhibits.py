@@ -1,0 +1,17 @@
+"""All exhibits, in the order of the paper."""
+
+from __future__ import annotations
+
+from orbiflow.paper import classes, spaces, square, symmetries, symmetrization, tilings
+from orbiflow.paper.exhibit import Exhibit
+
+EXHIBITS: tuple[Exhibit, ...] = (
+    square.EXHIBIT,
+    classes.TEMPLATES,
+    classes.GROUPS_TABLE,
+    spaces.SPACES_FIGURE,
+    symmetries.EXHIBIT,
+    tilings.EXHIBIT,
+    symmetrization.EXHIBIT,
+    spaces.SYMMETRIZATION,
+)
