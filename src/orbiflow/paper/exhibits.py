@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from orbiflow.paper import classes, spaces, square, symmetries, symmetrization, tilings
+from orbiflow.paper import animal, classes, comparison, frequencies, method, spaces, square, symmetries, symmetrization, tilings
 from orbiflow.paper.exhibit import Exhibit
 
 EXHIBITS: tuple[Exhibit, ...] = (
@@ -11,7 +11,12 @@ EXHIBITS: tuple[Exhibit, ...] = (
     classes.GROUPS_TABLE,
     spaces.SPACES_FIGURE,
     symmetries.EXHIBIT,
+    method.EXHIBIT,
     tilings.EXHIBIT,
     symmetrization.EXHIBIT,
+    animal.EXHIBIT,
+    frequencies.EXHIBIT,
+    comparison.TILES,
+    comparison.TABLE,
     spaces.SYMMETRIZATION,
 )

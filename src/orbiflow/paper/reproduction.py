@@ -6,15 +6,14 @@ import contextlib
 import functools
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from orbiflow.cancel import Cancel, Cancelled
 from orbiflow.errors import OrbiflowError
 from orbiflow.escher.processes import process_context, work
-from orbiflow.paper.canvas import Canvas
-from orbiflow.paper.exhibit import Exhibit, Shown, Work
+from orbiflow.paper.canvas import Canvas, Picture
+from orbiflow.paper.exhibit import Draw, Exhibit, Findings, Shown, Work
 from orbiflow.paper.extent import Extent
 from orbiflow.threads import one_blas_thread, one_thread
 
@@ -74,10 +73,11 @@ def reproduce(
     given = [[done.get(one.key, _LOST) for one in needed] for needed in needs]
     shown = [Shown(exhibit, failure=_LOST.failure) for exhibit in exhibits]
     function = functools.partial(_drawn, extent=extent, folder=folder)
-    for index, outcome in run(function, list(zip(exhibits, given, strict=True))):
-        failed = Shown(exhibits[index], failure=outcome.failure)
-        shown[index] = replace(outcome.value or failed, seconds=outcome.seconds)
-        tell(DRAWING, f"drawn {exhibits[index].label}")
+    drawings = [(one.name, one.draw, values) for one, values in zip(exhibits, given, strict=True)]
+    for index, outcome in run(function, drawings):
+        exhibit, drawn = exhibits[index], outcome.value or ((), None)
+        shown[index] = Shown(exhibit, *drawn, failure=outcome.failure, seconds=outcome.seconds)
+        tell(DRAWING, f"drawn {exhibit.label}")
     cancel.check()
     return shown
 
@@ -136,11 +136,13 @@ def _work_done(job: Work) -> Any:
     return job.function(*job.arguments)
 
 
-def _drawn(item: tuple[Exhibit, list[Outcome]], *, extent: Extent, folder: Path) -> Shown:
-    exhibit, given = item
-    missing = next((outcome.failure for outcome in given if outcome.failure), "")
-    if missing:
-        return Shown(exhibit, failure=missing)
-    canvas = Canvas(folder, exhibit.name)
-    findings = exhibit.draw(canvas, extent, [outcome.value for outcome in given])
-    return Shown(exhibit, tuple(canvas.pictures), findings)
+def _drawn(
+    item: tuple[str, Draw, list[Outcome]], *, extent: Extent, folder: Path
+) -> tuple[tuple[Picture, ...], Findings]:
+    name, draw, given = item
+    for outcome in given:
+        if outcome.failure:
+            raise OrbiflowError(outcome.failure)
+    canvas = Canvas(folder, name)
+    findings = draw(canvas, extent, [outcome.value for outcome in given])
+    return tuple(canvas.pictures), findings
