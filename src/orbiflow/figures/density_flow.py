@@ -64,12 +64,12 @@ def flow_png(
     axes.set_xlim(low, high)
     axes.set_ylim(low, high)  # `draw_magnitude` keeps these
 
-    def mean_field(points: Tensor) -> Tensor:
-        return _mean_field(density, view.to_chart(points))
+    def field(points: Tensor) -> Tensor:
+        return mean_field(density, view.to_chart(points))
 
-    draw_magnitude(axes, mean_field, window)
-    draw_flow(axes, mean_field, space.group, window)
-    _draw_cells(axes, space.group, window)
+    draw_magnitude(axes, field, window)
+    draw_flow(axes, field, space.group, window)
+    draw_cells(axes, space.group, window)
     place = figure.add_axes((0.85, 0.07, 0.025, 0.88))
     colour_bar(axes.images[0], place, "speed, sides of the square per unit time", size)
     axes.set_axis_off()
@@ -114,7 +114,8 @@ def _palette() -> Array:
 
 
 @torch.no_grad()
-def _mean_field(density: SymmetricDensity, points: Tensor) -> Tensor:
+def mean_field(density: SymmetricDensity, points: Tensor) -> Tensor:
+    """The time mean of the flow's fields (..., d) at chart points (..., d), float64."""
     flow, like = density.flow, next(iter(density.flow.parameters()), points)
     if isinstance(flow, NeuralFlow):  # whose field changes with time
         times = (torch.arange(_TIMES).to(like) + 0.5) / _TIMES
@@ -124,7 +125,8 @@ def _mean_field(density: SymmetricDensity, points: Tensor) -> Tensor:
     return torch.stack(vectors).mean(dim=0).double().cpu()
 
 
-def _draw_cells(axes: Axes, group: CrystallographicGroup, window: Any) -> None:
+def draw_cells(axes: Axes, group: CrystallographicGroup, window: Any) -> None:
+    """The images of the canonical square in a window, a letter F in each, the square outlined."""
     for t in np.arange(np.floor(window[0]), np.ceil(window[2]) + 1):
         axes.axvline(t, color="#ffffff", linewidth=0.7, alpha=0.7, zorder=4)
         axes.axhline(t, color="#ffffff", linewidth=0.7, alpha=0.7, zorder=4)

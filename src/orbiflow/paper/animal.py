@@ -16,7 +16,7 @@ from orbiflow.paper.drawing import draw_over, draw_tiling, window_of
 from orbiflow.paper.exhibit import Exhibit, Findings, Table
 from orbiflow.paper.extent import Extent
 from orbiflow.paper.nested import equivariance_error
-from orbiflow.paper.panels import INK, Box, around, caption, panel, text_size, tiny
+from orbiflow.paper.panels import INK, SAMPLES, Box, around, caption, panel, text_size, tiny
 from orbiflow.paper.published import animal
 from orbiflow.symmetry.isometry import Array
 from orbiflow.tilings import CLASSES
@@ -102,7 +102,7 @@ def _draw_row(figure: Figure, row: int, outcome: Any, outline: Array) -> None:
     for box in boxes[2:]:
         axes = panel(figure, box, window)
         if box is boxes[2]:
-            draw_magnitude(axes, field, window)
+            draw_magnitude(axes, field, window, samples=SAMPLES)
         else:
             axes.fill(*np.array(window)[[[0, 2, 2, 0], [1, 1, 3, 3]]], facecolor="#1d2b3a", zorder=0)
             draw_flow(axes, field, tile.group, window)

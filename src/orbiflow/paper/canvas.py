@@ -6,6 +6,8 @@ import io
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
+from PIL import Image
+
 from orbiflow.figures.canvas import DPI, blank_figure, png_bytes
 from orbiflow.files import write_atomic
 
@@ -58,6 +60,7 @@ class Canvas:
         *,
         part: str = "",
         pages: dict[str, str] | None = None,
+        exact: bool = False,
     ) -> None:
         """Write a figure as PNG and PDF.
 
@@ -67,21 +70,31 @@ class Canvas:
             caption: below it.
             part: what sets it apart, where the exhibit has several.
             pages: texts of further files by their names, which belong to it.
+            exact: whether the PNG keeps all its colours; else it has 256, and a third of the bytes.
 
         Raises:
             OutputError: if a file cannot be written.
         """
         stem = f"{self.name}-{part}" if part else self.name
-        write_atomic(self.folder / f"{stem}.png", png_bytes(figure))
+        picture = png_bytes(figure)
+        write_atomic(self.folder / f"{stem}.png", picture if exact else _fewer_colours(picture))
         write_atomic(self.folder / f"{stem}.pdf", pdf_bytes(figure))
         others = [("PDF", f"{stem}.pdf")]
         for file, text in (pages or {}).items():
             write_atomic(self.folder / f"{self.name}-{file}.html", text)
-            others.append((f"{file.replace('-', ' ')}, to be turned", f"{self.name}-{file}.html"))
+            others.append((file.replace("-", " "), f"{self.name}-{file}.html"))
         size = (figure.get_size_inches() * DPI).round().astype(int)
         self.pictures.append(
             Picture(f"{stem}.png", alt, caption, int(size[0]), int(size[1]), tuple(others))
         )
+
+
+def _fewer_colours(png: bytes) -> bytes:
+    image = Image.open(io.BytesIO(png)).convert("RGB")
+    buffer = io.BytesIO()
+    # no dither: it would triple the bytes
+    image.quantize(256, dither=Image.Dither.NONE).save(buffer, "PNG", optimize=True)
+    return buffer.getvalue()
 
 
 def pdf_bytes(figure: Figure) -> bytes:

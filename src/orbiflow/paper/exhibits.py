@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from orbiflow.paper import animal, classes, comparison, frequencies, method, spaces, square, symmetries, symmetrization, tilings
+from orbiflow.paper import animal, classes, comparison, densities, density_surfaces, frequencies, method, spaces, square, symmetries, symmetrization, tilings
 from orbiflow.paper.exhibit import Exhibit
 
 EXHIBITS: tuple[Exhibit, ...] = (
@@ -19,4 +19,8 @@ EXHIBITS: tuple[Exhibit, ...] = (
     comparison.TILES,
     comparison.TABLE,
     spaces.SYMMETRIZATION,
+    densities.TABLE,
+    densities.SIX_GAUSSIANS,
+    density_surfaces.EXHIBIT,
+    densities.CHECKERBOARD,
 )

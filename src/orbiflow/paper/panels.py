@@ -13,6 +13,9 @@ if TYPE_CHECKING:
 
 INK, FAINT = "#16202a", "#56626e"
 
+SAMPLES = 200
+"""Of a field's magnitude, along a panel's side."""
+
 Box = tuple[float, float, float, float]
 """Left, bottom, width and height in shares of the figure."""
 
