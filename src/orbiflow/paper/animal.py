@@ -27,7 +27,12 @@ if TYPE_CHECKING:
 PARTS = (("a", ("IH1", "IH2", "IH3")), ("b", ("IH4", "IH5", "IH6")), ("c", ("IH7", "IH21", "IH28")))
 """Three pictures of three rows each."""
 
-COLUMNS = ("(a) tile, and the animal in red", "(b) tiling", "(c) magnitude of the field", "(d) flow lines")
+COLUMNS = (
+    "(a) tile, and the animal in red",
+    "(b) tiling",
+    "(c) magnitude of the field",
+    "(d) flow lines",
+)
 HEIGHT = 0.70
 _HEAD, _LEFT = 0.075, 0.07
 
@@ -44,10 +49,11 @@ def _draw(canvas: Canvas, extent: Extent, values: list[Any]) -> Findings:
             caption(figure, (box[0], box[1], box[2], box[3] + 0.004), title, size=0.95)
         canvas.add(
             figure,
-            f"Three rows, of {', '.join(names)}: a tile like a turtle, its tiling, and the field of its flow "
-            "as colours and as white flow lines, both with the symmetry of the tiling.",
-            f"{', '.join(names)}. The field is pushed forward to where the tile lies. Yellow: the tile; black: a "
-            "lattice cell; signs: rotation centres; dashed: glide lines.",
+            f"Three rows, of {', '.join(names)}: a tile like a turtle, its tiling, and the field "
+            "of its flow as colours and as white flow lines, both with the symmetry of the "
+            "tiling.",
+            f"{', '.join(names)}. The field is pushed forward to where the tile lies. Yellow: the "
+            "tile; black: a lattice cell; signs: rotation centres; dashed: glide lines.",
             part=part,
         )
     good = {name: one for name, one in outcomes.items() if isinstance(one, TileResult)}
@@ -58,11 +64,16 @@ def _draw(canvas: Canvas, extent: Extent, values: list[Any]) -> Findings:
     return Findings(
         "agrees" if certified == len(CLASSES) and worst < 1e-9 else "agrees in part",
         f"The paper's own method, from the template, with one stationary field and Ω = {OMEGA} "
-        f"({extent.iterations} iterations): {certified} of nine tiles are certified, with edges that match to "
-        f"rounding. The field has its group's symmetry to {tiny(worst)} of its size. The animal is a turtle in "
-        "the public domain: the paper's rabbit does not come with it.",
+        f"({extent.iterations} iterations): {certified} of nine tiles are certified, with edges "
+        f"that match to rounding. The field has its group's symmetry to {tiny(worst)} of its "
+        "size. The animal is a turtle in the public domain: the paper's rabbit does not come "
+        "with it.",
         numbers={
-            name: {"iou": one.metrics.iou, "edge_mismatch": one.certificate.edge_mismatch, "symmetry_error": symmetry[name]}
+            name: {
+                "iou": one.metrics.iou,
+                "edge_mismatch": one.certificate.edge_mismatch,
+                "symmetry_error": symmetry[name],
+            }
             for name, one in good.items()
         },
         tables=[
@@ -84,10 +95,19 @@ def _draw_row(figure: Figure, row: int, outcome: Any, outline: Array) -> None:
     size = text_size(figure)
     middle = _box(row, 0)[1] + _box(row, 0)[3] / 2
     figure.text(
-        _LEFT / 2, middle, outcome.name, ha="center", va="center", fontsize=size, weight="bold", color=INK
+        _LEFT / 2,
+        middle,
+        outcome.name,
+        ha="center",
+        va="center",
+        fontsize=size,
+        weight="bold",
+        color=INK,
     )
     if not isinstance(outcome, TileResult):
-        figure.text(0.5, middle, f"no certified tile: {outcome.reason}", ha="center", fontsize=0.8 * size)
+        figure.text(
+            0.5, middle, f"no certified tile: {outcome.reason}", ha="center", fontsize=0.8 * size
+        )
         return
     tile = outcome.normal_tile
     boxes = [_box(row, column) for column in range(4)]
@@ -95,7 +115,7 @@ def _draw_row(figure: Figure, row: int, outcome: Any, outline: Array) -> None:
     axes = panel(figure, boxes[0], window_of([tile.polygon, outline], aspect))
     draw_over(axes, tile.polygon, outline, width=1.4)
     high = 1.75
-    window = around(*tile.center, high * aspect, high)
+    window = around(tile.center, high * aspect, high)
     draw_tiling(panel(figure, boxes[1], window), tile, window)
     field = placed_field(outcome.model.restore())
     ring = np.concatenate([tile.polygon, tile.polygon[:1]])
@@ -104,7 +124,9 @@ def _draw_row(figure: Figure, row: int, outcome: Any, outline: Array) -> None:
         if box is boxes[2]:
             draw_magnitude(axes, field, window, samples=SAMPLES)
         else:
-            axes.fill(*np.array(window)[[[0, 2, 2, 0], [1, 1, 3, 3]]], facecolor="#1d2b3a", zorder=0)
+            axes.fill(
+                *np.array(window)[[[0, 2, 2, 0], [1, 1, 3, 3]]], facecolor="#1d2b3a", zorder=0
+            )
             draw_flow(axes, field, tile.group, window)
         outline_cell(axes, tile.group, tile.center)
         axes.plot(*ring.T, color="#111111", linewidth=2.2, zorder=5)
@@ -134,9 +156,9 @@ EXHIBIT = Exhibit(
     "figure-7",
     "Figure 7",
     "One animal in all nine classes",
-    "Given the target image of a rabbit, Escherization for the nine classes: the tile, the tiling it admits, the "
-    "magnitude of the vector field and its flow lines. The field has the symmetry inherent in the class's "
-    "group. Computed for Ω = 5.",
+    "Given the target image of a rabbit, Escherization for the nine classes: the tile, the "
+    "tiling it admits, the magnitude of the vector field and its flow lines. The field has the "
+    "symmetry inherent in the class's group. Computed for Ω = 5.",
     _draw,
     lambda extent: animal_work(extent, OMEGA),
 )

@@ -15,7 +15,9 @@ OMEGA = 5
 
 def animal_tile(name: str, omega: int, affine: int, iterations: int) -> TileResult | ClassFailure:
     """The tile of one class: affine phase, then the flow of one stationary field, occupancy loss."""
-    settings = OccupancySettings(max_frequency=omega, affine_iterations=affine, iterations=iterations)
+    settings = OccupancySettings(
+        max_frequency=omega, affine_iterations=affine, iterations=iterations
+    )
     return escherize_class(animal(), name, settings)
 
 

@@ -98,7 +98,7 @@ def _fewer_colours(png: bytes) -> bytes:
 
 
 def pdf_bytes(figure: Figure) -> bytes:
-    """The figure as PDF, lines and texts as such, with fonts that journals take; always the same bytes."""
+    """The figure as PDF, lines and texts as such, in fonts that journals take; always the same."""
     import matplotlib as mpl
 
     buffer = io.BytesIO()

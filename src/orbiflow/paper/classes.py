@@ -15,7 +15,7 @@ from orbiflow.paper.panels import FAINT, INK, around, caption, grid_box, panel, 
 from orbiflow.paper.published import GROUPS
 from orbiflow.symmetry import CrystallographicGroup
 from orbiflow.symmetry.elements import symmetry_elements
-from orbiflow.tilings import CLASSES, EdgePair, IsohedralClass
+from orbiflow.tilings import CLASSES, IsohedralClass
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -33,7 +33,7 @@ def identification_error(kind: IsohedralClass) -> float:
 
 
 def constrained_angles(kind: IsohedralClass) -> dict[int, int]:
-    """Vertices whose angle the class fixes, and it in degrees: identified edges meet there in a turn."""
+    """Angles that the class fixes, in degrees, by vertex: identified edges meet there in a turn."""
     count = len(kind.template())
     found = {}
     for pair in kind.identified_edges:
@@ -67,17 +67,17 @@ def _draw_templates(canvas: Canvas, _extent: Extent, _values: list[Any]) -> Find
         box = grid_box(*divmod(number, 3), 3, 3, title=0.11, low=0.0)
         middle = (kind.template().min(axis=0) + kind.template().max(axis=0)) / 2
         half = 1.2
-        axes = panel(figure, box, around(*middle, half * 3 / (0.72 * 3) * 0.99, half))
+        axes = panel(figure, box, around(middle, half / 0.72, half))
         draw_template(axes, kind)
         _draw_angles(axes, kind, text_size(figure))
         caption(figure, box, kind.name, weight="bold", size=1.1)
     canvas.add(
         figure,
-        "Nine templates: hexagons for IH1 to IH7, pentagons for IH21 and IH28. Identified edges share a "
-        "colour and carry arrows; some vertices carry their angle.",
-        "Identified edges share a colour, and their arrows are images of each other; an arrow with one barb "
-        "belongs to a glide reflection, a lens to an edge that is turned onto itself. Degrees: angles that "
-        "the class fixes.",
+        "Nine templates: hexagons for IH1 to IH7, pentagons for IH21 and IH28. Identified edges "
+        "share a colour and carry arrows; some vertices carry their angle.",
+        "Identified edges share a colour, and their arrows are images of each other; an arrow "
+        "with one barb belongs to a glide reflection, a lens to an edge that is turned onto "
+        "itself. Degrees: angles that the class fixes.",
     )
     worst = max(identification_error(kind) for kind in CLASSES.values())
     angles = {name: constrained_angles(kind) for name, kind in CLASSES.items()}
@@ -88,8 +88,9 @@ def _draw_templates(canvas: Canvas, _extent: Extent, _values: list[Any]) -> Find
     )
     return Findings(
         "agrees" if worst < 1e-12 else "differs",
-        f"Drawn from the table of groups alone: each edge's partner is found by the group, and agrees to "
-        f"{tiny(worst)}. Angles are fixed where two identified edges meet in a rotation centre: {fixed}.",
+        "Drawn from the table of groups alone: each edge's partner is found by the group, and "
+        f"agrees to {tiny(worst)}. Angles are fixed where two identified edges meet in a rotation "
+        f"centre: {fixed}.",
         numbers={"identification_error": worst, "angles": angles},
     )
 
@@ -100,12 +101,12 @@ def _draw_angles(axes: Axes, kind: IsohedralClass, size: float) -> None:
         corner = vertices[vertex]
         ends = vertices[[vertex - 1, (vertex + 1) % len(vertices)]] - corner
         angles = np.unwrap(np.arctan2(ends[::-1, 1], ends[::-1, 0]))
-        arc = np.linspace(*angles, 40)
+        arc = np.linspace(angles[0], angles[1], 40)
         points = corner + 0.17 * np.stack([np.cos(arc), np.sin(arc)], axis=1)
         axes.plot(*points.T, color=FAINT, linewidth=1.2)
         middle = arc.mean()
-        place = corner + 0.36 * np.array([np.cos(middle), np.sin(middle)])
-        axes.text(*place, f"{degrees}°", ha="center", va="center", fontsize=0.8 * size, color=INK)
+        x, y = corner + 0.36 * np.array([np.cos(middle), np.sin(middle)])
+        axes.text(x, y, f"{degrees}°", ha="center", va="center", fontsize=0.8 * size, color=INK)
 
 
 def _draw_groups(_canvas: Canvas, _extent: Extent, _values: list[Any]) -> Findings:
@@ -116,13 +117,23 @@ def _draw_groups(_canvas: Canvas, _extent: Extent, _values: list[Any]) -> Findin
         found = symbol(group)
         same.append(found == GROUPS[name])
         closures.append(closure / group.cell_volume)
-        rows.append((name, GROUPS[name], found, str(group.order), _pairs(kind), tiny(closures[-1])))
+        rows.append(
+            (
+                name,
+                GROUPS[name],
+                found,
+                str(group.order),
+                " ".join(pair.brief for pair in kind.identified_edges),
+                tiny(closures[-1]),
+            )
+        )
     headings = ("class", "paper", "found", "order", "edges", "order × area against |det B|")
     return Findings(
         "agrees" if all(same) and max(closures) < 1e-12 else "differs",
-        "The groups are generated from the printed generators (Table 2), and their symbols are read off the "
-        "rotation centres and glide lines that they turn out to have. All nine agree, and each closes: the "
-        f"group's order times the template's area is |det B| to {tiny(max(closures))}.",
+        "The groups are generated from the printed generators (Table 2), and their symbols are "
+        "read off the rotation centres and glide lines that they turn out to have. All nine "
+        "agree, and each closes: the group's order times the template's area is |det B| to "
+        f"{tiny(max(closures))}.",
         numbers={"agree": sum(same), "closure": max(closures)},
         tables=[
             Table(
@@ -132,16 +143,6 @@ def _draw_groups(_canvas: Canvas, _extent: Extent, _values: list[Any]) -> Findin
             )
         ],
     )
-
-
-def _pairs(kind: IsohedralClass) -> str:
-    return " ".join(map(_pair, kind.identified_edges))
-
-
-def _pair(pair: EdgePair) -> str:
-    if pair.folded:
-        return f"{pair.first}o"
-    return f"{pair.first}{ {'translation': '=', 'glide': '~', 'rotation': '>'}[pair.kind] }{pair.second}"
 
 
 TEMPLATES = Exhibit(

@@ -33,6 +33,13 @@ LABELS = {
     "overlap": "here,\noverlap",
     "likeness": "here,\nlikeness",
 }
+HEADINGS = (
+    "goal", "paper, “IoU”", "its ARAP, “IoU”", "paper, pixel accuracy", "its ARAP, pixel accuracy",
+    "squared: class", "IoU", "Dice", "pixel accuracy", "true aspect: class", "IoU", "Dice",
+    "pixel accuracy", "EST, best IoU", "ARAP, best IoU",
+)  # fmt: skip
+"""Of the table."""
+
 _LEFT, _HEAD = 0.075, 0.022
 
 
@@ -41,7 +48,9 @@ def impossible_rows() -> list[str]:
     return [
         name
         for name, goal in goals().items()
-        if any(goal.printed["iou"][k] > goal.printed["pixel_accuracy"][k] for k in ("paper", "arap"))
+        if any(
+            goal.printed["iou"][k] > goal.printed["pixel_accuracy"][k] for k in ("paper", "arap")
+        )
     ]
 
 
@@ -60,7 +69,13 @@ def _draw_tiles(canvas: Canvas, _extent: Extent, values: list[Any]) -> Findings:
         rings = _rings(goal, overlap[name], likeness[name])
         x = _LEFT + column * wide
         figure.text(
-            x + wide / 2, 1 - 0.6 * _HEAD / height, name, ha="center", va="center", fontsize=size, color=INK
+            x + wide / 2,
+            1 - 0.6 * _HEAD / height,
+            name,
+            ha="center",
+            va="center",
+            fontsize=size,
+            color=INK,
         )
         for row, (label, fill) in enumerate(ROWS):
             box = (x + 0.003, (len(ROWS) - 1 - row) * tall + 0.006, wide - 0.006, tall - 0.012)
@@ -75,14 +90,21 @@ def _draw_tiles(canvas: Canvas, _extent: Extent, values: list[Any]) -> Findings:
     for row, (label, _) in enumerate(ROWS):
         middle = (len(ROWS) - 0.5 - row) * tall
         figure.text(
-            _LEFT / 2, middle, LABELS[label], ha="center", va="center", fontsize=0.9 * size, color=INK
+            _LEFT / 2,
+            middle,
+            LABELS[label],
+            ha="center",
+            va="center",
+            fontsize=0.9 * size,
+            color=INK,
         )
     canvas.add(
         figure,
-        "Nine columns: bat, beetle, camel, dolphin, octopus, pegasus, penguin, spider, squirrel. Rows: the goal, the "
-        "tiles of ARAP and EST, and two tiles of ours, one for overlap and one for likeness.",
-        "Each method's first tile by its own measure, after the best similarity; red the goal. ARAP and EST: computed "
-        "with Nagata and Imahori's program (MIT) on the same goals.",
+        "Nine columns: bat, beetle, camel, dolphin, octopus, pegasus, penguin, spider, squirrel. "
+        "Rows: the goal, the tiles of ARAP and EST, and two tiles of ours, one for overlap and "
+        "one for likeness.",
+        "Each method's first tile by its own measure, after the best similarity; red the goal. "
+        "ARAP and EST: computed with Nagata and Imahori's program (MIT) on the same goals.",
     )
     certified = sum(one is not None and one.certified for one in values)
     ours = [one.iou for one in overlap.values() if one is not None]
@@ -90,22 +112,26 @@ def _draw_tiles(canvas: Canvas, _extent: Extent, values: list[Any]) -> Findings:
     mean = float(np.mean(ours)) if ours else float("nan")
     return Findings(
         "agrees" if mean > arap else "differs",
-        f"Mean IoU of the nine: {mean:.3f} here for overlap, {arap:.3f} ARAP, {est:.3f} EST (of the latter two the "
-        f"best of their first twenty tiles). {certified} of our 18 tiles are certified.",
-        "Overlap is not likeness: ARAP's tiles overlap least and often look most alike, because limbs bend and "
-        "are not cut off. The last row therefore bends the silhouette itself until it tiles; among judges who "
-        "saw black tiles alone these were preferred (docs/blind.md).",
+        f"Mean IoU of the nine: {mean:.3f} here for overlap, {arap:.3f} ARAP, {est:.3f} EST (of "
+        f"the latter two the best of their first twenty tiles). {certified} of our 18 tiles are "
+        "certified.",
+        "Overlap is not likeness: ARAP's tiles overlap least and often look most alike, because "
+        "limbs bend and are not cut off. The last row therefore bends the silhouette itself "
+        "until it tiles; among judges who saw black tiles alone these were preferred "
+        "(docs/blind.md).",
         numbers={
             "mean_iou": mean,
             "mean_iou_arap": arap,
             "mean_iou_est": est,
             "certified": certified,
-            "likeness_classes": {n: one.isohedral_class for n, one in likeness.items() if one is not None},
+            "likeness_classes": {n: one.isohedral_class for n, one in likeness.items() if one},
         },
     )  # fmt: skip
 
 
-def _rings(goal: Goal, overlap: GoalTile | None, likeness: GoalTile | None) -> dict[str, Array | None]:
+def _rings(
+    goal: Goal, overlap: GoalTile | None, likeness: GoalTile | None
+) -> dict[str, Array | None]:
     return {
         "goal": goal.outline,
         "ARAP": goal.tiles["arap"].polygon,
@@ -152,12 +178,14 @@ def _draw_table(_canvas: Canvas, _extent: Extent, values: list[Any]) -> Findings
     verdict = "agrees in part" if dice >= paper - 0.005 else "differs"
     return Findings(
         verdict,
-        f"On the goals as the paper had them, each axis stretched to a square, our mean Dice is {dice:.3f}, to the paper's "
-        f"{paper:.3f} under IoU. On the goals at their true aspect our tiles overlap more than those of EST and ARAP.",
-        f"The column headed IoU cannot be IoU: for {', '.join(impossible)} it exceeds the pixel accuracy, and no IoU can "
-        "(the union is part of the picture). In size it agrees with the Dice coefficient, 2|A∩B| / (|A|+|B|), beside "
-        "which it should be read. The paper's ARAP tiles are not EST's or ARAP's first tiles at true aspect either: "
-        "their overlaps are smaller.",
+        "On the goals as the paper had them, each axis stretched to a square, our mean Dice is "
+        f"{dice:.3f}, to the paper's {paper:.3f} under IoU. On the goals at their true aspect our "
+        "tiles overlap more than those of EST and ARAP.",
+        f"The column headed IoU cannot be IoU: for {', '.join(impossible)} it exceeds the pixel "
+        "accuracy, and no IoU can (the union is part of the picture). In size it agrees with the "
+        "Dice coefficient, 2|A∩B| / (|A|+|B|), beside which it should be read. The paper's ARAP "
+        "tiles are not EST's or ARAP's first tiles at true aspect either: their overlaps are "
+        "smaller.",
         numbers={
             "impossible_rows": impossible,
             "mean_dice_squared": dice,
@@ -172,11 +200,9 @@ def _draw_table(_canvas: Canvas, _extent: Extent, values: list[Any]) -> Findings
         },
         tables=[
             Table(
-                "The paper's table (first four columns) beside what we measure. Squared: the goal as the paper had it. Best: "
-                "of the first twenty tiles of EST and ARAP.",
-                ("goal", "paper, “IoU”", "its ARAP, “IoU”", "paper, pixel accuracy", "its ARAP, pixel accuracy",
-                 "squared: class", "IoU", "Dice", "pixel accuracy",
-                 "true aspect: class", "IoU", "Dice", "pixel accuracy", "EST, best IoU", "ARAP, best IoU"),
+                "The paper's table (first four columns) beside what we measure. Squared: the "
+                "goal as the paper had it. Best: of the first twenty tiles of EST and ARAP.",
+                HEADINGS,
                 (*rows, means),
             )
         ],
@@ -216,8 +242,8 @@ TILES = Exhibit(
     "figure-9",
     "Figure 9",
     "Comparison with ARAP on nine goals",
-    "Nine target shapes; the tiles of ARAP (Nagata and Imahori, 2021); the tiles of the paper's method, which "
-    "demonstrates comparable performance.",
+    "Nine target shapes; the tiles of ARAP (Nagata and Imahori, 2021); the tiles of the paper's "
+    "method, which demonstrates comparable performance.",
     _draw_tiles,
     _needs_both,
 )
@@ -225,8 +251,9 @@ TABLE = Exhibit(
     "table-3",
     "Table 3",
     "IoU and pixel accuracy, against ARAP",
-    "IoU and pixel accuracy of the paper's tiles and of ARAP's for nine goals: from 0.809 and 0.818 (octopus) to 0.927 and "
-    "0.935 (penguin) under IoU. ARAP is ahead or level in all but one.",
+    "IoU and pixel accuracy of the paper's tiles and of ARAP's for nine goals: from 0.809 and "
+    "0.818 (octopus) to 0.927 and 0.935 (penguin) under IoU. ARAP is ahead or level in all but "
+    "one.",
     _draw_table,
     _needs_table,
 )

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import functools
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-import numpy as np
 import torch
 
 from orbiflow.density import SPACES, SymmetricDensity, make_space
@@ -27,7 +26,11 @@ from orbiflow.symmetry.isometry import Array
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-NAMES = {"4-gaussian": "4 Gaussians", "6-gaussian": "6 Gaussians", "checkerboard": "5 × 5 checkerboard"}
+NAMES = {
+    "4-gaussian": "4 Gaussians",
+    "6-gaussian": "6 Gaussians",
+    "checkerboard": "5 × 5 checkerboard",
+}
 ROUND = ("sphere", "projective-plane")
 _HALF_WINDOW = (-0.5, -0.5, 1.5, 1.5)
 
@@ -57,10 +60,18 @@ def _draw_table(_canvas: Canvas, extent: Extent, values: list[Fitted]) -> Findin
     for space in _table_spaces(extent):
         printed = KL.get(space, {})
         cells = [f"{printed[name]:.2f}" if printed else "–" for name in TARGETS]
-        rows.append((TITLES[space], *cells, *(f"{found[space, n, 'flat'].kl:.4f}" for n in TARGETS)))
+        rows.append(
+            (TITLES[space], *cells, *(f"{found[space, n, 'flat'].kl:.4f}" for n in TARGETS))
+        )
     if extent.round_measure:
         rows.append(
-            ("sphere, round area", "–", "–", "–", *(f"{found['sphere', n, 'round'].kl:.4f}" for n in TARGETS))
+            (
+                "sphere, round area",
+                "–",
+                "–",
+                "–",
+                *(f"{found['sphere', n, 'round'].kl:.4f}" for n in TARGETS),
+            )
         )
     rows.append(("the even density", *(f"{uniform[name]:.3f}" for name in TARGETS), "", "", ""))
     cells = [(space, name) for space in KL for name in TARGETS]
@@ -69,19 +80,23 @@ def _draw_table(_canvas: Canvas, extent: Extent, values: list[Fitted]) -> Findin
     gained = [1 - KL[s]["6-gaussian"] / uniform["6-gaussian"] for s in KL]
     mass = max(abs(one.mass - 1) for one in values)
     smooth, sharp = (
-        max(one.kl for one in values if (one.target == "checkerboard") is there) for there in (False, True)
+        max(one.kl for one in values if (one.target == "checkerboard") is there)
+        for there in (False, True)
     )
     return Findings(
         "agrees in part" if better == len(cells) else "differs",
         f"Our divergences are smaller in {better} of the six cells of the paper's table. They are "
-        f"at most {smooth:.3f} for the Gaussians and {sharp:.3f} for the checkerboard, whose edges no smooth density "
-        f"has. Every density integrates to 1 within {tiny(mass)}. {extent.points:,} samples each, at most "
-        f"{extent.evaluations} evaluations of the likelihood, KL by quadrature at doubled steps.",
-        f"That the method works agrees; the printed numbers are those of fits that had not succeeded. For "
-        f"{' and '.join(worse)} the KL is larger than that of the even density, which knows nothing of the data: log "
-        f"25/13 = {uniform['checkerboard']:.3f}. For six Gaussians {uniform['6-gaussian']:.2f} is there to gain, of which "
-        f"the paper's fits have {100 * gained[0]:.0f} and {100 * gained[1]:.0f} %. Ours have splines for fields, a "
-        "start in closed form, an exact trace in place of an adjoint, and a base that is invariant under the group.",
+        f"at most {smooth:.3f} for the Gaussians and {sharp:.3f} for the checkerboard, whose "
+        f"edges no smooth density has. Every density integrates to 1 within {tiny(mass)}. "
+        f"{extent.points:,} samples each, at most {extent.evaluations} evaluations of the "
+        "likelihood, KL by quadrature at doubled steps.",
+        "That the method works agrees; the printed numbers are those of fits that had not "
+        f"succeeded. For {' and '.join(worse)} the KL is larger than that of the even density, "
+        f"which knows nothing of the data: log 25/13 = {uniform['checkerboard']:.3f}. For six "
+        f"Gaussians {uniform['6-gaussian']:.2f} is there to gain, of which the paper's fits have "
+        f"{100 * gained[0]:.0f} and {100 * gained[1]:.0f} %. Ours have splines for fields, a "
+        "start in closed form, an exact trace in place of an adjoint, and a base that is "
+        "invariant under the group.",
         numbers={
             "kl": {f"{one.space}, {one.target}, {one.measure}": one.kl for one in values},
             "uniform": uniform,
@@ -90,7 +105,7 @@ def _draw_table(_canvas: Canvas, extent: Extent, values: list[Fitted]) -> Findin
         tables=[
             Table(
                 "KL divergence from the target, nats: the paper's, and ours.",
-                ("space", *(f"paper, {NAMES[n]}" for n in TARGETS), *(f"here, {NAMES[n]}" for n in TARGETS)),
+                ("space", *(f"{who}, {NAMES[n]}" for who in ("paper", "here") for n in TARGETS)),
                 tuple(rows),
             )
         ],
@@ -129,19 +144,27 @@ def _draw_flat(name: str, canvas: Canvas, _extent: Extent, values: list[Fitted])
     for row, text in enumerate(("density", "flow")):
         box = _box(row, 0)
         figure.text(
-            0.018, box[1] + box[3] / 2, text, rotation=90, va="center", ha="center", fontsize=size, color=INK
+            0.018,
+            box[1] + box[3] / 2,
+            text,
+            rotation=90,
+            va="center",
+            ha="center",
+            fontsize=size,
+            color=INK,
         )
     canvas.add(
         figure,
-        f"Above the density estimated for {NAMES[name]} on torus, sphere, Klein bottle and projective plane, and the "
-        "target; below the flow fields with the letter F in every cell.",
-        "Above: density per area of the square, dark is low. Below: mean of the flow's fields over time, colour "
-        "its speed; the canonical square outlined, F in each of its images.",
+        f"Above the density estimated for {NAMES[name]} on torus, sphere, Klein bottle and "
+        "projective plane, and the target; below the flow fields with the letter F in every cell.",
+        "Above: density per area of the square, dark is low. Below: mean of the flow's fields "
+        "over time, colour its speed; the canonical square outlined, F in each of its images.",
     )
     return Findings(
         "agrees" if max(errors) < 1e-6 else "differs",
-        f"The flows have the symmetry of their spaces to {tiny(max(errors))} of their size: on the sphere "
-        "quarter turns about the corners, on Klein bottle and projective plane glides. KL divergences "
+        f"The flows have the symmetry of their spaces to {tiny(max(errors))} of their size: on "
+        "the sphere quarter turns about the corners, on Klein bottle and projective plane "
+        "glides. KL divergences "
         + ", ".join(f"{one.kl:.4f} ({TITLES[one.space]})" for one in values) + ".",
         numbers={
             "kl": {one.space: one.kl for one in values},
@@ -156,7 +179,13 @@ def _box(row: int, column: int) -> Box:
 
 def _image(axes: Axes, values: Array, top: float) -> None:
     axes.imshow(
-        values.T, origin="lower", extent=(0, 1, 0, 1), cmap=COLOURS, vmin=0, vmax=top, interpolation="bilinear"
+        values.T,
+        origin="lower",
+        extent=(0, 1, 0, 1),
+        cmap=COLOURS,
+        vmin=0,
+        vmax=top,
+        interpolation="bilinear",
     )
     axes.set_axis_off()
 
@@ -170,9 +199,9 @@ TABLE = Exhibit(
     "table-5",
     "Table 5",
     "KL divergence of estimated densities",
-    "KL divergence between target and estimated distribution. Torus: 0.03, 0.45, 0.67; sphere: 0.03, 0.47, 0.56, for "
-    "4 Gaussians, 6 Gaussians and the 5 × 5 checkerboard. The results demonstrate the effectiveness of the "
-    "methodology.",
+    "KL divergence between target and estimated distribution. Torus: 0.03, 0.45, 0.67; sphere: "
+    "0.03, 0.47, 0.56, for 4 Gaussians, 6 Gaussians and the 5 × 5 checkerboard. The results "
+    "demonstrate the effectiveness of the methodology.",
     _draw_table,
     _needs_table,
 )
@@ -180,8 +209,9 @@ SIX_GAUSSIANS = Exhibit(
     "figure-10",
     "Figure 10",
     "Density estimation: six Gaussians",
-    "The densities estimated for a mixture of six Gaussians on torus, sphere, Klein bottle and projective plane, black "
-    "where probability is low; the flow fields clearly show the symmetry of each space.",
+    "The densities estimated for a mixture of six Gaussians on torus, sphere, Klein bottle and "
+    "projective plane, black where probability is low; the flow fields clearly show the symmetry "
+    "of each space.",
     functools.partial(_draw_flat, "6-gaussian"),
     functools.partial(_needs_flat, "6-gaussian"),
 )

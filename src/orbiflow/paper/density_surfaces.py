@@ -10,7 +10,7 @@ from orbiflow.figures.density_page import density_page
 from orbiflow.figures.density_square import COLOURS
 from orbiflow.paper.canvas import Canvas
 from orbiflow.paper.densities import NAMES, square_values
-from orbiflow.paper.density_fits import Fitted, fit_work
+from orbiflow.paper.density_fits import fit_work
 from orbiflow.paper.density_targets import TARGETS
 from orbiflow.paper.exhibit import Exhibit, Findings, Work
 from orbiflow.paper.extent import Extent
@@ -49,7 +49,9 @@ def _draw(canvas: Canvas, extent: Extent, values: list[Any]) -> Findings:
         turn = TORUS_TURN if one.space == "torus" else None
         draw_surface(axes, density.space, colours, turn=turn, front=front)
         if row == 0:
-            caption(figure, (box[0], box[1], box[2], box[3] + 0.01), NAMES[one.target], weight="bold")
+            caption(
+                figure, (box[0], box[1], box[2], box[3] + 0.01), NAMES[one.target], weight="bold"
+            )
         if column == 0:
             figure.text(
                 0.02, box[1] + box[3] / 2, TITLES[one.space], rotation=90, va="center", ha="center",
@@ -61,19 +63,20 @@ def _draw(canvas: Canvas, extent: Extent, values: list[Any]) -> Findings:
         )
     canvas.add(
         figure,
-        "Two rows of three surfaces: rings above, spheres below, coloured by densities of four Gaussians, six Gaussians "
-        "and a checkerboard.",
+        "Two rows of three surfaces: rings above, spheres below, coloured by densities of four "
+        "Gaussians, six Gaussians and a checkerboard.",
         "Colour: density per area of the square, as the targets are given. To turn them yourself:",
         pages=pages,
         exact=True,
     )
     return Findings(
         "agrees",
-        "The standard embeddings, coloured by the estimated densities: the colours close over the seams, since the "
-        "densities are invariant under the group.",
-        "On the sphere these colours are a texture, not the density of points on it: the square's area is not the "
-        "sphere's, and per round area the density grows without bound towards the three places that the square's "
-        "corners become. A density on the sphere is one with respect to its area; Table 5 has fits of that kind, too.",
+        "The standard embeddings, coloured by the estimated densities: the colours close over "
+        "the seams, since the densities are invariant under the group.",
+        "On the sphere these colours are a texture, not the density of points on it: the "
+        "square's area is not the sphere's, and per round area the density grows without bound "
+        "towards the three places that the square's corners become. A density on the sphere is "
+        "one with respect to its area; Table 5 has fits of that kind, too.",
         numbers={f"{one.space}, {one.target}": one.kl for one in values},
     )  # fmt: skip
 
@@ -82,8 +85,8 @@ EXHIBIT = Exhibit(
     "figure-11",
     "Figure 11",
     "Densities on torus and sphere, in space",
-    "The densities estimated on torus and sphere with the standard embedding, for 4 Gaussians, 6 Gaussians and the "
-    "5 × 5 checkerboard.",
+    "The densities estimated on torus and sphere with the standard embedding, for 4 Gaussians, 6 "
+    "Gaussians and the 5 × 5 checkerboard.",
     _draw,
     _needs,
 )

@@ -32,7 +32,9 @@ def draw_tiling(axes: Axes, tile: Tile, window: Window, palette: Palette | None 
     copies = copies_meeting(tile, window)
     rings, own = copies.images(tile.polygon), colouring(tile).colours(copies)
     for number in np.unique(own):
-        fill_rings(axes, list(rings[own == number]), palette.fill(int(number)), palette.outline, 0.5)
+        fill_rings(
+            axes, list(rings[own == number]), palette.fill(int(number)), palette.outline, 0.5
+        )
 
 
 def window_of(rings: list[Array], aspect: float, margin: float = 0.05) -> Window:
@@ -41,5 +43,4 @@ def window_of(rings: list[Array], aspect: float, margin: float = 0.05) -> Window
     low, high = points.min(axis=0), points.max(axis=0)
     half = (0.5 + margin) * (high - low)
     half = np.maximum(half, half[::-1] * (aspect, 1 / aspect))
-    x, y = (low + high) / 2
-    return around(float(x), float(y), float(half[0]), float(half[1]))
+    return around((low + high) / 2, float(half[0]), float(half[1]))

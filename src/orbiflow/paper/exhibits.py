@@ -2,7 +2,20 @@
 
 from __future__ import annotations
 
-from orbiflow.paper import animal, classes, comparison, densities, density_surfaces, frequencies, method, spaces, square, symmetries, symmetrization, tilings
+from orbiflow.paper import (
+    animal,
+    classes,
+    comparison,
+    densities,
+    density_surfaces,
+    frequencies,
+    method,
+    spaces,
+    square,
+    symmetries,
+    symmetrization,
+    tilings,
+)
 from orbiflow.paper.exhibit import Exhibit
 
 EXHIBITS: tuple[Exhibit, ...] = (

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -47,10 +48,10 @@ def _draw(canvas: Canvas, extent: Extent, values: list[Any]) -> Findings:
     _label(figure, names, omegas, height)
     canvas.add(
         figure,
-        "A grid of tiles, a column for each class and a row for each maximum frequency: polygons above, "
-        "turtles below.",
-        "Blue: the tile of each class and frequency, fitted to the animal in red. Same start, loss and number of "
-        "iterations in every panel.",
+        "A grid of tiles, a column for each class and a row for each maximum frequency: polygons "
+        "above, turtles below.",
+        "Blue: the tile of each class and frequency, fitted to the animal in red. Same start, "
+        "loss and number of iterations in every panel.",
     )
     ious = {w: [_iou(table[w, name]) for name in names] for w in omegas}
     means = {w: float(np.nanmean(ious[w])) for w in omegas}
@@ -58,22 +59,26 @@ def _draw(canvas: Canvas, extent: Extent, values: list[Any]) -> Findings:
     free = {name: FourierField(kind.group(), 0).size for name, kind in CLASSES.items()}
     moving = ", ".join(f"{name} {n}" for name, n in free.items() if n)
     straight = max(_straightness(table[omegas[0], name], name) for name in names)
-    rising = all(lengths[a] <= lengths[b] for a, b in zip(omegas, omegas[1:], strict=False))
-    rows = tuple(
-        (name, *(f"{_iou(table[w, name]):.3f}" for w in omegas)) for name in names
-    ) + (
+    rising = all(lengths[a] <= lengths[b] for a, b in pairwise(omegas))
+    rows = (
+        *((name, *(f"{_iou(table[w, name]):.3f}" for w in omegas)) for name in names),
         ("mean IoU", *(f"{means[w]:.3f}" for w in omegas)),
         ("mean length of the outline", *(f"{lengths[w]:.2f}" for w in omegas)),
     )
     return Findings(
         "agrees in part" if rising and straight < 1e-6 else "differs",
-        f"At Ω = 0 every tile is a polygon with the template's number of sides (to {straight:.0e}); the mean length "
-        f"of the outline, of tiles of area 1, grows from {lengths[omegas[0]]:.2f} to {lengths[omegas[-1]]:.2f}, and the "
-        f"mean IoU from {means[omegas[0]]:.3f} to {means[omegas[-1]]:.3f}.",
+        "At Ω = 0 every tile is a polygon with the template's number of sides (to "
+        f"{straight:.0e}); the mean length of the outline, of tiles of area 1, grows from "
+        f"{lengths[omegas[0]]:.2f} to {lengths[omegas[-1]]:.2f}, and the mean IoU from "
+        f"{means[omegas[0]]:.3f} to {means[omegas[-1]]:.3f}.",
         "Ω = 0 leaves translations in p1 alone, and along the glide in pg (free parameters: "
-        f"{moving}); a constant field that commutes with a rotation is zero. And our tile at Ω = 0 is not the regular "
-        "template: pentagons have two shape parameters and lattices up to two, which the fit uses.",
-        numbers={"mean_iou": {str(w): m for w, m in means.items()}, "mean_length": {str(w): v for w, v in lengths.items()}},
+        f"{moving}); a constant field that commutes with a rotation is zero. And our tile at Ω = "
+        "0 is not the regular template: pentagons have two shape parameters and lattices up to "
+        "two, which the fit uses.",
+        numbers={
+            "mean_iou": {str(w): m for w, m in means.items()},
+            "mean_length": {str(w): v for w, v in lengths.items()},
+        },
         tables=[Table("IoU with the animal.", ("class", *(f"Ω = {w}" for w in omegas)), rows)],
     )
 
@@ -81,7 +86,12 @@ def _draw(canvas: Canvas, extent: Extent, values: list[Any]) -> Findings:
 def _box(row: int, column: int, rows: int, height: float) -> Box:
     head = _HEAD / height
     wide, tall = (1 - _LEFT) / len(CLASSES), (1 - head) / rows
-    return _LEFT + column * wide + 0.002, 1 - head - (row + 1) * tall + 0.004, wide - 0.004, tall - 0.008
+    return (
+        _LEFT + column * wide + 0.002,
+        1 - head - (row + 1) * tall + 0.004,
+        wide - 0.004,
+        tall - 0.008,
+    )
 
 
 def _label(figure: Figure, names: Sequence[str], omegas: Sequence[int], height: float) -> None:
@@ -125,8 +135,8 @@ EXHIBIT = Exhibit(
     "figure-8",
     "Figure 8",
     "The effect of the maximum frequency Ω",
-    "For Ω = 0 there is no deformation in the shape of the tile, as the diffeomorphism only has translational effects. "
-    "The higher the allowed frequency, the more complex the tile shape.",
+    "For Ω = 0 there is no deformation in the shape of the tile, as the diffeomorphism only has "
+    "translational effects. The higher the allowed frequency, the more complex the tile shape.",
     _draw,
     _needs,
 )

@@ -68,7 +68,11 @@ def goal_work(extent: Extent, objective: Objective) -> list[Work]:
     costs = {"octopus": 3.0, "spider": 5.0}
     share = 1.0 if extent.effort == "fast" else 4.0
     return [
-        Work(goal_tile, (name, objective, extent.effort, extent.classes), 2 * share * costs.get(name, 1.0))
+        Work(
+            goal_tile,
+            (name, objective, extent.effort, extent.classes),
+            2 * share * costs.get(name, 1.0),
+        )
         for name in goals()
     ]
 

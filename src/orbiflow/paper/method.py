@@ -72,7 +72,12 @@ def _draw(canvas: Canvas, _extent: Extent, values: list[Any]) -> Findings:
     figure = canvas.figure(HEIGHT)
     boxes = [grid_box(0, k, 1, 4, title=0.12, gap=0.01) for k in range(4)]
     aspect = boxes[0][2] / (boxes[0][3] * HEIGHT)
-    titles = ("samples q about S", "A⁻¹ q: affine map alone", "D⁻¹ q: with the flow", "the tile D(T) over S")
+    titles = (
+        "samples q about S",
+        "A⁻¹ q: affine map alone",
+        "D⁻¹ q: with the flow",
+        "the tile D(T) over S",
+    )
     for box, title in zip(boxes, titles, strict=True):
         caption(figure, box, title)
     around_all = window_of([outline, ring], aspect, margin=0.12)
@@ -88,19 +93,22 @@ def _draw(canvas: Canvas, _extent: Extent, values: list[Any]) -> Findings:
     draw_over(panel(figure, boxes[3], around_all), ring, outline, width=1.4)
     canvas.add(
         figure,
-        "Four panels: points in and about a turtle; the same points over a hexagon after an affine map, many of "
-        "them red; after the inverse flow, few of them red; the tile, laid over the turtle.",
-        "Blue: inside S. Grey: outside. Red: on the wrong side of the template's boundary, what the occupancy loss "
-        f"punishes. {CLASS}, Ω = {OMEGA}.",
+        "Four panels: points in and about a turtle; the same points over a hexagon after an "
+        "affine map, many of them red; after the inverse flow, few of them red; the tile, laid "
+        "over the turtle.",
+        "Blue: inside S. Grey: outside. Red: on the wrong side of the template's boundary, what "
+        f"the occupancy loss punishes. {CLASS}, Ω = {OMEGA}.",
     )
     shares = [float(pulled.wrong(places).mean()) for places in (pulled.affine, pulled.full)]
     return Findings(
         "agrees" if shares[1] < shares[0] else "differs",
-        f"With the affine map alone {100 * shares[0]:.1f} % of the points come to lie on the wrong side, with the flow "
-        f"{100 * shares[1]:.1f} %; the loss falls from {pulled.losses[0]:.3f} to {pulled.losses[1]:.3f} (τ = "
-        f"{HARDNESS:g}). Two thirds of the points are scattered about the outline, where they teach most.",
-        "The loss is the paper's; what precedes it is not all of the paper: the lattice's own freedom (two "
-        "parameters for p2) is fitted as well, since a periodic flow cannot change its lattice.",
+        f"With the affine map alone {100 * shares[0]:.1f} % of the points come to lie on the "
+        f"wrong side, with the flow {100 * shares[1]:.1f} %; the loss falls from "
+        f"{pulled.losses[0]:.3f} to {pulled.losses[1]:.3f} (τ = {HARDNESS:g}). Two thirds of the "
+        "points are scattered about the outline, where they teach most.",
+        "The loss is the paper's; what precedes it is not all of the paper: the lattice's own "
+        "freedom (two parameters for p2) is fitted as well, since a periodic flow cannot change "
+        "its lattice.",
         numbers={"wrong_affine": shares[0], "wrong_flow": shares[1], "losses": pulled.losses},
     )
 
@@ -113,9 +121,9 @@ EXHIBIT = Exhibit(
     "figure-5",
     "Figure 5",
     "The method: inverse map and occupancy loss",
-    "Points sampled about the target S are mapped to the template's domain through D⁻¹. Points inside S must "
-    "land inside the template T, points outside S outside; the occupancy loss punishes those that do not. "
-    "The diffeomorphism that minimises it yields the tile.",
+    "Points sampled about the target S are mapped to the template's domain through D⁻¹. Points "
+    "inside S must land inside the template T, points outside S outside; the occupancy loss "
+    "punishes those that do not. The diffeomorphism that minimises it yields the tile.",
     _draw,
     _needs,
 )

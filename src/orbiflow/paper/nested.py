@@ -68,7 +68,7 @@ def nested_error(group: CrystallographicGroup, operators: Sequence[Operator]) ->
 
 @torch.no_grad()
 def equivariance_error(field: VectorField, group: CrystallographicGroup) -> float:
-    """Largest |V(g p) - R_g V(p)| over the cosets at random points, relative to V's root mean square."""
+    """Largest |V(g p) - R_g V(p)| over the cosets at random points, over V's root mean square."""
     points = _points()
     values = field(points)
     worst = max(float((field(g(points)) - g.push(values)).norm(dim=-1).max()) for g in group.cosets)

@@ -53,8 +53,8 @@ def paper_page(shown: Sequence[Shown], extent: Extent, seconds: float) -> str:
 def _head(extent: Extent, seconds: float) -> str:
     command = "orbiflow paper --fast" if extent.name == "fast" else "orbiflow paper"
     preview = (
-        "<p><strong>This is the preview of a minute:</strong> every exhibit, with less work in each, so "
-        "its figures are weaker than those of <code>orbiflow paper</code>.</p>\n"
+        "<p><strong>This is the preview of a minute:</strong> every exhibit, with less work in "
+        "each, so its figures are weaker than those of <code>orbiflow paper</code>.</p>\n"
         if extent.name == "fast"
         else ""
     )
@@ -62,8 +62,8 @@ def _head(extent: Extent, seconds: float) -> str:
 <p class="kicker">The paper, reproduced</p>
 <h1>{TITLE}</h1>
 <p>by {AUTHORS}. Every figure and table, drawn anew by
-<code>{command}</code> in {seconds:.0f} s: left what the paper states, right what we find. Every picture is also there
-as PDF, all numbers in <a href="paper.json">paper.json</a>.</p>
+<code>{command}</code> in {seconds:.0f} s, beside what the paper states. A badge says whether the two
+agree; where they do not, we say why. Every picture is also there as PDF, and all numbers are in <a href="paper.json">paper.json</a>.</p>
 {preview}</header>"""
 
 

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+from numpy.typing import ArrayLike
+
 from orbiflow.figures.canvas import plane_axes
 from orbiflow.tilings.patch import Window
 
@@ -74,8 +77,9 @@ def caption(
     )  # fmt: skip
 
 
-def around(x: float, y: float, half_width: float, half_height: float) -> Window:
-    """The window about a point."""
+def around(middle: ArrayLike, half_width: float, half_height: float) -> Window:
+    """The window about a point (2,)."""
+    x, y = (float(value) for value in np.asarray(middle))
     return x - half_width, y - half_height, x + half_width, y + half_height
 
 

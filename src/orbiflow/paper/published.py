@@ -1,4 +1,4 @@
-"""What ships for the exhibits: the nine goals, tiles of EST and ARAP, one silhouette, printed figures."""
+"""What ships for the exhibits: nine goals, tiles of EST and ARAP, a silhouette, printed figures."""
 
 from __future__ import annotations
 

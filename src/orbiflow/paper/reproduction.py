@@ -75,8 +75,9 @@ def reproduce(
     function = functools.partial(_drawn, extent=extent, folder=folder)
     drawings = [(one.name, one.draw, values) for one, values in zip(exhibits, given, strict=True)]
     for index, outcome in run(function, drawings):
-        exhibit, drawn = exhibits[index], outcome.value or ((), None)
-        shown[index] = Shown(exhibit, *drawn, failure=outcome.failure, seconds=outcome.seconds)
+        exhibit = exhibits[index]
+        pictures, findings = ((), None) if outcome.failure else outcome.value
+        shown[index] = Shown(exhibit, pictures, findings, outcome.failure, outcome.seconds)
         tell(DRAWING, f"drawn {exhibit.label}")
     cancel.check()
     return shown

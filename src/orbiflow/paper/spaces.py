@@ -72,10 +72,10 @@ def _draw_spaces(canvas: Canvas, extent: Extent, _values: list[Any]) -> Findings
         space = make_space(name)
         box = grid_box(0, column, 3, 4, title=0.10, gap=0.02)
         caption(figure, box, TITLES[name], weight="bold", size=1.1)
-        _draw_square(panel(figure, box, around(0.5, 0.5, 0.72, 0.72)), space.group)
+        _draw_square(panel(figure, box, around((0.5, 0.5), 0.72, 0.72)), space.group)
         box = grid_box(1, column, 3, 4, gap=0.02)
         _draw_cells(
-            panel(figure, box, around(1.0, 1.0, 2.0, 2.0 * box[3] * 0.8 / box[2])), space.group
+            panel(figure, box, around((1.0, 1.0), 2.0, 2.0 * box[3] * 0.8 / box[2])), space.group
         )
         axes = figure.add_axes(grid_box(2, column, 3, 4, gap=0.0))
         draw_surface(axes, space, _checked(space, extent.resolution), turn=TURNS[name])
@@ -83,11 +83,14 @@ def _draw_spaces(canvas: Canvas, extent: Extent, _values: list[Any]) -> Findings
         rows.append((TITLES[name], space.group.name, str(chi), "yes" if sided else "no"))
     canvas.add(
         figure,
-        "Four columns: torus, sphere, Klein bottle, projective plane. Above the square with identified edges, "
-        "in the middle its tiling with a letter F in every cell, below the surface.",
-        "Edges of one colour are one edge, in the sense of the arrows. In the tilings one fill for each aspect. "
-        "Klein bottle (figure eight) and projective plane (Boy's surface) pass through themselves, as they "
-        "must in space. They carry the square's chequerboard of 8 by 8 fields, and its edges.",
+        "Four columns: torus, sphere, Klein bottle, projective plane. Above the square with "
+        "identified edges, in the middle its tiling with a letter F in every cell, below the "
+        "surface.",
+        "Edges of one colour are one edge, in the sense of the arrows. In the tilings one fill "
+        "for each aspect. Klein bottle (figure eight) and projective plane (Boy's surface) pass "
+        "through themselves, as they must in space. They carry the square's chequerboard of 8 by "
+        "8 fields, and its edges.",
+        exact=True,
     )
     wanted = {
         "torus": (0, True),
@@ -101,12 +104,13 @@ def _draw_spaces(canvas: Canvas, extent: Extent, _values: list[Any]) -> Findings
     )
     return Findings(
         "agrees" if right else "differs",
-        "Each group identifies the square's edges in pairs, and counting vertices, edges and the face that are "
-        "left gives the Euler characteristic: with orientability it proves which surface each is.",
-        "The topology agrees, the geometry is more: on the sphere and the projective plane the plane's group "
-        "has rotation centres at the square's corners. There the square's flat metric has cone points, of a "
-        "quarter or half turn, that no symmetric flow can move; a density must be taken with respect to the "
-        "round area to be one on the round sphere.",
+        "Each group identifies the square's edges in pairs, and counting vertices, edges and the "
+        "face that are left gives the Euler characteristic: with orientability it proves which "
+        "surface each is.",
+        "The topology agrees, the geometry is more: on the sphere and the projective plane the "
+        "plane's group has rotation centres at the square's corners. There the square's flat "
+        "metric has cone points, of a quarter or half turn, that no symmetric flow can move; a "
+        "density must be taken with respect to the round area to be one on the round sphere.",
         numbers={name: euler_characteristic(g) for name, g in groups.items()},
         tables=[
             Table(
@@ -151,7 +155,7 @@ def _draw_cells(axes: Axes, group: CrystallographicGroup) -> None:
 
 
 def _checked(space: Space, n: int) -> Array:
-    """(n, n, 3) a chequered square with its edges in their colours, as far as the surface shows them."""
+    """(n, n, 3) a chequered square with its edges in their colours."""
     t = (np.arange(n) + 0.5) / n
     x, y = np.meshgrid(t, t, indexing="ij")
     odd = ((8 * x).astype(int) + (8 * y).astype(int)) % 2 == 1
@@ -181,24 +185,26 @@ def _draw_symmetrization(_canvas: Canvas, _extent: Extent, _values: list[Any]) -
         closure = abs(space.group.order - space.group.cell_volume)
         size = f"{row.lattice[0][0]:g} × {row.lattice[1][1]:g}"
         rows.append(
-            (TITLES[name], size, listed, space.group.name, str(space.group.order), str(terms(operators)),
-             tiny(errors[-1]), tiny(closure))
+            (TITLES[name], size, listed, space.group.name, str(space.group.order),
+             str(terms(operators)), tiny(errors[-1]), tiny(closure))
         )  # fmt: skip
     closed = all(row[-1] == "0" for row in rows)
     return Findings(
         "agrees in part" if max(errors) < 1e-12 and closed else "differs",
-        "The printed lattices and generators close: each group's order is the number of squares in its cell. The "
-        f"nested operators equal the mean over the cosets times the number of their terms, to {tiny(max(errors))}.",
-        "The method built on the table needs two corrections. A base that is not invariant under the group (the "
-        "paper's von Mises distribution on the square) makes no density on the space: here it is summed over "
-        "the group. And symmetric fields vanish at the corners of sphere and projective plane, so that "
-        "a flow can never correct a density there: the base for these is the round area.",
+        "The printed lattices and generators close: each group's order is the number of squares "
+        "in its cell. The nested operators equal the mean over the cosets times the number of "
+        f"their terms, to {tiny(max(errors))}.",
+        "The method built on the table needs two corrections. A base that is not invariant under "
+        "the group (the paper's von Mises distribution on the square) makes no density on the "
+        "space: here it is summed over the group. And symmetric fields vanish at the corners of "
+        "sphere and projective plane, so that a flow can never correct a density there: the base "
+        "for these is the round area.",
         numbers={"nested_error": max(errors)},
         tables=[
             Table(
                 "The paper's operators against the mean over the group (Reynolds operator).",
-                ("space", "cell", "generators", "group", "order", "terms of the nested sums", "difference",
-                 "order against |det B|"),
+                ("space", "cell", "generators", "group", "order", "terms of the nested sums",
+                 "difference", "order against |det B|"),
                 tuple(rows),
             )
         ],
@@ -209,16 +215,17 @@ SPACES_FIGURE = Exhibit(
     "figure-3",
     "Figure 3",
     "Four identifications of a square, and their tilings",
-    "Different ways of identification in a template square result in torus, sphere, Klein bottle and projective "
-    "plane. Copies of the square joined by the identification rule result in specific tiling patterns.",
+    "Different ways of identification in a template square result in torus, sphere, Klein bottle "
+    "and projective plane. Copies of the square joined by the identification rule result in "
+    "specific tiling patterns.",
     _draw_spaces,
 )
 SYMMETRIZATION = Exhibit(
     "table-4",
     "Table 4",
     "Symmetrization for identification spaces",
-    "For each space the template, the translational unit B, its symmetries, and the symmetrized vector field as "
-    "nested operators: V = P_B(F) for the torus, R_c(P_B(F)) for the sphere, G(P_B(F)) for the Klein "
-    "bottle, G(G(P_B(F))) for the projective plane.",
+    "For each space the template, the translational unit B, its symmetries, and the symmetrized "
+    "vector field as nested operators: V = P_B(F) for the torus, R_c(P_B(F)) for the sphere, "
+    "G(P_B(F)) for the Klein bottle, G(G(P_B(F))) for the projective plane.",
     _draw_symmetrization,
 )

@@ -101,23 +101,25 @@ def _draw(canvas: Canvas, _extent: Extent, _values: list[object]) -> Findings:
     for k, (one, title) in enumerate(panels):
         box = grid_box(0, k, 1, 3, title=0.09)
         middle = one.ring.mean(axis=0)
-        axes = panel(figure, box, around(*middle, 1.04, 0.95), title)
+        axes = panel(figure, box, around(middle, 1.04, 0.95), title)
         _draw_square(axes, one, copies=k > 0)
     canvas.add(
         figure,
-        "Three squares. The first straight, its opposite sides in one colour. The second deformed: its "
-        "opposite sides differ, and its copies overlap (red) and leave gaps (dark). The third deformed "
-        "so that opposite sides are translates, and its copies fit without gap or overlap.",
-        "Faint: copies by the lattice vectors. Red: covered twice. Dark: not covered. Both flows come from "
-        "one field, integrated by 32 steps of RK4.",
+        "Three squares. The first straight, its opposite sides in one colour. The second "
+        "deformed: its opposite sides differ, and its copies overlap (red) and leave gaps "
+        "(dark). The third deformed so that opposite sides are translates, and its copies fit "
+        "without gap or overlap.",
+        "Faint: copies by the lattice vectors. Red: covered twice. Dark: not covered. Both flows "
+        "come from one field, integrated by 32 steps of RK4.",
     )
     worst = max(bound.mismatch, bound.overlap, bound.gap)
     return Findings(
         "agrees" if worst < 1e-9 < free.mismatch else "differs",
-        f"Flowed along a field without symmetry, opposite sides come apart by up to {free.mismatch:.2f} of the "
-        f"side; copies of the shape overlap on {100 * free.overlap:.0f} % of the plane and leave "
-        f"{100 * free.gap:.0f} % of it bare. The very same field, symmetrized, moves opposite sides alike to "
-        f"{tiny(bound.mismatch)} (rounding), and copies overlap on {tiny(bound.overlap)} of the plane.",
+        "Flowed along a field without symmetry, opposite sides come apart by up to "
+        f"{free.mismatch:.2f} of the side; copies of the shape overlap on "
+        f"{100 * free.overlap:.0f} % of the plane and leave {100 * free.gap:.0f} % of it bare. "
+        f"The very same field, symmetrized, moves opposite sides alike to {tiny(bound.mismatch)} "
+        f"(rounding), and copies overlap on {tiny(bound.overlap)} of the plane.",
         numbers={
             "mismatch_unconstrained": free.mismatch,
             "mismatch_symmetrized": bound.mismatch,
@@ -183,7 +185,8 @@ EXHIBIT = Exhibit(
     "figure-1",
     "Figure 1",
     "Constrained against unconstrained deformation",
-    "A template square has its opposite sides identified: they must deform identically. An unconstrained "
-    "diffeomorphism violates the constraint; flow symmetrization deforms the template while satisfying it.",
+    "A template square has its opposite sides identified: they must deform identically. An "
+    "unconstrained diffeomorphism violates the constraint; flow symmetrization deforms the "
+    "template while satisfying it.",
     _draw,
 )

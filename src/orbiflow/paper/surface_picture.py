@@ -33,7 +33,7 @@ def draw_surface(
     """Draw a space's surface into axes without a frame.
 
     Args:
-        colours: (n, n, 3) RGB of the n x n faces, from 0 to 1: of the canonical square's even grid, x first.
+        colours: (n, n, 3) RGB of the n x n faces, 0 to 1: of the square's even grid, x first.
         turn: yaw and pitch of the eye in radians; default so that `front` is seen.
         front: place of the canonical square.
     """

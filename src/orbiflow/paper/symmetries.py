@@ -106,27 +106,35 @@ def _draw(canvas: Canvas, _extent: Extent, _values: list[Any]) -> Findings:
     rows, after = [], []
     for k, kind in enumerate(KINDS):
         box = grid_box(0, k, 1, 3, title=0.10, low=0.10)
-        axes = plane_axes(figure, around(0.0, 0.0, HALF, HALF), box=box)
+        axes = plane_axes(figure, around((0.0, 0.0), HALF, HALF), box=box)
         _draw_field(axes, kind)
         _draw_element(axes, kind, text_size(figure))
         caption(figure, box, kind.title, size=1.1)
         figure.text(
-            box[0] + box[2] / 2, 0.055, kind.equation, ha="center", fontsize=text_size(figure), color=INK
+            box[0] + box[2] / 2,
+            0.055,
+            kind.equation,
+            ha="center",
+            fontsize=text_size(figure),
+            color=INK,
         )
         found = residue(kind.before(), kind.images), residue(kind.after(), kind.images)
         after.append(found[1])
         rows.append((kind.title, kind.equation, f"{found[0]:.1f}", tiny(found[1])))
     canvas.add(
         figure,
-        "Three fields of arrows. In the first the same vector stands at all translates of a point, in the second "
-        "vectors turn with a point about a centre, in the third a vector is mirrored where the point is "
-        "glided along a dashed line.",
-        "Bold: the vector at one point, dark, and at its images. Grey outline: the lattice's cell. R_c turns by a quarter about c, R_o vectors by as much; M is the mirror in ℓ, T moves along it by μ, M_o mirrors vectors.",
+        "Three fields of arrows. In the first the same vector stands at all translates of a "
+        "point, in the second vectors turn with a point about a centre, in the third a vector is "
+        "mirrored where the point is glided along a dashed line.",
+        "Bold: the vector at one point, dark, and at its images. Grey outline: the lattice's "
+        "cell. R_c turns by a quarter about c, R_o vectors by as much; M is the mirror in ℓ, T "
+        "moves along it by μ, M_o mirrors vectors.",
     )
     return Findings(
         "agrees" if max(after) < 1e-12 else "differs",
-        "Each operator applied to a random Fourier field without the symmetry gives it to rounding error: "
-        f"the equations hold to {tiny(max(after))} of the field's size at 300 points.",
+        "Each operator applied to a random Fourier field without the symmetry gives it to "
+        f"rounding error: the equations hold to {tiny(max(after))} of the field's size at 300 "
+        "points.",
         numbers={kind.title: value for kind, value in zip(KINDS, after, strict=True)},
         tables=[
             Table(
@@ -167,17 +175,23 @@ def _draw_element(axes: Axes, kind: Kind, size: float) -> None:
     axes.plot(*ring.T, color="#56626e", linewidth=1.3, zorder=3)
     if not kind.operators:
         for k in (0, 1):
-            axes.annotate(
-                "", corner + kind.lattice[:, k], corner, zorder=5,
-                arrowprops={"arrowstyle": "-|>", "color": INK, "linewidth": 2.0, "shrinkA": 0, "shrinkB": 0},
-            )  # fmt: skip
-            place = corner + kind.lattice[:, k] * 0.55 + np.array([(0.02, -0.13), (-0.15, 0.02)][k])
-            axes.text(*place, ("b₁", "b₂")[k], fontsize=1.1 * size, color=INK, zorder=9)
+            style = {
+                "arrowstyle": "-|>",
+                "color": INK,
+                "linewidth": 2.0,
+                "shrinkA": 0,
+                "shrinkB": 0,
+            }
+            axes.annotate("", corner + kind.lattice[:, k], corner, zorder=5, arrowprops=style)
+            x, y = corner + kind.lattice[:, k] * 0.55 + ((0.02, -0.13), (-0.15, 0.02))[k]
+            axes.text(x, y, ("b₁", "b₂")[k], fontsize=1.1 * size, color=INK, zorder=9)
     elif kind.operators[0][1] == 4:
         axes.fill(*center_sign(4, 0.07).T, facecolor=CENTER_COLOURS[4], zorder=9)
         axes.text(0.09, 0.07, "c", fontsize=1.1 * size, color=INK, zorder=9)
     else:
-        axes.plot([0, 0], [-HALF, HALF], color=LINE_COLOUR, linewidth=1.8, linestyle=(0, (6, 3)), zorder=4)
+        axes.plot(
+            [0, 0], [-HALF, HALF], color=LINE_COLOUR, linewidth=1.8, linestyle=(0, (6, 3)), zorder=4
+        )
         axes.text(0.05, HALF - 0.22, "ℓ", fontsize=1.3 * size, color=LINE_COLOUR, zorder=9)
 
 
@@ -185,7 +199,8 @@ EXHIBIT = Exhibit(
     "figure-4",
     "Figure 4",
     "Three types of symmetry of a vector field",
-    "Periodicity, rotation equivariance and transflection equivariance arise in the vector field of a diffeomorphism "
-    "under identification constraints; each is illustrated with its equation (equations 3 to 5).",
+    "Periodicity, rotation equivariance and transflection equivariance arise in the vector field "
+    "of a diffeomorphism under identification constraints; each is illustrated with its equation "
+    "(equations 3 to 5).",
     _draw,
 )

@@ -74,20 +74,23 @@ def _draw(_canvas: Canvas, _extent: Extent, _values: list[Any]) -> Findings:
     right = max(nestings) < 1e-11 and max(mended) < 1e-11
     return Findings(
         "agrees in part" if right and broken else "agrees" if right else "differs",
-        "All nine rows close as printed: order times area is |det B|. The nested sums are the mean over the "
-        f"cosets times the number of their terms, to {tiny(max(nestings))}; the mean needs a term for each coset, "
-        "and a Fourier field whose coefficients are symmetrized once needs one evaluation and has 1/|G| of "
-        "the parameters.",
-        f"The last step of the printed equation, V(z) = V_sym(A⁻¹ z), is wrong for {', '.join(broken)}. A vector "
-        "field must be pushed forward, A V_sym(A⁻¹ z): without it the glide reflections are lost as soon as "
-        f"A turns (here by {TURN:g} rad). Translations survive, and rotations, which commute with A. We compose "
-        "D = A ∘ L ∘ flow instead, with the flow in the group's own frame and L the lattice's freedom.",
+        "All nine rows close as printed: order times area is |det B|. The nested sums are the "
+        f"mean over the cosets times the number of their terms, to {tiny(max(nestings))}; the "
+        "mean needs a term for each coset, and a Fourier field whose coefficients are "
+        "symmetrized once needs one evaluation and has 1/|G| of the parameters.",
+        "The last step of the printed equation, V(z) = V_sym(A⁻¹ z), is wrong for "
+        f"{', '.join(broken)}. A vector field must be pushed forward, A V_sym(A⁻¹ z): without it "
+        f"the glide reflections are lost as soon as A turns (here by {TURN:g} rad). Translations "
+        "survive, and rotations, which commute with A. We compose D = A ∘ L ∘ flow instead, with "
+        "the flow in the group's own frame and L the lattice's freedom.",
         numbers={"nested_error": max(nestings), "printed_error": printed, "pushed_error": max(mended)},
         tables=[
             Table(
-                f"Each row of the table. Violations are relative to the field's root mean square, Ω = {OMEGA}.",
-                ("class", "order × area = |det B|", "terms nested", "nested − mean", "parameters, paper",
-                 "parameters, here", "violation as printed", "violation with A V(A⁻¹ z)"),
+                "Each row of the table. Violations are relative to the field's root mean square, "
+                f"Ω = {OMEGA}.",
+                ("class", "order × area = |det B|", "terms nested", "nested − mean",
+                 "parameters, paper", "parameters, here", "violation as printed",
+                 "violation with A V(A⁻¹ z)"),
                 tuple(rows),
             )
         ],
@@ -98,8 +101,8 @@ EXHIBIT = Exhibit(
     "table-2",
     "Table 2",
     "Symmetrization for the nine isohedral classes",
-    "For each class the template, the basic translation unit B = [b1, b2], all its symmetries, and the symmetrized "
-    "vector field: nested operators around P_B(F), composed with A⁻¹, the inverse of the affine "
-    "transformation found in the first phase.",
+    "For each class the template, the basic translation unit B = [b1, b2], all its symmetries, "
+    "and the symmetrized vector field: nested operators around P_B(F), composed with A⁻¹, the "
+    "inverse of the affine transformation found in the first phase.",
     _draw,
 )

@@ -59,7 +59,7 @@ def _draw(canvas: Canvas, _extent: Extent, _values: list[Any]) -> Findings:
         middle = (kind.template().min(axis=0) + kind.template().max(axis=0)) / 2
         middle = (middle + cell_ring(group, middle)[:4].mean(axis=0)) / 2
         aspect = box[2] / (box[3] * 0.94)
-        window = around(*middle, 4.1 * aspect, 4.1)
+        window = around(middle, 4.1 * aspect, 4.1)
         draw_tiling(panel(figure, box, window), kind, window)
         caption(figure, box, f"{kind.name}  ({kind.group_name})", size=1.0)
         wrong += sum(not group.contains(g) for g in drawn_elements(group))
@@ -80,16 +80,17 @@ def _draw(canvas: Canvas, _extent: Extent, _values: list[Any]) -> Findings:
     _key(figure)
     canvas.add(
         figure,
-        "Nine tilings by hexagons or pentagons, one for each class, with a lattice cell in black, glide lines "
-        "dashed in red, and signs on all rotation centres.",
-        "One fill for each aspect (coset of the lattice). All centres and lines are found from the group; "
-        "the classes have no mirrors.",
+        "Nine tilings by hexagons or pentagons, one for each class, with a lattice cell in "
+        "black, glide lines dashed in red, and signs on all rotation centres.",
+        "One fill for each aspect (coset of the lattice). All centres and lines are found from "
+        "the group; the classes have no mirrors.",
     )
     return Findings(
         "agrees" if not wrong else "differs",
-        "All symmetries are there, not only the generators that the paper lists: every mark drawn belongs to "
-        f"an element of the group ({wrong} do not). The cells are the shortest, with centres of the highest "
-        "order at their corners; the paper's Table 2 names longer ones of the same lattice for some classes.",
+        "All symmetries are there, not only the generators that the paper lists: every mark "
+        f"drawn belongs to an element of the group ({wrong} do not). The cells are the shortest, "
+        "with centres of the highest order at their corners; the paper's Table 2 names longer "
+        "ones of the same lattice for some classes.",
         numbers={"marks_outside_the_group": wrong},
         tables=[
             Table(
@@ -120,7 +121,8 @@ EXHIBIT = Exhibit(
     "figure-6",
     "Figure 6",
     "The symmetries of each tiling",
-    "The tiling pattern of each of the nine classes: its unit of periodicity as a black quadrilateral, lines of "
-    "transflection in red, rotation centres of each order as coloured symbols.",
+    "The tiling pattern of each of the nine classes: its unit of periodicity as a black "
+    "quadrilateral, lines of transflection in red, rotation centres of each order as coloured "
+    "symbols.",
     _draw,
 )
