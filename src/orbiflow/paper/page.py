@@ -63,7 +63,8 @@ def _head(extent: Extent, seconds: float) -> str:
 <h1>{TITLE}</h1>
 <p>by {AUTHORS}. Every figure and table, drawn anew by
 <code>{command}</code> in {seconds:.0f} s, beside what the paper states. A badge says whether the two
-agree; where they do not, we say why. Every picture is also there as PDF, and all numbers are in <a href="paper.json">paper.json</a>.</p>
+agree; where they do not, we say why. Every picture is also there as PDF, and all numbers are in
+<a href="paper.json">paper.json</a>.</p>
 {preview}</header>"""
 
 
