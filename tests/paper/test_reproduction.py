@@ -6,6 +6,7 @@ import html
 import json
 import os
 import re
+from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
@@ -146,6 +147,40 @@ def test_the_page_lists_every_exhibit_and_refers_to_nothing_else() -> None:
     assert page.count("Not drawn: not tried") == len(EXHIBITS)
     assert not re.findall(r'(?:src|href)="(?:https?:)?//', page)
     assert "<script" not in page
+
+
+class Balanced(HTMLParser):
+    """Fails where a tag is closed that is not open, or stays open."""
+
+    VOID = ("meta", "img", "br", "link")
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        if tag not in self.VOID:
+            self.open.append(tag)
+        assert tag != "img" or dict(attrs)["alt"]
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+
+def test_the_page_is_well_formed(tmp_path: Path) -> None:
+    chosen = [exhibit("figure-1", draw_sum), exhibit("figure-2", draw_badly)]
+    parser = Balanced()
+    parser.feed(paper_page(reproduce(chosen, FAST, tmp_path), FAST, 1.0))
+    assert parser.open == []
+
+
+def test_the_snippet_of_the_docs(tmp_path: Path, monkeypatch, capsys) -> None:
+    text = (Path(__file__).parents[2] / "docs" / "paper.md").read_text("utf-8")
+    (snippet,) = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
+    monkeypatch.chdir(tmp_path)
+    exec(compile(snippet, "paper.md", "exec"), {})
+    assert capsys.readouterr().out.startswith("agrees {'B-periodic': ")
+    assert (tmp_path / "figures" / "figure-4.pdf").is_file()
 
 
 def test_all_of_the_paper_is_there() -> None:
