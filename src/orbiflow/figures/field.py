@@ -21,8 +21,7 @@ from orbiflow.tilings.patch import Window
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-SAMPLES = 400
-"""Along the longer side of a picture of its own."""
+_SAMPLES = 400  # along the longer side
 
 
 def field_png(
@@ -71,11 +70,13 @@ def field_png(
 
 
 def draw_magnitude(
-    axes: Axes, velocity: Callable[[Any], Any], window: Window, *, samples: int = SAMPLES
+    axes: Axes, velocity: Callable[[Any], Any], window: Window, *, samples: int | None = None
 ) -> None:
-    """Colour a window by a field's magnitude, at so many points along its longer side."""
+    """Colour a window by a field's magnitude, at so many points along its longer side (default 400)."""
     longer = max(window[2] - window[0], window[3] - window[1])
-    counts = [max(2, round(samples * (window[i + 2] - window[i]) / longer)) for i in (0, 1)]
+    counts = [
+        max(2, round((samples or _SAMPLES) * (window[i + 2] - window[i]) / longer)) for i in (0, 1)
+    ]
     x, y = (np.linspace(window[i], window[i + 2], counts[i]) for i in (0, 1))
     points = np.stack(np.meshgrid(x, y), axis=-1)
     vectors = evaluate(velocity, points)
