@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 
 import numpy as np
+import pypdfium2
 import pytest
 
 from orbiflow.density import read_density
@@ -67,6 +68,37 @@ def test_plots(tmp_path: Path, orbiflow) -> None:
     names = {path.name for path in out.iterdir()}
     assert names == {"density.png", "flow.png", "samples.png", "surface.html"}
     assert (out / "surface.html").read_text().lstrip().lower().startswith("<!doctype html>")
+
+
+@pytest.mark.usefixtures("small_pictures")
+def test_plots_for_papers(tmp_path: Path, orbiflow) -> None:
+    data, model, out = table(tmp_path), tmp_path / "model", tmp_path / "plots.pdf"
+    orbiflow("density", "fit", data, "--space", "sphere", "--out", model, *FIT)
+    plot = ("density", "plot", "--model", model, "--data", data)
+    drawn = orbiflow(*plot, "--width", "double", "--out", out)
+    assert drawn.status == 0, drawn.err
+    pages = pypdfium2.PdfDocument(out)
+    assert [round(page.get_width()) for page in pages] == [510, 510, 510]
+    assert "caption: Density on the sphere. The edges with one arrow head" in drawn.out
+    assert f"written {out}, a page a figure" in drawn.out
+    folder = tmp_path / "figures"
+    drawn = orbiflow(*plot, "--format", "svg", "--width", "9cm", "--out", folder)
+    assert drawn.status == 0, drawn.err
+    figures = {"density.svg", "flow.svg", "samples.svg"}
+    assert {path.name for path in folder.iterdir()} == figures | {"surface.html"}
+    assert 'width="255.1' in (folder / "flow.svg").read_text()
+    before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+    for options, message in (
+        (("--width", "2mm"), "--width a figure is 80 to 1000 mm wide"),
+        (("--width", "90"), "--width '90' has no unit"),
+        (("--out", out, "--format", "png"), "--out ends in .pdf but --format is png"),
+        (("--out", tmp_path / "plot.png"), "several pictures; give a folder, or a .pdf"),
+        (("--out", tmp_path / "none" / "plots.pdf"), "create it first"),
+    ):
+        refused = orbiflow(*plot, *options)
+        assert refused.status == 2, options
+        assert message in refused.err
+    assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == before
 
 
 @pytest.mark.usefixtures("small_pictures")

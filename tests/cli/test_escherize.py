@@ -21,7 +21,7 @@ from orbiflow.escher import TileModel, load_model, methods
 from orbiflow.escher.boundary import extract_tile
 from orbiflow.escher.fit import Fit
 from orbiflow.escher.result import best_tiles
-from orbiflow.export.folder import write_tile_folder
+from orbiflow.export.folder import FIGURE_FILES, write_tile_folder
 from orbiflow.silhouette import Target
 from orbiflow.tilings import CLASSES
 
@@ -155,7 +155,7 @@ def test_a_run_on_a_polygon_with_y_up(tmp_path: Path, orbiflow) -> None:
     tile, goal = shapely.Polygon(entry["polygon"]), shapely.Polygon(BOOT)
     iou = tile.intersection(goal).area / tile.union(goal).area
     assert iou == pytest.approx(entry["metrics"]["iou"], abs=1e-9)
-    assert {p.name for p in (tmp_path / "o" / "IH28").iterdir()} == FILES | {"field.png"}
+    assert {p.name for p in (tmp_path / "o" / "IH28").iterdir()} == FILES | set(FIGURE_FILES)
     with Image.open(tmp_path / "o" / "IH28" / "field.png") as image:
         image.load()
         assert min(image.size) >= 400
@@ -215,7 +215,7 @@ def test_help_and_version(orbiflow, orbiflow_process) -> None:
 
 def test_help_does_not_import_torch() -> None:
     code = (
-        "import sys; sys.argv = ['orbiflow', 'escherize', '--help']\n"
+        "import sys; sys.argv = ['orbiflow', 'export', '--help']\n"
         "from orbiflow.cli.app import main\n"
         "try: main()\n"
         "except SystemExit: pass\n"

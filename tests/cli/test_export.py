@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pypdfium2
 import pytest
 
 from exported import tile_of
@@ -64,6 +65,20 @@ def test_purposes(purpose: str, result: Path, tmp_path: Path, orbiflow, monkeypa
     text = (tmp_path / f"boot-IH4.{ending}").read_bytes()
     assert (b"<use" in text) == (purpose == "web")
     assert (b'stroke="#ff0000" stroke-width="0.01"' in text) == (purpose == "laser")
+
+
+@pytest.mark.parametrize(
+    ("options", "size"), [((), (85, 57)), (("--area", "double", "--tile-size", "3cm"), (180, 120))]
+)
+def test_a_figure_for_a_paper_is_as_wide_as_its_column(
+    options: tuple[str, ...], size: tuple[int, int], result: Path, tmp_path: Path, orbiflow
+) -> None:
+    out = tmp_path / "figure.pdf"
+    outcome = orbiflow("export", result, "--for", "paper", *options, "--out", out)
+    assert outcome.status == 0, outcome.err
+    page = pypdfium2.PdfDocument(out)[0]
+    millimetres = (page.get_width() * 25.4 / 72, page.get_height() * 25.4 / 72)
+    assert millimetres == pytest.approx(size, abs=0.01)
 
 
 def test_options_go_before_the_purpose(result: Path, tmp_path: Path, orbiflow) -> None:

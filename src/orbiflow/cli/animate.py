@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from orbiflow.cli.tile_options import Palette, Result, Tile
 from orbiflow.cli.work import do
 from orbiflow.jobs import AnimateRequest
 
@@ -21,12 +22,7 @@ class Kind(StrEnum):
 
 
 def animate(
-    result: Annotated[
-        Path,
-        typer.Argument(
-            help="A search's folder, or its result.json.", show_default=False, metavar="RESULT"
-        ),
-    ],
+    result: Result,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -37,7 +33,7 @@ def animate(
             show_default=False,
         ),
     ] = None,
-    tile: Annotated[str, typer.Option(help="A class, such as IH4, or a rank; 1 is best.")] = "1",
+    tile: Tile = "1",
     kind: Annotated[
         Kind,
         typer.Option(
@@ -54,12 +50,7 @@ def animate(
     size: Annotated[
         int | None, typer.Option(help="Width in pixels, default 800.", show_default=False)
     ] = None,
-    palette: Annotated[
-        str | None,
-        typer.Option(
-            help="Of fills: delft, lagoon, ochre, heather, ink, okabe-ito.", show_default=False
-        ),
-    ] = None,
+    palette: Palette = None,
     force: Annotated[
         bool, typer.Option("--force", help="Animate a tile that is not certified.")
     ] = False,

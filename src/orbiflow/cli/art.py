@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from orbiflow.cli.tile_options import Palette, Result, Tile, option
 from orbiflow.cli.work import do
 from orbiflow.jobs import ArtRequest
 
@@ -28,17 +29,8 @@ class Strokes(StrEnum):
     FEATHERS = "feathers"
 
 
-def _option(text: str) -> typer.models.OptionInfo:
-    return typer.Option(help=text, show_default=False)
-
-
 def art(
-    result: Annotated[
-        Path,
-        typer.Argument(
-            help="A search's folder, or its result.json.", show_default=False, metavar="RESULT"
-        ),
-    ],
+    result: Result,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -48,40 +40,37 @@ def art(
             show_default=False,
         ),
     ] = None,
-    tile: Annotated[str, typer.Option(help="A class, such as IH4, or a rank; 1 is best.")] = "1",
+    tile: Tile = "1",
     picture: Annotated[
         Path | None,
-        _option("Over the silhouette, in the same frame: PNG, JPEG, WebP or an SVG drawing."),
+        option("Over the silhouette, in the same frame: PNG, JPEG, WebP or an SVG drawing."),
     ] = None,
     size: Annotated[
-        str | None, _option("The page: pixels, default 3000x2000, or such as 300x200mm.")
+        str | None, option("The page: pixels, default 3000x2000, or such as 300x200mm.")
     ] = None,
     tile_size: Annotated[
         str | None,
-        _option("Longer side of the tile's smallest rectangle: pixels, or such as 40mm."),
+        option("Longer side of the tile's smallest rectangle: pixels, or such as 40mm."),
     ] = None,
     repeat: Annotated[
         bool, typer.Option("--repeat", help="The cell that repeats without seams, instead.")
     ] = False,
     tolerance: Annotated[
-        float | None, _option("How much that cell may be stretched; default 0.02, which is 2 %.")
+        float | None, option("How much that cell may be stretched; default 0.02, which is 2 %.")
     ] = None,
-    palette: Annotated[
-        str | None,
-        _option("earth, sea, dusk, forest, pastel, festival, woodcut, moss, clay, print and more."),
-    ] = None,
+    palette: Palette = None,
     colour: Annotated[
         Colour | None,
-        _option("Aspect: one a way that tiles lie. Neighbour: neighbours differ. Default that."),
+        option("Aspect: one a way that tiles lie. Neighbour: neighbours differ. Default that."),
     ] = None,
     outline: Annotated[
-        str | None, _option("Width of the lines between tiles: pixels, such as 0.3mm, or none.")
+        str | None, option("Width of the lines between tiles: pixels, such as 0.3mm, or none.")
     ] = None,
     engrave: Annotated[
         bool, typer.Option("--engrave", help="Draw lines inside the tile, as on a woodcut.")
     ] = False,
     strokes: Annotated[
-        Strokes | None, _option("Engrave with hatching, echoes of the outline, or feathers.")
+        Strokes | None, option("Engrave with hatching, echoes of the outline, or feathers.")
     ] = None,
     eye: Annotated[
         list[str] | None,
@@ -92,7 +81,7 @@ def art(
             show_default=False,
         ),
     ] = None,
-    dpi: Annotated[float | None, _option("Pixels an inch, default 300.")] = None,
+    dpi: Annotated[float | None, option("Pixels an inch, default 300.")] = None,
     force: Annotated[
         bool, typer.Option("--force", help="Draw a tile that is not certified.")
     ] = False,

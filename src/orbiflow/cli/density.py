@@ -10,6 +10,7 @@ import typer
 from orbiflow.cli.density_options import (
     Columns,
     Data,
+    Format,
     Measure,
     Model,
     Scale,
@@ -121,7 +122,12 @@ def sample(
 def plot(
     model: Model,
     out: Annotated[
-        Path, typer.Option("--out", "-o", help="Folder for the pictures, made if need be.")
+        Path,
+        typer.Option(
+            "--out",
+            "-o",
+            help="Folder for the pictures, made if need be; or a .pdf, a page a figure.",
+        ),
     ] = Path("plots"),
     data: Annotated[
         Path | None,
@@ -135,6 +141,19 @@ def plot(
         Path | None,
         typer.Option(
             help="Table of lat,lon drawn as lines on the sphere; lat beyond 90 ends a line.",
+            show_default=False,
+        ),
+    ] = None,
+    file_format: Annotated[
+        Format | None,
+        typer.Option(
+            "--format", help="Of the figures: png, or pdf or svg for print.", show_default=False
+        ),
+    ] = None,
+    width: Annotated[
+        str | None,
+        typer.Option(
+            help="For print, with texts of 7 to 8 points: single (85mm), double (180mm) or a length.",
             show_default=False,
         ),
     ] = None,
@@ -159,7 +178,7 @@ def plot(
     ] = False,
     seed: Annotated[int, typer.Option(help="Of the samples.")] = 0,
 ) -> None:
-    """Draw a density: density.png, flow.png, samples.png and surface.html, which turns in 3-D.
+    """Draw a density: density, flow, samples as PNG, PDF or SVG, and surface.html, to turn in 3-D.
 
     Of a torus of more or fewer than two angles: samples.png alone, all pairs of angles.
     """
@@ -169,6 +188,8 @@ def plot(
         data=data,
         columns=named_columns(columns),
         coastlines=coastlines,
+        format=file_format.value if file_format else None,
+        width=width,
         measure=measure.value,
         scale=scale.value,
         center=center,

@@ -43,6 +43,14 @@ class Scale(StrEnum):
     LOG = "log"
 
 
+class Format(StrEnum):
+    """Of figures."""
+
+    PNG = "png"
+    PDF = "pdf"
+    SVG = "svg"
+
+
 Data = Annotated[Path, typer.Argument(help="CSV, TSV, NPY or Parquet.", show_default=False)]
 
 

@@ -123,7 +123,10 @@ def escherize(
     ] = None,
     figures: Annotated[
         bool,
-        typer.Option("--figures", help="Draw the flow of each tile that one made: field.png."),
+        typer.Option(
+            "--figures",
+            help="Also for print: tiling.pdf, overlay.pdf; and the flow: field.png, field.pdf.",
+        ),
     ] = False,
     workers: Annotated[
         int | None, typer.Option(help="Processes; default one a core.", show_default=False)

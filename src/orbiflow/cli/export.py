@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from orbiflow.cli.tile_options import Palette, Result, Tile, option
 from orbiflow.cli.work import do
 from orbiflow.jobs import ExportRequest
 
@@ -35,28 +36,20 @@ class Purpose(StrEnum):
 
     LASER = "laser"
     PRINT = "print"
+    PAPER = "paper"
     WEB = "web"
     PLOTTER = "plotter"
 
 
-def _option(text: str) -> typer.models.OptionInfo:
-    return typer.Option(help=text, show_default=False)
-
-
 def export(
-    result: Annotated[
-        Path,
-        typer.Argument(
-            help="A search's folder, or its result.json.", show_default=False, metavar="RESULT"
-        ),
-    ],
+    result: Result,
     out: Annotated[
         Path | None,
         typer.Option(
             "--out", "-o", help="The file; default one named after the tile.", show_default=False
         ),
     ] = None,
-    tile: Annotated[str, typer.Option(help="A class, such as IH4, or a rank; 1 is best.")] = "1",
+    tile: Tile = "1",
     purpose: Annotated[
         Purpose | None,
         typer.Option("--for", help="Settings that suit it; options go before.", show_default=False),
@@ -66,19 +59,22 @@ def export(
         typer.Option("--format", help="Default: the file's ending, or svg.", show_default=False),
     ] = None,
     tile_size: Annotated[
-        str | None, _option("Longer side of the tile's smallest rectangle; default 40mm.")
+        str | None, option("Longer side of the tile's smallest rectangle; default 40mm.")
     ] = None,
-    area: Annotated[str | None, _option("The page; default 300x200mm.")] = None,
+    area: Annotated[
+        str | None,
+        option("The page; default 300x200mm. Also single or double, a journal's columns."),
+    ] = None,
     cut: Annotated[
         Cut | None,
-        _option("None: every tile drawn. Skeleton: shared edges once. Pieces: tiles apart."),
+        option("None: every tile drawn. Skeleton: shared edges once. Pieces: tiles apart."),
     ] = None,
-    kerf: Annotated[str | None, _option("Pieces: width that the tool burns away.")] = None,
-    spacing: Annotated[str | None, _option("Pieces: gap between cuts, default 1mm.")] = None,
+    kerf: Annotated[str | None, option("Pieces: width that the tool burns away.")] = None,
+    spacing: Annotated[str | None, option("Pieces: gap between cuts, default 1mm.")] = None,
     clearance: Annotated[
-        str | None, _option("Pieces: gap between pieces put together, for a puzzle.")
+        str | None, option("Pieces: gap between pieces put together, for a puzzle.")
     ] = None,
-    copies: Annotated[int | None, _option("Pieces: how many; default what the page holds.")] = None,
+    copies: Annotated[int | None, option("Pieces: how many; default what the page holds.")] = None,
     clip: Annotated[
         bool | None,
         typer.Option(
@@ -91,22 +87,20 @@ def export(
         bool, typer.Option("--border", help="Skeleton with --clip: cut the page's border, too.")
     ] = False,
     bed: Annotated[
-        str | None, _option("The machine's size, such as 300x200mm: several files if need be.")
+        str | None, option("The machine's size, such as 300x200mm: several files if need be.")
     ] = None,
     calibrate: Annotated[
         bool, typer.Option("--calibrate", help="Add a mark of 100 mm on a layer of its own.")
     ] = False,
     tolerance: Annotated[
         str | None,
-        _option("How far curves may be from the tile; default 1/800 of its size, 0.05mm at least."),
+        option("How far curves may be from the tile; default 1/800 of its size, 0.05mm at least."),
     ] = None,
     warn_neck: Annotated[
-        str | None, _option("Say where the tile is thinner than this, such as 2mm.")
+        str | None, option("Say where the tile is thinner than this, such as 2mm.")
     ] = None,
-    palette: Annotated[
-        str | None, _option("Of fills: delft, lagoon, ochre, heather, ink, okabe-ito.")
-    ] = None,
-    dpi: Annotated[float | None, _option("PNG: dots per inch, default 300.")] = None,
+    palette: Palette = None,
+    dpi: Annotated[float | None, option("PNG: dots per inch, default 300.")] = None,
     force: Annotated[
         bool, typer.Option("--force", help="Export a tile that is not certified, marked so.")
     ] = False,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -16,7 +16,7 @@ from orbiflow.export.motion import Motion
 from orbiflow.export.motion_kinds import KINDS, Kind, bend, grow, morph
 from orbiflow.export.motion_pictures import require_ffmpeg, write_gif, write_mp4
 from orbiflow.export.motion_svg import write_motion_svg
-from orbiflow.export.result_file import ExportTile
+from orbiflow.export.result_file import ExportTile, TileSource
 from orbiflow.export.timeline import frames
 from orbiflow.figures.palette import DEFAULT_PALETTE, palette
 from orbiflow.files import write_atomic
@@ -73,7 +73,7 @@ class AnimationSettings:
 
 
 def animate(
-    tile: ExportTile | TileResult | Tile,
+    tile: TileSource,
     out: str | Path,
     settings: AnimationSettings | None = None,
     *,
@@ -82,9 +82,9 @@ def animate(
     """Write an animation of a tile.
 
     Args:
-        tile: see `read_result`.
-        out: the file; the settings' format counts, not its ending.
-        settings: see `AnimationSettings`.
+        tile: in memory, or a run's folder; see `read_result`.
+        out: the file; an ending .gif, .mp4 or .svg decides the format.
+        settings: see `AnimationSettings`; their format counts for other endings.
         force: take a tile that is not certified.
 
     Raises:
@@ -93,11 +93,15 @@ def animate(
         OutputError: if the file cannot be written.
     """
     out = as_path(out, "the file to animate to")
+    settings = settings or AnimationSettings()
+    ending = out.suffix.lower().lstrip(".")
+    form = next((known for known in FORMATS if known == ending), settings.format)
+    settings = replace(settings, format=form)
     return write_atomic(out, animation(tile, settings, force=force))
 
 
 def animation(
-    tile: ExportTile | TileResult | Tile,
+    tile: TileSource,
     settings: AnimationSettings | None = None,
     *,
     force: bool = False,
@@ -121,7 +125,7 @@ def animation(
             f"{given.name} is not certified ({'; '.join(certificate.reasons)}), so it is not "
             "animated; --force animates it"
         )
-    made = motion(tile, settings)
+    made = motion(given if isinstance(tile, str | Path) else tile, settings)
     told(0.0)
     loop = frames(settings.seconds, settings.fps)
     match settings.format:

@@ -9,7 +9,6 @@ from pathlib import Path
 from orbiflow import __version__
 from orbiflow.arguments import path as as_path
 from orbiflow.errors import CertificationError, OrbiflowError
-from orbiflow.escher.result import TileResult
 from orbiflow.export.dxf_writer import write_dxf
 from orbiflow.export.json_writer import write_json
 from orbiflow.export.layout import Layout, layout
@@ -17,16 +16,16 @@ from orbiflow.export.offset import place_on
 from orbiflow.export.pdf_writer import write_pdf
 from orbiflow.export.pieces_scene import pieces_scenes
 from orbiflow.export.png_writer import write_png
-from orbiflow.export.result_file import ExportTile
+from orbiflow.export.result_file import ExportTile, TileSource
 from orbiflow.export.scene import Scene
-from orbiflow.export.settings import ExportSettings
+from orbiflow.export.settings import FORMATS, ExportSettings
 from orbiflow.export.sheets import calibrated, split
 from orbiflow.export.skeleton_scene import skeleton_scene
 from orbiflow.export.svg_writer import write_svg
 from orbiflow.export.tiling_scene import tiling_scene
 from orbiflow.files import write_atomic
 from orbiflow.likeness.thinnest import narrowest_neck
-from orbiflow.tilings import Certificate, Tile, certify
+from orbiflow.tilings import Certificate, certify
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,9 +46,14 @@ class Exported:
         """On all sheets; one that is cut where sheets meet counts on each."""
         return sum(len(scene.tiles) for scene in self.scenes)
 
+    def _repr_png_(self) -> bytes:
+        """What a notebook shows: the first sheet, some 600 pixels wide."""
+        sheet = self.scenes[0]
+        return write_png(sheet, dpi=600 * 25.4 / max(sheet.width, sheet.height))
+
 
 def export(
-    tile: ExportTile | TileResult | Tile,
+    tile: TileSource,
     out: str | Path,
     settings: ExportSettings | None = None,
     *,
@@ -58,9 +62,10 @@ def export(
     """Write a tiling, its lines or its pieces in real size.
 
     Args:
-        tile: see `read_result`.
-        out: the file; with several sheets its name gets a number.
-        settings: see `ExportSettings`; its format counts, not the file's ending.
+        tile: in memory, or a run's folder; see `read_result`.
+        out: the file; with several sheets its name gets a number. An ending of a known format, such as
+            .pdf, decides the format.
+        settings: see `ExportSettings`; their format counts for other endings.
         force: export a tile that is not certified; the file says so.
 
     Raises:
@@ -68,8 +73,8 @@ def export(
         OrbiflowError: for settings that cannot be met, in words.
         OutputError: if a file cannot be written.
     """
-    settings = settings or ExportSettings()
     out = as_path(out, "the file to export to")
+    settings = _for_file(settings or ExportSettings(), out)
     found, notes = scenes(tile, settings, force=force)
     # all contents before the first file
     contents = [write_scene(scene, settings) for scene in found]
@@ -78,8 +83,14 @@ def export(
     return Exported(tuple(files), tuple(found), notes)
 
 
+def _for_file(settings: ExportSettings, out: Path) -> ExportSettings:
+    ending = out.suffix.lower().lstrip(".")
+    known = next((form for form in FORMATS if form == ending), settings.format)
+    return replace(settings, format=known)
+
+
 def scenes(
-    tile: ExportTile | TileResult | Tile, settings: ExportSettings, *, force: bool = False
+    tile: TileSource, settings: ExportSettings, *, force: bool = False
 ) -> tuple[list[Scene], tuple[str, ...]]:
     """The sheets, and what the user should know.
 

@@ -8,9 +8,10 @@ from pathlib import Path
 from orbiflow.escher.placed_field import placed_field
 from orbiflow.escher.result import TileResult
 from orbiflow.export.svg import tile_svg, tiling_svg
-from orbiflow.figures.bending import bending_png
-from orbiflow.figures.field import field_png
-from orbiflow.figures.tilings import overlay_png, tiling_png
+from orbiflow.figures.bending import bending_picture, bending_png
+from orbiflow.figures.field import field_picture
+from orbiflow.figures.sheet import Picture, Sheet
+from orbiflow.figures.tilings import overlay_picture, overlay_png, tiling_picture, tiling_png
 from orbiflow.files import make_folder, write_atomic
 from orbiflow.silhouette.target import Target
 from orbiflow.tilings import Colouring, colouring
@@ -18,8 +19,10 @@ from orbiflow.tilings import Colouring, colouring
 TILE_FILES = ("tile.svg", "tiling.svg", "tiling.png", "overlay.png", "model.safetensors")
 """What every class's folder holds."""
 
-FIGURE_FILES = ("field.png",)
-"""What it holds besides if figures were asked for, as far as there is something to show."""
+FIELD_FILES = ("field.png", "field.pdf")
+FIGURE_FILES = ("tiling.pdf", "overlay.pdf", *FIELD_FILES)
+"""What it holds besides if figures were asked for: for print, as wide as a journal's column, and the
+field of the flow where there is one."""
 
 
 def overlay(result: TileResult, target: Target, *, label: str = "", width_px: int = 1200) -> bytes:
@@ -38,7 +41,21 @@ def overlay(result: TileResult, target: Target, *, label: str = "", width_px: in
 
 def figure_files(result: TileResult) -> tuple[str, ...]:
     """Which of the `FIGURE_FILES` there are: no flow moves a tile that the silhouette bent to."""
-    return () if result.objective == "likeness" else FIGURE_FILES
+    likeness = result.objective == "likeness"
+    return tuple(file for file in FIGURE_FILES if not (likeness and file in FIELD_FILES))
+
+
+def _overlay_picture(result: TileResult, target: Target) -> Picture:
+    """The picture of `overlay` for print."""
+    y_down = target.y_down
+    if result.bent is None or result.rest is None:
+        return overlay_picture(result.tile, target.outline, y_down=y_down)
+    return bending_picture(result.tile, result.rest, result.bent, y_down=y_down)
+
+
+def _field_picture(result: TileResult, sheet: Sheet) -> Picture:
+    field = placed_field(result.model.restore())
+    return field_picture(field, result.normal_tile.group, result.normal_tile, sheet=sheet)
 
 
 def write_tile_folder(
@@ -70,9 +87,10 @@ def write_tile_folder(
         "tiling.svg": lambda: tiling_svg(result.tile, y_down=y_down, title=title, colours=colours),
         "tiling.png": lambda: tiling_png(result.tile, y_down=y_down, colours=colours),
         "overlay.png": lambda: overlay(result, target, label=label),
-        "field.png": lambda: field_png(
-            placed_field(result.model.restore()), result.normal_tile.group, result.normal_tile
-        ),
+        "tiling.pdf": lambda: tiling_picture(result.tile, y_down=y_down, colours=colours).file(),
+        "overlay.pdf": lambda: _overlay_picture(result, target).file(),
+        "field.png": lambda: _field_picture(result, Sheet.screen(1200)).file(),
+        "field.pdf": lambda: _field_picture(result, Sheet.column()).file(),
         "model.safetensors": result.model.to_bytes,
     }
     names = (*TILE_FILES, *(figure_files(result) if figures else ()))

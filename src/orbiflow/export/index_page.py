@@ -22,7 +22,10 @@ CHOICES = {
     "tiling.svg": "the tiling (SVG)",
     "tiling.png": "the tiling (PNG)",
     "overlay.png": "the comparison (PNG)",
+    "tiling.pdf": "the tiling, for print (PDF)",
+    "overlay.pdf": "the comparison, for print (PDF)",
     "field.png": "the flow (PNG)",
+    "field.pdf": "the flow, for print (PDF)",
     "model.safetensors": "the map (safetensors)",
 }
 """Files of a class, in words."""

@@ -6,6 +6,7 @@ import math
 import re
 
 from orbiflow.errors import OrbiflowError
+from orbiflow.figures.sheet import COLUMNS, Sheet
 
 MILLIMETRES = {"mm": 1.0, "cm": 10.0, "in": 25.4, "pt": 25.4 / 72}
 """Of each unit."""
@@ -94,6 +95,34 @@ def pixel_size(text: str, dpi: float) -> tuple[int, int]:
     width, height = size(text)
     per = dpi / MILLIMETRES["in"]
     return max(1, round(width * per)), max(1, round(height * per))
+
+
+def column_width(text: str) -> str | float:
+    """The width of a printed figure: a word of `orbiflow.figures.sheet.COLUMNS`, or mm.
+
+    Raises:
+        OrbiflowError: as `length`, and for a width that no figure has.
+
+    >>> column_width("double"), column_width("8.5cm")
+    ('double', 85.0)
+    """
+    word = text.strip().lower()
+    width = word if word in COLUMNS else length(text)
+    Sheet.column(width)
+    return width
+
+
+def page_size(text: str) -> tuple[float, float]:
+    """As `size`; a journal's "single" or "double" column is two thirds as high as wide.
+
+    Raises:
+        OrbiflowError: as `size`.
+
+    >>> page_size("double"), page_size("3x2cm")
+    ((180.0, 120.0), (30.0, 20.0))
+    """
+    width = COLUMNS.get(text.strip().lower())
+    return size(text) if width is None else (width, round(width / 1.5, 1))
 
 
 def _unit(unit: str, number: str, text: str) -> float:

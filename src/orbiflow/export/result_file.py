@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -41,19 +41,27 @@ class ExportTile:
     model: Path | None = None
 
     @classmethod
-    def of(cls, tile: ExportTile | TileResult | Tile) -> ExportTile:
-        """From whatever holds a tile.
+    def of(cls, tile: TileSource) -> ExportTile:
+        """From whatever holds a tile; of a run's folder, the best one.
 
         Raises:
             OrbiflowError: for what holds none.
+            InputFileError: as `read_result`.
         """
         if isinstance(tile, ExportTile):
             return tile
+        if isinstance(tile, str | Path):
+            return read_result(tile)
         if isinstance(tile, TileResult):
             frame = tile.model.frame
             return cls(tile.tile, frame is not None and frame.y_down, tile.name)
         plain = instance(tile, Tile, "the tile", "read_result(folder) gives one")
         return cls(plain, name=plain.isohedral_class or "tile")
+
+
+TileSource: TypeAlias = ExportTile | TileResult | Tile | str | Path
+"""What the functions of this room take for a tile: a text or path is a run's folder, or its
+result.json, whose best tile is meant; `read_result` gives the others."""
 
 
 def read_result(path: str | Path, which: str | int = 1) -> ExportTile:

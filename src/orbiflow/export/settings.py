@@ -9,6 +9,7 @@ from typing import Any, Literal
 from orbiflow.arguments import number, whole
 from orbiflow.errors import OrbiflowError
 from orbiflow.figures.palette import DEFAULT_PALETTE, palette
+from orbiflow.figures.sheet import COLUMNS
 
 Format = Literal["svg", "pdf", "dxf", "png", "json"]
 Cut = Literal["none", "skeleton", "pieces"]
@@ -121,7 +122,7 @@ class ExportSettings:
 
     @classmethod
     def preset(cls, name: str, **settings: Any) -> ExportSettings:
-        """The settings for "laser", "print", "web" or "plotter", with others over them.
+        """The settings for "laser", "print", "paper", "web" or "plotter", with others over them.
 
         Raises:
             OrbiflowError: for another name or a setting that cannot be used.
@@ -159,6 +160,15 @@ PRESETS: dict[str, dict[str, Any]] = {
         "stroke_width": 0.01,
     },
     "print": {"format": "pdf", "cut": "none", "clip": True, "filled": True},
+    "paper": {
+        "format": "pdf",
+        "cut": "none",
+        "clip": True,
+        "filled": True,
+        "area": (COLUMNS["single"], round(COLUMNS["single"] / 1.5)),
+        "tile_size": 17.0,
+        "stroke_width": 0.12,
+    },
     "web": {"format": "svg", "cut": "none", "clip": True, "filled": True},
     "plotter": {
         "format": "svg",
@@ -169,7 +179,7 @@ PRESETS: dict[str, dict[str, Any]] = {
         "stroke_width": 0.3,
     },
 }
-"""What each machine wants; explicit settings go before."""
+"""What each machine or medium wants; explicit settings go before."""
 
 
 def preset_values(name: str) -> dict[str, Any]:

@@ -8,6 +8,8 @@ import numpy as np
 
 from orbiflow.figures.captioned import arrow, caption, captioned, dashes, strip_middle
 from orbiflow.figures.raster import Raster, rgb
+from orbiflow.figures.sheet import Picture, Sheet
+from orbiflow.figures.vector import vector_picture
 from orbiflow.symmetry.isometry import Array
 from orbiflow.tilings import Tile
 
@@ -46,6 +48,24 @@ def bending_png(
     raster = bending_raster(tile, rest, bent, width_px=width_px, y_down=y_down, text=text)
     _legend(raster)
     return raster.png()
+
+
+def bending_picture(
+    tile: Tile, rest: Array, bent: Array, *, y_down: bool = False, sheet: Sheet | None = None
+) -> Picture:
+    """The picture of `bending_png` for print, in curves; the caption has its legend.
+
+    Args:
+        rest, bent, y_down: as for `bending_png`.
+        sheet: default a journal's single column, as PDF.
+    """
+    raster = bending_raster(tile, rest, bent, width_px=1600, y_down=y_down)
+    title = f"Silhouette bent into a tile {tile.isohedral_class}".strip()
+    caption = (
+        "Dashed: the silhouette as it was, with arrows to where it went. The tile's outline is "
+        "coloured by how far each point moved, from blue, little, to red, far."
+    )
+    return vector_picture(raster, sheet or Sheet.column(), title=title, caption=caption)
 
 
 def bending_raster(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import torch
@@ -16,19 +16,25 @@ from orbiflow.density.spaces.space import Space
 from orbiflow.errors import OrbiflowError
 from orbiflow.figures.immersions import edge_pairs
 from orbiflow.figures.marks import CENTER_COLOURS, center_sign
+from orbiflow.figures.sheet import Sheet
 from orbiflow.symmetry import CrystallographicGroup
 from orbiflow.symmetry.elements import symmetry_elements
 from orbiflow.symmetry.isometry import Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 EDGE_COLOURS = ("#d95f02", "#1f78b4")
 """Of the two pairs of edges that are one edge each."""
 
 INK = "#1a1a1a"
 LONGEST_NAME = 40
+
+HEAD = 0.035
+"""Length of an arrow's head, in sides of the square."""
+
+LETTER = 0.56
+"""Mean width of a letter, in ems."""
 
 
 class View(NamedTuple):
@@ -125,6 +131,21 @@ def axis_label(view: View, column: int) -> str:
     return f"{column_name(view, column)} ({unit_of(view.space)})"
 
 
+def fitted(label: str, side: float, sheet: Sheet) -> str:
+    """The label of an axis of so many inches, in print no longer than that.
+
+    >>> fitted("a name that goes on and on (degrees)", 1.5, Sheet.column())
+    'a name that g… (degrees)'
+    """
+    room = int(side / (LETTER * sheet.em))
+    if not sheet.printed or len(label) <= room:
+        return label
+    name, opening, unit = label.rpartition(" (")
+    ending = opening + unit if room - len(unit) > 8 else ""
+    room -= len(ending)
+    return (name if len(name) <= room else f"{name[: room - 1]}…") + ending
+
+
 def angle_axis(view: View, axis: int) -> tuple[str, list[float], list[str]]:
     """Label, places and texts of the ticks of one axis, for a space that `ANGLE_AXES` has."""
     return ANGLE_AXES[view.space.name](view, axis)
@@ -168,71 +189,57 @@ def angle_text(turns: float, unit: str) -> str:
     return f"\N{MINUS SIGN}{text}" if turns < 0 else text
 
 
-def dress(axes: Axes, view: View, size: float, *, places: bool = True) -> None:
-    """Ticks, edges with their arrows, and cone points, with `places` where these lie in the data."""
-    space = view.space
+def dress(
+    axes: Axes, view: View, sheet: Sheet, *, places: bool = True, upward: bool = True
+) -> None:
+    """Ticks, edges with their arrows, and cone points.
+
+    Args:
+        axes: square ones.
+        places: whether to say where the cone points lie in the data.
+        upward: whether the ticks at the left have texts, and the axis its name.
+    """
+    space, size = view.space, sheet.text
+    side = axes.get_position().width * sheet.width
     axes.set_xlim(0, 1)
     axes.set_ylim(0, 1)
     axes.set_aspect("equal")
     for spine in axes.spines.values():
         spine.set_visible(False)
-    axes.tick_params(labelsize=0.9 * size, length=0.3 * size, pad=0.5 * size)
+    axes.tick_params(labelsize=sheet.small, length=0.3 * size, pad=0.4 * size, width=sheet.pen(0.8))
     axes.set_xticks([])
     axes.set_yticks([])
     if space.name in ANGLE_AXES:
         label, at, texts = angle_axis(view, 0)
-        axes.set_xticks(at, texts)
+        axes.set_xticks(at, apart(at, texts, side, sheet))
+        label = fitted(label, side, sheet)
         axes.set_xlabel(label, fontsize=size, color=INK, parse_math=False)
         label, at, texts = angle_axis(view, 1)
-        axes.set_yticks(at, texts)
-        axes.set_ylabel(label, fontsize=size, color=INK, labelpad=0.2 * size, parse_math=False)
+        label = fitted(label, side, sheet)
+        axes.set_yticks(at, texts if upward else [""] * len(at))
+        if upward:
+            axes.set_ylabel(label, fontsize=size, color=INK, labelpad=0.2 * size, parse_math=False)
+    # signs that can be made out in a small square and are no larger than letters in a large one
+    head = 1.1 * sheet.em / side if sheet.printed else HEAD
     for order, pair in enumerate(edge_pairs(space.group)):
         for edge in pair:
-            _arrow(axes, edge, EDGE_COLOURS[order % 2], order + 1, size)
-    for corner, order in _cones(space.group):
-        sign = np.array(corner) + center_sign(order, 0.018)
+            _arrow(axes, edge, EDGE_COLOURS[order % 2], order + 1, sheet, head)
+    for corner, order in cones(space.group):
+        sign = np.array(corner) + center_sign(order, 0.5 * head)
         axes.fill(
             *sign.T, facecolor=CENTER_COLOURS[order], edgecolor="#ffffff", linewidth=0.08 * size,
             zorder=8, clip_on=False,
         )  # fmt: skip
         if places:
-            _place(axes, space, corner, size)
+            _place(axes, space, corner, sheet)
 
 
-def legend(
-    figure: Figure, space: Space, size: float, *, dots: bool, notes: Sequence[str] = ()
-) -> None:
-    """What edges, signs and dots are, in the lower left corner, and further `notes`."""
-    from matplotlib.lines import Line2D
-
-    entries = [
-        Line2D([], [], color=colour, linewidth=0.28 * size, marker=">", label=_edges_label(text))
-        for colour, text in zip(EDGE_COLOURS, ("orange", "blue"), strict=True)
-    ]
-    for order in sorted({order for _, order in _cones(space.group)}, reverse=True):
-        outline = center_sign(order, 1.0)
-        style: dict[str, Any] = {"marker": np.concatenate([outline, outline[:1]])}
-        style |= {"color": CENTER_COLOURS[order], "markersize": size, "linestyle": "none"}
-        turn = {2: "half", 4: "quarter"}[order]
-        entries.append(
-            Line2D([], [], label=f"cone point of a {turn} turn: no flow moves it", **style)
-        )
-    if dots:
-        style = {"markerfacecolor": "#ffffff", "markeredgecolor": INK, "linestyle": "none"}
-        entries.append(Line2D([], [], marker="o", label="points", **style))
-    if space.is_round:
-        note = "dots crowd where the square shrinks areas"
-        notes = [*([note] if dots else []), *notes]
-    entries += [Line2D([], [], linestyle="none", label=note) for note in notes]
-    figure.legend(
-        handles=entries, loc="lower left", bbox_to_anchor=(0.05, 0.005), ncols=2, frameon=False,
-        fontsize=0.9 * size,
-    )  # fmt: skip
-
-
-def font(figure: Figure) -> float:
-    """Size of its texts, in points."""
-    return 9.5 * figure.get_figwidth() / 8
+def apart(at: list[float], texts: list[str], side: float, sheet: Sheet) -> list[str]:
+    """Texts of ticks along an axis of so many inches: every second one where all would touch."""
+    widest = max(map(len, texts)) * LETTER * sheet.small / 72
+    if len(at) < 3 or 1.3 * widest < (at[1] - at[0]) * side:
+        return texts
+    return [text if k % 2 == 0 else "" for k, text in enumerate(texts)]
 
 
 def check_plane(space: Space) -> None:
@@ -244,26 +251,24 @@ def check_plane(space: Space) -> None:
         raise OrbiflowError(f"a picture needs two dimensions, this {space.name} has {space.dim}")
 
 
-def _edges_label(colour: str) -> str:
-    return f"both {colour} edges are one edge"
-
-
-def _arrow(axes: Axes, edge: Array, colour: str, heads: int, size: float) -> None:
+def _arrow(axes: Axes, edge: Array, colour: str, heads: int, sheet: Sheet, length: float) -> None:
     """An edge with as many heads in its middle as the number of its pair."""
-    axes.plot(*edge.T, color=colour, linewidth=0.28 * size, clip_on=False, zorder=6)
+    size = sheet.text
+    width = (0.16 if sheet.printed else 0.28) * size
+    axes.plot(*edge.T, color=colour, linewidth=width, clip_on=False, zorder=6)
     along = edge[1] - edge[0]
     across = np.array([-along[1], along[0]])
     for k in range(heads):
-        tip = edge[0] + (0.53 + 0.035 * (k - (heads - 1) / 2)) * along
-        back = tip - 0.035 * along
-        ring = np.stack([tip, back + 0.016 * across, back - 0.016 * across])
+        tip = edge[0] + (0.5 + length * (0.86 + k - (heads - 1) / 2)) * along
+        back = tip - length * along
+        ring = np.stack([tip, back + 0.46 * length * across, back - 0.46 * length * across])
         axes.fill(
             *ring.T, facecolor=colour, edgecolor="#ffffff", linewidth=0.06 * size,
             clip_on=False, zorder=7,
         )  # fmt: skip
 
 
-def _cones(group: CrystallographicGroup) -> list[tuple[tuple[float, float], int]]:
+def cones(group: CrystallographicGroup) -> list[tuple[tuple[float, float], int]]:
     """Corners of the square that are rotation centres, and their orders."""
     found = symmetry_elements(group, np.full(2, 0.5), 1.0).centers
     corners = [(x, y) for x in (0.0, 1.0) for y in (0.0, 1.0)]
@@ -275,13 +280,13 @@ def _cones(group: CrystallographicGroup) -> list[tuple[tuple[float, float], int]
     ]
 
 
-def _place(axes: Axes, space: Space, corner: tuple[float, float], size: float) -> None:
+def _place(axes: Axes, space: Space, corner: tuple[float, float], sheet: Sheet) -> None:
     """Where in the data's columns a cone point lies."""
     digits = 2 if len(space.columns) == 3 else 0
     row = space.from_chart(torch.tensor([corner], dtype=torch.float64))[0].round(digits) + 0.0
     text = ", ".join(f"{n} {v:.{digits}f}" for n, v in zip(space.columns, row, strict=True))
     axes.annotate(
-        text.replace("-", "\N{MINUS SIGN}"), corner, xytext=(0, size * (2 * corner[1] - 1)),
+        text.replace("-", "\N{MINUS SIGN}"), corner, xytext=(0, sheet.text * (2 * corner[1] - 1)),
         textcoords="offset points", ha="right" if corner[0] else "left",
-        va="bottom" if corner[1] else "top", fontsize=0.85 * size, color=INK,
+        va="bottom" if corner[1] else "top", fontsize=sheet.small, color=INK,
     )  # fmt: skip

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,15 +15,20 @@ from orbiflow.density.models.blend import BlendedDensity
 from orbiflow.density.models.neural import NeuralFlow
 from orbiflow.density.models.symmetric import SymmetricDensity
 from orbiflow.errors import OrbiflowError
-from orbiflow.figures.canvas import blank_figure, png_bytes
-from orbiflow.figures.density_axes import INK, check_plane, font, space_title, view_of
-from orbiflow.figures.density_square import COLOURS, colour_bar
+from orbiflow.figures.density_axes import INK, check_plane, space_title, view_of
+from orbiflow.figures.density_frame import Room, colour_bar, framed
+from orbiflow.figures.density_square import COLOURS
 from orbiflow.figures.field import draw_flow, draw_magnitude
+from orbiflow.figures.sheet import Picture, Sheet
 from orbiflow.symmetry import CrystallographicGroup
 from orbiflow.symmetry.isometry import Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+SPEED = "speed, sides of the square per unit time"
+SCREEN = Room(1.8, 3.8, 10.8, 2.7, 1.7, 1.5)
+"""With a caption below."""
 
 _TIMES = 16
 """At which a field that changes with time is averaged."""
@@ -36,31 +41,46 @@ def flow_png(
     center: Sequence[float] | None = None,
     width_px: int = 1600,
 ) -> bytes:
-    """PNG of the time mean of the flow's vector fields, over the canonical square and its images.
+    """PNG of `flow_picture` for a screen, in 256 colours.
+
+    Raises:
+        OrbiflowError: as `flow_picture`, and for a size that cannot be made.
+    """
+    sheet = Sheet.screen(width_px)
+    return few_colours(flow_picture(density, cells=cells, center=center, sheet=sheet).file())
+
+
+def flow_picture(
+    density: SymmetricDensity,
+    *,
+    cells: int = 3,
+    center: Sequence[float] | None = None,
+    sheet: Sheet | None = None,
+) -> Picture:
+    """The time mean of the flow's vector fields, over the canonical square and its images.
 
     The square is outlined; the letter F in every cell shows how the cell is the square's image. Of a
-    density with kernels beside the flow, the flow's part alone. The PNG has 256 colours.
+    density with kernels beside the flow, the flow's part alone.
 
     Args:
         density: on a two-dimensional space.
         cells: along each side of the picture, 1 to 9.
         center: of the torus' square; see `orbiflow.figures.density_axes.view_of`.
-        width_px: the height follows.
+        sheet: default a screen of 1600 pixels.
 
     Raises:
-        OrbiflowError: for a space of another dimension, another number of cells, a centre that does
-            not fit, or a size that cannot be made.
+        OrbiflowError: for a space of another dimension, another number of cells, or a centre that
+            does not fit.
     """
-    space = density.space
+    sheet, space = sheet or Sheet.screen(), density.space
     check_plane(space)
     if isinstance(cells, bool) or int(cells) != cells or not 1 <= cells <= 9:
         raise OrbiflowError(f"cells must be an integer from 1 to 9, got {cells!r}")
     view = view_of(space, center=center)
     low, high = 0.5 - cells / 2, 0.5 + cells / 2
     window = (low, low, high, high)
-    figure = blank_figure(width_px, round(0.9 * width_px))
-    size = font(figure)
-    axes = figure.add_axes((0.03, 0.07, 0.7920, 0.88))
+    frame = framed(sheet, None, SPEED, room=None if sheet.printed else SCREEN)
+    axes = frame.axes
     axes.set_xlim(low, high)
     axes.set_ylim(low, high)  # `draw_magnitude` keeps these
 
@@ -68,14 +88,14 @@ def flow_png(
         return mean_field(density, view.to_chart(points))
 
     draw_magnitude(axes, field, window)
-    draw_flow(axes, field, space.group, window)
-    draw_cells(axes, space.group, window)
-    place = figure.add_axes((0.85, 0.07, 0.025, 0.88))
-    colour_bar(axes.images[0], place, "speed, sides of the square per unit time", size)
+    draw_flow(axes, field, space.group, window, pen=sheet.pen)
+    draw_cells(axes, space.group, window, pen=sheet.pen)
+    colour_bar(axes.images[0], frame, sheet, SPEED)
     axes.set_axis_off()
-    caption = f"{_subject(density)}: canonical square outlined, its images thin"
-    figure.text(0.03, 0.025, caption, fontsize=size, color=INK)
-    return _palette_png(png_bytes(figure))
+    title, signs = _subject(density), "canonical square outlined, its images thin"
+    if not sheet.printed:
+        frame.figure.text(0.03, 0.025, f"{title}: {signs}", fontsize=sheet.text, color=INK)
+    return Picture(frame.figure, sheet, title, f"The {signs}.")
 
 
 def _subject(density: SymmetricDensity) -> str:
@@ -85,8 +105,8 @@ def _subject(density: SymmetricDensity) -> str:
     return f"Flow on {name}"
 
 
-def _palette_png(png: bytes) -> bytes:
-    """The same picture in 256 colours: a third of the bytes."""
+def few_colours(png: bytes) -> bytes:
+    """The same picture of a flow in 256 colours: a third of the bytes."""
     chart = Image.new("P", (1, 1))
     chart.putpalette(_palette().tobytes().ljust(768, b"\0"))
     image = Image.open(io.BytesIO(png)).convert("RGB")
@@ -125,18 +145,28 @@ def mean_field(density: SymmetricDensity, points: Tensor) -> Tensor:
     return torch.stack(vectors).mean(dim=0).double().cpu()
 
 
-def draw_cells(axes: Axes, group: CrystallographicGroup, window: Any) -> None:
+def draw_cells(
+    axes: Axes,
+    group: CrystallographicGroup,
+    window: Any,
+    *,
+    pen: Callable[[float], float] = float,
+) -> None:
     """The images of the canonical square in a window, a letter F in each, the square outlined."""
+    thin = pen(0.7)
     for t in np.arange(np.floor(window[0]), np.ceil(window[2]) + 1):
-        axes.axvline(t, color="#ffffff", linewidth=0.7, alpha=0.7, zorder=4)
-        axes.axhline(t, color="#ffffff", linewidth=0.7, alpha=0.7, zorder=4)
+        axes.axvline(t, color="#ffffff", linewidth=thin, alpha=0.7, zorder=4)
+        axes.axhline(t, color="#ffffff", linewidth=thin, alpha=0.7, zorder=4)
     square = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]])
     for colour, width in (("#111111", 3.6), ("#ffd166", 1.8)):
-        axes.plot(*square.T, color=colour, linewidth=width, solid_joinstyle="miter", zorder=5)
+        axes.plot(*square.T, color=colour, linewidth=pen(width), solid_joinstyle="miter", zorder=5)
     letter = np.array(
         [[0, 0], [0, 5], [3, 5], [3, 4], [1, 4], [1, 3], [2.4, 3], [2.4, 2], [1, 2], [1, 0]]
     )
     letter = 0.07 + 0.026 * letter
     middle = np.full(2, 0.5)
     for g in group.elements_near(middle, window[2] - window[0], source=middle):
-        axes.fill(*g(letter).T, facecolor="#ffd166", edgecolor="#111111", linewidth=0.5, zorder=6)
+        axes.fill(
+            *g(letter).T, facecolor="#ffd166", edgecolor="#111111", linewidth=pen(0.5),
+            zorder=6,
+        )  # fmt: skip

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 import numpy as np
 import torch
@@ -11,18 +11,12 @@ from torch import Tensor
 
 from orbiflow.density.models.blend import BlendedDensity
 from orbiflow.density.models.symmetric import SymmetricDensity, midpoints
-from orbiflow.figures.canvas import blank_figure, png_bytes
-from orbiflow.figures.density_axes import (
-    INK,
-    check_plane,
-    dress,
-    font,
-    legend,
-    space_title,
-    view_of,
-)
+from orbiflow.figures.density_axes import INK, check_plane, dress, space_title, view_of
+from orbiflow.figures.density_frame import Framed, colour_bar, framed, side_by_side
+from orbiflow.figures.density_legend import caption, legend
 from orbiflow.figures.density_scale import Shade, bar_label, bar_ticks, minor_places, shading
 from orbiflow.figures.density_values import density_on_grid, is_sharp, takes_logarithms
+from orbiflow.figures.sheet import Picture, Sheet
 from orbiflow.symmetry.isometry import Array
 
 if TYPE_CHECKING:
@@ -36,7 +30,36 @@ _GRID, _FINE_GRID = 240, 360
 """Pixels along a side at which a density is evaluated: of a flow, and with kernels beside it."""
 
 
+class AxesOptions(TypedDict, total=False):
+    """Of `samples_picture`."""
+
+    names: Sequence[str] | None
+    center: Sequence[float] | None
+
+
+class DensityOptions(AxesOptions, total=False):
+    """Of `density_picture`."""
+
+    measure: str
+    scale: str
+
+
 def density_png(
+    density: SymmetricDensity,
+    samples: Tensor | None = None,
+    *,
+    width_px: int = 1600,
+    **options: Unpack[DensityOptions],
+) -> bytes:
+    """PNG of `density_picture`, which has the `options`, for a screen; the height follows.
+
+    Raises:
+        OrbiflowError: as `density_picture`, and for a size that cannot be made.
+    """
+    return density_picture(density, samples, sheet=Sheet.screen(width_px), **options).file()
+
+
+def density_picture(
     density: SymmetricDensity,
     samples: Tensor | None = None,
     *,
@@ -44,9 +67,9 @@ def density_png(
     scale: str = "linear",
     names: Sequence[str] | None = None,
     center: Sequence[float] | None = None,
-    width_px: int = 1600,
-) -> bytes:
-    """PNG of a density on the canonical square, with the edges marked that are the same edge.
+    sheet: Sheet | None = None,
+) -> Picture:
+    """A density on the canonical square, with the edges marked that are the same edge.
 
     Edges of one colour and number of arrow heads are identified, in the sense of the arrows. Ticks
     are in the user's units where the chart is a plain rescaling of them (torus, Klein bottle).
@@ -59,12 +82,13 @@ def density_png(
         measure: with respect to which the density is drawn (`orbiflow.density.spaces.space.MEASURES`).
         scale: of the colours, one of `orbiflow.figures.density_scale.SCALES`.
         names, center: of the axes; see `orbiflow.figures.density_axes.view_of`.
-        width_px: the height follows.
+        sheet: default a screen of 1600 pixels.
 
     Raises:
         OrbiflowError: for a space of another dimension, an unknown measure or scale, samples of
-            another shape, names or a centre that do not fit, or a size that cannot be made.
+            another shape, or names or a centre that do not fit.
     """
+    sheet = sheet or Sheet.screen()
     space, count = density.space, _FINE_GRID if isinstance(density, BlendedDensity) else _GRID
     check_plane(space)
     view = view_of(space, names, center)
@@ -72,22 +96,23 @@ def density_png(
     values = density_on_grid(density, middles + view.low[0], middles + view.low[1], measure)
     areas = space.log_area(midpoints(space, count)).exp().numpy().reshape(count, count)
     shade = shading(values, areas, log=takes_logarithms(density, measure, scale))
-    figure = blank_figure(width_px, round(0.94 * width_px))
-    size = font(figure)
-    axes = figure.add_axes((0.11, 0.163, 0.7, 0.7447))
-    image = axes.imshow(
+    label = bar_label(shade, space, measure)
+    frame = framed(sheet, view, label, [tick.text for tick in bar_ticks(shade)])
+    image = frame.axes.imshow(
         shade.places(values).T, extent=(0, 1, 0, 1), origin="lower", cmap=COLOURS,
         interpolation="bicubic", vmin=0, vmax=1,
     )  # fmt: skip
     if samples is not None:
-        draw_dots(axes, view.places(samples), 0.55)
-    place = figure.add_axes((0.865, 0.163, 0.025, 0.7447))
-    _shade_bar(image, place, shade, bar_label(shade, space, measure), size)
-    dress(axes, view, size)
-    axes.set_title(f"Density on the {space_title(space)}", fontsize=1.15 * size, pad=14)
-    notes = [average_note(count)] if is_sharp(density, 1 / count) else []
-    legend(figure, space, size, dots=samples is not None, notes=notes)
-    return png_bytes(figure)
+        draw_dots(frame.axes, view.places(samples), 0.55, shrink=_dot_shrink(sheet, frame.side))
+    _shade_bar(image, frame, sheet, shade, label)
+    dress(frame.axes, view, sheet)
+    title = f"Density on the {space_title(space)}"
+    signs: dict[str, Any] = {"dots": samples is not None}
+    signs["notes"] = [average_note(count)] if is_sharp(density, 1 / count) else []
+    if not sheet.printed:
+        frame.axes.set_title(title, fontsize=1.15 * sheet.text, pad=14)
+        legend(frame.figure, space, sheet, **signs)
+    return Picture(frame.figure, sheet, title, caption(space, **signs))
 
 
 def samples_png(
@@ -95,11 +120,28 @@ def samples_png(
     data: Tensor,
     drawn: Tensor,
     *,
+    width_px: int = 1600,
+    **options: Unpack[AxesOptions],
+) -> bytes:
+    """PNG of `samples_picture`, which has the `options`, for a screen.
+
+    Raises:
+        OrbiflowError: as `samples_picture`, and for a size that cannot be made.
+    """
+    sheet = Sheet.screen(width_px)
+    return samples_picture(density, data, drawn, sheet=sheet, **options).file()
+
+
+def samples_picture(
+    density: SymmetricDensity,
+    data: Tensor,
+    drawn: Tensor,
+    *,
     names: Sequence[str] | None = None,
     center: Sequence[float] | None = None,
-    width_px: int = 1600,
-) -> bytes:
-    """PNG of data and samples side by side on the canonical square.
+    sheet: Sheet | None = None,
+) -> Picture:
+    """Data and samples side by side on the canonical square.
 
     Args:
         density: on a two-dimensional space.
@@ -107,43 +149,34 @@ def samples_png(
             `density.sample((M,))`; at most `MAX_DOTS` of each are drawn, the same number where
             there are enough.
         names, center: of the axes; see `orbiflow.figures.density_axes.view_of`.
+        sheet: default a screen of 1600 pixels.
 
     Raises:
-        OrbiflowError: for a space of another dimension, points of another shape, names or a centre
-            that do not fit, or a size that cannot be made.
+        OrbiflowError: for a space of another dimension, points of another shape, or names or a
+            centre that do not fit.
     """
-    space = density.space
+    sheet, space = sheet or Sheet.screen(), density.space
     check_plane(space)
     view = view_of(space, names, center)
     both = [view.places(points) for points in (data, drawn)]
     count = min(len(points) for points in both) or MAX_DOTS
-    figure = blank_figure(width_px, round(0.56 * width_px))
-    size = 0.9 * font(figure)
-    for k, (name, points) in enumerate(zip(("data", "samples"), both, strict=True)):
-        axes = figure.add_axes((0.085 + 0.485 * k, 0.14, 0.39, 0.6964))
+    figure, panels, side = side_by_side(sheet, view)
+    shrink = _dot_shrink(sheet, side)
+    heads = ("data", "samples")
+    for axes, name, points in zip(panels, heads, both, strict=True):
         axes.set_facecolor("#f4f4f1")
-        draw_dots(axes, points, 0.5, limit=count, fill="#3b528b", rim="none")
-        dress(axes, view, size, places=False)
+        draw_dots(axes, points, 0.5, limit=count, fill="#3b528b", rim="none", shrink=shrink)
+        dress(axes, view, sheet, places=False, upward=axes is panels[0])
         shown = min(len(points), count, MAX_DOTS)
         few = "" if shown == len(points) else f"{shown} of "
-        axes.set_title(f"{few}{len(points)} {name}", fontsize=1.1 * size, pad=8)
-    return png_bytes(figure)
+        axes.set_title(f"{few}{len(points)} {name}", fontsize=sheet.text, pad=0.7 * sheet.text)
+    title = f"Data and samples on the {space_title(space)}"
+    return Picture(figure, sheet, title, caption(space, dots=True))
 
 
 def average_note(count: int) -> str:
     """What a picture of `count` pixels along a side says of peaks that are narrower."""
     return f"peaks narrower than 1/{count} of a side are averaged over it"
-
-
-def colour_bar(
-    image: AxesImage, place: Axes, label: str, size: float, extend: str = "neither"
-) -> None:
-    """The bar of an image's colours, in the axes `place`."""
-    bar = place.figure.colorbar(image, cax=place, extend=extend)
-    bar.set_label(label, fontsize=size, color=INK)
-    bar.ax.tick_params(labelsize=0.9 * size)
-    bar.ax.yaxis.get_offset_text().set_fontsize(0.9 * size)
-    bar.outline.set_visible(False)
 
 
 def draw_dots(
@@ -155,16 +188,19 @@ def draw_dots(
     fill: str = "#ffffff",
     rim: str = INK,
     shrink: float = 1.0,
+    rasterized: bool = False,
 ) -> None:
     """Points (N, 2) of the window as dots, at most `limit` and `MAX_DOTS` of them.
 
     Args:
         shrink: what to multiply the dots' area by.
+        rasterized: whether they are pixels in a PDF or SVG, too: for more than such files should hold.
     """
     points = thinned(points, min(limit, MAX_DOTS))
     axes.scatter(
         *points.T, s=shrink * max(2.0, 9.0 - len(points) / 500), c=fill, edgecolors=rim,
-        linewidths=0.35, alpha=alpha, zorder=3,
+        linewidths=0.35 * shrink**0.5, alpha=alpha, zorder=3,
+        rasterized=rasterized,
     )  # fmt: skip
 
 
@@ -175,9 +211,14 @@ def thinned(points: Array, limit: int = MAX_DOTS) -> Array:
     return points[np.random.default_rng(0).choice(len(points), limit, replace=False)]
 
 
-def _shade_bar(image: AxesImage, place: Axes, shade: Shade, label: str, size: float) -> None:
+def _dot_shrink(sheet: Sheet, side: float) -> float:
+    """Of dots in a square of so many inches: those on a screen have one of 5.6."""
+    return max(0.2, (side / 5.6) ** 2) if sheet.printed else 1.0
+
+
+def _shade_bar(image: AxesImage, frame: Framed, sheet: Sheet, shade: Shade, label: str) -> None:
     extend = {(True, False): "max", (False, True): "min"}.get((shade.cut, shade.faint), "neither")
-    colour_bar(image, place, label, size, extend)
+    colour_bar(image, frame, sheet, label, extend)
     ticks = bar_ticks(shade)
-    place.set_yticks([tick.at for tick in ticks], [tick.text for tick in ticks])
-    place.set_yticks(minor_places(shade), minor=True)
+    frame.bar.set_yticks([tick.at for tick in ticks], [tick.text for tick in ticks])
+    frame.bar.set_yticks(minor_places(shade), minor=True)

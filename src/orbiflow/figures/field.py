@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 import numpy as np
 import torch
 
 from orbiflow.errors import OrbiflowError
-from orbiflow.figures.canvas import blank_figure, plane_axes, png_bytes
+from orbiflow.figures.canvas import plane_axes
 from orbiflow.figures.flow_lines import flow_lines, symmetric_seeds
 from orbiflow.figures.marks import mark_symmetry, outline_cell
+from orbiflow.figures.sheet import Picture, Sheet
 from orbiflow.symmetry import CrystallographicGroup
 from orbiflow.symmetry.isometry import Array
 from orbiflow.symmetry.lattices import reduced_basis
@@ -29,12 +30,36 @@ def field_png(
     group: CrystallographicGroup,
     tile: Tile | None = None,
     *,
-    window: Window | None = None,
     width_px: int = 1200,
+    **options: Unpack[FieldOptions],
+) -> bytes:
+    """PNG of `field_picture` for a screen; the height follows from the window.
+
+    Raises:
+        OrbiflowError: as `field_picture`, and for a size that cannot be made.
+    """
+    return field_picture(velocity, group, tile, sheet=Sheet.screen(width_px), **options).file()
+
+
+class FieldOptions(TypedDict, total=False):
+    """Of `field_picture`."""
+
+    window: Window | None
+    y_down: bool
+    signs: bool
+
+
+def field_picture(
+    velocity: Callable[[Any], Any],
+    group: CrystallographicGroup,
+    tile: Tile | None = None,
+    *,
+    window: Window | None = None,
     y_down: bool = False,
     signs: bool = True,
-) -> bytes:
-    """PNG of a vector field: magnitude as colour, short flow lines over it.
+    sheet: Sheet | None = None,
+) -> Picture:
+    """A vector field: magnitude as colour, short flow lines over it.
 
     After the paper's figure of results. The lines start at an orbit of the group, so the picture has
     the symmetry that the field has, and shows it where the field has not.
@@ -45,28 +70,29 @@ def field_png(
         group: whose lattice cell is outlined, and whose rotation centres and lines are marked.
         tile: drawn on top, if given.
         window: default about four cells around the tile or the origin.
-        width_px: the height follows from the window.
         y_down: whether the y axis points down, as in images.
         signs: whether to mark rotation centres and lines.
+        sheet: default a screen of 1200 pixels.
 
     Raises:
         OrbiflowError: if the field does not return finite vectors of the points' shape.
     """
+    sheet = sheet or Sheet.screen(1200)
     middle = np.zeros(2) if tile is None else tile.center
     window = window or _about_four_cells(group, middle)
-    aspect = (window[3] - window[1]) / (window[2] - window[0])
-    figure = blank_figure(width_px, round(width_px * aspect))
+    figure = sheet.figure(sheet.width * (window[3] - window[1]) / (window[2] - window[0]))
     axes = plane_axes(figure, window, y_down=y_down)
     draw_magnitude(axes, velocity, window)
-    draw_flow(axes, velocity, group, window)
-    outline_cell(axes, group, middle)
+    draw_flow(axes, velocity, group, window, pen=sheet.pen)
+    outline_cell(axes, group, middle, pen=sheet.pen)
     if tile is not None:
         ring = np.concatenate([tile.polygon, tile.polygon[:1]])
-        axes.plot(*ring.T, color="#111111", linewidth=2.6, zorder=5)
-        axes.plot(*ring.T, color="#ffd166", linewidth=1.5, zorder=5)
+        axes.plot(*ring.T, color="#111111", linewidth=sheet.pen(2.6), zorder=5)
+        axes.plot(*ring.T, color="#ffd166", linewidth=sheet.pen(1.5), zorder=5)
     if signs:
-        mark_symmetry(axes, group, window, size=0.03 * np.sqrt(group.cell_volume))
-    return png_bytes(figure)
+        size = 0.03 * np.sqrt(group.cell_volume)
+        mark_symmetry(axes, group, window, size=size, pen=sheet.pen)
+    return Picture(figure, sheet, "Vector field", "Colour is the field's magnitude.")
 
 
 def draw_magnitude(
@@ -92,8 +118,16 @@ def draw_magnitude(
 
 
 def draw_flow(
-    axes: Axes, velocity: Callable[[Any], Any], group: CrystallographicGroup, window: Window
+    axes: Axes,
+    velocity: Callable[[Any], Any],
+    group: CrystallographicGroup,
+    window: Window,
+    *,
+    pen: Callable[[float], float] = float,
 ) -> None:
+    """Lines with heads and fading tails; `pen` gives the width in points of a line as wide as its
+    argument on a screen.
+    """
     from matplotlib.collections import LineCollection, PolyCollection
 
     scale = np.sqrt((window[2] - window[0]) * (window[3] - window[1]))
@@ -106,7 +140,9 @@ def draw_flow(
     segments = np.stack([lines[:, :-1], lines[:, 1:]], axis=2).reshape(-1, 2, 2)
     alpha = np.tile(np.linspace(0.05, 0.9, lines.shape[1] - 1), len(lines))
     colours = np.concatenate([np.ones((len(segments), 3)), alpha[:, None]], axis=1)
-    axes.add_collection(LineCollection(list(segments), colors=colours, linewidths=0.9, zorder=2))
+    axes.add_collection(
+        LineCollection(list(segments), colors=colours, linewidths=pen(0.9), zorder=2)
+    )
     # heads at the seeds, which keep their distance; at the ends they would pile up in every sink
     middle = lines.shape[1] // 2
     along = lines[:, middle + 1] - lines[:, middle - 1]

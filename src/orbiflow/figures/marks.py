@@ -6,6 +6,7 @@ mirrors (International Tables for Crystallography, volume A, section 1.4).
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -37,13 +38,20 @@ def center_sign(order: int, size: float) -> Array:
 
 
 def mark_symmetry(
-    axes: Axes, group: CrystallographicGroup, window: Window, *, size: float, halo: str = "#ffffff"
+    axes: Axes,
+    group: CrystallographicGroup,
+    window: Window,
+    *,
+    size: float,
+    halo: str = "#ffffff",
+    pen: Callable[[float], float] = float,
 ) -> None:
     """Mark all rotation centres and lines of `group` in `window`.
 
     Args:
         size: radius of the signs, in the group's units.
         halo: colour of the thin rim that sets the marks off the picture.
+        pen: from widths of lines on a screen to those here, in points.
     """
     low, high = np.array(window[:2]), np.array(window[2:])
     middle, reach = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
@@ -51,22 +59,30 @@ def mark_symmetry(
     for line in found.lines:
         ends = np.stack([line.line.point + s * reach * line.line.direction for s in (-1.0, 1.0)])
         style = "-" if line.is_mirror else (0, (5, 3))
-        axes.plot(*ends.T, color=halo, linewidth=2.2, alpha=0.5, zorder=4)
-        axes.plot(*ends.T, color=LINE_COLOUR, linewidth=1.2, linestyle=style, zorder=5)
+        axes.plot(*ends.T, color=halo, linewidth=pen(2.2), alpha=0.5, zorder=4)
+        axes.plot(*ends.T, color=LINE_COLOUR, linewidth=pen(1.2), linestyle=style, zorder=5)
     for center in found.centers:
         sign = center.point + center_sign(center.order, size)
         axes.fill(
-            *sign.T, facecolor=CENTER_COLOURS[center.order], edgecolor=halo, linewidth=0.6, zorder=6
-        )
+            *sign.T, facecolor=CENTER_COLOURS[center.order], edgecolor=halo, linewidth=pen(0.6),
+            zorder=6,
+        )  # fmt: skip
 
 
 def outline_cell(
-    axes: Axes, group: CrystallographicGroup, middle: Array, *, colour: str = "#111111"
+    axes: Axes,
+    group: CrystallographicGroup,
+    middle: Array,
+    *,
+    colour: str = "#111111",
+    pen: Callable[[float], float] = float,
 ) -> None:
-    """Outline the lattice cell `cell_ring(group, middle)`."""
+    """Outline the lattice cell `cell_ring(group, middle)`; `pen` as in `mark_symmetry`."""
     ring = cell_ring(group, middle)
-    axes.plot(*ring.T, color="#ffffff", linewidth=3.2, alpha=0.7, solid_joinstyle="miter", zorder=5)
-    axes.plot(*ring.T, color=colour, linewidth=1.7, solid_joinstyle="miter", zorder=5)
+    for ink, width, alpha in (("#ffffff", 3.2, 0.7), (colour, 1.7, 1.0)):
+        axes.plot(
+            *ring.T, color=ink, linewidth=pen(width), alpha=alpha, solid_joinstyle="miter", zorder=5
+        )
 
 
 def cell_ring(group: CrystallographicGroup, middle: Array) -> Array:

@@ -33,19 +33,25 @@ SHARP = 0.3
 """Turn in radians beyond which a line's joint is rounded: flatter ones show no notch."""
 
 
-class _Polygon(NamedTuple):
+class Filled(NamedTuple):
+    """A polygon, in pixels, in the colour of that number."""
+
     points: Array
     holes: tuple[Array, ...]
     colour: int
 
 
-class _Line(NamedTuple):
+class Drawn(NamedTuple):
+    """A line, in pixels, in the colour of that number."""
+
     points: Array
     width: float
     colour: int
 
 
-class _Text(NamedTuple):
+class Words(NamedTuple):
+    """A text at a place in pixels."""
+
     place: tuple[float, float]
     text: str
     size: float
@@ -56,7 +62,8 @@ class _Text(NamedTuple):
 class Raster:
     """A window of the plane, and below it a strip for a legend.
 
-    Things are drawn in the order in which they are added, and only when `image` is called.
+    Things are drawn in the order in which they are added, and only when `image` is called; until then
+    they are `shapes` and `texts`, which `orbiflow.figures.vector` draws as curves.
 
     Args:
         window: (xmin, ymin, xmax, ymax), in the units of all points.
@@ -91,9 +98,9 @@ class Raster:
         self._origin = np.array([window[0], window[1] if y_down else window[3]])
         self._signs = np.array([1.0, 1.0 if y_down else -1.0])
         self.paper = paper
-        self._colours = [paper]
-        self._shapes: list[_Polygon | _Line] = []
-        self._texts: list[_Text] = []
+        self.colours = [paper]
+        self.shapes: list[Filled | Drawn] = []
+        self.texts: list[Words] = []
 
     def to_pixels(self, points: Array) -> Array:
         """(..., 2) points of the plane in pixels from the upper left corner."""
@@ -102,7 +109,7 @@ class Raster:
     def fill(self, rings: Sequence[Array], colour: str) -> None:
         """Fill closed polygons (N, 2), their border included."""
         number = self._number(colour)
-        self._shapes += [_Polygon(self.to_pixels(ring), (), number) for ring in rings]
+        self.shapes += [Filled(self.to_pixels(ring), (), number) for ring in rings]
 
     def fill_geometry(self, geometry: Any, colour: str) -> None:
         """Fill a shapely geometry, holes left as they are; lines and points in it are ignored."""
@@ -114,7 +121,7 @@ class Raster:
                     self.to_pixels(np.asarray(ring.coords))
                     for ring in (part.exterior, *part.interiors)
                 )
-                self._shapes.append(_Polygon(outer, tuple(holes), self._number(colour)))
+                self.shapes.append(Filled(outer, tuple(holes), self._number(colour)))
 
     def line(
         self, points: Array, colour: str, width_px: float, *, closed: bool = False, pixels=False
@@ -122,11 +129,11 @@ class Raster:
         """A line along (N, 2) points of the plane, or of the picture if `pixels`; ends are round."""
         path = points if pixels else self.to_pixels(points)
         path = np.concatenate([path, path[:1]]) if closed else path
-        self._shapes.append(_Line(path, width_px, self._number(colour)))
+        self.shapes.append(Drawn(path, width_px, self._number(colour)))
 
     def fill_pixels(self, ring: Array, colour: str) -> None:
         """Fill a polygon (N, 2) in pixels of the picture."""
-        self._shapes.append(_Polygon(np.asarray(ring, float), (), self._number(colour)))
+        self.shapes.append(Filled(np.asarray(ring, float), (), self._number(colour)))
 
     def text(
         self,
@@ -140,7 +147,7 @@ class Raster:
     ) -> None:
         """Words at a place of the picture in pixels, `size` pixels high; Pillow's `anchor`."""
         self._number(colour)
-        self._texts.append(_Text((x, y), text, size, anchor, colour))
+        self.texts.append(Words((x, y), text, size, anchor, colour))
 
     def image(self) -> Image.Image:
         """The picture, RGB."""
@@ -149,29 +156,29 @@ class Raster:
         for top in range(0, self.height, rows):
             picture.paste(self._band(top, min(rows, self.height - top)), (0, top))
         pen = ImageDraw.Draw(picture)
-        for place, text, size, anchor, colour in self._texts:
+        for place, text, size, anchor, colour in self.texts:
             pen.text(place, text, fill=colour, font=font(size), anchor=anchor)
         return picture
 
     def png(self) -> bytes:
         """The picture as PNG."""
-        return palette_png(self.image(), self._colours)
+        return palette_png(self.image(), self.colours)
 
     def _number(self, colour: str) -> int:
-        if colour not in self._colours:
-            self._colours.append(colour)
-        return self._colours.index(colour)
+        if colour not in self.colours:
+            self.colours.append(colour)
+        return self.colours.index(colour)
 
     def _band(self, top: int, rows: int) -> Image.Image:
         band = Image.new("P", (self.width * FINER, rows * FINER))
-        band.putpalette([value for colour in self._colours for value in rgb(colour)])
+        band.putpalette([value for colour in self.colours for value in rgb(colour)])
         pen = ImageDraw.Draw(band)
-        for shape in self._shapes:
-            reach = shape.width if isinstance(shape, _Line) else 1.0
+        for shape in self.shapes:
+            reach = shape.width if isinstance(shape, Drawn) else 1.0
             low, high = shape.points[:, 1].min() - reach, shape.points[:, 1].max() + reach
             if high < top or low > top + rows:
                 continue
-            if isinstance(shape, _Line):
+            if isinstance(shape, Drawn):
                 _draw_line(pen, _fine(shape.points, top), shape.width * FINER, shape.colour)
             elif shape.holes:
                 _draw_with_holes(band, shape, top)
@@ -201,7 +208,7 @@ def _draw_line(pen: ImageDraw.ImageDraw, path: Array, width: float, colour: int)
         pen.circle(tuple(point.tolist()), (whole - 1) / 2, fill=colour)
 
 
-def _draw_with_holes(band: Image.Image, shape: _Polygon, top: int) -> None:
+def _draw_with_holes(band: Image.Image, shape: Filled, top: int) -> None:
     mask = Image.new("1", band.size)
     pen = ImageDraw.Draw(mask)
     pen.polygon(_flat(_fine(shape.points, top)), fill=1)

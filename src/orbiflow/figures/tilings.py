@@ -12,6 +12,8 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.figures.captioned import caption, captioned, strip_middle
 from orbiflow.figures.palette import DEFAULT_PALETTE, Palette, palette
 from orbiflow.figures.raster import Raster
+from orbiflow.figures.sheet import Picture, Sheet
+from orbiflow.figures.vector import vector_picture
 from orbiflow.figures.window import default_window
 from orbiflow.tilings import Colouring, Tile, colouring, copies_meeting
 from orbiflow.tilings.patch import Window, checked_window
@@ -84,6 +86,34 @@ def tiling_raster(
     return raster
 
 
+def tiling_picture(
+    tile: Tile,
+    window: Window | None = None,
+    *,
+    palette_name: str | Palette = DEFAULT_PALETTE,
+    colours: Colouring | None = None,
+    y_down: bool = False,
+    sheet: Sheet | None = None,
+) -> Picture:
+    """The picture of `tiling_png` for print, in curves.
+
+    Args:
+        window, palette_name, colours, y_down: as for `tiling_png`.
+        sheet: default a journal's single column, as PDF.
+
+    Raises:
+        OrbiflowError: as `tiling_png`.
+    """
+    instance(tile, Tile, "the tile", "Tile(polygon, group) makes one")
+    raster = tiling_raster(
+        tile, window, width_px=1600, palette_name=palette_name, colours=colours, y_down=y_down,
+        outline_px=3.0,
+    )  # fmt: skip
+    name = f"a tile of class {tile.isohedral_class}" if tile.isohedral_class else "a tile"
+    title = f"Tiling by copies of {name}"
+    return vector_picture(raster, sheet or Sheet.column(), title=title, caption="")
+
+
 def overlay_png(
     tile: Tile,
     target: ArrayLike | BaseGeometry,
@@ -109,6 +139,28 @@ def overlay_png(
     raster = overlay_raster(tile, goal, width_px=width_px, y_down=y_down, text=text)
     _legend(raster)
     return raster.png()
+
+
+def overlay_picture(
+    tile: Tile,
+    target: ArrayLike | BaseGeometry,
+    *,
+    y_down: bool = False,
+    sheet: Sheet | None = None,
+) -> Picture:
+    """The picture of `overlay_png` for print, in curves; the caption has its legend.
+
+    Args:
+        target, y_down: as for `overlay_png`.
+        sheet: default a journal's single column, as PDF.
+
+    Raises:
+        OrbiflowError: as `overlay_png`.
+    """
+    raster = overlay_raster(tile, target, width_px=1600, y_down=y_down)
+    title = f"Tile {tile.isohedral_class} over the silhouette".replace("  ", " ")
+    caption = "Grey: in both. Orange: missing, in the silhouette alone. Blue: added."
+    return vector_picture(raster, sheet or Sheet.column(), title=title, caption=caption)
 
 
 def overlay_raster(

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 from orbiflow.cancel import Cancel
 from orbiflow.export.animation import AnimationSettings, animation
 from orbiflow.export.result_file import read_result
 from orbiflow.files import write_atomic
+from orbiflow.jobs.asked import given
 from orbiflow.jobs.events import Finished, Note, Progress, Written
 from orbiflow.jobs.place import check_place
 from orbiflow.jobs.requests import AnimateRequest
@@ -55,11 +55,7 @@ def animate(request: AnimateRequest, tell: Sink, cancel: Cancel) -> Finished:
 
 
 def _settings(request: AnimateRequest) -> AnimationSettings:
-    asked: dict[str, Any] = {
-        name: value
-        for name in ("seconds", "fps", "size", "palette")
-        if (value := getattr(request, name)) is not None
-    }
+    asked = given(request, ("seconds", "fps", "size", "palette"))
     if request.out is not None:
         asked["format"] = request.out.suffix.lower().lstrip(".")
     return AnimationSettings(kind=request.animation, **asked)

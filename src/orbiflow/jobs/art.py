@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 from orbiflow.cancel import Cancel
-from orbiflow.errors import OrbiflowError
 from orbiflow.export.art.making import Artwork, artwork
 from orbiflow.export.art.over import read_over
 from orbiflow.export.art.settings import ArtSettings
@@ -15,6 +14,7 @@ from orbiflow.export.art.writing import write_artwork
 from orbiflow.export.exporting import require_certified
 from orbiflow.export.lengths import pixel_size, pixels
 from orbiflow.files import write_atomic
+from orbiflow.jobs.asked import given, read_as
 from orbiflow.jobs.events import Finished, Note, Progress, Written
 from orbiflow.jobs.place import check_place
 from orbiflow.jobs.records import RecordError
@@ -78,40 +78,22 @@ def _said(made: Artwork, path: Path) -> str:
 
 
 def _settings(request: ArtRequest) -> ArtSettings:
-    asked: dict[str, Any] = {
-        name: value
-        for name in ("tolerance", "palette", "colour", "dpi")
-        if (value := getattr(request, name)) is not None
-    }
+    asked = given(request, ("tolerance", "palette", "colour", "dpi"))
     dpi = request.dpi or ArtSettings.dpi
     if request.engrave or request.strokes:
         asked["engrave"] = request.strokes or "hatch"
-    asked["repeat"] = request.repeat
-    try:
-        if request.size is not None:
-            asked["size"] = _named("size", pixel_size, request.size, dpi)
-        if request.tile_size is not None:
-            asked["tile_size"] = _named("tile_size", pixels, request.tile_size, dpi)
-        if request.outline is not None:
-            none = request.outline.strip().lower() == "none"
-            asked["outline"] = 0.0 if none else _outline(request.outline, dpi)
-        asked["eyes"] = tuple(_eye(text) for text in request.eyes)
-        return ArtSettings(**asked)
-    except RecordError:
-        raise
-    except OrbiflowError as error:
-        raise RecordError(str(error).replace("{", "(").replace("}", ")")) from error
-
-
-def _named(name: str, read: Any, text: str, dpi: float) -> Any:
-    try:
-        return read(text, dpi)
-    except OrbiflowError as error:
-        raise RecordError(f"{{{name}}} {str(error).replace('{', '(')}") from error
+    if request.size is not None:
+        asked["size"] = read_as("size", partial(pixel_size, dpi=dpi), request.size)
+    if request.tile_size is not None:
+        asked["tile_size"] = read_as("tile_size", partial(pixels, dpi=dpi), request.tile_size)
+    if request.outline is not None:
+        asked["outline"] = read_as("outline", partial(_outline, dpi=dpi), request.outline)
+    eyes = tuple(_eye(text) for text in request.eyes)
+    return ArtSettings(repeat=request.repeat, eyes=eyes, **asked)
 
 
 def _outline(text: str, dpi: float) -> float:
-    return _named("outline", lambda given, per: pixels(given, per, zero=True), text, dpi)
+    return 0.0 if text.strip().lower() == "none" else pixels(text, dpi, zero=True)
 
 
 def _eye(text: str) -> tuple[float, ...]:

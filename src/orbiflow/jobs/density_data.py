@@ -8,11 +8,11 @@ from typing import Any
 from orbiflow.density import SymmetricDensity, read_density
 from orbiflow.density.tables import Table, read_table
 from orbiflow.errors import OrbiflowError
+from orbiflow.export.density_plots import MODEL
 from orbiflow.jobs.events import Note
 from orbiflow.jobs.run import Sink
 
-MODEL, REPORT = "density.safetensors", "report.json"
-PICTURES = ("density.png", "flow.png", "samples.png", "surface.html")
+REPORT = "report.json"
 
 
 def model_at(path: Path) -> tuple[SymmetricDensity, dict[str, Any]]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import time
 from typing import Any
@@ -19,16 +18,11 @@ from orbiflow.escher import (
 )
 from orbiflow.escher.methods import Settings
 from orbiflow.escher.report import report
-from orbiflow.export.folder import figure_files
-from orbiflow.export.gallery import (
-    OVERVIEW,
-    RESULT,
-    write_front,
-    write_gallery,
-    written_files,
-)
-from orbiflow.files import write_atomic
+from orbiflow.export.folder import FIELD_FILES, figure_files
+from orbiflow.export.gallery import OVERVIEW, written_files
+from orbiflow.export.run_folder import fill_run
 from orbiflow.folders import ResultFolder
+from orbiflow.jobs.asked import given
 from orbiflow.jobs.events import (
     ClassFailed,
     Finished,
@@ -148,11 +142,7 @@ def _class_names(classes: tuple[str, ...] | None) -> list[str]:
 
 
 def _settings(request: EscherizeRequest) -> Settings:
-    asked: dict[str, Any] = {
-        name: value
-        for name in ("max_frequency", "turns", "iterations")
-        if (value := getattr(request, name)) is not None
-    }
+    asked = given(request, ("max_frequency", "turns", "iterations"))
     if request.method == "occupancy":
         return OccupancySettings(seed=request.seed, **asked)
     effort, objective = request.effort or "normal", request.objective or "likeness"
@@ -189,22 +179,20 @@ def _write(
     with folder.replaced() as staged:
         if results:
             tell(Note("drawing"))
-            if figures and not any(map(figure_files, results)):
+            if figures and not any(FIELD_FILES[0] in figure_files(result) for result in results):
                 tell(
                     Note("no flow made these tiles, so there is none to draw: the silhouette bent")
                 )
-            write_gallery(
-                results,
-                target,
-                staged,
-                failures=failures,
-                figures=figures > 0,
-                workers=max(1, figures),
-            )
-            if document["objective"] == "both":
-                write_front(results, found, target, staged)
-        write_atomic(staged / RESULT, json.dumps(document, allow_nan=False))
-        written = sorted(path.relative_to(staged) for path in staged.rglob("*") if path.is_file())
+        written = fill_run(
+            staged,
+            document,
+            results,
+            target,
+            found=found,
+            failures=failures,
+            figures=figures > 0,
+            workers=max(1, figures),
+        )
     for path in written:
         tell(Written(folder.path / path))
 

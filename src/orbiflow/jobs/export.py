@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from orbiflow.cancel import Cancel
-from orbiflow.errors import OrbiflowError
 from orbiflow.export.exporting import Exported, scenes, sheet_names, write_scene
-from orbiflow.export.lengths import length, size
+from orbiflow.export.lengths import length, page_size, size
 from orbiflow.export.result_file import read_result
-from orbiflow.export.settings import FORMATS, ExportSettings, preset_values
+from orbiflow.export.settings import FORMATS, ExportSettings
 from orbiflow.files import write_atomic
+from orbiflow.jobs.asked import given, read_as
 from orbiflow.jobs.events import Finished, Note, Progress, Written
 from orbiflow.jobs.place import check_place
 from orbiflow.jobs.records import RecordError
@@ -20,7 +22,6 @@ from orbiflow.jobs.run import Sink
 
 LENGTHS = ("tile_size", "tolerance", "warn_neck")
 LENGTHS_OR_ZERO = ("kerf", "clearance", "spacing")
-SIZES = ("area", "bed")
 
 
 def export(request: ExportRequest, tell: Sink, cancel: Cancel) -> Finished:
@@ -77,11 +78,7 @@ def _said(done: Exported, settings: ExportSettings, name: str) -> str:
 
 
 def _settings(request: ExportRequest) -> ExportSettings:
-    asked: dict[str, Any] = {
-        name: value
-        for name in ("format", "cut", "copies", "clip", "palette", "dpi")
-        if (value := getattr(request, name)) is not None
-    }
+    asked = given(request, ("format", "cut", "copies", "clip", "palette", "dpi"))
     asked |= {"border": request.border, "calibrate": request.calibrate}
     asked |= _lengths(request)
     ending = request.out.suffix.lower().lstrip(".") if request.out else ""
@@ -92,28 +89,13 @@ def _settings(request: ExportRequest) -> ExportSettings:
             f"{{out}} ends in .{ending} but {{format}} is {asked['format']}; make them the same"
         )
     if request.purpose is None:
-        chosen: dict[str, Any] = {}
-    else:
-        chosen = preset_values(request.purpose)
-    if asked.get("cut", "none") == "pieces" and "clip" not in asked:
-        chosen.pop("clip", None)
-    try:
-        return ExportSettings(**{**chosen, **asked})
-    except OrbiflowError as error:
-        raise RecordError(str(error).replace("{", "(").replace("}", ")")) from error
+        return ExportSettings(**asked)
+    return ExportSettings.preset(request.purpose, **asked)
 
 
 def _lengths(request: ExportRequest) -> dict[str, Any]:
-    found: dict[str, Any] = {}
-    for name in (*LENGTHS, *LENGTHS_OR_ZERO, *SIZES):
-        text = getattr(request, name)
-        if text is None:
-            continue
-        try:
-            if name in SIZES:
-                found[name] = size(text)
-            else:
-                found[name] = length(text, zero=name in LENGTHS_OR_ZERO)
-        except OrbiflowError as error:
-            raise RecordError(f"{{{name}}} {str(error).replace('{', '(')}") from error
-    return found
+    readers: dict[str, Callable[[str], Any]] = dict.fromkeys(LENGTHS, length)
+    readers |= dict.fromkeys(LENGTHS_OR_ZERO, partial(length, zero=True))
+    readers |= {"area": page_size, "bed": size}
+    asked = given(request, readers)
+    return {name: read_as(name, readers[name], text) for name, text in asked.items()}

@@ -113,11 +113,12 @@ class EscherizeRequest(Request):
 class ExportRequest(Request):
     """Write a tile's tiling, lines or pieces in real size; see `orbiflow export --help`.
 
-    Lengths are text with their unit, such as "40mm"; sizes such as "300x200mm".
+    Lengths are text with their unit, such as "40mm"; sizes such as "300x200mm"; an area may be
+    "single" or "double", a journal's columns.
 
     - `result`: a search's folder, or its result.json. `tile`: a class or a rank.
     - `out`: the file, None for one named after the tile in the working directory.
-    - `purpose`: "laser", "print", "web" or "plotter", for what the other fields leave open.
+    - `purpose`: "laser", "print", "paper", "web" or "plotter", for what the other fields leave open.
     - `format`: None for the file's ending, or the purpose's.
     - others: as in `orbiflow.export.ExportSettings`; None is its default, or the purpose's.
     """
@@ -127,7 +128,7 @@ class ExportRequest(Request):
     result: Path
     out: Path | None = None
     tile: str = "1"
-    purpose: Literal["laser", "print", "web", "plotter"] | None = None
+    purpose: Literal["laser", "print", "paper", "web", "plotter"] | None = None
     format: Literal["svg", "pdf", "dxf", "png", "json"] | None = None
     tile_size: str | None = None
     area: str | None = None
@@ -302,6 +303,8 @@ class DensitySampleRequest(Request):
 class DensityPlotRequest(Request):
     """Draw a density; see `orbiflow density plot --help`.
 
+    - `out`: a folder, or a .pdf that gets a page a figure.
+    - `format`, `width`: of the figures; a width, "single", "double" or such as "85mm", is for print.
     - `center`: angles in the middle of a torus' pictures, such as "180,180".
     """
 
@@ -312,6 +315,8 @@ class DensityPlotRequest(Request):
     data: Path | None = None
     columns: tuple[str, ...] | None = None
     coastlines: Path | None = None
+    format: Literal["png", "pdf", "svg"] | None = None
+    width: str | None = None
     measure: Measure = "natural"
     scale: Literal["auto", "linear", "log"] = "auto"
     center: str | None = None

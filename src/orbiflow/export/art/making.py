@@ -16,6 +16,7 @@ from orbiflow.export.art.raster import render_page
 from orbiflow.export.art.settings import ArtSettings
 from orbiflow.export.art.source import ArtTile
 from orbiflow.export.curves import Curve
+from orbiflow.export.result_file import TileSource
 from orbiflow.export.scene import Motif, Part, Style
 from orbiflow.figures.palette import palette
 from orbiflow.symmetry.isometry import Array
@@ -52,9 +53,15 @@ class Artwork:
         width = self.settings.outline
         return max(1.0, self.page.tile_size / OUTLINE) if width is None else width
 
+    def _repr_png_(self) -> bytes:
+        """What a notebook shows."""
+        from orbiflow.export.art.writing import png_of  # which writes what is made here
+
+        return png_of(render_artwork(self), self.settings.dpi)
+
 
 def artwork(
-    tile: ArtTile,
+    tile: ArtTile | TileSource,
     settings: ArtSettings | None = None,
     *,
     picture: Picture | None = None,
@@ -64,7 +71,7 @@ def artwork(
     """Prepare a picture of a tiling with something on its tiles.
 
     Args:
-        tile: see `read_art_tile`.
+        tile: in memory, or a run's folder; see `ArtTile.of`.
         settings: see `ArtSettings`.
         picture: colours over the silhouette, see `read_picture`.
         drawing: carried already; `read_over` gives either, and `notes`.
@@ -73,7 +80,7 @@ def artwork(
         OrbiflowError: for a picture or an eye where there is no map of the silhouette, an eye outside
             it, too many tiles, and where no rectangle repeats.
     """
-    settings = settings or ArtSettings()
+    settings, tile = settings or ArtSettings(), ArtTile.of(tile)
     if picture is not None or drawing is not None or settings.eyes:
         tile.require_map()
     page = art_page(tile.given, settings)

@@ -12,9 +12,10 @@ from scipy.spatial import KDTree
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.escher.carried import CarriedTile
 from orbiflow.escher.matched import matched
+from orbiflow.escher.result import TileResult
 from orbiflow.escher.storage import SavedModel, load_saved
 from orbiflow.export.gallery import folder_names
-from orbiflow.export.result_file import ExportTile, read_document, read_result
+from orbiflow.export.result_file import ExportTile, TileSource, read_document, read_result
 from orbiflow.silhouette.frame import Frame
 from orbiflow.silhouette.target import Target
 from orbiflow.symmetry.isometry import Array
@@ -52,6 +53,35 @@ class ArtTile:
     given: ExportTile
     carried: CarriedTile
     notes: tuple[str, ...] = ()
+
+    @classmethod
+    def of(cls, tile: ArtTile | TileSource, target: Target | None = None) -> ArtTile:
+        """From whatever has a tile, with its map if there is one; of a run's folder, the best tile.
+
+        Args:
+            tile: in memory, or a run's folder, or its result.json.
+            target: of the search, from whose outline the map is made where the search left none, as
+                one for overlap does.
+
+        Raises:
+            OrbiflowError: for what holds no tile.
+            InputFileError: as `read_art_tile`.
+        """
+        if isinstance(tile, ArtTile):
+            return tile
+        if isinstance(tile, str | Path):
+            return read_art_tile(tile)
+        if isinstance(tile, ExportTile) and tile.model is not None and tile.rank is not None:
+            return read_art_tile(tile.model.parent.parent, tile.rank)
+        given = ExportTile.of(tile)
+        saved = tile.model if isinstance(tile, TileResult) else None
+        if saved is not None and saved.frame is not None and saved.bending is not None:
+            return cls(given, CarriedTile(given.tile, saved.frame, saved.bending))
+        if target is not None:
+            return _with_outlines(given, target)
+        frame = (saved.frame if saved else None) or Frame(_unit(given), np.zeros(2))
+        reason = "there is no map of the silhouette; give the search's target as well"
+        return cls(given, CarriedTile(given.tile, frame, None, (reason,)))
 
     def require_map(self) -> None:
         """Nothing, if there is a map from the silhouette.
@@ -120,6 +150,11 @@ def _matched(given: ExportTile, document: dict[str, Any], saved: SavedModel | No
     except OrbiflowError as error:
         frame = (saved.frame if saved else None) or Frame(_unit(given), np.zeros(2))
         return ArtTile(given, CarriedTile(given.tile, frame, None, (str(error),)))
+    return _with_outlines(given, target)
+
+
+def _with_outlines(given: ExportTile, target: Target) -> ArtTile:
+    """With a map between the outlines of silhouette and tile."""
     frame = target.frame
     try:
         bending = matched(target.normal, frame.to_normal(given.tile.polygon))

@@ -1,0 +1,75 @@
+"""What the signs on a density's square mean: a legend on a screen, words for a caption in print."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from orbiflow.density.spaces.space import Space
+from orbiflow.figures.density_axes import EDGE_COLOURS, INK, cones
+from orbiflow.figures.marks import CENTER_COLOURS, center_sign
+from orbiflow.figures.sheet import Sheet
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+TURNS = {2: "half", 4: "quarter"}
+CROWDED = "dots crowd where the square shrinks areas"
+
+
+def legend(
+    figure: Figure, space: Space, sheet: Sheet, *, dots: bool, notes: Sequence[str] = ()
+) -> None:
+    """What edges, signs and dots are, in the lower left corner, and further `notes`."""
+    from matplotlib.lines import Line2D
+
+    size = sheet.text
+    entries = [
+        Line2D(
+            [], [], color=colour, linewidth=0.28 * size, marker=">",
+            label=f"both {name} edges are one edge",
+        )
+        for colour, name in zip(EDGE_COLOURS, ("orange", "blue"), strict=True)
+    ]  # fmt: skip
+    for order in _orders(space):
+        outline = center_sign(order, 1.0)
+        style: dict[str, Any] = {"marker": np.concatenate([outline, outline[:1]])}
+        style |= {"color": CENTER_COLOURS[order], "markersize": size, "linestyle": "none"}
+        text = f"cone point of a {TURNS[order]} turn: no flow moves it"
+        entries.append(Line2D([], [], label=text, **style))
+    if dots:
+        style = {"markerfacecolor": "#ffffff", "markeredgecolor": INK, "linestyle": "none"}
+        entries.append(Line2D([], [], marker="o", label="points", **style))
+    notes = [*([CROWDED] if dots and space.is_round else []), *notes]
+    entries += [Line2D([], [], linestyle="none", label=note) for note in notes]
+    figure.legend(
+        handles=entries, loc="lower left", bbox_to_anchor=(0.05, 0.005), ncols=2, frameon=False,
+        fontsize=sheet.small,
+    )  # fmt: skip
+
+
+def caption(space: Space, *, dots: bool, notes: Sequence[str] = ()) -> str:
+    """The same in words.
+
+    >>> from orbiflow.density.spaces.catalogue import make_space
+    >>> caption(make_space("torus"), dots=True)
+    'The edges with one arrow head are one edge, and so are those with two. Dots are points.'
+    """
+    parts = ["The edges with one arrow head are one edge, and so are those with two"]
+    parts += [
+        f"{SIGNS[order]} are cone points of a {TURNS[order]} turn, which no flow moves"
+        for order in _orders(space)
+    ]
+    parts += ["Dots are points"] if dots else []
+    notes = [*([CROWDED] if dots and space.is_round else []), *notes]
+    parts += [note[0].upper() + note[1:] for note in notes]
+    return "".join(f"{part}. " for part in parts).strip()
+
+
+SIGNS = {2: "Lenses", 4: "Squares"}
+
+
+def _orders(space: Space) -> list[int]:
+    return sorted({order for _, order in cones(space.group)}, reverse=True)

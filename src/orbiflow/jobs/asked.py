@@ -1,0 +1,37 @@
+"""From a request's fields to a room's settings."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Any, TypeVar
+
+from orbiflow.errors import OrbiflowError
+from orbiflow.jobs.records import RecordError
+from orbiflow.jobs.requests import Request
+
+Value = TypeVar("Value")
+
+
+def given(request: Request, names: Iterable[str]) -> dict[str, Any]:
+    """The fields of these names that were set, by their names: the others keep their defaults.
+
+    >>> from orbiflow.jobs.requests import AnimateRequest
+    >>> given(AnimateRequest(result="out", fps=12), ("seconds", "fps"))
+    {'fps': 12.0}
+    """
+    values = {name: getattr(request, name) for name in names}
+    return {name: value for name, value in values.items() if value is not None}
+
+
+def read_as(name: str, read: Callable[[str], Value], text: str) -> Value:
+    """A field's text, read.
+
+    Raises:
+        RecordError: where `read` raises an `OrbiflowError`, with the field's name before it.
+    """
+    try:
+        return read(text)
+    except OrbiflowError as error:
+        # what the user wrote must not be taken for a field's name
+        said = str(error).replace("{", "(").replace("}", ")")
+        raise RecordError(f"{{{name}}} {said}") from error
