@@ -17,7 +17,6 @@ import time
 from concurrent.futures import ProcessPoolExecutor
 
 import torch
-from torch import Tensor
 
 from orbiflow.density import (
     SPACES,
@@ -27,62 +26,26 @@ from orbiflow.density import (
     make_space,
     midpoints,
 )
-from orbiflow.density.spaces.space import Space
+from orbiflow.paper.density_targets import FIT_SETTINGS, TargetMeasure, drawn, weighted
+from orbiflow.paper.published import KL
 
 BARS = {"4-gaussian": 0.01, "6-gaussian": 0.02, "checkerboard": 0.08}
-PAPER = {
-    "torus": {"4-gaussian": 0.03, "6-gaussian": 0.45, "checkerboard": 0.67},
-    "sphere": {"4-gaussian": 0.03, "6-gaussian": 0.47, "checkerboard": 0.56},
-}
 AUTHORS = {
     "torus": {"4-gaussian": 0.099, "6-gaussian": 0.058, "checkerboard": 0.293},
     "sphere": {"4-gaussian": 0.034, "6-gaussian": 0.023, "checkerboard": 0.205},
 }
-SMOOTH = {"detail": 6, "segments": 8, "roughness": (1e-3, 1e-3)}
-SHARP = {"detail": 8, "segments": 6, "roughness": (1e-4, 1e-4)}
-SETTINGS = {"4-gaussian": SMOOTH, "6-gaussian": SMOOTH, "checkerboard": SHARP}
 
 
-def target(name: str, points: Tensor) -> Tensor:
-    """Density (N,) on the square, with respect to its area and not quite normalised."""
-    if name == "checkerboard":
-        cells = (points * 5).floor().clamp(0, 4).sum(dim=-1)
-        return (cells % 2 == 0).to(points) * 25 / 13
-    if name == "4-gaussian":
-        means = torch.tensor([[x, y] for x in (0.25, 0.75) for y in (0.25, 0.75)])
-    else:
-        angle = torch.arange(6) * math.pi / 3
-        means = 0.5 + 0.3 * torch.stack([angle.cos(), angle.sin()], dim=-1)
-    squared = ((points[..., None, :] - means.to(points)) ** 2).sum(dim=-1)
-    return (-squared / 0.01).exp().mean(dim=-1) / (2 * math.pi * 0.005)
-
-
-def weighted(name: str, space: Space, points: Tensor, measure: str) -> Tensor:
-    """The target with respect to the square's area, given in `measure`."""
-    factor = space.log_area(points).exp() if measure == "round" else 1.0
-    return target(name, points) * factor
-
-
-def drawn(name: str, space: Space, measure: str, count: int, seed: int) -> Tensor:
-    """Samples (count, 2) of a target, by rejection."""
-    generator = torch.Generator().manual_seed(seed)
-    most = 1.1 * float(weighted(name, space, midpoints(space, 400), measure).max())
-    found: list[Tensor] = []
-    while sum(len(part) for part in found) < count:
-        points = torch.rand(4 * count, 2, dtype=torch.float64, generator=generator)
-        chance = torch.rand(4 * count, dtype=torch.float64, generator=generator)
-        found.append(points[chance * most < weighted(name, space, points, measure)])
-    return torch.cat(found)[:count]
-
-
-def run(job: tuple[str, str, str, int, float, int]) -> tuple[float, float, float, float, int]:
+def run(
+    job: tuple[str, str, TargetMeasure, int, float, int],
+) -> tuple[float, float, float, float, int]:
     """KL, mass, seconds, validation NLL and steps of one fit."""
     torch.set_num_threads(1)
     name, label, measure, count, seconds, seed = job
     space = make_space(name)
     points = drawn(label, space, measure, count, seed)
     begin = time.perf_counter()
-    settings = FitSettings(seed=seed, seconds=seconds, **SETTINGS[label])  # type: ignore[arg-type]
+    settings = FitSettings(seed=seed, seconds=seconds, **FIT_SETTINGS[label])  # type: ignore[arg-type]
     density, report = fit_density(space, points, settings)
     spent = time.perf_counter() - begin
     grid = midpoints(space, 200)
@@ -127,7 +90,7 @@ def main() -> None:
             mass = max((o[1] for o in outcomes), key=lambda m: abs(m - 1))
             spent = max(o[2] for o in outcomes)
             paper, authors = (
-                f"{table.get(space, {}).get(label, math.nan):7.3f}" for table in (PAPER, AUTHORS)
+                f"{table.get(space, {}).get(label, math.nan):7.3f}" for table in (KL, AUTHORS)
             )
             met = "met" if kl <= BARS[label] and spent <= 60 and abs(mass - 1) < 1e-3 else ""
             print(

@@ -44,14 +44,8 @@ def _row(kind: IsohedralClass) -> tuple[str, ...]:
         kind.name,
         kind.group_name,
         str(len(kind.template())),
-        " ".join(_pair(p.first, p.second, p.kind) for p in kind.identified_edges),
+        " ".join(pair.brief for pair in kind.identified_edges),
         ", ".join(f"{order}-fold" for order in orders) or "-",
         {0: "-", 1: "one direction"}.get(len(glides), "two directions"),
         _FREEDOM[kind.stretch_dim],
     )
-
-
-def _pair(first: int, second: int, kind: str) -> str:
-    if first == second:
-        return f"{first}o"
-    return f"{first}{ {'translation': '=', 'glide': '~', 'rotation': '>'}[kind] }{second}"

@@ -13,6 +13,8 @@ from orbiflow.cli.console import errors, output
 from orbiflow.jobs import Event, Finished, Note, Preview, Progress, Started, TileFound
 
 INTERRUPTED = "interrupted"
+FORKING = ("escherize", "paper")
+"""Jobs that start processes."""
 
 
 class Terminal:
@@ -35,7 +37,7 @@ class Terminal:
                 self.job = event.job
             case Progress():
                 if self.bar is None:
-                    self.bar = _Bar(search=self.job == "escherize")
+                    self.bar = _Bar(search=self.job == "escherize", forks=self.job in FORKING)
                 self.bar.update(event)
             case Note():
                 self._end_bar()  # they come before the work and after it
@@ -67,19 +69,19 @@ class Terminal:
 class _Bar:
     """How far a job is, gone when it is done."""
 
-    def __init__(self, *, search: bool) -> None:
-        self.search = search
+    def __init__(self, *, search: bool, forks: bool) -> None:
+        self.forks = forks
         self.best: tuple[float, str] = (0.0, "")
         columns = [BarColumn(), TaskProgressColumn(), TimeElapsedColumn()]
         text = TextColumn("{task.description}")
-        # no thread that refreshes in a search: workers are forked from a process with one thread
+        # no thread that refreshes: workers are forked from a process with one thread
         self.progress = Bar(
             *([text] if search else []),
             *columns,
             TextColumn("{task.fields[best]}") if search else text,
             console=output,
             transient=True,
-            auto_refresh=not search,
+            auto_refresh=not forks,
         )
         self.task = self.progress.add_task("", total=1.0, best="")
         self.progress.start()
@@ -91,7 +93,7 @@ class _Bar:
             completed=event.share,
             description=event.what,
             best=f"best {iou:.4f} ({name})" if name else "",
-            refresh=self.search,
+            refresh=self.forks,
         )
 
 

@@ -61,12 +61,12 @@ def _panel(
     figure.text(left + 0.045 * width, bottom + 0.77 * height, kind.group_name, fontsize=1.2 * font)
     middle = (kind.template().min(axis=0) + kind.template().max(axis=0)) / 2
     box = (left + 0.02 * width, bottom, _PANEL[0] * width, 0.8 * height)
-    _draw_template(plane_axes(figure, _around(middle, 1.42, 1.42)), box, kind)
+    draw_template(plane_axes(figure, _around(middle, 1.42, 1.42), box=box), kind)
     box = (left + 0.33 * width, bottom + 0.04 * height, _PANEL[1] * width * 0.96, 0.92 * height)
     aspect = box[2] * figure.get_figwidth() / (box[3] * figure.get_figheight())
     middle = (middle + cell_ring(kind.group(), middle)[:4].mean(axis=0)) / 2
     window = _around(middle, 4.25 * aspect, 4.25)
-    _draw_tiling(plane_axes(figure, window, box=box), kind, window)
+    draw_tiling(plane_axes(figure, window, box=box), kind, window)
 
 
 def _around(middle: Array, half_width: float, half_height: float) -> Window:
@@ -79,10 +79,8 @@ def _around(middle: Array, half_width: float, half_height: float) -> Window:
     )
 
 
-def _draw_template(
-    axes: Axes, box: tuple[float, float, float, float], kind: IsohedralClass
-) -> None:
-    axes.set_position(box)
+def draw_template(axes: Axes, kind: IsohedralClass) -> None:
+    """A class's template: identified edges in one colour, with the arrows that are identified."""
     vertices = kind.template()
     fill_rings(axes, [vertices], ASPECT_FILLS[0], "none", 0)
     for pair, colour in zip(kind.identified_edges, EDGE_COLOURS, strict=False):
@@ -113,7 +111,8 @@ def _arrow(kind: IsohedralClass, pair: EdgePair) -> Array:
     return np.stack([tip, back + (0.17 if pair.kind == "glide" else 0.11) * inward, other])
 
 
-def _draw_tiling(axes: Axes, kind: IsohedralClass, window: Window) -> None:
+def draw_tiling(axes: Axes, kind: IsohedralClass, window: Window) -> None:
+    """The template's tiling: a fill for each aspect, the lattice cell, all centres and lines."""
     tile = Tile(kind.template(), kind.group(), kind.name)
     elements = patch(tile, window)
     for element, aspect in zip(elements, aspects(tile, elements), strict=True):

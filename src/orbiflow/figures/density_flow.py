@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -84,12 +84,12 @@ def flow_picture(
     axes.set_xlim(low, high)
     axes.set_ylim(low, high)  # `draw_magnitude` keeps these
 
-    def mean_field(points: Tensor) -> Tensor:
-        return _mean_field(density, view.to_chart(points))
+    def field(points: Tensor) -> Tensor:
+        return mean_field(density, view.to_chart(points))
 
-    draw_magnitude(axes, mean_field, window)
-    draw_flow(axes, mean_field, space.group, window, pen=sheet.pen)
-    _draw_cells(axes, space.group, window, sheet)
+    draw_magnitude(axes, field, window)
+    draw_flow(axes, field, space.group, window, pen=sheet.pen)
+    draw_cells(axes, space.group, window, pen=sheet.pen)
     colour_bar(axes.images[0], frame, sheet, SPEED)
     axes.set_axis_off()
     title, signs = _subject(density), "canonical square outlined, its images thin"
@@ -134,7 +134,8 @@ def _palette() -> Array:
 
 
 @torch.no_grad()
-def _mean_field(density: SymmetricDensity, points: Tensor) -> Tensor:
+def mean_field(density: SymmetricDensity, points: Tensor) -> Tensor:
+    """The time mean of the flow's fields (..., d) at chart points (..., d), float64."""
     flow, like = density.flow, next(iter(density.flow.parameters()), points)
     if isinstance(flow, NeuralFlow):  # whose field changes with time
         times = (torch.arange(_TIMES).to(like) + 0.5) / _TIMES
@@ -144,16 +145,21 @@ def _mean_field(density: SymmetricDensity, points: Tensor) -> Tensor:
     return torch.stack(vectors).mean(dim=0).double().cpu()
 
 
-def _draw_cells(axes: Axes, group: CrystallographicGroup, window: Any, sheet: Sheet) -> None:
-    thin = sheet.pen(0.7)
+def draw_cells(
+    axes: Axes,
+    group: CrystallographicGroup,
+    window: Any,
+    *,
+    pen: Callable[[float], float] = float,
+) -> None:
+    """The images of the canonical square in a window, a letter F in each, the square outlined."""
+    thin = pen(0.7)
     for t in np.arange(np.floor(window[0]), np.ceil(window[2]) + 1):
         axes.axvline(t, color="#ffffff", linewidth=thin, alpha=0.7, zorder=4)
         axes.axhline(t, color="#ffffff", linewidth=thin, alpha=0.7, zorder=4)
     square = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]])
     for colour, width in (("#111111", 3.6), ("#ffd166", 1.8)):
-        axes.plot(
-            *square.T, color=colour, linewidth=sheet.pen(width), solid_joinstyle="miter", zorder=5
-        )
+        axes.plot(*square.T, color=colour, linewidth=pen(width), solid_joinstyle="miter", zorder=5)
     letter = np.array(
         [[0, 0], [0, 5], [3, 5], [3, 4], [1, 4], [1, 3], [2.4, 3], [2.4, 2], [1, 2], [1, 0]]
     )
@@ -161,6 +167,6 @@ def _draw_cells(axes: Axes, group: CrystallographicGroup, window: Any, sheet: Sh
     middle = np.full(2, 0.5)
     for g in group.elements_near(middle, window[2] - window[0], source=middle):
         axes.fill(
-            *g(letter).T, facecolor="#ffd166", edgecolor="#111111", linewidth=sheet.pen(0.5),
+            *g(letter).T, facecolor="#ffd166", edgecolor="#111111", linewidth=pen(0.5),
             zorder=6,
         )  # fmt: skip

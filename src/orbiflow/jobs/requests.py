@@ -345,6 +345,27 @@ class PatchesRequest(Request):
             raise RecordError(f"{{farthest}} must be at least 0, got {self.farthest:g}")
 
 
+@dataclass(frozen=True)
+class PaperRequest(Request):
+    """Reproduce the paper; see `orbiflow paper --help`.
+
+    - `fast`: a preview, with less work in each exhibit. `only`: names of exhibits, None for all.
+    - `workers`: processes, None for one a core.
+    """
+
+    KIND = "paper"
+
+    out: Path = Path("paper")
+    fast: bool = False
+    only: tuple[str, ...] | None = None
+    workers: int | None = None
+
+    def check(self) -> None:
+        at_least_one(self, "workers")
+        if self.only == ():
+            raise RecordError("{only} names no exhibit; give some, as in figure-9,table-3")
+
+
 REQUESTS: dict[str, type[Request]] = {
     kind.KIND: kind
     for kind in (
@@ -357,6 +378,7 @@ REQUESTS: dict[str, type[Request]] = {
         DensitySampleRequest,
         DensityPlotRequest,
         PatchesRequest,
+        PaperRequest,
     )
 }
 

@@ -24,6 +24,7 @@ _MODULES = {
     "density-sample": "density_use",
     "density-plot": "density_plot",
     "density-patches": "density_use",
+    "paper": "paper",
 }
 
 

@@ -63,6 +63,18 @@ class EdgePair(NamedTuple):
         """Whether the start of `first` goes to the end of `second`: unless it is a glide."""
         return self.kind != "glide"
 
+    @property
+    def brief(self) -> str:
+        """In brief: = translation, ~ glide, > rotation, o an edge turned over about its middle.
+
+        >>> EdgePair(0, 3, "translation").brief, EdgePair(2, 2, "rotation").brief
+        ('0=3', '2o')
+        """
+        if self.folded:
+            return f"{self.first}o"
+        sign = {"translation": "=", "glide": "~", "rotation": ">"}[self.kind]
+        return f"{self.first}{sign}{self.second}"
+
 
 class ClassRow(NamedTuple):
     """A row of the table; operators in the order in which the paper nests them, outermost first."""
