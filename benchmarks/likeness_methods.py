@@ -101,10 +101,10 @@ def _first(
     outline = np.asarray(target.normal)
     if method == "overlap":
         results, _ = escherize(target, settings=DescentSettings.for_effort(effort))
-        return results[0].normal_tile.polygon.tolist()
+        return results[0].normal_tile.polygon.tolist() if results else []
     if method == "likeness":
         tiles = kept(folder, name, effort, lambda: likeness_tiles(target, effort))
-        return aligned(tiles[0].ring, outline, TRIES).tolist()
+        return aligned(tiles[0].ring, outline, TRIES).tolist() if tiles else []
     if method in BASELINES:
         path = DATA / "silhouettes" / "baseline_tiles" / f"{name}.json"
         tiles = json.loads(path.read_text())[BASELINES[method]] if path.exists() else []
