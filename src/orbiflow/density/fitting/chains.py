@@ -95,7 +95,7 @@ def fit_chains(
     size = min(SMALLEST, most)
 
     def start(count: int, order: Tensor) -> VonMisesChains:
-        return _expectation_maximization(
+        return fit_chain_mixture(
             space, train, validation, count, order, iterations, generator, budget
         )
 
@@ -133,7 +133,7 @@ def _nll(mixture: VonMisesChains, points: Tensor) -> float:
 
 
 @torch.no_grad()
-def _expectation_maximization(
+def fit_chain_mixture(
     space: Space,
     train: Tensor,
     validation: Tensor,
