@@ -12,6 +12,7 @@ from orbiflow.cli.density_options import (
     Data,
     Measure,
     Model,
+    Repeats,
     Scale,
     Space,
     Unit,
@@ -45,19 +46,37 @@ def fit(
     unit: Annotated[
         Unit, typer.Option(help="Of angles on the torus and the Klein bottle.")
     ] = Unit.RADIANS,
+    parts: Annotated[
+        str | None,
+        typer.Option(
+            help="Of flow, kernels, mixture and chains those that may be used, such as "
+            "kernels,mixture; default all, and rows held out choose.",
+            show_default=False,
+        ),
+    ] = None,
+    repeats: Annotated[
+        Repeats,
+        typer.Option(
+            help="What rows that repeat another are: places that new rows repeat as often, or an "
+            "accident of rounding."
+        ),
+    ] = Repeats.PLACES,
     detail: Annotated[
-        int, typer.Option(help="Waves of the flow along a side of the square, 1 to 64.")
-    ] = 8,
-    segments: Annotated[int, typer.Option(help="Stationary pieces of the flow.")] = 6,
+        int | None,
+        typer.Option(
+            help="Waves of the flow along a side of the square, 1 to 64.", show_default=False
+        ),
+    ] = None,
+    segments: Annotated[
+        int | None, typer.Option(help="Stationary pieces of the flow.", show_default=False)
+    ] = None,
     kernels: Annotated[
         bool,
-        typer.Option(
-            "--kernels", help="Add kernels about the points: for clusters sharper than the flow."
-        ),
+        typer.Option("--kernels", help="A flow with adaptive kernels, and nothing else."),
     ] = False,
     seconds: Annotated[
         float | None,
-        typer.Option(help="Of refinement at most; default no limit.", show_default=False),
+        typer.Option(help="Of training at most; default no limit.", show_default=False),
     ] = None,
     seed: Annotated[int, typer.Option(help="Same seed, same machine: same density.")] = 0,
 ) -> None:
@@ -71,6 +90,8 @@ def fit(
         out=out,
         columns=named_columns(columns),
         unit=unit.value,
+        parts=named_columns(parts),
+        repeats=repeats.value,
         detail=detail,
         segments=segments,
         kernels=kernels,

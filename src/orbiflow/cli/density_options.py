@@ -27,6 +27,13 @@ class Unit(StrEnum):
     TURNS = "turns"
 
 
+class Repeats(StrEnum):
+    """What rows that repeat another are."""
+
+    PLACES = "places"
+    ROUNDING = "rounding"
+
+
 class Measure(StrEnum):
     """What a density is per."""
 

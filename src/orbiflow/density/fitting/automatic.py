@@ -149,6 +149,12 @@ def _families(
     if space.is_torus and space.dim > 1:
         families.append(ChainFamily(space, settings.seed, starts))
     chosen = [family for family in families if family.name in settings.parts]
+    beside = "flow" in settings.parts and settings.parts not in (PARTS, ("flow",))
+    if beside and space.dim > MOST_DIM:
+        raise OrbiflowError(
+            f"on a torus of {space.dim} angles a flow stands alone: leave it out of the parts, or all "
+            "others"
+        )
     if not chosen and (space.dim > MOST_DIM or settings.parts != ("flow",)):
         raise OrbiflowError(f"there are no {' or '.join(settings.parts)} on this {space!r}")
     return chosen
