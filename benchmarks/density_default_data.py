@@ -19,17 +19,18 @@ Log = Callable[[Data], Data]
 
 
 class Drawn(NamedTuple):
-    """Rows, their space, and their log density where it is known."""
+    """Rows, their space, their log density where it is known; rows to train on, default nine tenths."""
 
     data: Data
     space: str
     log_density: Log | None = None
+    trained: int | None = None
 
 
 def log_von_mises(data: Data, centers: Data, kappa: Data, weights: Data) -> Data:
     """Log of a mixture of products of von Mises distributions, (N,)."""
     terms = kappa * (np.cos(data[:, None] - centers) - 1) - np.log(2 * math.pi * ive(0, kappa))
-    return logsumexp(terms.sum(axis=-1) + np.log(weights), axis=1)
+    return np.asarray(logsumexp(terms.sum(axis=-1) + np.log(weights), axis=1))
 
 
 def clusters(count: int, centers: Data, kappa: Data, weights: Data, seed: int) -> Drawn:
@@ -134,7 +135,7 @@ def surface(name: str, space: str) -> Drawn:
 
 
 SETS: dict[str, Callable[[], Drawn]] = {
-    "tiny": lambda: round_clusters(30),
+    "tiny": lambda: round_clusters(1_000)._replace(trained=30),
     "clusters": lambda: round_clusters(3_000),
     "rounded": lambda: Drawn(np.round(round_clusters(2_000).data, 1), "torus"),
     "repeated": repeated,
