@@ -105,8 +105,8 @@ def line(name: str, drawn: Drawn, outcomes: list[Outcome]) -> str:
     seconds = np.mean([outcome.seconds["default"] for outcome in outcomes])
     verdict = "met" if mean <= max(0.01, 2 * error) else "MISSED"
     return (
-        f"{name:14}{drawn.space[:10]:11}{drawn.trained or len(drawn.data):7}{columns}{mean:9.3f} +- {error:.3f}"
-        f"  {best:8}{regret}{seconds:8.1f}  {verdict}"
+        f"{name:14}{drawn.space[:10]:11}{drawn.trained or len(drawn.data):7}{columns}"
+        f"{mean:9.3f} +- {error:.3f}  {best:8}{regret}{seconds:8.1f}  {verdict}"
     )
 
 

@@ -37,8 +37,8 @@ REPEATS = ("places", "rounding")
 LEAST_FLOW_ROWS = 300
 """With fewer, a flow is not tried: none has gained anything."""
 
-MANY_ROWS = 20_000
-"""From here on a flow may be finer."""
+FEW_ROWS, MANY_ROWS = 5_000, 20_000
+"""With fewer a flow is fitted in one stage; from the latter on it may be finer."""
 
 MEMBERS = 12
 """Chains of one size on tori of four or more angles, all folds together."""
@@ -224,7 +224,9 @@ def flow_settings(space: Space, rows: int, seed: int) -> FitSettings:
         return FitSettings(detail=5, segments=3, roughness=(1e-3,), iterations=60, seed=seed)
     if rows >= MANY_ROWS:
         return FitSettings(roughness=(1e-3, 1e-4), seed=seed)
-    return FitSettings(detail=6, segments=4, roughness=(1e-3, 1e-4), iterations=60, seed=seed)
+    if rows >= FEW_ROWS:
+        return FitSettings(detail=6, segments=4, roughness=(1e-3, 1e-4), iterations=60, seed=seed)
+    return FitSettings(detail=6, segments=4, roughness=(1e-3,), iterations=40, seed=seed)
 
 
 def _shrunk(parts: list[PartEvidence], flow: float) -> list[PartEvidence]:

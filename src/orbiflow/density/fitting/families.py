@@ -29,8 +29,8 @@ MIXTURE_ROWS, CHAIN_ROWS = 8, 20
 SMALLEST_CHAINS = 4
 """Components: fewer are no better than a mixture's."""
 
-MOST_FITTED = 20_000
-"""Rows that mixtures and chains are fitted to."""
+MOST_MIXED, MOST_CHAINED = 20_000, 12_000
+"""Rows that mixtures and chains are fitted to at most."""
 
 CLEARLY = 2.0
 """Standard errors by which a larger mixture must be worse, to be the last that is tried."""
@@ -98,7 +98,7 @@ class MixtureFamily(Family):
     name = "mixture"
 
     def fitted(self, number: int, train: Tensor, held: Tensor, say: Say) -> dict[str, Base]:
-        train = train[:MOST_FITTED]
+        train = train[:MOST_MIXED]
         generator = torch.Generator().manual_seed(self.seed + number)
 
         def fit(size: int) -> Base:
@@ -141,7 +141,7 @@ class ChainFamily(Family):
     _first: dict[str, Base] = field(default_factory=dict)
 
     def fitted(self, number: int, train: Tensor, held: Tensor, say: Say) -> dict[str, Base]:
-        train = train[:MOST_FITTED]
+        train = train[:MOST_CHAINED]
         generator = torch.Generator().manual_seed(self.seed + number)
         natural = torch.arange(self.space.dim)
 

@@ -14,10 +14,10 @@ FOLDS = 10
 LEAST_PLACES = 10
 """Different points that a density needs."""
 
-USED = ((1_500, 10), (4_000, 5), (10_000, 3))
+USED = ((600, 10), (2_000, 5), (10_000, 3))
 """Of them are used, by the number of rows at most: few rows need all, many need few to tell; else 2."""
 
-MOST_HELD = 3_000
+MOST_HELD = 2_000
 """Rows of a fold that are scored."""
 
 
