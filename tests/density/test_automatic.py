@@ -75,8 +75,8 @@ def test_it_is_invariant_and_has_gradients(name: str) -> None:
     density, _ = fit_automatic(space, smooth(name, 150), AutomaticSettings(seed=3))
     points = torch.rand(20, 2, dtype=torch.float64, generator=torch.Generator().manual_seed(0))
     for element in space.group.cosets:
-        values = [density.log_prob(space.project(p)) for p in (element(points), points)]
-        assert torch.allclose(*values, atol=1e-7)
+        one, other = (density.log_prob(space.project(p)) for p in (element(points), points))
+        assert torch.allclose(one, other, atol=1e-7)
     assert torch.autograd.gradcheck(density.log_prob, (points[:3].requires_grad_(),), atol=1e-4)
 
 
@@ -120,6 +120,15 @@ def test_a_flow_alone_is_a_flow() -> None:
     angles = np.random.default_rng(0).vonmises([0.0, 1.0], 3.0, (200, 2))
     found = DensityEstimator("torus", parts="flow", **small).fit(angles).density_  # type: ignore[arg-type]
     assert type(found) is SymmetricDensity
+
+
+@pytest.mark.parametrize("count", [0, 1, 3, 100])
+def test_any_number_of_samples(count: int) -> None:
+    density, _ = fit_automatic(Torus(2), smooth("torus", 120))
+    generator = torch.Generator().manual_seed(0)
+    drawn = density.sample((count,), generator)
+    assert drawn.shape == (count, 2)
+    assert bool(((drawn >= 0) & (drawn <= 1)).all())
 
 
 def test_many_angles_have_chains_beside_kernels(tmp_path: Path) -> None:

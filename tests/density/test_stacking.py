@@ -76,9 +76,8 @@ def test_mixtures_integrate_to_one_and_are_invariant(name: str, seed: int) -> No
     points = 2 * torch.rand(20, 2, dtype=torch.float64, generator=generator)
     for element in space.group.cosets:
         images = element(points)
-        pair = [space.project(p) if space.is_round else p for p in (images, points)]
-        values = [found.log_prob(p) for p in pair]
-        assert torch.allclose(*values, atol=1e-7)
+        one, other = (space.project(p) if space.is_round else p for p in (images, points))
+        assert torch.allclose(found.log_prob(one), found.log_prob(other), atol=1e-7)
 
 
 @pytest.mark.parametrize("name", SPACES)

@@ -10,8 +10,10 @@ import typer
 from orbiflow.cli.density_options import (
     Columns,
     Data,
+    DropMissing,
     Measure,
     Model,
+    NoHeader,
     Repeats,
     Scale,
     Space,
@@ -43,9 +45,16 @@ def fit(
         Path, typer.Option("--out", "-o", help="Folder for the results, made if need be.")
     ] = Path("density"),
     columns: Columns = None,
+    no_header: NoHeader = False,
+    drop_missing: DropMissing = False,
     unit: Annotated[
-        Unit, typer.Option(help="Of angles on the torus and the Klein bottle.")
-    ] = Unit.RADIANS,
+        Unit | None,
+        typer.Option(
+            help="Of angles on the torus and the Klein bottle; default radians, if no value is "
+            "beyond 2 pi.",
+            show_default=False,
+        ),
+    ] = None,
     parts: Annotated[
         str | None,
         typer.Option(
@@ -89,7 +98,9 @@ def fit(
         space=space.value,
         out=out,
         columns=named_columns(columns),
-        unit=unit.value,
+        header=False if no_header else None,
+        drop_missing=drop_missing,
+        unit=None if unit is None else unit.value,
         parts=named_columns(parts),
         repeats=repeats.value,
         detail=detail,
@@ -109,6 +120,8 @@ def score(
         Path, typer.Option("--out", "-o", help="The data with a column log_prob.")
     ] = Path("scores.csv"),
     columns: Columns = None,
+    no_header: NoHeader = False,
+    drop_missing: DropMissing = False,
     measure: Annotated[
         Measure,
         typer.Option(help="Natural: the data's own units, or steradians. Uniform: against chance."),
@@ -120,6 +133,8 @@ def score(
         model=model,
         out=out,
         columns=named_columns(columns),
+        header=False if no_header else None,
+        drop_missing=drop_missing,
         measure=measure.value,
     )
     do(request)

@@ -66,6 +66,12 @@ Columns = Annotated[
     str | None,
     typer.Option(help="Names or numbers of the columns, such as lat,lon.", show_default=False),
 ]
+NoHeader = Annotated[
+    bool, typer.Option("--no-header", help="The table's first line is a row, names or not.")
+]
+DropMissing = Annotated[
+    bool, typer.Option("--drop-missing", help="Leave out rows that lack a value.")
+]
 Model = Annotated[
     Path, typer.Option("--model", "-m", help="Folder that `fit` wrote.", show_default=False)
 ]

@@ -17,7 +17,7 @@ from orbiflow.density.fitting.report import FitReport
 from orbiflow.density.tables import Table
 from orbiflow.files import write_atomic
 from orbiflow.folders import ResultFolder
-from orbiflow.jobs.density_data import MODEL, PICTURES, REPORT, read_data
+from orbiflow.jobs.density_data import MODEL, PICTURES, REPORT, read_data, unit_of
 from orbiflow.jobs.events import Finished, Note, Progress, Written
 from orbiflow.jobs.requests import DensityFitRequest
 from orbiflow.jobs.run import Sink
@@ -42,10 +42,17 @@ def density_fit(request: DensityFitRequest, tell: Sink, cancel: Cancel) -> Finis
         Cancelled: if it was told to stop; nothing is written.
     """
     begin = time.perf_counter()
-    table = read_data(request.data, request.columns, WIDTH[request.space], tell)
+    table = read_data(
+        request.data,
+        request.columns,
+        WIDTH[request.space],
+        tell,
+        has_header=request.header,
+        drop_missing=request.drop_missing,
+    )
     estimator = DensityEstimator(
         request.space,
-        unit=request.unit,
+        unit=unit_of(request.space, request.unit, table, tell),
         parts="auto" if request.parts is None else ",".join(request.parts),
         repeats=request.repeats,
         detail=request.detail,

@@ -252,6 +252,9 @@ class DensityFitRequest(Request):
 
     - `data`: the table. `out`: folder for the model and its report.
     - `columns`: names or numbers, None for what the space takes.
+    - `header`: whether a text's first line names the columns, None to look.
+    - `drop_missing`: leave out rows that lack a value.
+    - `unit`: of angles; None for radians if no value is beyond 2 pi.
     - `parts`: of flow, kernels, mixture and chains those that may be used; None lets rows held out
       choose among all.
     - `repeats`: what rows that repeat another are taken for.
@@ -266,7 +269,9 @@ class DensityFitRequest(Request):
     space: SpaceName
     out: Path = Path("density")
     columns: tuple[str, ...] | None = None
-    unit: Unit = "radians"
+    header: bool | None = None
+    drop_missing: bool = False
+    unit: Unit | None = None
     parts: tuple[str, ...] | None = None
     repeats: Literal["places", "rounding"] = "places"
     detail: int | None = None
@@ -288,7 +293,10 @@ class DensityFitRequest(Request):
 
 @dataclass(frozen=True)
 class DensityScoreRequest(Request):
-    """Add log densities to a table; see `orbiflow density score --help`."""
+    """Add log densities to a table; see `orbiflow density score --help`.
+
+    `columns`, `header`, `drop_missing`: as for a fit; rows left out get an empty cell.
+    """
 
     KIND = "density-score"
 
@@ -296,6 +304,8 @@ class DensityScoreRequest(Request):
     model: Path
     out: Path = Path("scores.csv")
     columns: tuple[str, ...] | None = None
+    header: bool | None = None
+    drop_missing: bool = False
     measure: Measure = "natural"
 
     def check(self) -> None:

@@ -107,14 +107,14 @@ class BlendedDensity(SymmetricDensity):
         part = torch.multinomial(self.shares, shape.numel(), replacement=True, generator=source)
         counts = torch.bincount(part, minlength=len(self.shares)).tolist()
         drawn = self._like().new_empty(shape.numel(), self.space.dim)
-        drawn = drawn.index_put(
-            (torch.nonzero(part == 0)[:, 0],), super().rsample((counts[0],), source)
-        )
-        for index, other in enumerate(self._others, 1):
-            drawn = drawn.index_put(
-                (torch.nonzero(part == index)[:, 0],),
-                other.sample(counts[index], source).to(drawn),
-            )
+        for index, count in enumerate(counts):
+            if not count:  # as a flow without a share
+                continue
+            if index:
+                own = self._others[index - 1].sample(count, source).to(drawn)
+            else:
+                own = super().rsample((count,), source)
+            drawn = drawn.index_put((torch.nonzero(part == index)[:, 0],), own)
         return drawn.reshape(*shape, self.space.dim)
 
     @torch.no_grad()
