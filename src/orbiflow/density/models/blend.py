@@ -104,6 +104,8 @@ class BlendedDensity(SymmetricDensity):
         """As `sample`, differentiable in the flow's parameters."""
         shape = shape_of(sample_shape)
         source = generator or torch.default_generator
+        if not shape.numel():
+            return self._like().new_empty(*shape, self.space.dim)
         part = torch.multinomial(self.shares, shape.numel(), replacement=True, generator=source)
         counts = torch.bincount(part, minlength=len(self.shares)).tolist()
         drawn = self._like().new_empty(shape.numel(), self.space.dim)
