@@ -46,8 +46,11 @@ class PartEvidence:
     rows: int
 
     def __str__(self) -> str:
-        without = f"worth {self.gain:.4f} ± {self.error:.4f}" if self.share else "would add nothing"
-        return f"{self.name}: {self.share:.1%}, {without} nats; alone {self.alone:.4f} over uniform"
+        worth = f"worth {self.gain:.4f} ± {self.error:.4f} nats"
+        return (
+            f"{self.name}: {self.share:.1%}, {worth if self.share else 'would add nothing'}; alone "
+            f"{self.alone:.4f} over uniform"
+        )
 
 
 @dataclass(frozen=True)
