@@ -22,6 +22,9 @@ from orbiflow.density.fitting.weights import (
 from orbiflow.density.models.bases import Base, UniformBase
 from orbiflow.density.spaces.space import Space
 
+KEPT = 2
+"""Sizes of a family that are fitted to all folds, beside the best alone."""
+
 FLOOR = "uniform"
 """Name of the part that is always there."""
 
@@ -88,14 +91,15 @@ def candidates_of(
 
 
 def _narrow(families: list[Family], block: dict[tuple[str, str], Tensor]) -> None:
-    """Of each family keep what has weight in the first fold, and the best alone."""
+    """Of each family keep what has most weight in the first fold, and the best alone."""
     keys = list(block)
     weights = stacking_weights(torch.stack([block[key] for key in keys])).tolist()
     for family in families:
         own = {name: w for (f, name), w in zip(keys, weights, strict=True) if f == family.name}
         if own:
             best = max(own, key=lambda name, f=family.name: float(block[f, name].mean()))
-            family.keep({best, *(name for name, w in own.items() if w >= NEGLIGIBLE)})
+            weighty = [name for name, w in own.items() if w >= NEGLIGIBLE]
+            family.keep({best, *sorted(weighty, key=lambda name, w=own: -w[name])[:KEPT]})
 
 
 def judged(candidates: Candidates, weights: Tensor) -> list[PartEvidence]:
