@@ -1,6 +1,9 @@
 """KL divergence of fitted densities from the paper's three targets, on the four spaces.
 
-    python benchmarks/density_kl.py [--points N] [--seconds S] [--seeds K] [--quick] [SPACE ...]
+    python benchmarks/density_kl.py [--flow] [--points N] [--seconds S] [--seeds K] [--quick]
+        [SPACE ...]
+
+What `density fit` chooses by itself; --flow: a flow alone, with settings for each target.
 
 Targets on the unit square (the paper's): four and six Gaussians of variance 0.005, and the 5 x 5
 checkerboard. On sphere and projective plane also with the round area in place of the square's: the
@@ -20,7 +23,9 @@ import torch
 
 from orbiflow.density import (
     SPACES,
+    AutomaticSettings,
     FitSettings,
+    fit_automatic,
     fit_density,
     kl_by_quadrature,
     make_space,
@@ -37,16 +42,19 @@ AUTHORS = {
 
 
 def run(
-    job: tuple[str, str, TargetMeasure, int, float, int],
+    job: tuple[str, str, TargetMeasure, int, float, int, bool],
 ) -> tuple[float, float, float, float, int]:
     """KL, mass, seconds, validation NLL and steps of one fit."""
     torch.set_num_threads(1)
-    name, label, measure, count, seconds, seed = job
+    name, label, measure, count, seconds, seed, flow = job
     space = make_space(name)
     points = drawn(label, space, measure, count, seed)
     begin = time.perf_counter()
-    settings = FitSettings(seed=seed, seconds=seconds, **FIT_SETTINGS[label])  # type: ignore[arg-type]
-    density, report = fit_density(space, points, settings)
+    if flow:
+        settings = FitSettings(seed=seed, seconds=seconds, **FIT_SETTINGS[label])  # type: ignore[arg-type]
+        density, report = fit_density(space, points, settings)
+    else:
+        density, report = fit_automatic(space, points, AutomaticSettings(seed=seed))
     spent = time.perf_counter() - begin
     grid = midpoints(space, 200)
     with torch.no_grad():
@@ -60,7 +68,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("spaces", nargs="*", metavar="SPACE", help=f"{', '.join(SPACES)} (all)")
     parser.add_argument("--points", type=int, default=131072)
-    parser.add_argument("--seconds", type=float, default=30.0, help="of likelihood refinement")
+    parser.add_argument("--flow", action="store_true", help="a flow alone")
+    parser.add_argument("--seconds", type=float, default=30.0, help="of a flow's refinement")
     parser.add_argument("--seeds", type=int, default=1, help="the worst is reported")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--quick", action="store_true", help="the torus, few points, 5 s each")
@@ -77,7 +86,9 @@ def main() -> None:
         for measure in (("flat", "round") if space in ("sphere", "projective-plane") else ("flat",))
         for label in BARS
     ]
-    jobs = [(*row, count, seconds, seed) for row in rows for seed in range(options.seeds)]
+    jobs = [
+        (*row, count, seconds, seed, options.flow) for row in rows for seed in range(options.seeds)
+    ]
     print(
         f"{count} points, {options.seeds} seeds, the worst of them; {options.workers} fits at once"
     )

@@ -1,6 +1,7 @@
 """Test log-likelihoods on protein backbones (torus), earthquakes and wildfires (sphere).
 
     python benchmarks/density_nll.py [--splits K] [--grouped] [--seconds S] [--quick] [DATA ...]
+        [--kernels]
 
 Random 80/10/10 splits (--grouped: equal locations stay together, since duplicates leak), mean negative
 log-likelihood in nats, per radian^2 or steradian, beside a von Mises or von Mises-Fisher kernel
@@ -8,7 +9,8 @@ density estimate whose width and uniform floor are tuned on the same validation 
 published rows of data/published.json (RFM: Riemannian flow matching; RDM: Riemannian diffusion
 model). Then the seconds for 100,000 query points, on the first split: exactly, by the kernels (timed
 on 5,000 and scaled) and from a table (with the root mean square error of its log densities). All are
-fitted with kernels beside the flow. The backbone angles are rounded; see `density_data.backbone`.
+fitted as `density fit` does by default; --kernels: a flow with adaptive kernels, at most S seconds of
+refinement. The backbone angles are rounded; see `density_data.backbone`.
 """
 
 from __future__ import annotations
@@ -48,23 +50,20 @@ def load(name: str) -> Data:
     return earth(name) if name in EARTH else backbone(name)
 
 
-def run(job: tuple[str, int, bool, float, int]) -> Outcome:
+def run(job: tuple[str, int, bool, float, int, bool]) -> Outcome:
     """One split."""
     torch.set_num_threads(1)
-    name, seed, grouped, seconds, detail = job
+    name, seed, grouped, seconds, detail, kernels = job
     round_ = name in EARTH
     train, held, test = splits(load(name), seed + 1, grouped=grouped)[seed]
     kde = KernelDensity.tuned(train, held, round_=round_)
     begin = time.perf_counter()
     share = len(held) / (len(train) + len(held))
-    estimator = DensityEstimator(
-        "sphere" if round_ else "torus",
-        detail=detail,
-        kernels=True,
-        validation=share,
-        seconds=seconds,
-        seed=seed,
-    ).fit(np.concatenate([train, held]))
+    options = {"detail": detail, "kernels": True, "validation": share, "seconds": seconds}
+    if not kernels:
+        options = {"repeats": "rounding" if grouped else "places"}
+    estimator = DensityEstimator("sphere" if round_ else "torus", seed=seed, **options)  # type: ignore[arg-type]
+    estimator.fit(np.concatenate([train, held]))
     fit = time.perf_counter() - begin
     rng = np.random.default_rng(seed)
     if round_:
@@ -113,6 +112,7 @@ def main() -> None:
     parser.add_argument("data", nargs="*", choices=(*TORI, *EARTH, []))
     parser.add_argument("--splits", type=int, default=5)
     parser.add_argument("--grouped", action="store_true")
+    parser.add_argument("--kernels", action="store_true", help="a flow with adaptive kernels")
     parser.add_argument("--seconds", type=float, default=20.0, help="of refinement")
     parser.add_argument("--detail", type=int, default=8)
     parser.add_argument("--workers", type=int, default=2)
@@ -125,14 +125,16 @@ def main() -> None:
     for name in names:
         load(name)  # what is missing is said here, once
     figures = published("density_nll")
-    print(f"{count} {'grouped' if options.grouped else 'random'} splits, detail {options.detail}")
+    print(f"{count} {'grouped' if options.grouped else 'random'} splits")
     print(
         "data         flow            kde      (difference)     rfm    rdm   fit s   100k: exact s"
         "   kde s  table s   error     mass"
     )
     with ProcessPoolExecutor(options.workers) as pool:
         jobs = [
-            (n, k, options.grouped, seconds, options.detail) for n in names for k in range(count)
+            (n, k, options.grouped, seconds, options.detail, options.kernels)
+            for n in names
+            for k in range(count)
         ]
         found = pool.map(run, jobs)
         for name in names:

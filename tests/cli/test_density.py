@@ -191,8 +191,9 @@ def test_mistakes_in_the_data(case: str, tmp_path: Path, orbiflow) -> None:
 
 def test_mistakes_in_the_options(tmp_path: Path, orbiflow) -> None:
     data, model = table(tmp_path), tmp_path / "model"
-    orbiflow("density", "fit", data, "--space", "torus", "--out", model, *FIT)
-    fit, score = ("density", "fit", data, "--space", "torus"), ("density", "score", data)
+    orbiflow("density", "fit", data, "--space", "torus", "--unit", "degrees", "--out", model, *FIT)
+    fit = ("density", "fit", data, "--space", "torus", "--unit", "degrees")
+    score = ("density", "score", data)
     for arguments, message in (
         ((*fit, "--columns", "lat,height"), "height"),
         ((*fit, "--columns", " , "), "--columns names no column"),
@@ -253,7 +254,9 @@ def test_a_fit_does_not_touch_what_it_did_not_write(tmp_path: Path, orbiflow) ->
     data, model = table(tmp_path), tmp_path / "model"
     model.mkdir()
     (model / "density.png").write_text("mine")
-    refused = orbiflow("density", "fit", data, "--space", "torus", *FIT, "--out", model)
+    refused = orbiflow(
+        "density", "fit", data, "--space", "torus", "--unit", "degrees", *FIT, "--out", model
+    )
     assert refused.status == 2
     assert "holds density.png, which orbiflow did not write" in refused.err
     assert (model / "density.png").read_text() == "mine"
@@ -261,7 +264,7 @@ def test_a_fit_does_not_touch_what_it_did_not_write(tmp_path: Path, orbiflow) ->
 
 def test_a_plot_leaves_other_files_alone(tmp_path: Path, orbiflow) -> None:
     data, model, out = table(tmp_path), tmp_path / "model", tmp_path / "plots"
-    orbiflow("density", "fit", data, "--space", "torus", *FIT, "--out", model)
+    orbiflow("density", "fit", data, "--space", "torus", "--unit", "degrees", *FIT, "--out", model)
     out.mkdir()
     (out / "notes.txt").write_text("mine")
     (out / "surface.html").write_text("of an earlier model")

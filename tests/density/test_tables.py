@@ -109,7 +109,10 @@ def test_single_column(tmp_path: Path) -> None:
         ("lat,lon\n1,2\n3,x4\n", "line 3: column 'lon': 'x4' is not a number"),
         ("1,2\n3,4\n\n5,1_000\n", "line 4: column 'column2': '1_000' is not"),
         ("a,b\n" + "1,2\n" * 200 + "1," + "z" * 99, "line 202: column 'b': 'z{37}...'"),
-        ("a;b\n1,5;2\n", "column 'a': '1,5' is not a number; write decimal points, not commas"),
+        (
+            "a;b\n0.5;2\n1,5;2\n",
+            "column 'a': '1,5' is not a number; write decimal points, not commas",
+        ),
         ("a,b,c\n1,2,x\n1,2,3\n1,y,x", "line 4: column 'b': 'y' is not"),
         ("a,b\n1,2\n,2\nNA,nan\n4,inf\n", "4 cells empty, NaN or infinite, .* line 3, column 'a'"),
         ("1,2\n3,-1e999\n", "1 cell empty, NaN or infinite, .* line 2, column 'column2'"),

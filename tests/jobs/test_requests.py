@@ -26,6 +26,7 @@ from orbiflow.jobs import (
     RecordError,
     Request,
     request_from_json,
+    requests,
 )
 
 names = st.text(st.characters(exclude_characters="\0"), min_size=1)
@@ -102,8 +103,9 @@ REQUESTS = st.one_of(
         space=spaces,
         columns=columns,
         unit=units,
-        detail=st.integers(),
-        kernels=st.booleans(),
+        parts=st.none() | st.lists(st.sampled_from(requests.PARTS), min_size=1).map(tuple),
+        repeats=st.sampled_from(["places", "rounding"]),
+        detail=st.none() | st.integers(),
         seconds=st.none() | numbers,
         seed=seeds,
     ),

@@ -10,9 +10,12 @@ import typer
 from orbiflow.cli.density_options import (
     Columns,
     Data,
+    DropMissing,
     Format,
     Measure,
     Model,
+    NoHeader,
+    Repeats,
     Scale,
     Space,
     Unit,
@@ -43,22 +46,47 @@ def fit(
         Path, typer.Option("--out", "-o", help="Folder for the results, made if need be.")
     ] = Path("density"),
     columns: Columns = None,
+    no_header: NoHeader = False,
+    drop_missing: DropMissing = False,
     unit: Annotated[
-        Unit, typer.Option(help="Of angles on the torus and the Klein bottle.")
-    ] = Unit.RADIANS,
+        Unit | None,
+        typer.Option(
+            help="Of angles on the torus and the Klein bottle; default radians, if no value is "
+            "beyond 2 pi.",
+            show_default=False,
+        ),
+    ] = None,
+    parts: Annotated[
+        str | None,
+        typer.Option(
+            help="Of flow, kernels, mixture and chains those that may be used, such as "
+            "kernels,mixture; default all, and rows held out choose.",
+            show_default=False,
+        ),
+    ] = None,
+    repeats: Annotated[
+        Repeats,
+        typer.Option(
+            help="What rows that repeat another are: places that new rows repeat as often, or an "
+            "accident of rounding."
+        ),
+    ] = Repeats.PLACES,
     detail: Annotated[
-        int, typer.Option(help="Waves of the flow along a side of the square, 1 to 64.")
-    ] = 8,
-    segments: Annotated[int, typer.Option(help="Stationary pieces of the flow.")] = 6,
+        int | None,
+        typer.Option(
+            help="Waves of the flow along a side of the square, 1 to 64.", show_default=False
+        ),
+    ] = None,
+    segments: Annotated[
+        int | None, typer.Option(help="Stationary pieces of the flow.", show_default=False)
+    ] = None,
     kernels: Annotated[
         bool,
-        typer.Option(
-            "--kernels", help="Add kernels about the points: for clusters sharper than the flow."
-        ),
+        typer.Option("--kernels", help="A flow with adaptive kernels, and nothing else."),
     ] = False,
     seconds: Annotated[
         float | None,
-        typer.Option(help="Of refinement at most; default no limit.", show_default=False),
+        typer.Option(help="Of training at most; default no limit.", show_default=False),
     ] = None,
     seed: Annotated[int, typer.Option(help="Same seed, same machine: same density.")] = 0,
 ) -> None:
@@ -71,7 +99,11 @@ def fit(
         space=space.value,
         out=out,
         columns=named_columns(columns),
-        unit=unit.value,
+        header=False if no_header else None,
+        drop_missing=drop_missing,
+        unit=None if unit is None else unit.value,
+        parts=named_columns(parts),
+        repeats=repeats.value,
         detail=detail,
         segments=segments,
         kernels=kernels,
@@ -89,6 +121,8 @@ def score(
         Path, typer.Option("--out", "-o", help="The data with a column log_prob.")
     ] = Path("scores.csv"),
     columns: Columns = None,
+    no_header: NoHeader = False,
+    drop_missing: DropMissing = False,
     measure: Annotated[
         Measure,
         typer.Option(help="Natural: the data's own units, or steradians. Uniform: against chance."),
@@ -100,6 +134,8 @@ def score(
         model=model,
         out=out,
         columns=named_columns(columns),
+        header=False if no_header else None,
+        drop_missing=drop_missing,
         measure=measure.value,
     )
     do(request)

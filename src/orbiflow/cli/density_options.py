@@ -27,6 +27,13 @@ class Unit(StrEnum):
     TURNS = "turns"
 
 
+class Repeats(StrEnum):
+    """What rows that repeat another are."""
+
+    PLACES = "places"
+    ROUNDING = "rounding"
+
+
 class Measure(StrEnum):
     """What a density is per."""
 
@@ -66,6 +73,12 @@ def named_columns(text: str | None) -> tuple[str, ...] | None:
 Columns = Annotated[
     str | None,
     typer.Option(help="Names or numbers of the columns, such as lat,lon.", show_default=False),
+]
+NoHeader = Annotated[
+    bool, typer.Option("--no-header", help="The table's first line is a row, names or not.")
+]
+DropMissing = Annotated[
+    bool, typer.Option("--drop-missing", help="Leave out rows that lack a value.")
 ]
 Model = Annotated[
     Path, typer.Option("--model", "-m", help="Folder that `fit` wrote.", show_default=False)

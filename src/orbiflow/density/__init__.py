@@ -2,10 +2,12 @@
 
 from orbiflow.density.estimator import DensityEstimator
 from orbiflow.density.fitting import (
+    AutomaticSettings,
     FitReport,
     FitSettings,
     NeuralSettings,
     blend_kernels,
+    fit_automatic,
     fit_density,
     fit_neural,
 )
@@ -44,6 +46,7 @@ __all__ = [
     "MEASURES",
     "SPACES",
     "AdaptiveKernels",
+    "AutomaticSettings",
     "Base",
     "BlendedDensity",
     "DensityEstimator",
@@ -65,6 +68,7 @@ __all__ = [
     "blend_kernels",
     "clear_rotation",
     "density_to_bytes",
+    "fit_automatic",
     "fit_density",
     "fit_neural",
     "from_klein",

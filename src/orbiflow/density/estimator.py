@@ -3,13 +3,21 @@
 from __future__ import annotations
 
 import inspect
+import math
 import numbers
+from dataclasses import replace
 from typing import Any, TypeAlias
 
 import numpy as np
 import torch
 from numpy.typing import ArrayLike
 
+from orbiflow.density.fitting.automatic import (
+    PARTS,
+    AutomaticSettings,
+    fit_automatic,
+    flow_settings,
+)
 from orbiflow.density.fitting.flow import MOST_DIM, fit_density
 from orbiflow.density.fitting.neural import NeuralSettings, fit_neural
 from orbiflow.density.fitting.report import FitReport, Progress
@@ -26,6 +34,11 @@ ONLY_SPLINES = (
 )  # fmt: skip
 """Parameters without a meaning for neural flows."""
 
+OF_FLOWS = (*ONLY_SPLINES[:-1], "evaluations", "validation")
+"""Parameters of a flow, alone or beside other parts."""
+
+AUTO = "auto"
+
 RandomState: TypeAlias = int | np.integer | np.random.RandomState | np.random.Generator | None
 """As scikit-learn has it, and NumPy's newer generators."""
 
@@ -38,14 +51,20 @@ class DensityEstimator:
     Args:
         space: "torus", "sphere", "klein-bottle", "projective-plane", or a `Space`.
         unit: of angles on torus and Klein bottle: "radians", "degrees" or "turns".
+        parts: "auto": of flow, kernels, mixture and chains what rows held out speak for
+            (`fit_automatic`). Or those that may be used, such as "kernels" or "flow,chains"; "flow" is
+            a flow alone (`fit_density`).
+        repeats: "places": rows that repeat another are real mass; "rounding": they are an accident.
         detail: largest wave number of the flow, in waves along a side of the square.
         segments: stationary pieces of the flow.
-        smoothness, ridge, roughness, kinetic, iterations, evaluations, validation, base, kernels,
-            seconds, seed: see `FitSettings`.
+        smoothness, ridge, roughness, kinetic, iterations, evaluations, validation, base: of the flow,
+            see `FitSettings`; None for what suits the number of rows.
+        kernels: a flow blended with adaptive kernels, and nothing else; see `blend_kernels`.
+        seconds: of training at most; then the fit depends on the machine.
+        seed: of all that is drawn.
 
-    On tori of four or more angles the density is a neural flow on a mixture of von Mises chains
-    (`fit_neural`): there only `evaluations`, `validation`, `seconds` and `seed` have a meaning, and the
-    others must be left at their defaults.
+    On tori of four or more angles a flow is neural and stands alone ("flow", see `fit_neural`), and
+    parameters of flows of splines must be left at their defaults.
 
     After `fit`: `space_`, `density_` (a `SymmetricDensity`), `report_` (a `FitReport`),
     `n_features_in_`.
@@ -62,13 +81,15 @@ class DensityEstimator:
         space: str | Space = "torus",
         *,
         unit: str = "radians",
-        detail: int = 8,
-        segments: int = 6,
+        parts: str = AUTO,
+        repeats: str = "places",
+        detail: int | None = None,
+        segments: int | None = None,
         smoothness: float = 2.0,
         ridge: float = 1e-4,
-        roughness: tuple[float, ...] = (1e-3, 1e-3, 1e-4),
+        roughness: tuple[float, ...] | None = None,
         kinetic: float = 0.0,
-        iterations: int = 100,
+        iterations: int | None = None,
         evaluations: int = 1000,
         validation: float = 0.1,
         base: str = "uniform",
@@ -78,6 +99,8 @@ class DensityEstimator:
     ) -> None:
         self.space = space
         self.unit = unit
+        self.parts = parts
+        self.repeats = repeats
         self.detail = detail
         self.segments = segments
         self.smoothness = smoothness
@@ -102,13 +125,7 @@ class DensityEstimator:
                 or one that has no meaning on a torus of so many angles.
         """
         del y
-        settings = FitSettings(
-            **{
-                name: value
-                for name, value in self.get_params().items()
-                if name not in ("space", "unit")
-            }
-        )
+        chosen, alone = self._parts(), self._flow_settings()
         data = np.asarray(X)
         self.space_ = self._space_for(data)
         points = self.space_.to_chart(data)
@@ -116,6 +133,18 @@ class DensityEstimator:
         self.report_: FitReport
         if self.space_.dim > MOST_DIM:
             self._refuse_settings_of_splines()
+        if not self.kernels and chosen != ("flow",):
+            settings = AutomaticSettings(
+                parts=chosen,
+                repeats=self.repeats,
+                flow=self._flow_beside(len(points)),
+                seconds=self.seconds,
+                seed=self.seed,
+            )
+            found = fit_automatic(self.space_, points, settings, progress=progress)
+        elif self.space_.dim <= MOST_DIM:
+            found = fit_density(self.space_, points, alone, progress=progress)
+        else:
             many = NeuralSettings(
                 refinement=min(NeuralSettings.refinement, self.evaluations),
                 validation=self.validation,
@@ -123,8 +152,6 @@ class DensityEstimator:
                 seed=self.seed,
             )
             found = fit_neural(self.space_, points, many, progress=progress)
-        else:
-            found = fit_density(self.space_, points, settings, progress=progress)
         self.density_, self.report_ = found
         self.n_features_in_ = int(data.shape[1])
         return self
@@ -207,9 +234,36 @@ class DensityEstimator:
             raise OrbiflowError(f"expected data of shape (N, k), got {data.shape}")
         return space_class(self.space).for_data(data, unit=self.unit, seed=self.seed)
 
-    def _refuse_settings_of_splines(self) -> None:
+    def _parts(self) -> tuple[str, ...]:
+        if self.parts == AUTO:
+            return PARTS
+        if not isinstance(self.parts, str):
+            raise OrbiflowError(
+                f'parts must be "{AUTO}" or names such as "kernels,mixture", got {self.parts!r}'
+            )
+        return tuple(name.strip() for name in self.parts.split(","))
+
+    def _flow_settings(self) -> FitSettings:
+        """Of a flow alone, or with kernels."""
+        return FitSettings(
+            kernels=self.kernels, seconds=self.seconds, seed=self.seed, **self._set(OF_FLOWS)
+        )
+
+    def _flow_beside(self, rows: int) -> FitSettings | None:
+        """Of a flow beside other parts."""
+        given = self._set(OF_FLOWS)
+        if not given or self.space_.dim > MOST_DIM:
+            return None
+        return replace(flow_settings(self.space_, rows, self.seed), seconds=math.inf, **given)
+
+    def _set(self, names: tuple[str, ...]) -> dict[str, Any]:
+        """Parameters that are not at their defaults."""
         defaults = inspect.signature(type(self)).parameters
-        set_ = [name for name in ONLY_SPLINES if getattr(self, name) != defaults[name].default]
+        given = {name: getattr(self, name) for name in names}
+        return {name: v for name, v in given.items() if v != defaults[name].default}
+
+    def _refuse_settings_of_splines(self) -> None:
+        set_ = list(self._set(ONLY_SPLINES))
         if set_:
             raise OrbiflowError(
                 f"{', '.join(set_)} would have no effect on a torus of {self.space_.dim} angles, where "

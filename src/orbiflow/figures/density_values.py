@@ -7,7 +7,6 @@ import math
 import torch
 from torch import Tensor
 
-from orbiflow.density.models.bases import UniformBase
 from orbiflow.density.models.blend import BlendedDensity
 from orbiflow.density.models.kernels import AdaptiveKernels, kernel_rows
 from orbiflow.density.models.symmetric import SymmetricDensity, midpoints
@@ -57,14 +56,15 @@ def density_on_grid(
     points = torch.stack(torch.meshgrid(x, y, indexing="ij"), dim=-1).reshape(-1, 2)
     if not isinstance(density, BlendedDensity):
         return density_at(density, points, measure).reshape(shape)
-    flow, kernels, floor = density.shares.tolist()
-    values = flow * density_at(density.flow_density, points, "square")
     if space.is_round:
         points = off_cones(points)
-    values = values + floor * UniformBase(space).log_prob(points).exp().numpy()
+    values = density.log_prob_without_kernels(points).exp().numpy()
     kappa = _widened(density.kernels, pixel or float(x[1] - x[0]))
     sums = _round_sums if space.is_round else _flat_sums
-    values = values.reshape(shape) + kernels * sums(density.kernels, kappa, x, y).numpy()
+    values = (
+        values.reshape(shape)
+        + float(density.shares[1]) * sums(density.kernels, kappa, x, y).numpy()
+    )
     return values * space.log_density_factor(points, measure).exp().numpy().reshape(shape)
 
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
 from orbiflow.density import SymmetricDensity, read_density
-from orbiflow.density.tables import Table, read_table
-from orbiflow.errors import OrbiflowError
+from orbiflow.density.tables import Table, is_identifier, read_table
+from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.export.density_plots import MODEL
 from orbiflow.jobs.events import Note
 from orbiflow.jobs.run import Sink
@@ -20,13 +21,64 @@ def model_at(path: Path) -> tuple[SymmetricDensity, dict[str, Any]]:
     return read_density(path / MODEL if path.is_dir() else path)
 
 
-def read_data(data: Path, columns: tuple[str, ...] | None, width: int | None, tell: Sink) -> Table:
-    """The columns asked for, else those that `read_table` takes for `width`; tells its notes."""
+def read_data(
+    data: Path,
+    columns: tuple[str, ...] | None,
+    width: int | None,
+    tell: Sink,
+    *,
+    has_header: bool | None = None,
+    drop_missing: bool = False,
+) -> Table:
+    """The columns asked for, else those of numbers, `width` of them, less identifiers; tells notes."""
     chosen = None if columns is None else list(columns)
-    table = read_table(data, columns=chosen, width=width if chosen is None else None)
+    how: dict[str, Any] = {"has_header": has_header, "drop_missing": drop_missing}
+    if chosen is not None:
+        table = read_table(data, columns=chosen, width=None, **how)
+    else:
+        try:
+            table = read_table(data, columns=None, width=width, **how)
+        except InputFileError:
+            # one more than wanted may be an identifier
+            if width is None:
+                raise
+            table = _without_identifiers(read_table(data, columns=None, width=None, **how), tell)
+            if len(table.columns) != width:
+                raise
+        else:
+            table = table if width is not None else _without_identifiers(table, tell)
     for note in table.notes:
         tell(Note(note))
     return table
+
+
+def _without_identifiers(table: Table, tell: Sink) -> Table:
+    for column in reversed(range(len(table.columns))):
+        name = table.columns[column]
+        if len(table.columns) > 1 and is_identifier(name, table.values[:, column]):
+            table = table.without(column)
+            tell(Note(f"left out the column {name!r}, which numbers the rows; --columns takes it"))
+    return table
+
+
+def unit_of(space: str, unit: str | None, table: Table, tell: Sink) -> str:
+    """The unit of angles: as said, else radians where all values are within a turn either way.
+
+    Raises:
+        OrbiflowError: if none was said and the values cannot be radians.
+    """
+    if unit is not None or space not in ("torus", "klein-bottle"):
+        return unit or "radians"
+    beyond = abs(table.values).max(axis=0) > 2 * math.pi + 1e-9
+    if beyond.any():
+        column = int(beyond.argmax())
+        most = table.values[abs(table.values[:, column]).argmax(), column]
+        raise OrbiflowError(
+            f"column {table.columns[column]!r} has {most:g}, beyond 2 pi: say --unit degrees, radians "
+            "or turns"
+        )
+    tell(Note("no --unit was given and all values are within 2 pi: they were read as radians"))
+    return "radians"
 
 
 def same_columns(data: Path, extra: dict[str, Any]) -> tuple[str, ...] | None:

@@ -32,7 +32,14 @@ def density_score(request: DensityScoreRequest, tell: Sink, cancel: Cancel) -> F
     """
     density, extra = model_at(request.model)
     columns = request.columns or same_columns(request.data, extra)
-    table = read_data(request.data, columns, None, tell)
+    table = read_data(
+        request.data,
+        columns,
+        None,
+        tell,
+        has_header=request.header,
+        drop_missing=request.drop_missing,
+    )
     points = density.space.to_chart(table.values)
     parts = []
     with torch.no_grad():

@@ -17,6 +17,12 @@ MOST_SAMPLES = 100_000_000
 SpaceName = Literal["torus", "sphere", "klein-bottle", "projective-plane"]
 Unit = Literal["radians", "degrees", "turns"]
 Measure = Literal["natural", "square", "uniform"]
+PARTS = (
+    "flow",
+    "kernels",
+    "mixture",
+    "chains",
+)  # as `orbiflow.density` has them, without its import
 
 
 class Request(Record):
@@ -247,7 +253,15 @@ class DensityFitRequest(Request):
 
     - `data`: the table. `out`: folder for the model and its report.
     - `columns`: names or numbers, None for what the space takes.
-    - `seconds`: of refinement at most, None for no limit.
+    - `header`: whether a text's first line names the columns, None to look.
+    - `drop_missing`: leave out rows that lack a value.
+    - `unit`: of angles; None for radians if no value is beyond 2 pi.
+    - `parts`: of flow, kernels, mixture and chains those that may be used; None lets rows held out
+      choose among all.
+    - `repeats`: what rows that repeat another are taken for.
+    - `detail`, `segments`: of the flow, None for what suits the number of rows.
+    - `kernels`: a flow and adaptive kernels, nothing else.
+    - `seconds`: of training at most, None for no limit.
     """
 
     KIND = "density-fit"
@@ -256,20 +270,34 @@ class DensityFitRequest(Request):
     space: SpaceName
     out: Path = Path("density")
     columns: tuple[str, ...] | None = None
-    unit: Unit = "radians"
-    detail: int = 8
-    segments: int = 6
+    header: bool | None = None
+    drop_missing: bool = False
+    unit: Unit | None = None
+    parts: tuple[str, ...] | None = None
+    repeats: Literal["places", "rounding"] = "places"
+    detail: int | None = None
+    segments: int | None = None
     kernels: bool = False
     seconds: float | None = None
     seed: int = 0
 
     def check(self) -> None:
         _columns_named(self.columns)
+        unknown = [part for part in self.parts or () if part not in PARTS]
+        if unknown or self.parts == ():
+            raise RecordError(
+                f"{{parts}} must be of {', '.join(PARTS)}, got {', '.join(unknown)!r}"
+            )
+        if self.kernels and self.parts is not None:
+            raise RecordError("{kernels} means a flow with kernels: give it or {parts}, not both")
 
 
 @dataclass(frozen=True)
 class DensityScoreRequest(Request):
-    """Add log densities to a table; see `orbiflow density score --help`."""
+    """Add log densities to a table; see `orbiflow density score --help`.
+
+    `columns`, `header`, `drop_missing`: as for a fit; rows left out get an empty cell.
+    """
 
     KIND = "density-score"
 
@@ -277,6 +305,8 @@ class DensityScoreRequest(Request):
     model: Path
     out: Path = Path("scores.csv")
     columns: tuple[str, ...] | None = None
+    header: bool | None = None
+    drop_missing: bool = False
     measure: Measure = "natural"
 
     def check(self) -> None:

@@ -95,7 +95,7 @@ def fit_chains(
     size = min(SMALLEST, most)
 
     def start(count: int, order: Tensor) -> VonMisesChains:
-        return _expectation_maximization(
+        return fit_chain_mixture(
             space, train, validation, count, order, iterations, generator, budget
         )
 
@@ -133,7 +133,7 @@ def _nll(mixture: VonMisesChains, points: Tensor) -> float:
 
 
 @torch.no_grad()
-def _expectation_maximization(
+def fit_chain_mixture(
     space: Space,
     train: Tensor,
     validation: Tensor,
@@ -142,8 +142,14 @@ def _expectation_maximization(
     iterations: int,
     generator: torch.Generator,
     budget: Budget,
+    *,
+    patience: int = PATIENCE,
+    worthwhile: float = 0.0,
 ) -> VonMisesChains:
-    """EM from seeds that are spread out; the iterate that was best on `validation`."""
+    """EM from seeds that are spread out; the iterate that was best on `validation`.
+
+    It ends after more looks than `patience` that bring no more than `worthwhile` nats.
+    """
     step = _Maximization(train, order)
     mixture = _started(space, step.angle, count, order, generator)
     best, least, idle = mixture, _nll(mixture, validation), 0
@@ -153,12 +159,11 @@ def _expectation_maximization(
             mixture = step(mixture, bent=iteration > STRAIGHT)
         if iteration % EVERY == 0 or iteration == iterations or late:
             score = _nll(mixture, validation)
+            idle = 0 if score < least - worthwhile else idle + 1
             if score < least:
-                best, least, idle = mixture, score, 0
-            else:
-                idle += 1
-                if idle > PATIENCE:
-                    break
+                best, least = mixture, score
+            if idle > patience:
+                break
         if late:
             break
     return best

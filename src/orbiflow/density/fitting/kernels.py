@@ -62,13 +62,13 @@ def blend_kernels(density: SymmetricDensity, train: Tensor, held: Tensor) -> Ble
         )
     weights = counts.double() / counts.sum()
     held = held[:MOST_HELD]
-    spreads = _spreads(space, centers, [m for m in NEIGHBOURS if m < len(centers)])
+    found_spreads = spreads(space, centers, [m for m in NEIGHBOURS if m < len(centers)])
     uniform = UniformBase(space).log_prob(held)
     with torch.no_grad():
         flow = density.log_prob(held)
     best, found = -math.inf, None
     shrinkage = (1.0,) if space.is_round or space.dim == 1 else ISOTROPY
-    for spread, scale, share in itertools.product(spreads, SCALES, shrinkage):
+    for spread, scale, share in itertools.product(found_spreads, SCALES, shrinkage):
         mean = spread.mean(dim=1, keepdim=True)
         kappa = 1 / (scale * ((1 - share) * spread + share * mean))
         kernels = AdaptiveKernels(space, centers, kappa.clamp(WIDEST, NARROWEST), weights)
@@ -94,7 +94,7 @@ def proportions(parts: Tensor, *, iterations: int = 60) -> tuple[Tensor, float]:
     return shares, float((parts + shares.log()[:, None]).logsumexp(dim=0).mean())
 
 
-def _spreads(space: Space, centers: Tensor, neighbours: list[int]) -> list[Tensor]:
+def spreads(space: Space, centers: Tensor, neighbours: list[int]) -> list[Tensor]:
     """Mean squares of the distance to the nearest neighbours, per axis: (N, 1) or (N, d) each."""
     images = space.features(centers)
     count = images.shape[1]

@@ -11,6 +11,7 @@ from torch import Tensor
 
 from orbiflow.density.arguments import check_kind, points_tensor
 from orbiflow.density.fitting.likelihood import Refinement
+from orbiflow.density.fitting.repeats import Repeats
 from orbiflow.density.models.symmetric import SymmetricDensity
 from orbiflow.density.spaces.space import Space
 from orbiflow.errors import OrbiflowError
@@ -27,8 +28,38 @@ Progress = Callable[[float, str], None]
 
 
 @dataclass(frozen=True)
+class PartEvidence:
+    """What a part of a density is worth.
+
+    - `name`: "flow", "kernels", "mixture" or "chains".
+    - `share`: of the density.
+    - `alone`: mean log density of the part alone at held-out rows, in nats above the uniform one.
+    - `gain`, `error`: nats that the density would lose without it, and their standard error.
+    - `rows`: held-out rows by which it was judged.
+    """
+
+    name: str
+    share: float
+    alone: float
+    gain: float
+    error: float
+    rows: int
+
+    def __str__(self) -> str:
+        worth = f"worth {self.gain:.4f} ± {self.error:.4f} nats"
+        return (
+            f"{self.name}: {self.share:.1%}, {worth if self.share else 'would add nothing'}; alone "
+            f"{self.alone:.4f} over uniform"
+        )
+
+
+@dataclass(frozen=True)
 class FitReport:
     """What a fit did; log-likelihoods in nats with respect to the square.
+
+    In a fit by evidence (`fit_automatic`) all rows are trained on in the end: `validation` counts those
+    that were held out in turn, `validation_nll` is their mean before that, `start_nll` that of the
+    uniform density; `stages`, `steps` and `integration_error` are the flow's, if it has a share.
 
     - `points`, `duplicates`: data points, and those that equal an earlier one.
     - `train`, `validation`: points of each.
@@ -39,7 +70,9 @@ class FitReport:
     - `steps`: RK4 steps a segment, in the end.
     - `mass`: integral over the square, see `SymmetricDensity.mass`; None above two dimensions.
     - `integration_error`: change of the flow's mean validation log density at doubled steps.
-    - `shares`: of flow, kernels and uniform floor, None without kernels.
+    - `shares`: of flow, kernels, uniform floor and, if there are, chains; None for a flow alone.
+    - `parts`: of a fit by evidence, what each part is worth.
+    - `repeats`: of a fit by evidence, what was found of rows that repeat another.
     - `notes`: what the user should know, in words.
     """
 
@@ -55,6 +88,8 @@ class FitReport:
     mass: float | None
     integration_error: float
     shares: tuple[float, ...] | None = None
+    parts: tuple[PartEvidence, ...] = ()
+    repeats: Repeats | None = None
     notes: tuple[str, ...] = field(default=())
 
 

@@ -1,4 +1,4 @@
-"""A flow's density beside adaptive kernels and a uniform floor."""
+"""A flow's density beside adaptive kernels, a uniform floor and von Mises chains."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from orbiflow.density.arguments import check_kind, float_tensor
+from orbiflow.density.arguments import check_kind, float_tensor, points_tensor
 from orbiflow.density.models.bases import Base, UniformBase
+from orbiflow.density.models.chains import VonMisesChains
 from orbiflow.density.models.kernels import AdaptiveKernels
 from orbiflow.density.models.symmetric import SymmetricDensity, shape_of
 from orbiflow.density.spaces.space import Space
@@ -18,33 +19,46 @@ from orbiflow.threads import one_thread
 
 
 class BlendedDensity(SymmetricDensity):
-    """shares_0 flow + shares_1 kernels + shares_2 uniform: exact, normalised, invariant.
+    """shares_0 flow + shares_1 kernels + shares_2 uniform (+ shares_3 chains): exact, normalised.
 
-    The flow gives the broad shape, the kernels what is sharper than its waves, the floor keeps a
-    lone observation from being impossible. `to_base` and `from_base` are the flow's.
+    The flow and the chains give the broad shape, the kernels what is sharper than a flow's waves, the
+    floor keeps a lone observation from being impossible. `to_base` and `from_base` are the flow's.
 
     Args:
         space, flow, base: see `SymmetricDensity`.
         kernels: on the same space.
-        shares: (3,), positive, of sum 1.
+        shares: (3,), or (4,) with chains; of sum 1, positive but for the flow's, which may be 0: then
+            the flow is not evaluated.
+        chains: von Mises chains on the same torus.
 
     Raises:
         OrbiflowError: for shares that are no proportions.
     """
 
     def __init__(
-        self, space: Space, flow: Flow, base: Base, kernels: AdaptiveKernels, shares: Tensor
+        self,
+        space: Space,
+        flow: Flow,
+        base: Base,
+        kernels: AdaptiveKernels,
+        shares: Tensor,
+        *,
+        chains: VonMisesChains | None = None,
     ) -> None:
         super().__init__(space, flow, base)
         check_kind(kernels, AdaptiveKernels, "kernels")
         shares = float_tensor(shares, "shares")
+        count = 3 if chains is None else 4
         if (
-            shares.shape != (3,)
-            or not bool((shares > 0).all())
+            shares.shape != (count,)
+            or not bool((shares[1:] > 0).all() and shares[0] >= 0)
             or abs(float(shares.sum()) - 1) > 1e-6
         ):
-            raise OrbiflowError(f"shares must be three proportions, got {shares.tolist()}")
-        self.kernels, self.shares = kernels, shares.double()
+            number = "three" if count == 3 else "four"
+            raise OrbiflowError(f"shares must be {number} proportions, got {shares.tolist()}")
+        if chains is not None:
+            check_kind(chains, VonMisesChains, "chains")
+        self.kernels, self.shares, self.chains = kernels, shares.double(), chains
         self._uniform = UniformBase(space)
 
     @property
@@ -52,41 +66,67 @@ class BlendedDensity(SymmetricDensity):
         """The flow's part alone."""
         return SymmetricDensity(self.space, self.flow, self.base)
 
+    @property
+    def _others(self) -> tuple[Base, ...]:
+        """What is beside the flow, in the order of `shares`."""
+        others = (self.kernels, self._uniform)
+        return others if self.chains is None else (*others, self.chains)
+
     def _log_prob(self, value: Tensor, measure: str) -> Tensor:
-        start, log_det = self.flow.inverse_and_log_det(value)
-        parts = [
-            self.base.log_prob(start) + log_det,
-            self.kernels.log_prob(value),
-            self._uniform.log_prob(value),
-        ]
-        weighted = [part + s.log() for part, s in zip(parts, self.shares.to(value), strict=True)]
-        blended = torch.stack(weighted).logsumexp(dim=0)
+        parts = [*self._flow_part(value), *(part.log_prob(value) for part in self._others)]
+        blended = self._sum(parts, self.shares[-len(parts) :])
         return blended + self.space.log_density_factor(value, measure)
+
+    @one_thread()
+    def log_prob_without_kernels(self, points: Tensor) -> Tensor:
+        """Log of the density less the kernels' share of it, (N,) at chart points (N, d).
+
+        With respect to the square's area; of integral 1 - shares_1.
+        """
+        value = points_tensor(points, self.space.dim).to(self._like().dtype)
+        parts = [*self._flow_part(value), *(part.log_prob(value) for part in self._others[1:])]
+        shares = torch.cat([self.shares[:1], self.shares[2:]])
+        return self._sum(parts, shares[-len(parts) :])
+
+    def _flow_part(self, value: Tensor) -> list[Tensor]:
+        """The flow's log density, or nothing where it has no share."""
+        if float(self.shares[0]) == 0:
+            return []
+        start, log_det = self.flow.inverse_and_log_det(value)
+        return [self.base.log_prob(start) + log_det]
+
+    def _sum(self, parts: list[Tensor], shares: Tensor) -> Tensor:
+        weighted = [part + s.log() for part, s in zip(parts, shares.to(parts[0]), strict=True)]
+        return torch.stack(weighted).logsumexp(dim=0)
 
     @one_thread()
     def rsample(self, sample_shape: Any = (), generator: torch.Generator | None = None) -> Tensor:
         """As `sample`, differentiable in the flow's parameters."""
         shape = shape_of(sample_shape)
         source = generator or torch.default_generator
+        if not shape.numel():
+            return self._like().new_empty(*shape, self.space.dim)
         part = torch.multinomial(self.shares, shape.numel(), replacement=True, generator=source)
-        counts = torch.bincount(part, minlength=3).tolist()
+        counts = torch.bincount(part, minlength=len(self.shares)).tolist()
         drawn = self._like().new_empty(shape.numel(), self.space.dim)
-        drawn = drawn.index_put(
-            (torch.nonzero(part == 0)[:, 0],), super().rsample((counts[0],), source)
-        )
-        for index, other in ((1, self.kernels), (2, self._uniform)):
-            drawn = drawn.index_put(
-                (torch.nonzero(part == index)[:, 0],),
-                other.sample(counts[index], source).to(drawn),
-            )
+        for index, count in enumerate(counts):
+            if not count:  # as a flow without a share
+                continue
+            if index:
+                own = self._others[index - 1].sample(count, source).to(drawn)
+            else:
+                own = super().rsample((count,), source)
+            drawn = drawn.index_put((torch.nonzero(part == index)[:, 0],), own)
         return drawn.reshape(*shape, self.space.dim)
 
     @torch.no_grad()
     def mass(self, resolution: int = 64) -> float:
-        """As of any density; kernels and floor, normalised in closed form, count as their shares.
+        """As of any density; all but the flow, normalised in closed form, counts as its shares.
 
         A grid would miss the narrowest kernels.
         """
+        if float(self.shares[0]) == 0:
+            return 1.0
         return self.mass_with(self.flow_density.mass(resolution))
 
     def mass_with(self, flow_mass: float) -> float:
@@ -95,5 +135,7 @@ class BlendedDensity(SymmetricDensity):
         return share * flow_mass + 1 - share
 
     def __repr__(self) -> str:
-        flow, kernels, floor = (f"{100 * s:.1f}%" for s in self.shares.tolist())
-        return f"BlendedDensity({self.space!r}, flow {flow}, kernels {kernels}, uniform {floor})"
+        names = ("flow", "kernels", "uniform", "chains")
+        shares = zip(names, self.shares.tolist(), strict=False)
+        listed = ", ".join(f"{name} {100 * share:.1f}%" for name, share in shares)
+        return f"BlendedDensity({self.space!r}, {listed})"

@@ -15,8 +15,8 @@ from orbiflow.errors import OrbiflowError
 
 MAX_COMPONENTS = 65536
 
-BASE = "base."
-"""Beginning of the tensors' names."""
+BASE, BESIDE = "base.", "chains."
+"""Beginning of the tensors' names, of a base and of what is beside a flow."""
 
 
 def chains_header(base: VonMisesChains) -> dict[str, Any]:
@@ -24,18 +24,18 @@ def chains_header(base: VonMisesChains) -> dict[str, Any]:
     return {"kind": "mixture", "components": len(base.concentrations), "scales": list(SCALES)}
 
 
-def chains_tensors(base: VonMisesChains) -> dict[str, Tensor]:
-    """Weights, means, concentrations and orders, float64, by names that begin with "base."."""
+def chains_tensors(base: VonMisesChains, prefix: str = BASE) -> dict[str, Tensor]:
+    """Weights, means, concentrations and orders, float64, by names that begin with `prefix`."""
     return {
-        BASE + "log_weights": base.log_weights,
-        BASE + "means": base.means,
-        BASE + "concentrations": base.concentrations,
-        BASE + "order": base.order.double(),
+        prefix + "log_weights": base.log_weights,
+        prefix + "means": base.means,
+        prefix + "concentrations": base.concentrations,
+        prefix + "order": base.order.double(),
     }
 
 
 def chains_from_header(
-    header: Mapping[str, Any], tensors: Mapping[str, Tensor], space: Space
+    header: Mapping[str, Any], tensors: Mapping[str, Tensor], space: Space, prefix: str = BASE
 ) -> VonMisesChains:
     """The base of `chains_header` and `chains_tensors`, bit for bit.
 
@@ -53,8 +53,8 @@ def chains_from_header(
     }
     parts = []
     for name, shape in shapes.items():
-        if BASE + name not in tensors:
-            raise OrbiflowError(f"the tensor {BASE + name} is missing")
+        if prefix + name not in tensors:
+            raise OrbiflowError(f"the tensor {prefix + name} is missing")
         # a component of no weight has the logarithm -inf
-        parts.append(checked_tensor(BASE + name, tensors[BASE + name], shape, least=-math.inf))
+        parts.append(checked_tensor(prefix + name, tensors[prefix + name], shape, least=-math.inf))
     return VonMisesChains(space, *parts)

@@ -19,14 +19,20 @@ from orbiflow.density.models.neural import NeuralFlow
 from orbiflow.density.models.symmetric import SymmetricDensity
 from orbiflow.density.spaces.catalogue import make_space
 from orbiflow.density.spaces.space import Space
-from orbiflow.density.storage.chains import chains_from_header, chains_header, chains_tensors
+from orbiflow.density.storage.chains import (
+    BESIDE,
+    chains_from_header,
+    chains_header,
+    chains_tensors,
+)
 from orbiflow.density.storage.groups import check_group, group_header, is_same_group
 from orbiflow.density.storage.neural import neural_from_header, neural_header, neural_tensors
 from orbiflow.density.storage.series import series_from_header, series_parts
 from orbiflow.errors import InputFileError, OrbiflowError
 
-FORMAT, FORMAT_1 = "orbiflow-density/2", "orbiflow-density/1"
-"""Written, and read as well: the first had one smoothness for all segments, and no group."""
+FORMAT, FORMAT_2, FORMAT_1 = "orbiflow-density/3", "orbiflow-density/2", "orbiflow-density/1"
+"""Written, and read as well: the first had one smoothness for all segments, and no group; the second
+no chains beside a flow. What needs no chains is still written as the second."""
 
 MAX_BYTES, MAX_HEADER, MAX_KERNELS = 256 * 2**20, 2**20, 1_000_000
 
@@ -51,14 +57,20 @@ def density_to_bytes(density: SymmetricDensity, **extra: Any) -> bytes:
     tensors |= more
     if isinstance(density, BlendedDensity):
         tensors |= _kernel_tensors(density)
+    chains = density.chains if isinstance(density, BlendedDensity) else None
+    if chains is not None:
+        _check_shared_space(density, chains, "mixture of chains")
+        tensors |= chains_tensors(chains, BESIDE)
     header = {
-        "format": FORMAT,
+        "format": FORMAT_2 if chains is None else FORMAT,
         "space": {"name": space.name, **space.settings()},
         "group": group_header(space.group),
         "base": base,
         "flow": flow,
         "extra": extra,
     }
+    if chains is not None:
+        header["chains"] = chains_header(chains)
     try:
         text = json.dumps(header, allow_nan=False)
     except (TypeError, ValueError) as error:
@@ -160,7 +172,7 @@ def read_density(path: str | Path) -> tuple[SymmetricDensity, dict[str, Any]]:
         if not 2 <= length <= min(len(data) - 8, MAX_HEADER):
             raise ValueError("no header")
         header = json.loads(json.loads(data[8 : 8 + length])["__metadata__"]["orbiflow"])
-        if header["format"] not in (FORMAT, FORMAT_1):
+        if header["format"] not in (FORMAT, FORMAT_2, FORMAT_1):
             raise ValueError(f"format {header['format']!r}")
         with torch.inference_mode(False):  # what is made in it could never be differentiated
             return _restored(header, load(data)), header["extra"]
@@ -190,7 +202,11 @@ def _restored(header: dict[str, Any], tensors: dict[str, Tensor]) -> SymmetricDe
     parts = [tensors[f"kernel_{name}"] for name in ("centers", "concentrations", "weights")]
     if len(parts[0]) > MAX_KERNELS:
         raise ValueError(f"{len(parts[0])} kernels")
-    return BlendedDensity(space, flow, base, AdaptiveKernels(space, *parts), tensors["shares"])
+    chains = header.get("chains")
+    if chains is not None:
+        chains = chains_from_header(chains, tensors, space, BESIDE)
+    kernels = AdaptiveKernels(space, *parts)
+    return BlendedDensity(space, flow, base, kernels, tensors["shares"], chains=chains)
 
 
 def _restored_base(header: dict[str, Any], tensors: dict[str, Tensor], space: Space) -> Base:

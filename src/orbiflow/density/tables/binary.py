@@ -19,13 +19,20 @@ from orbiflow.density.tables.table import (
     choose,
     find,
     quote,
+    without_missing,
 )
 from orbiflow.errors import InputFileError, OrbiflowError
 
 MAX_NPY_HEADER = 10_000  # characters; numpy parses the header with `ast.literal_eval`
 
 
-def read_npy(path: Path, columns: Sequence[str] | None, width: int | None, max_rows: int) -> Table:
+def read_npy(
+    path: Path,
+    columns: Sequence[str] | None,
+    width: int | None,
+    max_rows: int,
+    drop_missing: bool = False,
+) -> Table:
     shape, dtype = _npy_header(path)
     check_count(path, shape[0], max_rows, "rows")
     fields = dtype.names
@@ -43,7 +50,7 @@ def read_npy(path: Path, columns: Sequence[str] | None, width: int | None, max_r
             values = np.stack([part.astype(np.float64) for part in parts], axis=1)
     except (OSError, ValueError, TypeError, IndexError, OverflowError) as exc:
         raise _damaged(path, exc) from exc
-    return _numbered(path, values, tuple(names[i] for i in picked), notes)
+    return _numbered(path, values, tuple(names[i] for i in picked), notes, drop_missing)
 
 
 def _npy_header(path: Path) -> tuple[tuple[int, ...], np.dtype]:
@@ -75,7 +82,11 @@ def _npy_header(path: Path) -> tuple[tuple[int, ...], np.dtype]:
 
 
 def read_parquet(
-    path: Path, columns: Sequence[str] | None, width: int | None, max_rows: int
+    path: Path,
+    columns: Sequence[str] | None,
+    width: int | None,
+    max_rows: int,
+    drop_missing: bool = False,
 ) -> Table:
     try:
         arrow = importlib.import_module("pyarrow")
@@ -104,15 +115,22 @@ def read_parquet(
         raise
     except (arrow.ArrowException, OSError, ValueError, KeyError, MemoryError) as exc:
         raise _damaged(path, exc) from exc
-    return _numbered(path, np.concatenate(blocks), names, notes)
+    return _numbered(path, np.concatenate(blocks), names, notes, drop_missing)
 
 
 def _numbered(
-    path: Path, values: NDArray[np.float64], names: tuple[str, ...], notes: list[str]
+    path: Path,
+    values: NDArray[np.float64],
+    names: tuple[str, ...],
+    notes: list[str],
+    drop_missing: bool,
 ) -> Table:
-    rows = np.arange(1, len(values) + 1, dtype=np.int64)
+    rows, dropped = np.arange(1, len(values) + 1, dtype=np.int64), frozenset()
+    if drop_missing and len(values):
+        values, rows, dropped, more = without_missing(path, values, rows, "row")
+        notes = [*notes, *more]
     check_finite(path, values, rows, names, "row")
-    return Table(values, names, rows, tuple(notes), None, None)
+    return Table(values, names, rows, tuple(notes), None, None, dropped=dropped)
 
 
 def _check_numeric(

@@ -27,6 +27,8 @@ def read_table(
     columns: Sequence[str] | None,
     width: int | None,
     max_rows: int = 20_000_000,
+    has_header: bool | None = None,
+    drop_missing: bool = False,
 ) -> Table:
     """Read columns of finite numbers from a text, `.npy` or Parquet file.
 
@@ -37,14 +39,20 @@ def read_table(
 
     `columns` names the columns wanted, in the order of `values`: each by its name (the very name
     first, then without regard to case), else by its 1-based number as text ("3"). None takes all
-    columns of numbers. `width` is how many columns there must be, None for any number.
+    columns of numbers. `width` is how many columns there must be, None for any number. `has_header`
+    says whether a text file's first line names the columns, None to look. With `drop_missing`, rows
+    that lack a value in a chosen column are left out. Decimal commas are read where they cannot be
+    taken for anything else.
 
     Raises `InputFileError` naming the file, the line and the column at fault; `OrbiflowError` for
     a Parquet file without pyarrow.
     """
     path = Path(path)
-    read = {"text": read_text, "npy": read_npy, "parquet": read_parquet}[_kind(path)]
-    return read(path, columns, width, max_rows)
+    kind = _kind(path)
+    if kind == "text":
+        return read_text(path, columns, width, max_rows, drop_missing, has_header)
+    read = {"npy": read_npy, "parquet": read_parquet}[kind]
+    return read(path, columns, width, max_rows, drop_missing)
 
 
 def append_column(table: Table, path_of_source: str | Path, name: str, values: ArrayLike) -> bytes:
@@ -52,8 +60,8 @@ def append_column(table: Table, path_of_source: str | Path, name: str, values: A
 
     `values` is (N,), one for each row of `table`, written with 10 significant digits. A text file
     keeps its delimiter, its other columns and its comments, and loses its blank lines; it gets the
-    new name only where it has a header. From npy and Parquet come `table`'s columns, as CSV. A name
-    that is taken gets a number: "density_2".
+    new name only where it has a header. Rows that were left out get an empty cell. From npy and
+    Parquet come `table`'s columns, as CSV. A name that is taken gets a number: "density_2".
 
     Raises `InputFileError` where the source has changed since it was read, `ValueError` where
     `values` has another shape.
@@ -73,8 +81,10 @@ def append_column(table: Table, path_of_source: str | Path, name: str, values: A
         elif header is not None:
             out += f"{line}{end}{_name_cell(_free_name(name, header), end)}\n".encode()
             header = None
+        elif number in table.dropped:
+            out += f"{line}{end}{_missing_cell(end)}\n".encode()
         elif lines[done] == number:
-            out += f"{line}{end}{values[done]:.10g}\n".encode()
+            out += f"{line}{end}{_number_cell(values[done], table)}\n".encode()
             done += 1
         else:
             raise changed
@@ -96,6 +106,15 @@ def to_csv(columns: Sequence[str], values: ArrayLike) -> bytes:
     out.write((",".join(_name_cell(name, ",") for name in columns) + "\n").encode())
     np.savetxt(out, values, fmt="%.10g", delimiter=",")
     return out.getvalue()
+
+
+def _number_cell(value: float, table: Table) -> str:
+    cell = f"{value:.10g}".replace(".", table.decimal)
+    return f'"{cell}"' if table.decimal == table.delimiter else cell
+
+
+def _missing_cell(delimiter: str) -> str:
+    return "nan" if delimiter == " " else ""
 
 
 def _free_name(name: str, taken: Sequence[str]) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +25,8 @@ class Table:
     - `notes`: what was decided for the user, in plain words.
     - `header`: names of all columns in a text file's header line, None where there is none.
     - `delimiter`: of a text file, " " for runs of whitespace; None for npy and Parquet.
+    - `decimal`: the mark before the decimals of a text file, "." or ",".
+    - `dropped`: numbers of the lines that were left out because a value was missing.
     """
 
     values: NDArray[np.float64]
@@ -33,6 +35,13 @@ class Table:
     notes: tuple[str, ...]
     header: tuple[str, ...] | None
     delimiter: str | None
+    decimal: str = "."
+    dropped: frozenset[int] = frozenset()
+
+    def without(self, column: int) -> Table:
+        """The table less a column, by its 0-based number."""
+        names = self.columns[:column] + self.columns[column + 1 :]
+        return replace(self, values=np.delete(self.values, column, axis=1), columns=names)
 
 
 def choose(
@@ -114,8 +123,21 @@ def check_finite(
         raise InputFileError(
             f"{path}: {len(rows)} cell{'s' * (len(rows) > 1)} empty, NaN or infinite, the first in "
             f"{unit} {lines[rows[0]]}, column {quote(columns[int(at[0])])}; fill them in "
-            "or drop their rows"
+            "or leave their rows out with --drop-missing"
         )
+
+
+def without_missing(
+    path: Path, values: NDArray[np.float64], lines: NDArray[np.int64], unit: str
+) -> tuple[NDArray[np.float64], NDArray[np.int64], frozenset[int], list[str]]:
+    """Rows and lines without a missing value, the lines left out, and a note of them."""
+    whole = ~np.isnan(values).any(axis=1)
+    if not whole.any():
+        raise InputFileError(f"{path}: every row lacks a value; choose others with --columns")
+    left = lines[~whole].tolist()
+    first = f", the first in {unit} {left[0]}" if left else ""
+    notes = [f"left out {len(left)} rows with missing values{first}"] if left else []
+    return values[whole], lines[whole], frozenset(left), notes
 
 
 def listing(names: Sequence[str]) -> str:

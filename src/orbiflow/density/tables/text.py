@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import csv
 import math
+import re
 from array import array
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -28,28 +29,42 @@ from orbiflow.density.tables.table import (
     column_number,
     listing,
     quote,
+    without_missing,
 )
 from orbiflow.errors import InputFileError
 
 MAX_LINE = 2**20  # characters
 SAMPLE = 100  # rows looked at to find the layout
 
+DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+(e[+-]?\d+)?", re.IGNORECASE)
+_WHOLE = re.compile(r"[+-]?\d+")
 _MISSING = frozenset({"", "na", "n/a", "nan", "null", "none"})
 
 
 @dataclass(frozen=True)
 class Layout:
-    """How a text file is laid out; `first` is the number of its first line that is no comment."""
+    """How a text file is laid out.
+
+    `first` is the number of its first line that is no comment, `decimal` the mark before decimals.
+    """
 
     delimiter: str
     header: tuple[str, ...] | None
     names: tuple[str, ...]
     numeric: tuple[bool, ...]
     first: int
+    decimal: str
 
 
-def read_text(path: Path, columns: Sequence[str] | None, width: int | None, max_rows: int) -> Table:
-    layout = layout_of(path, columns)
+def read_text(
+    path: Path,
+    columns: Sequence[str] | None,
+    width: int | None,
+    max_rows: int,
+    drop_missing: bool = False,
+    has_header: bool | None = None,
+) -> Table:
+    layout = layout_of(path, columns, has_header)
     picked, notes = choose(path, layout.names, layout.numeric, columns, width)
     names = tuple(layout.names[i] for i in picked)
     values, lines, cells, comments = array("d"), array("q"), [], 0
@@ -59,22 +74,37 @@ def read_text(path: Path, columns: Sequence[str] | None, width: int | None, max_
             continue
         row = split_line(path, number, line, layout.delimiter)
         if len(row) != len(layout.names):
-            raise _ragged(path, number, len(row), layout.first, len(layout.names))
+            raise _ragged(path, number, len(row), layout.first, len(layout.names), layout.delimiter)
         lines.append(number)
         cells.extend([row[i] for i in picked])
         if len(cells) >= BLOCK * len(picked):
-            values.extend(_numbers(path, cells, lines, names))
+            values.extend(_numbers(path, cells, lines, names, layout.decimal))
             cells.clear()
             check_count(path, len(lines), max_rows, "rows")
-    values.extend(_numbers(path, cells, lines, names))
+    values.extend(_numbers(path, cells, lines, names, layout.decimal))
     check_count(path, len(lines), max_rows, "rows")
-    table = np.frombuffer(values).reshape(-1, len(picked)), np.frombuffer(lines, dtype=np.int64)
-    check_finite(path, *table, names, "line")
+    rows, at = np.frombuffer(values).reshape(-1, len(picked)), np.frombuffer(lines, dtype=np.int64)
+    dropped = frozenset()
+    if drop_missing and len(lines):
+        rows, at, dropped, more = without_missing(path, rows, at, "line")
+        notes += more
+    check_finite(path, rows, at, names, "line")
+    if layout.decimal == ",":
+        notes.append("read decimal commas")
     if layout.header is not None:
         notes.append(f"took line {layout.first} as the header: {listing(layout.header)}")
     if comments:
         notes.append(f"passed over {comments} comment line{'s' * (comments > 1)}")
-    return Table(table[0], names, table[1], tuple(notes), layout.header, layout.delimiter)
+    return Table(
+        rows,
+        names,
+        at,
+        tuple(notes),
+        layout.header,
+        layout.delimiter,
+        layout.decimal,
+        dropped,
+    )
 
 
 def text_lines(path: Path) -> Iterator[tuple[int, str, bool]]:
@@ -108,7 +138,7 @@ def _undecodable(path: Path) -> int:
     return number
 
 
-def layout_of(path: Path, columns: Sequence[str] | None) -> Layout:
+def layout_of(path: Path, columns: Sequence[str] | None, has_header: bool | None = None) -> Layout:
     lines = (line[:2] for line in text_lines(path) if not line[2])
     sample = list(islice(lines, SAMPLE))
     if not sample:
@@ -119,17 +149,33 @@ def layout_of(path: Path, columns: Sequence[str] | None) -> Layout:
     check_count(path, len(rows[0]), MAX_COLUMNS, "columns")
     for (number, _), row in zip(sample, rows, strict=True):
         if len(row) != len(rows[0]):
-            raise _ragged(path, number, len(row), first, len(rows[0]))
-    classes = list(zip(*([_class(cell) for cell in row] for row in rows), strict=True))
+            raise _ragged(path, number, len(row), first, len(rows[0]), delimiter)
+    decimal = _decimal(rows)
+    pointed = [[_pointed(cell, decimal) for cell in row] for row in rows]
+    classes = list(zip(*([_class(cell) for cell in row] for row in pointed), strict=True))
     header = None
-    if _has_header(path, first, rows[0], classes, columns):
+    if has_header is None:
+        has_header = _has_header(path, first, rows[0], classes, columns)
+    if has_header:
         header = tuple(cell.strip().strip('"').strip() for cell in rows[0])
         if len(rows) == 1:
             raise InputFileError(f"{path}: line {first} is a header and no row follows; add rows")
         classes = [column[1:] for column in classes]
     names = tuple(name or f"column{i}" for i, name in enumerate(header or [""] * len(classes), 1))
     numeric = tuple(c.count("number") >= max(1, c.count("word")) for c in classes)
-    return Layout(delimiter, header, names, numeric, first)
+    return Layout(delimiter, header, names, numeric, first, decimal)
+
+
+def _decimal(rows: list[list[str]]) -> str:
+    """The mark before decimals: a comma where cells are numbers with one and none has a point."""
+    cells = [cell.strip() for row in rows for cell in row]
+    commas = any(DECIMAL_COMMA.fullmatch(cell) for cell in cells)
+    points = any("." in cell and _class(cell) == "number" for cell in cells)
+    return "," if commas and not points else "."
+
+
+def _pointed(cell: str, decimal: str) -> str:
+    return cell if decimal == "." else cell.replace(decimal, ".")
 
 
 def _delimiter(lines: list[str]) -> str:
@@ -140,6 +186,8 @@ def _delimiter(lines: list[str]) -> str:
     >>> _delimiter(["lat;lon", "1,5;2"]), _delimiter(["1, 2", "3, 4"]), _delimiter(["1 2", "3\t4"])
     (';', ',', ' ')
     """
+    if _is_spaced(lines[len(lines) > 1 :]):
+        return " "
     counts = {mark: [line.count(mark) for line in lines] for mark in "\t;,"}
     for mark, count in counts.items():
         if count[0] and len(set(count)) == 1:
@@ -148,6 +196,19 @@ def _delimiter(lines: list[str]) -> str:
         if 2 * sum(map(bool, count)) > len(lines):
             return mark
     return " " if any(len(line.split()) > 1 for line in lines) else ","
+
+
+def _is_spaced(lines: list[str]) -> bool:
+    """Whether all lines are numbers parted by spaces, some with decimal commas.
+
+    >>> _is_spaced(["1,5 2", "3 4,25"]), _is_spaced(["1, 2", "3, 4"])
+    (True, False)
+    """
+    cells = [line.split() for line in lines]
+    flat = [cell for row in cells for cell in row]
+    numbers = all(DECIMAL_COMMA.fullmatch(cell) or _WHOLE.fullmatch(cell) for cell in flat)
+    some = any("," in cell for cell in flat)
+    return numbers and some and all(len(row) > 1 for row in cells) and "\t" not in "".join(lines)
 
 
 def split_line(path: Path, number: int, line: str, delimiter: str) -> list[str]:
@@ -197,13 +258,17 @@ def _has_header(
         return True
     raise InputFileError(
         f"{path}: line {first} may be a header or a row, as its numbers stand above numbers and "
-        "its words above words; put a header line of names above it, or choose columns by the "
-        "names in it with --columns"
+        "its words above words; say --no-header, put a header line of names above it, or choose "
+        "columns by the names in it with --columns"
     )
 
 
-def _numbers(path: Path, cells: list[str], lines: array, names: tuple[str, ...]) -> list[float]:
+def _numbers(
+    path: Path, cells: list[str], lines: array, names: tuple[str, ...], decimal: str
+) -> list[float]:
     """`cells` of the last of `lines`, row after row, as floats; NaN where one is missing."""
+    if decimal != ".":
+        cells = [_pointed(cell, decimal) for cell in cells]
     try:
         if "_" not in "".join(cells):  # float takes 1_000
             return list(map(float, cells))
@@ -228,8 +293,11 @@ def _number(path: Path, line: int, name: str, cell: str) -> float:
     )
 
 
-def _ragged(path: Path, number: int, n: int, first: int, expected: int) -> InputFileError:
+def _ragged(
+    path: Path, number: int, n: int, first: int, expected: int, delimiter: str
+) -> InputFileError:
+    spaced = "; a name with a space in it counts as two" if delimiter == " " else ""
     return InputFileError(
         f"{path}: line {number} has {n} cell{'s' * (n != 1)} and line {first} has {expected}; give "
-        "every line as many"
+        f"every line as many{spaced}"
     )

@@ -1,0 +1,99 @@
+"""One density of what a fit by evidence has chosen."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+from orbiflow.density.fitting.evidence import Candidates
+from orbiflow.density.fitting.families import Family
+from orbiflow.density.fitting.flow import MOST_DIM
+from orbiflow.density.fitting.scales import even_kernels, joined
+from orbiflow.density.models.bases import Base, UniformBase
+from orbiflow.density.models.blend import BlendedDensity
+from orbiflow.density.models.chains import VonMisesChains
+from orbiflow.density.models.kernels import AdaptiveKernels
+from orbiflow.density.models.neural import NeuralFlow, NeuralTorusField
+from orbiflow.density.models.symmetric import SymmetricDensity
+from orbiflow.density.spaces.space import Space
+from orbiflow.fields import SplineField
+from orbiflow.flows import Flow
+
+FLAT = 1e-6
+"""Concentration of a kernel that is as good as uniform."""
+
+
+def assembled(
+    space: Space,
+    families: list[Family],
+    candidates: Candidates,
+    weights: Tensor,
+    rows: Tensor,
+    flow: SymmetricDensity | None,
+    share: float,
+) -> BlendedDensity:
+    """The candidates in proportions (P,), made final with all rows; a flow of a share beside them."""
+    kernels: list[tuple[AdaptiveKernels, float]] = []
+    chains: list[tuple[VonMisesChains, float]] = []
+    for family in families:
+        chosen = [
+            (name, float(weight))
+            for own, name, weight in zip(
+                candidates.families, candidates.names, weights, strict=True
+            )
+            if own == family.name and weight > 0
+        ]
+        found = family.final(rows, candidates.fitted[family.name], [name for name, _ in chosen])
+        for part, (_, weight) in zip(found, chosen, strict=True):
+            _sort(part, weight, kernels, chains)
+    floor = float(weights[candidates.floor].sum())
+    if not kernels:  # a blend has some: half of the floor, as one
+        center = rows.new_full((1, space.dim), 0.5)
+        floor /= 2
+        kernels = [(even_kernels(space, center, FLAT), floor)]
+    sizes = [[weight for _, weight in part] for part in (kernels, chains)]
+    shares = torch.tensor([0.0, sum(sizes[0]), floor, sum(sizes[1])], dtype=torch.float64)
+    shares = (1 - share) * shares / shares.sum()
+    shares[0] = share
+    mixture = joined([part for part, _ in kernels], torch.tensor(sizes[0], dtype=torch.float64))
+    carried = _still(space) if flow is None else flow.flow
+    return BlendedDensity(
+        space,
+        carried,
+        UniformBase(space) if flow is None else flow.base,
+        mixture,
+        shares if chains else shares[:3],
+        chains=mixed([part for part, _ in chains], torch.tensor(sizes[1])) if chains else None,
+    )
+
+
+def _sort(
+    part: Base,
+    weight: float,
+    kernels: list[tuple[AdaptiveKernels, float]],
+    chains: list[tuple[VonMisesChains, float]],
+) -> None:
+    if isinstance(part, VonMisesChains):
+        chains.append((part, weight))
+    else:
+        assert isinstance(part, AdaptiveKernels)  # families have no others
+        kernels.append((part, weight))
+
+
+def mixed(parts: list[VonMisesChains], shares: Tensor) -> VonMisesChains:
+    """The mixture of mixtures of chains on one torus, in proportions (P,)."""
+    logs = (shares.double() / shares.sum()).log()
+    return VonMisesChains(
+        parts[0].space,
+        torch.cat([part.log_weights + log for part, log in zip(parts, logs, strict=True)]),
+        torch.cat([part.means for part in parts]),
+        torch.cat([part.concentrations for part in parts]),
+        torch.cat([part.order for part in parts]),
+    )
+
+
+def _still(space: Space) -> Flow:
+    """A flow that moves nothing: a new field is zero."""
+    if space.dim > MOST_DIM:
+        return NeuralFlow(NeuralTorusField(space.dim, width=1, depth=1, waves=1), steps=1)
+    return Flow([SplineField(space.group, 1)], steps=1, warn=False)

@@ -1,0 +1,282 @@
+"""A density that chooses its parts by rows held out: flow, kernels, mixtures, chains, uniform floor."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import torch
+from torch import Tensor
+
+from orbiflow.density.arguments import check_kind, check_range
+from orbiflow.density.fitting.assembly import assembled
+from orbiflow.density.fitting.budget import Budget
+from orbiflow.density.fitting.evidence import Candidates, PartEvidence, candidates_of, judged
+from orbiflow.density.fitting.families import ChainFamily, Family, KernelFamily, MixtureFamily
+from orbiflow.density.fitting.flow import MOST_DIM, fit_density
+from orbiflow.density.fitting.folds import LEAST_PLACES, Folds, folds_of
+from orbiflow.density.fitting.kernels import NARROWEST
+from orbiflow.density.fitting.repeats import Repeats, repeats_of
+from orbiflow.density.fitting.report import FitReport, Progress, mean_nll, own_points, steps_note
+from orbiflow.density.fitting.settings import FitSettings
+from orbiflow.density.fitting.training import training
+from orbiflow.density.fitting.weights import gain_of, sparse_weights, stacked, stacking_weights
+from orbiflow.density.models.blend import BlendedDensity
+from orbiflow.density.models.symmetric import SymmetricDensity
+from orbiflow.density.spaces.flat import whole_turn
+from orbiflow.density.spaces.space import Space
+from orbiflow.errors import OrbiflowError
+
+PARTS = ("flow", "kernels", "mixture", "chains")
+"""What a density may be made of, beside its uniform floor."""
+
+REPEATS = ("places", "rounding")
+"""What rows that repeat another are taken for."""
+
+LEAST_FLOW_ROWS = 300
+"""With fewer, a flow is not tried: none has gained anything."""
+
+FEW_ROWS, MANY_ROWS = 5_000, 20_000
+"""With fewer a flow is fitted in one stage; from the latter on it may be finer."""
+
+MEMBERS = 12
+"""Chains of one size on tori of four or more angles, all folds together."""
+
+SCORED = 2_000
+"""Rows over which the report's mean log density is taken: each costs all kernels."""
+
+BEFORE_FLOW = 0.7
+"""Of the work."""
+
+
+@dataclass(frozen=True)
+class AutomaticSettings:
+    """What there is to choose of a fit that chooses by itself.
+
+    - `parts`: of `PARTS`, those that may be used; chains are for tori of two or more angles, a flow for
+      spaces of three dimensions at most.
+    - `repeats`: "places": new rows repeat the old ones as often as these repeat each other; "rounding":
+      repeated values are an accident, and the density is to have no peaks at them.
+    - `flow`: its settings; None for what suits the number of rows.
+    - `seconds`: after which nothing further is tried; a fit that it ends depends on the machine.
+    - `seed`: of the folds and the starts.
+    """
+
+    parts: tuple[str, ...] = PARTS
+    repeats: str = "places"
+    flow: FitSettings | None = None
+    seconds: float = math.inf
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        unknown = [part for part in self.parts if part not in PARTS]
+        if unknown or not self.parts:
+            raise OrbiflowError(f"parts must be of {', '.join(PARTS)}, got {self.parts!r}")
+        if self.repeats not in REPEATS:
+            raise OrbiflowError(
+                f"repeats must be one of {', '.join(REPEATS)}, got {self.repeats!r}"
+            )
+        check_range("seconds", self.seconds, 0, math.inf)
+        check_range("seed", self.seed, -(2**63), 2**64 - 1, integer=True)
+
+
+@training()
+def fit_automatic(
+    space: Space,
+    points: Tensor,
+    settings: AutomaticSettings | None = None,
+    *,
+    progress: Progress | None = None,
+) -> tuple[BlendedDensity, FitReport]:
+    """Fit what suits the data best: a mixture of densities with weights by rows held out.
+
+    Kernel estimates of many widths, mixtures and von Mises chains of many sizes are fitted to the rows
+    without a tenth, and judged by that tenth, for several tenths in turn; the weights that suit the
+    rows held out best (stacking: Smyth and Wolpert, 1999) are those of the density, in which kernels
+    are about all rows and mixtures the mean of those of the folds. A flow, fitted without the first
+    tenth, is blended in if that tenth says so.
+
+    Args:
+        space: any.
+        points: (N, d) in the chart, N >= 10 different ones.
+        settings: default `AutomaticSettings()`.
+        progress: told how far it is.
+
+    Returns:
+        The density, float64, and the report, with the evidence on each part.
+
+    Raises:
+        OrbiflowError: for points of another shape or too few, or parts that the space does not have.
+    """
+    settings = AutomaticSettings() if settings is None else settings
+    check_kind(settings, AutomaticSettings, "settings")
+    say = progress or (lambda _share, _what: None)
+    budget = Budget(seconds=settings.seconds)
+    rows = own_points(space, points)
+    found = repeats_of(space, rows)
+    if found.places < LEAST_PLACES:
+        raise OrbiflowError(
+            f"a density needs at least {LEAST_PLACES} different points, got {found.places} among "
+            f"{len(rows)}"
+        )
+    generator = torch.Generator().manual_seed(settings.seed)
+    folds = folds_of(rows, together=settings.repeats == "rounding", generator=generator)
+    families = _families(space, folds, settings, found)
+    candidates = candidates_of(
+        space, families, folds, lambda done, what: say(BEFORE_FLOW * done, what), budget
+    )
+    weights = sparse_weights(candidates.table, candidates.floor)
+    tried = _try_flow(space, folds, candidates, weights, settings, budget, say)
+    say(1.0, "putting together")
+    density = assembled(space, families, candidates, weights, folds.rows, tried.flow, tried.share)
+    parts = (*tried.evidence, *_shrunk(judged(candidates, weights), tried.share))
+    return density, _report(
+        density, folds, candidates, weights, tried, parts, found, settings, budget
+    )
+
+
+def _families(
+    space: Space, folds: Folds, settings: AutomaticSettings, found: Repeats
+) -> list[Family]:
+    rounding = settings.repeats == "rounding"
+    narrowest = _narrowest(space, found.step) if rounding else NARROWEST
+    starts = max(1, round(MEMBERS / folds.used)) if space.dim > MOST_DIM else 1
+    families: list[Family] = [
+        KernelFamily(space, narrowest, repeats=not rounding),
+        MixtureFamily(space, settings.seed, narrowest),
+    ]
+    if space.is_torus and space.dim > 1:
+        families.append(ChainFamily(space, settings.seed, starts))
+    chosen = [family for family in families if family.name in settings.parts]
+    beside = "flow" in settings.parts and settings.parts not in (PARTS, ("flow",))
+    if beside and space.dim > MOST_DIM:
+        raise OrbiflowError(
+            f"on a torus of {space.dim} angles a flow stands alone: leave it out of the parts, or all "
+            "others"
+        )
+    if not chosen and (space.dim > MOST_DIM or settings.parts != ("flow",)):
+        raise OrbiflowError(f"there are no {' or '.join(settings.parts)} on this {space!r}")
+    return chosen
+
+
+def _narrowest(space: Space, step: float | None) -> float:
+    """Concentration of kernels of a deviation of one step of rounding."""
+    if step is None:
+        return NARROWEST
+    if space.is_round:
+        angle = math.radians(step) if space.settings()["form"] == "latlon" else step
+    else:
+        angle = 2 * math.pi * step / whole_turn(str(space.unit))
+    return min(NARROWEST, 1 / angle**2)
+
+
+class _Tried(NamedTuple):
+    """A flow, its share and what came of it."""
+
+    flow: SymmetricDensity | None = None
+    share: float = 0.0
+    evidence: tuple[PartEvidence, ...] = ()
+    report: FitReport | None = None
+
+
+def _try_flow(
+    space: Space,
+    folds: Folds,
+    candidates: Candidates,
+    weights: Tensor,
+    settings: AutomaticSettings,
+    budget: Budget,
+    say: Progress,
+) -> _Tried:
+    """A flow fitted without the first tenth, and the share that this tenth gives it."""
+    wanted = "flow" in settings.parts and space.dim <= MOST_DIM and not budget.is_spent
+    only = settings.parts == ("flow",)
+    if not wanted or (len(folds.rows) < LEAST_FLOW_ROWS and not only):
+        return _Tried()
+    chosen = settings.flow or flow_settings(space, len(folds.rows), settings.seed)
+    density, report = fit_density(
+        space,
+        folds.train(0),
+        replace(chosen, seconds=min(chosen.seconds, budget.seconds_left)),
+        progress=lambda done, what: say(BEFORE_FLOW + (1 - BEFORE_FLOW) * done, f"flow: {what}"),
+    )
+    held = folds.held(0)
+    with torch.no_grad():
+        own = density.log_prob(held)
+    first = candidates.table[:, : candidates.first]
+    others = stacked(first, weights)
+    table = torch.stack([others, own])
+    both = stacking_weights(table)
+    gain = gain_of(stacked(table, both), others)
+    alone = float((own - first[-1]).mean())
+    # a weight chosen on these rows gains one nat among all of them by chance
+    kept = gain.nats * len(held) >= 1
+    share = float(both[1]) if kept else 0.0
+    worth = gain if kept else gain_of(others, others)
+    evidence = PartEvidence("flow", share, alone, worth.nats, worth.error, len(held))
+    return _Tried(density if kept else None, share, (evidence,), report)
+
+
+def flow_settings(space: Space, rows: int, seed: int) -> FitSettings:
+    """Of a flow beside other parts: those have the clusters, it has what is smooth."""
+    if space.dim == MOST_DIM:
+        return FitSettings(detail=5, segments=3, roughness=(1e-3,), iterations=60, seed=seed)
+    if rows >= MANY_ROWS:
+        return FitSettings(roughness=(1e-3, 1e-4), seed=seed)
+    if rows >= FEW_ROWS:
+        return FitSettings(detail=6, segments=4, roughness=(1e-3, 1e-4), iterations=60, seed=seed)
+    return FitSettings(detail=6, segments=4, roughness=(1e-3,), iterations=40, seed=seed)
+
+
+def _shrunk(parts: list[PartEvidence], flow: float) -> list[PartEvidence]:
+    """Beside a flow of this share."""
+    return [replace(part, share=part.share * (1 - flow)) for part in parts]
+
+
+def _report(
+    density: BlendedDensity,
+    folds: Folds,
+    candidates: Candidates,
+    weights: Tensor,
+    tried: _Tried,
+    parts: tuple[PartEvidence, ...],
+    found: Repeats,
+    settings: AutomaticSettings,
+    budget: Budget,
+) -> FitReport:
+    held = float(stacked(candidates.table, weights).mean())
+    held += sum(part.gain for part in parts if part.name == "flow")
+    flow = tried.report if tried.share else None
+    error = flow.integration_error if flow else 0.0
+    total = candidates.table.shape[1]
+    chosen = [
+        f"chosen by {total} rows held out, in {folds.used} parts of a tenth each: "
+        f"{held - float(candidates.table[-1].mean()):.4f} nats above uniform",
+        *map(str, parts),
+    ]
+    mass = None
+    if density.space.dim == 2:
+        mass = density.mass_with(flow.mass) if flow and flow.mass is not None else 1.0
+    return FitReport(
+        points=len(folds.rows),
+        duplicates=found.rows,
+        train=len(folds.rows),
+        validation=total,
+        start_nll=-float(candidates.table[-1].mean()),
+        train_nll=mean_nll(density, folds.rows[:SCORED]),
+        validation_nll=-held,
+        stages=flow.stages if flow else (),
+        steps=density.flow.steps,
+        mass=mass,
+        integration_error=error,
+        shares=tuple(density.shares.tolist()),
+        parts=parts,
+        repeats=found,
+        notes=(
+            *chosen,
+            *found.notes(settings.repeats),
+            *budget.notes(),
+            *steps_note(density, error),
+        ),
+    )

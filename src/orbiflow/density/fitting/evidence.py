@@ -1,0 +1,122 @@
+"""What rows that were held out say of families of densities: weights, shares, gains."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from orbiflow.density.fitting.budget import Budget
+from orbiflow.density.fitting.families import Family
+from orbiflow.density.fitting.folds import Folds
+from orbiflow.density.fitting.report import PartEvidence, Progress
+from orbiflow.density.fitting.weights import (
+    NEGLIGIBLE,
+    Gain,
+    gain_of,
+    sparse_weights,
+    stacked,
+    stacking_weights,
+)
+from orbiflow.density.models.bases import Base, UniformBase
+from orbiflow.density.spaces.space import Space
+
+KEPT = 2
+"""Sizes of a family that are fitted to all folds, beside the best alone."""
+
+FLOOR = "uniform"
+"""Name of the part that is always there."""
+
+
+@dataclass(frozen=True)
+class Candidates:
+    """Log densities of all candidates at all rows that were held out.
+
+    - `families`, `names`: of each row of `table` (P, N); the last is the uniform floor.
+    - `fitted`: of each family, what was fitted to each fold.
+    - `first`: rows of the first fold, which stand first.
+    """
+
+    families: list[str]
+    names: list[str]
+    table: Tensor
+    fitted: dict[str, list[dict[str, Base]]]
+    first: int
+
+    @property
+    def floor(self) -> Tensor:
+        """Which candidate is the floor (P,)."""
+        return torch.tensor([family == FLOOR for family in self.families])
+
+    def of(self, *families: str) -> Tensor:
+        """The floor and the candidates of these families (P,)."""
+        return torch.tensor([family in (FLOOR, *families) for family in self.families])
+
+
+def candidates_of(
+    space: Space, families: list[Family], folds: Folds, say: Progress, budget: Budget
+) -> Candidates:
+    """Fit all families to all folds; after the first, only what may be of use."""
+    blocks: list[dict[tuple[str, str], Tensor]] = []
+    fitted: dict[str, list[dict[str, Base]]] = {family.name: [] for family in families}
+    for number, (train, held) in enumerate(folds):
+        if number and budget.is_spent:
+            break
+
+        def tell(what: str, number: int = number) -> None:
+            # the first fold tries more
+            done = (number + bool(number)) / (folds.used + 1)
+            say(done, f"held-out part {number + 1} of {folds.used}: {what}")
+
+        block: dict[tuple[str, str], Tensor] = {}
+        for family in families:
+            found = family.fitted(number, train, held, tell)
+            fitted[family.name].append(found)
+            with torch.no_grad():
+                block |= {(family.name, name): p.log_prob(held) for name, p in found.items()}
+        block[FLOOR, FLOOR] = UniformBase(space).log_prob(held)
+        blocks.append(block)
+        if number == 0:
+            _narrow(families, block)
+    keys = [key for key in blocks[-1] if all(key in block for block in blocks)]
+    table = torch.cat([torch.stack([block[key] for key in keys]) for block in blocks], dim=1)
+    return Candidates(
+        [family for family, _ in keys],
+        [name for _, name in keys],
+        table,
+        fitted,
+        len(blocks[0][FLOOR, FLOOR]),
+    )
+
+
+def _narrow(families: list[Family], block: dict[tuple[str, str], Tensor]) -> None:
+    """Of each family keep what has most weight in the first fold, and the best alone."""
+    keys = list(block)
+    weights = stacking_weights(torch.stack([block[key] for key in keys])).tolist()
+    for family in families:
+        own = {name: w for (f, name), w in zip(keys, weights, strict=True) if f == family.name}
+        if own:
+            best = max(own, key=lambda name, f=family.name: float(block[f, name].mean()))
+            weighty = [name for name, w in own.items() if w >= NEGLIGIBLE]
+            family.keep({best, *sorted(weighty, key=lambda name, w=own: -w[name])[:KEPT]})
+
+
+def judged(candidates: Candidates, weights: Tensor) -> list[PartEvidence]:
+    """What each family is worth in the mixture of these weights (P,)."""
+    table = candidates.table
+    whole, uniform = stacked(table, weights), table[-1]
+    found = []
+    names = [name for name in dict.fromkeys(candidates.families) if name != FLOOR]
+    for name in names:
+        own = candidates.of(name)
+        alone = stacked(table[own], sparse_weights(table[own], candidates.floor[own]))
+        share = float(weights[own & ~candidates.floor].sum())
+        gain = Gain(0.0, 0.0)
+        if share:
+            rest = ~own | candidates.floor
+            without = stacked(table[rest], sparse_weights(table[rest], candidates.floor[rest]))
+            gain = gain_of(whole, without)
+        above = float((alone - uniform).mean())
+        found.append(PartEvidence(name, share, above, gain.nats, gain.error, table.shape[1]))
+    return found

@@ -1,0 +1,200 @@
+"""Families of densities that a fit by evidence tries: what is fitted to a fold, and in the end."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+
+import torch
+from torch import Tensor
+
+from orbiflow.density.fitting.budget import Budget
+from orbiflow.density.fitting.chains import fit_chain_mixture
+from orbiflow.density.fitting.kernels import NARROWEST
+from orbiflow.density.fitting.mixtures import fit_mixture
+from orbiflow.density.fitting.scales import joined, kernel_estimates
+from orbiflow.density.models.bases import Base
+from orbiflow.density.models.chains import VonMisesChains, averaged
+from orbiflow.density.models.kernels import AdaptiveKernels
+from orbiflow.density.spaces.space import Space
+
+SIZES = (1, 2, 4, 8, 16, 32, 64)
+"""Components of the mixtures and chains tried."""
+
+MIXTURE_ROWS, CHAIN_ROWS = 8, 20
+"""That each component must have on average."""
+
+SMALLEST_CHAINS = 4
+"""Components: fewer are no better than a mixture's."""
+
+MOST_MIXED, MOST_CHAINED = 20_000, 12_000
+"""Rows that mixtures and chains are fitted to at most."""
+
+CLEARLY = 2.0
+"""Standard errors by which a larger mixture must be worse, to be the last that is tried."""
+
+ITERATIONS, IDLE = 60, 1e-3
+"""Of EM at most; it ends where five bring fewer nats than the latter."""
+
+Say = Callable[[str], None]
+"""Told what is being tried."""
+
+
+class Family(ABC):
+    """Densities of a kind, by their names."""
+
+    name: str
+
+    @abstractmethod
+    def fitted(self, number: int, train: Tensor, held: Tensor, say: Say) -> dict[str, Base]:
+        """What is fitted to the training rows of a fold, to be judged by the rows held out."""
+
+    @abstractmethod
+    def final(self, rows: Tensor, folds: list[dict[str, Base]], names: list[str]) -> list[Base]:
+        """What the density is made of, given all rows and what was fitted to each fold."""
+
+    def keep(self, names: set[str]) -> None:
+        """Leave out all but `names` from now on, where that saves time."""
+        del names
+
+
+@dataclass
+class KernelFamily(Family):
+    """Kernel estimates, in the end about all rows."""
+
+    space: Space
+    narrowest: float = NARROWEST
+    repeats: bool = True
+    name = "kernels"
+
+    def fitted(self, number: int, train: Tensor, held: Tensor, say: Say) -> dict[str, Base]:
+        del number, held
+        say("kernels")
+        return dict(self._estimates(train))
+
+    def final(self, rows: Tensor, folds: list[dict[str, Base]], names: list[str]) -> list[Base]:
+        del folds
+        found = self._estimates(rows)
+        return [found[name] for name in names]
+
+    def _estimates(self, rows: Tensor) -> dict[str, AdaptiveKernels]:
+        return kernel_estimates(self.space, rows, narrowest=self.narrowest, repeats=self.repeats)
+
+
+@dataclass
+class MixtureFamily(Family):
+    """Mixtures of several sizes, in the end the mean of those of all folds.
+
+    By concavity the mean of densities scores at least the mean of their scores, and EM ends in another
+    optimum from every start (Breiman, Bagging predictors, 1996).
+    """
+
+    space: Space
+    seed: int
+    narrowest: float = NARROWEST
+    sizes: tuple[int, ...] | None = None
+    name = "mixture"
+
+    def fitted(self, number: int, train: Tensor, held: Tensor, say: Say) -> dict[str, Base]:
+        train = train[:MOST_MIXED]
+        generator = torch.Generator().manual_seed(self.seed + number)
+
+        def fit(size: int) -> Base:
+            say(f"mixture of {size}")
+            return fit_mixture(
+                self.space, train, size, narrowest=self.narrowest, generator=generator
+            )
+
+        if self.sizes is None:
+            return _grown(fit, [k for k in SIZES if k == 1 or MIXTURE_ROWS * k <= len(train)], held)
+        return {str(size): fit(size) for size in self.sizes}
+
+    def final(self, rows: Tensor, folds: list[dict[str, Base]], names: list[str]) -> list[Base]:
+        del rows
+        found: list[Base] = []
+        for name in names:
+            parts = [fold[name] for fold in folds if name in fold]
+            kernels = [part for part in parts if isinstance(part, AdaptiveKernels)]
+            found.append(joined(kernels, torch.ones(len(kernels), dtype=torch.float64)))
+        return found
+
+    def keep(self, names: set[str]) -> None:
+        self.sizes = tuple(sorted(map(int, names)))
+
+
+@dataclass
+class ChainFamily(Family):
+    """Mixtures of von Mises chains on a torus, in the end the mean of those of all folds.
+
+    Args:
+        starts: fitted to each fold but the first; those after the first have their angles in random
+            orders, so that they differ more.
+    """
+
+    space: Space
+    seed: int
+    starts: int = 1
+    sizes: tuple[int, ...] | None = None
+    name = "chains"
+    _first: dict[str, Base] = field(default_factory=dict)
+
+    def fitted(self, number: int, train: Tensor, held: Tensor, say: Say) -> dict[str, Base]:
+        train = train[:MOST_CHAINED]
+        generator = torch.Generator().manual_seed(self.seed + number)
+        natural = torch.arange(self.space.dim)
+
+        def fit(size: int, start: int) -> VonMisesChains:
+            say(f"chains of {size}" + (f", start {start + 1}" if self.starts > 1 else ""))
+            turn = number + start > 0
+            order = torch.randperm(self.space.dim, generator=generator) if turn else natural
+            return fit_chain_mixture(
+                self.space,
+                train,
+                held,
+                size,
+                order,
+                ITERATIONS,
+                generator,
+                Budget(),
+                patience=0,
+                worthwhile=IDLE,
+            )
+
+        if self.sizes is None:
+            sizes = [k for k in SIZES if k >= SMALLEST_CHAINS and CHAIN_ROWS * k <= len(train)]
+            return _grown(lambda size: fit(size, 0), sizes, held)
+        return {
+            str(size): averaged([fit(size, start) for start in range(self.starts)])
+            for size in self.sizes
+        }
+
+    def final(self, rows: Tensor, folds: list[dict[str, Base]], names: list[str]) -> list[Base]:
+        del rows
+        found: list[Base] = []
+        for name in names:
+            parts = [fold[name] for fold in folds if name in fold]
+            found.append(averaged([part for part in parts if isinstance(part, VonMisesChains)]))
+        return found
+
+    def keep(self, names: set[str]) -> None:
+        self.sizes = tuple(sorted(map(int, names)))
+
+
+def _grown(fit: Callable[[int], Base], sizes: Iterable[int], held: Tensor) -> dict[str, Base]:
+    """Fits of growing size, until one is clearly worse on the held-out rows than the best before."""
+    found: dict[str, Base] = {}
+    best: Tensor | None = None
+    for size in sizes:
+        part = found[str(size)] = fit(size)
+        with torch.no_grad():
+            score = part.log_prob(held)
+        if best is not None:
+            gain = score - best
+            error = float(gain.std()) / math.sqrt(len(gain))
+            if float(gain.mean()) < -CLEARLY * error:
+                break
+        if best is None or float(score.mean()) > float(best.mean()):
+            best = score
+    return found

@@ -1,0 +1,72 @@
+"""Folds: which rows are held out, and how often."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+FOLDS = 10
+"""Each holds out a tenth of the rows."""
+
+LEAST_PLACES = 10
+"""Different points that a density needs."""
+
+USED = ((600, 10), (2_000, 5), (10_000, 3))
+"""Of them are used, by the number of rows at most: few rows need all, many need few to tell; else 2."""
+
+MOST_HELD = 2_000
+"""Rows of a fold that are scored."""
+
+
+@dataclass(frozen=True)
+class Folds:
+    """Rows (N, d) in random order, and the fold (N,) of each.
+
+    - `used`: folds that are held out in turn, from the first.
+    """
+
+    rows: Tensor
+    fold: Tensor
+    used: int
+
+    def train(self, number: int) -> Tensor:
+        """All rows but those of a fold."""
+        return self.rows[self.fold != number]
+
+    def held(self, number: int) -> Tensor:
+        """Rows of a fold, `MOST_HELD` at most."""
+        return self.rows[self.fold == number][:MOST_HELD]
+
+    def __iter__(self) -> Iterator[tuple[Tensor, Tensor]]:
+        for number in range(self.used):
+            yield self.train(number), self.held(number)
+
+
+def folds_of(points: Tensor, *, together: bool, generator: torch.Generator) -> Folds:
+    """Tenths of the points (N, d) at random, N >= 10 different ones.
+
+    A new row of the same source repeats an old one as often as the old ones repeat each other, and so
+    do rows held out at random. Where equal rows are an accident of rounding, that would reward peaks
+    at the values that happened to be recorded: then they are kept `together`, in one fold.
+    """
+    order = torch.randperm(len(points), generator=generator)
+    rows = points[order]
+    if together:
+        _, place = places(rows)
+        group = torch.randperm(int(place.max()) + 1, generator=generator)[place]
+    else:
+        group = torch.arange(len(rows))
+    used = next((count for most, count in USED if len(rows) <= most), 2)
+    return Folds(rows, group % FOLDS, used)
+
+
+def places(points: Tensor) -> tuple[Tensor, Tensor]:
+    """How many of the points (N, d) are at each different place (M,), and the place (N,) of each."""
+    # rounding keeps together what differs by the projection's last digit
+    _, place, counts = torch.unique(
+        (points * 1e9).round(), dim=0, return_inverse=True, return_counts=True
+    )
+    return counts, place

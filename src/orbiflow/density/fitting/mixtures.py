@@ -1,0 +1,122 @@
+"""Mixtures of few von Mises or von Mises-Fisher components on any of the spaces, by EM."""
+
+from __future__ import annotations
+
+import math
+
+import torch
+from torch import Tensor
+
+from orbiflow.density.fitting.chains import PRIOR, PRIOR_RESULTANT, concentration
+from orbiflow.density.fitting.kernels import NARROWEST, WIDEST
+from orbiflow.density.fitting.training import training
+from orbiflow.density.models.kernels import AdaptiveKernels, kernel_rows
+from orbiflow.density.models.log_sum import FAINT
+from orbiflow.density.spaces.round import RoundSpace
+from orbiflow.density.spaces.space import Space, rectangle
+
+CONVERGED = 1e-4
+"""Nats that an iteration of EM must bring."""
+
+BLOCK = 4_096
+"""Points at a time."""
+
+
+@training()
+@torch.no_grad()
+def fit_mixture(
+    space: Space,
+    train: Tensor,
+    components: int,
+    *,
+    iterations: int = 60,
+    narrowest: float = NARROWEST,
+    generator: torch.Generator,
+) -> AdaptiveKernels:
+    """A mixture of components whose places, widths and weights are all fitted.
+
+    Products of von Mises distributions with a concentration an angle on torus and Klein bottle, von
+    Mises-Fisher on sphere and projective plane (Banerjee et al., Clustering on the unit hypersphere
+    using von Mises-Fisher distributions, 2005), summed over the group. Few imaginary points hold each
+    concentration finite.
+
+    Args:
+        train: canonical points (N, d), N >= components.
+        components: their number.
+        iterations: of EM at most.
+        narrowest: concentration at most.
+        generator: of the start (k-means++).
+    """
+    blocks = space.features(train).split(BLOCK, dim=1)
+    mean = _spread_out(space.features(train), components, generator)
+    width = 1 if space.is_round else space.dim
+    kappa = mean.new_full((components, width), 10.0)
+    weights = mean.new_full((components,), 1 / components)
+    last = -math.inf
+    for _ in range(iterations):
+        count, total, score = _expectation(space, blocks, mean, kappa, weights)
+        weights = (count + 0.01) / (count + 0.01).sum()
+        mean, length = _directions(space, total)
+        resultant = (length + PRIOR * PRIOR_RESULTANT) / (count[:, None] + PRIOR)
+        kappa = (_round_concentration if space.is_round else concentration)(resultant)
+        kappa = kappa.clamp(WIDEST / 100, narrowest)
+        if score - last < CONVERGED * len(train):
+            break
+        last = score
+    return AdaptiveKernels(space, _points(space, mean), kappa, weights)
+
+
+def _spread_out(images: Tensor, count: int, generator: torch.Generator) -> Tensor:
+    """Features (K, m) of points far from each other over their images (E, N, m): k-means++."""
+    own = images[0]
+    chosen = [int(torch.randint(len(own), (), generator=generator))]
+    far = ((images - own[chosen[0]]) ** 2).sum(dim=-1).amin(dim=0)
+    for _ in range(count - 1):
+        chosen.append(int(torch.multinomial(far + 1e-12, 1, generator=generator)))
+        far = torch.minimum(far, ((images - own[chosen[-1]]) ** 2).sum(dim=-1).amin(dim=0))
+    return own[chosen].clone()
+
+
+def _expectation(
+    space: Space, blocks: tuple[Tensor, ...], mean: Tensor, kappa: Tensor, weights: Tensor
+) -> tuple[Tensor, Tensor, float]:
+    """Points (K,) of each component, sums (K, m) of their nearest images' features, log-likelihood."""
+    rows, offsets = kernel_rows(space, mean, kappa)
+    rows, offsets = rows.mT.contiguous(), offsets + weights.log()
+    count, total, score = torch.zeros_like(weights), torch.zeros_like(mean), 0.0
+    for images in blocks:
+        joint = images @ rows + offsets
+        top = joint.amax(dim=(0, 2), keepdim=True)
+        share = (joint - top).clamp_min_(FAINT).exp_()
+        every = share.sum(dim=(0, 2), keepdim=True)
+        share /= every
+        count += share.sum(dim=(0, 1))
+        total += torch.einsum("enk,enm->km", share, images)
+        score += float((every.log() + top).sum())
+    return count, total, score
+
+
+def _directions(space: Space, total: Tensor) -> tuple[Tensor, Tensor]:
+    """Unit vectors of sums (K, m), and their lengths: of the whole, or an angle each."""
+    parts = total[:, None] if space.is_round else torch.stack(total.chunk(2, dim=1), dim=-1)
+    length = parts.norm(dim=-1)
+    unit = parts / length.clamp_min(1e-300)[..., None]
+    return (unit[:, 0] if space.is_round else torch.cat(unit.unbind(dim=-1), dim=1)), length
+
+
+def _round_concentration(resultant: Tensor) -> Tensor:
+    """kappa of mean cosines coth(kappa) - 1 / kappa: Banerjee et al. (2005), then Newton."""
+    r = resultant.clamp(1e-4, 1 - 1e-8)
+    kappa = r * (3 - r**2) / (1 - r**2)
+    for _ in range(4):
+        ratio = 1 / torch.tanh(kappa) - 1 / kappa
+        kappa = (kappa - (ratio - r) / (1 - ratio**2 - 2 * ratio / kappa)).clamp(1e-3, 1e8)
+    return kappa
+
+
+def _points(space: Space, mean: Tensor) -> Tensor:
+    """Chart points of features (K, m)."""
+    if isinstance(space, RoundSpace):
+        return space.vectors_to_chart(mean.numpy())
+    cos, sin = mean.chunk(2, dim=1)
+    return space.project(torch.atan2(sin, cos) / (2 * math.pi) * rectangle(space))

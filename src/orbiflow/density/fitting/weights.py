@@ -1,0 +1,74 @@
+"""Weights of densities by what they give to rows that were held out: stacking."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import torch
+from torch import Tensor
+
+TOLERANCE = 1e-4
+"""Nats by which the weights may be off the best ones."""
+
+ITERATIONS, EVERY = 3_000, 25
+"""Of EM at most, and between looks at how far it is."""
+
+NEGLIGIBLE = 3e-3
+"""Weights below are dropped."""
+
+
+class Gain(NamedTuple):
+    """A mean difference of log densities in nats, and its standard error over the rows."""
+
+    nats: float
+    error: float
+
+
+def gain_of(better: Tensor, worse: Tensor) -> Gain:
+    """Of two log densities (N,) at the same rows."""
+    difference = better - worse
+    spread = float(difference.std()) if len(difference) > 1 else math.nan
+    return Gain(float(difference.mean()), spread / math.sqrt(len(difference)))
+
+
+def stacked(table: Tensor, weights: Tensor) -> Tensor:
+    """Log density (N,) of the mixture of densities in proportions (P,), from a table (P, N)."""
+    return (table + weights.log()[:, None]).logsumexp(dim=0)
+
+
+def stacking_weights(table: Tensor) -> Tensor:
+    """Proportions (P,) that give held-out rows the greatest mean log density, from a table (P, N).
+
+    The problem is concave; EM finds its only optimum (Smyth and Wolpert, Linearly combining density
+    estimators via stacking, 1999). The largest mean ratio of a density to the mixture, less 1, bounds
+    what is missing.
+
+    >>> table = torch.tensor([[0.0, 0.0], [-1.0, -1.0]])
+    >>> stacking_weights(table).round(decimals=2)
+    tensor([1., 0.])
+    """
+    relative = (table - table.amax(dim=0)).exp()
+    weights = torch.full_like(table[:, 0], 1 / len(table))
+    for iteration in range(ITERATIONS):
+        ratio = (relative / (weights @ relative)).mean(dim=1)
+        if iteration % EVERY == 0 and float(ratio.max()) - 1 < TOLERANCE:
+            break
+        weights = weights * ratio
+        weights = weights / weights.sum()
+    return weights
+
+
+def sparse_weights(table: Tensor, always: Tensor) -> Tensor:
+    """As `stacking_weights`, without those that are `NEGLIGIBLE`; but `always` (P,) has a little.
+
+    The least weight of what must be there is half a row's: nothing is impossible that as many rows
+    could not rule out.
+    """
+    weights = stacking_weights(table)
+    kept = (weights >= NEGLIGIBLE) | always
+    found = torch.zeros_like(weights)
+    found[kept] = stacking_weights(table[kept])
+    least = 0.5 / (table.shape[1] + 1)
+    found[always] = found[always].clamp_min(least)
+    return found / found.sum()

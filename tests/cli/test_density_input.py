@@ -1,0 +1,81 @@
+"""`orbiflow density fit`: units said or refused, identifiers left out, missing values, no header."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+SMALL = ["--parts", "kernels"]
+
+
+def table(folder: Path, scale: float, *, first: str = "", count: int = 40) -> Path:
+    rng = np.random.default_rng(0)
+    rows = (scale * rng.normal(0.0, 1.0, (count, 2)).clip(-3, 3)).round(4)
+    path = folder / "data.csv"
+    header = f"{first}phi angle,psi angle\n"
+    lines = [f"{k},{a},{b}" if first else f"{a},{b}" for k, (a, b) in enumerate(rows, 1)]
+    path.write_text("\ufeff" + header + "\n".join(lines) + "\n")
+    return path
+
+
+def test_units_are_said_or_asked_for(tmp_path: Path, orbiflow) -> None:
+    out = tmp_path / "model"
+    fit = ("density", "fit", table(tmp_path, 1.0), "--space", "torus", "--out", out, *SMALL)
+    fitted = orbiflow(*fit)
+    assert fitted.status == 0, fitted.err
+    assert "they were read as radians" in fitted.out
+    assert "--parts" not in fitted.err
+    said = orbiflow(*fit, "--unit", "radians")
+    assert "read as radians" not in said.out
+    table(tmp_path, 50.0)
+    refused = orbiflow(*fit)
+    assert refused.status == 2
+    assert "beyond 2 pi: say --unit degrees, radians or turns" in refused.err
+    assert orbiflow(*fit, "--unit", "degrees").status == 0
+    report = json.loads((out / "report.json").read_text())
+    assert report["space"]["unit"] == "degrees"
+    assert report["columns"] == ["phi angle", "psi angle"]
+    assert report["report"]["parts"][0]["name"] == "kernels"
+
+
+@pytest.mark.parametrize("space", ["torus", "klein-bottle"])
+def test_columns_that_number_the_rows_are_left_out(space: str, tmp_path: Path, orbiflow) -> None:
+    data, out = table(tmp_path, 1.0, first="id,"), tmp_path / "model"
+    fitted = orbiflow("density", "fit", data, "--space", space, "--out", out, *SMALL)
+    assert fitted.status == 0, fitted.err
+    assert "left out the column 'id', which numbers the rows" in fitted.out
+    assert json.loads((out / "report.json").read_text())["columns"] == ["phi angle", "psi angle"]
+    scores = tmp_path / "scores.csv"
+    assert orbiflow("density", "score", data, "--model", out, "--out", scores).status == 0
+    assert scores.read_text().startswith("id,phi angle,psi angle,log_prob")
+
+
+def test_missing_values_and_no_header(tmp_path: Path, orbiflow) -> None:
+    data, out = table(tmp_path, 1.0), tmp_path / "model"
+    rows = data.read_text(encoding="utf-8-sig").splitlines()[1:]
+    data.write_text("\n".join(["x,1.0", *rows, "0.5,"]) + "\n")
+    fit = ("density", "fit", data, "--space", "torus", "--out", out, *SMALL)
+    assert "--drop-missing" in orbiflow(*fit).err
+    fitted = orbiflow(*fit, "--drop-missing")
+    assert fitted.status == 0, fitted.err
+    assert "left out 1 rows with missing values" in fitted.out
+    scores = tmp_path / "scores.csv"
+    score = ("density", "score", data, "--model", out, "--out", scores, "--drop-missing")
+    assert orbiflow(*score).status == 0
+    assert scores.read_text().splitlines()[-1] == "0.5,,"
+    data.write_text("\n".join(["a,0.1,0.2", *(f"b,{row}" for row in rows)]) + "\n")
+    assert "--no-header" in orbiflow(*fit).err
+    assert orbiflow(*fit, "--no-header").status == 0
+
+
+def test_parts_that_are_none(tmp_path: Path, orbiflow) -> None:
+    fit = ("density", "fit", table(tmp_path, 1.0), "--space", "torus", "--out", tmp_path / "m")
+    for options, message in (
+        (("--parts", "trees"), "--parts must be of flow, kernels, mixture, chains"),
+        (("--parts", "kernels", "--kernels"), "--kernels means a flow with kernels"),
+        (("--repeats", "noise"), "noise"),
+    ):
+        outcome = orbiflow(*fit, *options)
+        assert outcome.status == 2
+        assert message in outcome.err

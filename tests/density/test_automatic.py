@@ -1,0 +1,173 @@
+"""A fit by evidence: parts chosen, normalised, invariant, the same again, saved and read."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from orbiflow.density import (
+    AutomaticSettings,
+    BlendedDensity,
+    DensityEstimator,
+    FitSettings,
+    SymmetricDensity,
+    Torus,
+    density_to_bytes,
+    fit_automatic,
+    make_space,
+    midpoints,
+    read_density,
+)
+from orbiflow.density.fitting.automatic import PARTS
+from orbiflow.errors import OrbiflowError
+from orbiflow.jobs import requests
+
+SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")
+QUICK = FitSettings(detail=2, segments=2, iterations=10, roughness=(1e-3,))
+
+
+def smooth(name: str, count: int = 400, seed: int = 0) -> torch.Tensor:
+    """Two broad clusters."""
+    rng = np.random.default_rng(seed)
+    centers = np.where(rng.random((count, 1)) < 0.7, [[0.3, 0.6]], [[0.8, 0.15]])
+    return make_space(name).project(torch.tensor(centers + 0.1 * rng.normal(size=(count, 2))))
+
+
+@pytest.mark.parametrize("name", SPACES)
+def test_a_fit_by_evidence(name: str, tmp_path: Path) -> None:
+    space, said = make_space(name), []
+    settings = AutomaticSettings(flow=QUICK)
+    density, report = fit_automatic(
+        space, smooth(name), settings, progress=lambda done, what: said.append((done, what))
+    )
+    assert isinstance(density, BlendedDensity)
+    grid = midpoints(space, 160)
+    with torch.no_grad():
+        assert float(density.log_prob(grid).exp().mean()) == pytest.approx(1, abs=5e-3)
+        held = float(density.log_prob(smooth(name, 2000, 1)).mean())
+    assert report.mass == pytest.approx(1, abs=1e-3)
+    assert report.shares is not None
+    assert sum(report.shares) == pytest.approx(1)
+    assert held == pytest.approx(-report.validation_nll, abs=0.15)
+    assert held > -report.start_nll + 0.5
+    wanted = {"flow", "kernels", "mixture"} | ({"chains"} if name == "torus" else set())
+    assert {part.name for part in report.parts} == wanted
+    assert sum(part.share for part in report.parts) == pytest.approx(1, abs=0.05)
+    assert report.repeats is not None
+    assert report.repeats.rows == 0
+    assert report.notes[0].startswith("chosen by 400 rows held out, in 10 parts")
+    assert [done for done, _ in said] == sorted(done for done, _ in said)
+    assert any("held-out part 2 of 10: mixture" in what for _, what in said)
+    path = tmp_path / "density.safetensors"
+    path.write_bytes(density_to_bytes(density))
+    back, _ = read_density(path)
+    with torch.no_grad():
+        assert torch.equal(back.log_prob(grid), density.log_prob(grid))
+    draws = [d.sample((50,), torch.Generator().manual_seed(0)) for d in (density, back)]
+    assert torch.equal(*draws)
+
+
+@pytest.mark.parametrize("name", ["torus", "projective-plane"])
+def test_it_is_invariant_and_has_gradients(name: str) -> None:
+    space = make_space(name)
+    density, _ = fit_automatic(space, smooth(name, 150), AutomaticSettings(seed=3))
+    points = torch.rand(20, 2, dtype=torch.float64, generator=torch.Generator().manual_seed(0))
+    for element in space.group.cosets:
+        one, other = (density.log_prob(space.project(p)) for p in (element(points), points))
+        assert torch.allclose(one, other, atol=1e-7)
+    assert torch.autograd.gradcheck(density.log_prob, (points[:3].requires_grad_(),), atol=1e-4)
+
+
+def test_the_same_seed_gives_the_same_density() -> None:
+    space, at = make_space("sphere"), smooth("sphere", 50, 9)
+    settings = [AutomaticSettings(flow=QUICK, seed=seed) for seed in (1, 1, 2)]
+    with torch.no_grad():
+        one, same, other = (
+            fit_automatic(space, smooth("sphere"), s)[0].log_prob(at) for s in settings
+        )
+    assert torch.equal(one, same)
+    assert not torch.equal(one, other)
+
+
+def test_repeated_places_are_mass_unless_said_otherwise() -> None:
+    rng = np.random.default_rng(0)
+    space, points = make_space("torus"), smooth("torus", 300)
+    points = torch.cat([points, points[torch.tensor(rng.integers(0, 10, 200))]])
+    at = points[300:]
+    values = {}
+    for repeats in ("places", "rounding"):
+        settings = AutomaticSettings(parts=("kernels",), repeats=repeats)
+        density, report = fit_automatic(space, points, settings)
+        with torch.no_grad():
+            values[repeats] = float(density.log_prob(at).mean())
+        assert "repeat an earlier one" in report.notes[-1]
+    assert values["places"] > values["rounding"] + 3
+
+
+@pytest.mark.parametrize("part", PARTS[1:])
+def test_each_part_alone(part: str) -> None:
+    estimator = DensityEstimator("torus", parts=part)
+    angles = np.random.default_rng(0).vonmises([0.0, 1.0, 2.0], 3.0, (200, 3))
+    estimator.fit(angles)
+    assert [p.name for p in estimator.report_.parts] == [part]
+    assert estimator.score(angles) > -3 * math.log(2 * math.pi) + 0.5
+
+
+def test_a_flow_alone_is_a_flow() -> None:
+    small = {"detail": 2, "segments": 2, "iterations": 3}
+    angles = np.random.default_rng(0).vonmises([0.0, 1.0], 3.0, (200, 2))
+    found = DensityEstimator("torus", parts="flow", **small).fit(angles).density_  # type: ignore[arg-type]
+    assert type(found) is SymmetricDensity
+
+
+@pytest.mark.parametrize("count", [0, 1, 3, 100])
+def test_any_number_of_samples(count: int) -> None:
+    density, _ = fit_automatic(Torus(2), smooth("torus", 120))
+    generator = torch.Generator().manual_seed(0)
+    drawn = density.sample((count,), generator)
+    assert drawn.shape == (count, 2)
+    assert bool(((drawn >= 0) & (drawn <= 1)).all())
+
+
+def test_many_angles_have_chains_beside_kernels(tmp_path: Path) -> None:
+    rng = np.random.default_rng(0)
+    angles = rng.vonmises(0, 4, (300, 5))
+    estimator = DensityEstimator("torus").fit(angles)
+    assert isinstance(estimator.density_, BlendedDensity)
+    assert estimator.report_.mass is None
+    path = tmp_path / "density.safetensors"
+    path.write_bytes(density_to_bytes(estimator.density_))
+    back, _ = read_density(path)
+    at = estimator.space_.to_chart(angles[:40])
+    with torch.no_grad():
+        assert torch.equal(back.log_prob(at), estimator.density_.log_prob(at))
+
+
+@pytest.mark.parametrize("count", [10, 15, 30])
+def test_few_points(count: int) -> None:
+    points = smooth("torus", count)
+    density, report = fit_automatic(Torus(2), points)
+    assert report.validation == count
+    with torch.no_grad():
+        assert bool(density.log_prob(midpoints(density.space, 40)).isfinite().all())
+
+
+def test_what_cannot_be_chosen_is_refused() -> None:
+    with pytest.raises(OrbiflowError, match="parts must be of flow, kernels"):
+        AutomaticSettings(parts=("trees",))
+    with pytest.raises(OrbiflowError, match="repeats must be"):
+        AutomaticSettings(repeats="noise")
+    with pytest.raises(OrbiflowError, match="no chains on this Sphere"):
+        fit_automatic(make_space("sphere"), smooth("sphere"), AutomaticSettings(parts=("chains",)))
+    with pytest.raises(OrbiflowError, match="a flow stands alone"):
+        DensityEstimator("torus", parts="flow,chains").fit(
+            np.zeros((50, 5)) + np.arange(50)[:, None]
+        )
+    with pytest.raises(OrbiflowError, match="at least 10 different points, got 3 among 30"):
+        fit_automatic(make_space("torus"), torch.rand(3, 2).repeat(10, 1))
+
+
+def test_the_request_knows_the_same_parts() -> None:
+    assert requests.PARTS == PARTS

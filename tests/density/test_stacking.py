@@ -1,0 +1,170 @@
+"""Weights by held-out rows, folds, repeats, mixtures by EM: what a fit by evidence is made of."""
+
+import math
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from orbiflow.density import UniformBase, VonMisesChains, make_space, midpoints
+from orbiflow.density.fitting.assembly import mixed
+from orbiflow.density.fitting.folds import FOLDS, folds_of
+from orbiflow.density.fitting.mixtures import fit_mixture
+from orbiflow.density.fitting.repeats import repeats_of
+from orbiflow.density.fitting.scales import joined, kernel_estimates
+from orbiflow.density.fitting.weights import (
+    TOLERANCE,
+    gain_of,
+    sparse_weights,
+    stacked,
+    stacking_weights,
+)
+
+SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")
+names, seeds = st.sampled_from(SPACES), st.integers(0, 2**31)
+
+
+def clustered(name: str, count: int, seed: int) -> torch.Tensor:
+    """Canonical points about three places."""
+    rng = np.random.default_rng(seed)
+    centers = np.array([[0.3, 0.6], [0.8, 0.2], [0.5, 0.45]])[rng.integers(3, size=count)]
+    return make_space(name).project(torch.tensor(centers + 0.04 * rng.normal(size=(count, 2))))
+
+
+@given(seeds, st.integers(2, 8), st.integers(1, 100))
+@settings(deadline=None)
+def test_no_other_weights_are_better(seed: int, parts: int, rows: int) -> None:
+    rng = np.random.default_rng(seed)
+    table = torch.tensor(3 * rng.normal(size=(parts, rows)))
+    weights = stacking_weights(table)
+    assert float(weights.sum()) == pytest.approx(1)
+    best = float(stacked(table, weights).mean())
+    for other in torch.tensor(rng.dirichlet(np.ones(parts), 20)):
+        assert float(stacked(table, other).mean()) <= best + 2 * TOLERANCE
+
+
+@given(seeds)
+@settings(deadline=None)
+def test_what_must_be_there_is_and_what_is_negligible_is_not(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    table = torch.tensor(rng.normal(size=(6, 50)))
+    table[-1] -= 50.0
+    always = torch.arange(6) == 5
+    weights = sparse_weights(table, always)
+    assert float(weights[-1]) >= 0.4 / 51
+    assert float(weights.sum()) == pytest.approx(1)
+    assert not bool(((weights > 0) & (weights < 2e-3)).any())
+
+
+def test_a_gain_has_its_standard_error() -> None:
+    better = torch.tensor([1.0, 2.0, 3.0, 4.0])
+    gain = gain_of(better, torch.zeros(4))
+    assert gain.nats == 2.5
+    assert gain.error == pytest.approx(float(better.std()) / 2)
+
+
+@given(names, seeds)
+@settings(max_examples=8, deadline=None)
+def test_mixtures_integrate_to_one_and_are_invariant(name: str, seed: int) -> None:
+    space = make_space(name)
+    generator = torch.Generator().manual_seed(seed)
+    found = fit_mixture(space, clustered(name, 200, seed), 3, narrowest=300.0, generator=generator)
+    grid = midpoints(space, 200)
+    assert float(found.log_prob(grid).exp().mean()) == pytest.approx(1, abs=2e-3)
+    points = 2 * torch.rand(20, 2, dtype=torch.float64, generator=generator)
+    for element in space.group.cosets:
+        images = element(points)
+        one, other = (space.project(p) if space.is_round else p for p in (images, points))
+        assert torch.allclose(found.log_prob(one), found.log_prob(other), atol=1e-7)
+
+
+@pytest.mark.parametrize("name", SPACES)
+def test_a_mixture_finds_clusters(name: str) -> None:
+    space, points = make_space(name), clustered(name, 900, 1)
+    generator = torch.Generator().manual_seed(0)
+    one, three = (fit_mixture(space, points, k, generator=generator) for k in (1, 3))
+    test = clustered(name, 300, 2)
+    assert float(three.log_prob(test).mean()) > float(one.log_prob(test).mean()) + 0.3
+    again = fit_mixture(space, points, 1, generator=torch.Generator().manual_seed(0))
+    assert torch.equal(again.concentrations, one.concentrations)
+
+
+@pytest.mark.parametrize("name", SPACES)
+def test_the_gradient_of_a_mixture(name: str) -> None:
+    space = make_space(name)
+    generator = torch.Generator().manual_seed(0)
+    found = fit_mixture(space, clustered(name, 100, 0), 2, generator=generator)
+    at = clustered(name, 4, 3).requires_grad_()
+    assert torch.autograd.gradcheck(found.log_prob, (at,), atol=1e-4)
+
+
+@pytest.mark.parametrize("name", SPACES)
+def test_kernel_estimates_are_normalised(name: str) -> None:
+    space = make_space(name)
+    points = clustered(name, 60, 0)
+    found = kernel_estimates(space, torch.cat([points, points[:5]]), narrowest=100.0)
+    assert {"repeated", "near 2, 0.4, 1" if space.is_round else "near 2, 0.4, 0.3"} <= set(found)
+    grid = midpoints(space, 120)
+    for part in found.values():
+        assert float(part.log_prob(grid).exp().mean()) == pytest.approx(1, abs=5e-3)
+    parts = [found["repeated"], *found.values()][:2]
+    both = joined(parts, torch.tensor([1.0, 3.0]))
+    expected = 0.25 * parts[0].log_prob(grid).exp() + 0.75 * parts[1].log_prob(grid).exp()
+    assert torch.allclose(both.log_prob(grid).exp(), expected)
+    alone = kernel_estimates(space, torch.cat([points, points[:5]]), repeats=False)
+    assert "repeated" not in alone
+
+
+def test_mixtures_of_chains_are_mixed() -> None:
+    space, parts = make_space("torus"), []
+    for k in (1.0, 9.0):
+        weights = torch.full((1, 3), -math.log(3), dtype=torch.float64)
+        means, kappa = torch.zeros(1, 2, 5), torch.full((1, 2), k)
+        parts.append(VonMisesChains(space, weights, means, kappa))
+    both, at = mixed(parts, torch.tensor([0.2, 0.8])), midpoints(space, 5)
+    expected = 0.2 * parts[0].log_prob(at).exp() + 0.8 * parts[1].log_prob(at).exp()
+    assert torch.allclose(both.log_prob(at).exp(), expected, atol=1e-7)
+
+
+@given(seeds, st.integers(30, 300), st.booleans())
+@settings(max_examples=30, deadline=None)
+def test_folds_part_the_rows(seed: int, count: int, together: bool) -> None:
+    generator = torch.Generator().manual_seed(seed)
+    points = torch.rand(20, 2, dtype=torch.float64, generator=generator)
+    points = points[torch.randint(20, (count,), generator=generator)]
+    folds = folds_of(points, together=together, generator=generator)
+    assert torch.equal(folds.rows.sort(dim=0).values, points.sort(dim=0).values)
+    assert sum(len(folds.held(k)) for k in range(FOLDS)) == count
+    for train, held in folds:
+        assert len(train) + len(held) == count
+        if together:
+            apart = (train[:, None] != held).any(dim=-1)
+            assert bool(apart.all())
+
+
+def test_repeats_are_told_from_rounding() -> None:
+    rng = np.random.default_rng(0)
+    space = make_space("torus", unit="degrees")
+    smooth = rng.normal(0, 20, (2000, 2))
+    rounded = repeats_of(space, space.to_chart(smooth.round(0)))
+    assert rounded.step == 1.0
+    assert rounded.is_rounding
+    assert "as many as rounding to 1 brings" in rounded.notes("places")[0]
+    several = np.concatenate([smooth.round(2), np.repeat(smooth[:5].round(2), 100, axis=0)])
+    stations = repeats_of(space, space.to_chart(several))
+    assert stations.step == 0.01
+    assert not stations.is_rounding
+    assert "far more than rounding to 0.01" in stations.notes("rounding")[0]
+    exact = repeats_of(space, space.to_chart(np.concatenate([smooth, smooth[:7]])))
+    assert (exact.rows, exact.places, exact.step) == (7, 2000, None)
+    assert "places of their own" in exact.notes("places")[0]
+    assert repeats_of(space, space.to_chart(smooth)).notes("places") == []
+
+
+def test_the_floor_is_uniform() -> None:
+    space = make_space("sphere")
+    assert float(UniformBase(space).log_prob(midpoints(space, 90)).exp().mean()) == pytest.approx(
+        1, abs=1e-3
+    )
