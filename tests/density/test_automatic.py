@@ -22,7 +22,7 @@ from orbiflow.density import (
 )
 from orbiflow.density.fitting.automatic import PARTS
 from orbiflow.errors import OrbiflowError
-from orbiflow.jobs import requests
+from orbiflow.jobs import density_requests
 
 SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")
 QUICK = FitSettings(detail=2, segments=2, iterations=10, roughness=(1e-3,))
@@ -170,4 +170,4 @@ def test_what_cannot_be_chosen_is_refused() -> None:
 
 
 def test_the_request_knows_the_same_parts() -> None:
-    assert requests.PARTS == PARTS
+    assert density_requests.PARTS == PARTS

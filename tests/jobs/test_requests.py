@@ -25,8 +25,8 @@ from orbiflow.jobs import (
     PatchesRequest,
     RecordError,
     Request,
+    density_requests,
     request_from_json,
-    requests,
 )
 
 names = st.text(st.characters(exclude_characters="\0"), min_size=1)
@@ -103,7 +103,7 @@ REQUESTS = st.one_of(
         space=spaces,
         columns=columns,
         unit=units,
-        parts=st.none() | st.lists(st.sampled_from(requests.PARTS), min_size=1).map(tuple),
+        parts=st.none() | st.lists(st.sampled_from(density_requests.PARTS), min_size=1).map(tuple),
         repeats=st.sampled_from(["places", "rounding"]),
         detail=st.none() | st.integers(),
         seconds=st.none() | numbers,

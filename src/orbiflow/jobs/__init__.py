@@ -9,6 +9,13 @@ True
 """
 
 from orbiflow.cancel import Cancel
+from orbiflow.jobs.density_requests import (
+    DensityFitRequest,
+    DensityPlotRequest,
+    DensitySampleRequest,
+    DensityScoreRequest,
+    PatchesRequest,
+)
 from orbiflow.jobs.events import (
     ClassFailed,
     Event,
@@ -24,21 +31,16 @@ from orbiflow.jobs.events import (
 )
 from orbiflow.jobs.process import Job, start
 from orbiflow.jobs.records import RecordError
-from orbiflow.jobs.requests import (
+from orbiflow.jobs.request import Request
+from orbiflow.jobs.requests import request_from_json
+from orbiflow.jobs.run import Sink, run
+from orbiflow.jobs.tile_requests import (
     AnimateRequest,
     ArtRequest,
-    DensityFitRequest,
-    DensityPlotRequest,
-    DensitySampleRequest,
-    DensityScoreRequest,
     EscherizeRequest,
     ExportRequest,
     PaperRequest,
-    PatchesRequest,
-    Request,
-    request_from_json,
 )
-from orbiflow.jobs.run import Sink, run
 
 __all__ = [
     "AnimateRequest",

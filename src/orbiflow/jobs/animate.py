@@ -11,8 +11,8 @@ from orbiflow.files import write_atomic
 from orbiflow.jobs.asked import given
 from orbiflow.jobs.events import Finished, Note, Progress, Written
 from orbiflow.jobs.place import check_place
-from orbiflow.jobs.requests import AnimateRequest
 from orbiflow.jobs.run import Sink
+from orbiflow.jobs.tile_requests import AnimateRequest
 
 
 def animate(request: AnimateRequest, tell: Sink, cancel: Cancel) -> Finished:

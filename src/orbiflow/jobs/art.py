@@ -18,8 +18,8 @@ from orbiflow.jobs.asked import given, read_as
 from orbiflow.jobs.events import Finished, Note, Progress, Written
 from orbiflow.jobs.place import check_place
 from orbiflow.jobs.records import RecordError
-from orbiflow.jobs.requests import ArtRequest
 from orbiflow.jobs.run import Sink
+from orbiflow.jobs.tile_requests import ArtRequest
 
 
 def art(request: ArtRequest, tell: Sink, cancel: Cancel) -> Finished:

@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 
 from orbiflow.errors import OrbiflowError
 from orbiflow.jobs.records import RecordError
-from orbiflow.jobs.requests import Request
+from orbiflow.jobs.request import Request
 
 Value = TypeVar("Value")
 
@@ -15,7 +15,7 @@ Value = TypeVar("Value")
 def given(request: Request, names: Iterable[str]) -> dict[str, Any]:
     """The fields of these names that were set, by their names: the others keep their defaults.
 
-    >>> from orbiflow.jobs.requests import AnimateRequest
+    >>> from orbiflow.jobs.tile_requests import AnimateRequest
     >>> given(AnimateRequest(result="out", fps=12), ("seconds", "fps"))
     {'fps': 12.0}
     """

@@ -19,8 +19,8 @@ from orbiflow.export.density_plots import MODEL, PICTURES
 from orbiflow.files import write_atomic
 from orbiflow.folders import ResultFolder
 from orbiflow.jobs.density_data import REPORT, read_data, unit_of
+from orbiflow.jobs.density_requests import DensityFitRequest
 from orbiflow.jobs.events import Finished, Note, Progress, Written
-from orbiflow.jobs.requests import DensityFitRequest
 from orbiflow.jobs.run import Sink
 from orbiflow.symmetry.isometry import Array
 from orbiflow.threads import one_thread

@@ -15,10 +15,10 @@ from orbiflow.export.density_plots import PlotSettings, is_one_file, known_names
 from orbiflow.export.lengths import column_width
 from orbiflow.jobs.asked import given, read_as
 from orbiflow.jobs.density_data import model_at, read_data, same_columns
+from orbiflow.jobs.density_requests import DensityPlotRequest
 from orbiflow.jobs.events import Finished, Note, Progress, Written
 from orbiflow.jobs.place import check_place
 from orbiflow.jobs.records import RecordError
-from orbiflow.jobs.requests import DensityPlotRequest
 from orbiflow.jobs.run import Sink
 from orbiflow.symmetry.isometry import Array
 from orbiflow.threads import one_thread

@@ -11,8 +11,8 @@ from orbiflow.density.tables import append_column, to_csv
 from orbiflow.errors import OrbiflowError
 from orbiflow.files import write_atomic
 from orbiflow.jobs.density_data import model_at, read_data, same_columns
+from orbiflow.jobs.density_requests import DensitySampleRequest, DensityScoreRequest, PatchesRequest
 from orbiflow.jobs.events import Finished, Note, Progress, Written
-from orbiflow.jobs.requests import DensitySampleRequest, DensityScoreRequest, PatchesRequest
 from orbiflow.jobs.run import Sink
 from orbiflow.threads import one_thread
 

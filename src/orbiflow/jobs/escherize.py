@@ -34,8 +34,8 @@ from orbiflow.jobs.events import (
     Written,
 )
 from orbiflow.jobs.records import RecordError
-from orbiflow.jobs.requests import EscherizeRequest
 from orbiflow.jobs.run import Sink
+from orbiflow.jobs.tile_requests import EscherizeRequest
 from orbiflow.silhouette import Emphasis, Pins, Target
 from orbiflow.tilings import CLASSES, isohedral_class
 

@@ -17,8 +17,8 @@ from orbiflow.jobs.asked import given, read_as
 from orbiflow.jobs.events import Finished, Note, Progress, Written
 from orbiflow.jobs.place import check_place
 from orbiflow.jobs.records import RecordError
-from orbiflow.jobs.requests import ExportRequest
 from orbiflow.jobs.run import Sink
+from orbiflow.jobs.tile_requests import ExportRequest
 
 LENGTHS = ("tile_size", "tolerance", "warn_neck")
 LENGTHS_OR_ZERO = ("kerf", "clearance", "spacing")

@@ -9,8 +9,8 @@ from orbiflow.cancel import Cancel
 from orbiflow.folders import ResultFolder
 from orbiflow.jobs.events import Finished, Note, Progress, Written
 from orbiflow.jobs.records import RecordError
-from orbiflow.jobs.requests import PaperRequest
 from orbiflow.jobs.run import Sink
+from orbiflow.jobs.tile_requests import PaperRequest
 from orbiflow.paper import EXHIBITS, FAST, FULL, Exhibit, reproduce, write_page, written_files
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from types import TracebackType
 
 from orbiflow.jobs.events import Event, Failed, Finished, event_from_json
-from orbiflow.jobs.requests import Request
+from orbiflow.jobs.request import Request
 
 
 def start(request: Request) -> Job:

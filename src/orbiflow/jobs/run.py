@@ -9,7 +9,8 @@ from typing import Any
 from orbiflow.cancel import Cancel, Cancelled
 from orbiflow.errors import OrbiflowError
 from orbiflow.jobs.events import Event, Failed, Finished, Started
-from orbiflow.jobs.requests import REQUESTS, Request
+from orbiflow.jobs.request import Request
+from orbiflow.jobs.requests import REQUESTS
 
 Sink = Callable[[Event], None]
 

@@ -1,0 +1,155 @@
+"""What can be asked for of densities: one frozen dataclass a job, checked when made."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from orbiflow.jobs.records import RecordError
+from orbiflow.jobs.request import Request
+
+MOST_SAMPLES = 100_000_000
+
+SpaceName = Literal["torus", "sphere", "klein-bottle", "projective-plane"]
+Unit = Literal["radians", "degrees", "turns"]
+Measure = Literal["natural", "square", "uniform"]
+PARTS = (
+    "flow",
+    "kernels",
+    "mixture",
+    "chains",
+)  # as `orbiflow.density` has them, without its import
+
+
+@dataclass(frozen=True)
+class DensityFitRequest(Request):
+    """Fit a density to a table; see `orbiflow density fit --help`.
+
+    - `data`: the table. `out`: folder for the model and its report.
+    - `columns`: names or numbers, None for what the space takes.
+    - `header`: whether a text's first line names the columns, None to look.
+    - `drop_missing`: leave out rows that lack a value.
+    - `unit`: of angles; None for radians if no value is beyond 2 pi.
+    - `parts`: of flow, kernels, mixture and chains those that may be used; None lets rows held out
+      choose among all.
+    - `repeats`: what rows that repeat another are taken for.
+    - `detail`, `segments`: of the flow, None for what suits the number of rows.
+    - `kernels`: a flow and adaptive kernels, nothing else.
+    - `seconds`: of training at most, None for no limit.
+    """
+
+    KIND = "density-fit"
+
+    data: Path
+    space: SpaceName
+    out: Path = Path("density")
+    columns: tuple[str, ...] | None = None
+    header: bool | None = None
+    drop_missing: bool = False
+    unit: Unit | None = None
+    parts: tuple[str, ...] | None = None
+    repeats: Literal["places", "rounding"] = "places"
+    detail: int | None = None
+    segments: int | None = None
+    kernels: bool = False
+    seconds: float | None = None
+    seed: int = 0
+
+    def check(self) -> None:
+        _columns_named(self.columns)
+        unknown = [part for part in self.parts or () if part not in PARTS]
+        if unknown or self.parts == ():
+            raise RecordError(
+                f"{{parts}} must be of {', '.join(PARTS)}, got {', '.join(unknown)!r}"
+            )
+        if self.kernels and self.parts is not None:
+            raise RecordError("{kernels} means a flow with kernels: give it or {parts}, not both")
+
+
+@dataclass(frozen=True)
+class DensityScoreRequest(Request):
+    """Add log densities to a table; see `orbiflow density score --help`.
+
+    `columns`, `header`, `drop_missing`: as for a fit; rows left out get an empty cell.
+    """
+
+    KIND = "density-score"
+
+    data: Path
+    model: Path
+    out: Path = Path("scores.csv")
+    columns: tuple[str, ...] | None = None
+    header: bool | None = None
+    drop_missing: bool = False
+    measure: Measure = "natural"
+
+    def check(self) -> None:
+        _columns_named(self.columns)
+
+
+@dataclass(frozen=True)
+class DensitySampleRequest(Request):
+    """Draw samples in the units of the data; see `orbiflow density sample --help`."""
+
+    KIND = "density-sample"
+
+    model: Path
+    out: Path = Path("samples.csv")
+    count: int = 1000
+    seed: int = 0
+
+    def check(self) -> None:
+        if not 1 <= self.count <= MOST_SAMPLES:
+            raise RecordError(f"{{count}} must be from 1 to {MOST_SAMPLES}, got {self.count}")
+
+
+@dataclass(frozen=True)
+class DensityPlotRequest(Request):
+    """Draw a density; see `orbiflow density plot --help`.
+
+    - `out`: a folder, or a .pdf that gets a page a figure.
+    - `format`, `width`: of the figures; a width, "single", "double" or such as "85mm", is for print.
+    - `center`: angles in the middle of a torus' pictures, such as "180,180".
+    """
+
+    KIND = "density-plot"
+
+    model: Path
+    out: Path = Path("plots")
+    data: Path | None = None
+    columns: tuple[str, ...] | None = None
+    coastlines: Path | None = None
+    format: Literal["png", "pdf", "svg"] | None = None
+    width: str | None = None
+    measure: Measure = "natural"
+    scale: Literal["auto", "linear", "log"] = "auto"
+    center: str | None = None
+    dots: bool = False
+    seed: int = 0
+
+    def check(self) -> None:
+        _columns_named(self.columns)
+
+
+@dataclass(frozen=True)
+class PatchesRequest(Request):
+    """Turn image patches into angles on the Klein bottle; see `orbiflow density patches --help`."""
+
+    KIND = "density-patches"
+
+    data: Path
+    out: Path = Path("angles.csv")
+    columns: tuple[str, ...] | None = None
+    unit: Unit = "radians"
+    farthest: float | None = None
+
+    def check(self) -> None:
+        _columns_named(self.columns)
+        if self.farthest is not None and not self.farthest >= 0:
+            raise RecordError(f"{{farthest}} must be at least 0, got {self.farthest:g}")
+
+
+def _columns_named(columns: tuple[str, ...] | None) -> None:
+    if columns == ():
+        raise RecordError("{columns} names no column; give their names or numbers, as in lat,lon")

@@ -1,0 +1,32 @@
+"""What every request has: fields that are checked, and the version of its layout.
+
+Importing this takes no time: no numerical library.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from orbiflow.jobs.records import Record, RecordError
+
+SCHEMA_VERSION = 1
+
+
+class Request(Record):
+    """Base of all requests."""
+
+    def to_json(self) -> dict[str, Any]:
+        """An object for `json.dumps`, with the version of its layout.
+
+        >>> from orbiflow.jobs import DensitySampleRequest
+        >>> DensitySampleRequest(model="quakes", out="drawn.csv").to_json()["schema_version"]
+        1
+        """
+        return {"schema_version": SCHEMA_VERSION, **super().to_json()}
+
+
+def at_least_one(request: Request, name: str) -> None:
+    """Raises a `RecordError` if the field is a number below 1."""
+    value = getattr(request, name)
+    if value is not None and value < 1:
+        raise RecordError(f"{{{name}}} must be at least 1, got {value}")
