@@ -36,6 +36,9 @@ WIDE = 0.5
 PINCHED = 0.25
 """Part of the silhouette's narrowest neck below which a tile's looks cut through."""
 
+COARSE = 0.003
+"""How far a silhouette's outline may be moved before its necks are looked for, in the same unit."""
+
 SOUND = 0.05
 """Width above which no neck does, in square roots of the area."""
 
@@ -88,7 +91,11 @@ def least_neck(silhouette: ArrayLike, min_neck: float) -> float:
     """
     if not min_neck:
         return 0.0
-    return max(min_neck, min(PINCHED * narrowest_neck(silhouette).share, SOUND))
+    _, polygon = _checked(silhouette)
+    # a photo's outline may have 20,000 vertices, whose pairs fill gigabytes
+    plain = shapely.simplify(polygon, COARSE * np.sqrt(polygon.area))
+    ring = shapely.get_coordinates(plain.exterior)[:-1]
+    return max(min_neck, min(PINCHED * narrowest_neck(ring).share, SOUND))
 
 
 def narrowest_neck(ring: ArrayLike) -> Thinnest:
