@@ -76,7 +76,13 @@ def test_what_is_missing_is_said_in_one_line(name: str, tmp_path: Path) -> None:
 
 def test_the_page_names_every_benchmark() -> None:
     page = (ROOT / "docs" / "benchmarks.md").read_text()
-    helpers = {"common", "density_data", "density_kde", "density_unoriented_data"}
+    helpers = {
+        "common",
+        "density_data",
+        "density_default_data",
+        "density_kde",
+        "density_unoriented_data",
+    }
     helpers |= {"density_unoriented_kde", "likeness_methods"}
     for path in BENCHMARKS.glob("*.py"):
         assert path.stem in helpers or f"`{path.name}" in page

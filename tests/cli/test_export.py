@@ -232,3 +232,11 @@ def test_the_snippet_of_the_documentation(result: Path, tmp_path: Path, monkeypa
     (tmp_path / "out" / "turtle").symlink_to(result)
     exec(compile(snippet, "export.md", "exec"), {})
     assert (tmp_path / "cut.svg").is_file()
+
+
+def test_an_ending_of_no_format_needs_the_format(result: Path, tmp_path: Path, orbiflow) -> None:
+    outcome = orbiflow("export", result, "--out", tmp_path / "boot.eps")
+    assert outcome.status == 2
+    assert "--out ends in .eps; say --format, or end it in .svg" in " ".join(outcome.err.split())
+    assert not list(tmp_path.glob("boot*"))
+    assert orbiflow("export", result, "--format", "svg", "--out", tmp_path / "boot.eps").status == 0

@@ -14,7 +14,7 @@ from orbiflow.density import DensityEstimator, SymmetricDensity, Torus, density_
 from orbiflow.density.spaces.round import Sphere
 from orbiflow.errors import OrbiflowError, OutputError
 from orbiflow.export import PlotSettings, plot_density
-from orbiflow.export.density_plots import MODEL, PICTURES
+from orbiflow.export.density_plots import MODEL, PICTURES, refuse_others
 from orbiflow.fields import FourierField
 from orbiflow.flows import Flow
 
@@ -48,10 +48,13 @@ def test_a_folder_holds_the_pictures_of_one_plot(tmp_path: Path) -> None:
     assert names(out) == figures | {"surface.html"}
     assert set(plotted.files) == {out / name for name in names(out)}
     assert len(plotted.captions) == 3
-    (out / "notes.txt").write_text("mine")
     plot_density(example(), out)
+    assert names(out) == {"density.png", "flow.png", "surface.html"}
+    assert names(out) < set(PICTURES)
+    (out / "notes.txt").write_text("mine")
+    with pytest.raises(OutputError, match=r"holds density\.png, which would go"):
+        plot_density(example(), out)
     assert names(out) == {"density.png", "flow.png", "surface.html", "notes.txt"}
-    assert names(out) - {"notes.txt"} < set(PICTURES)
 
 
 def test_one_pdf_has_a_page_a_figure(tmp_path: Path) -> None:
@@ -134,3 +137,13 @@ def test_what_does_not_fit_the_density_is_refused_before_anything_is_written(
     with pytest.raises(OrbiflowError):
         plot_density(example(), out, data=DATA[:, :1])
     assert not out.exists()
+
+
+def test_a_folder_of_ones_own_pictures_is_left_alone(tmp_path: Path) -> None:
+    for name in ("density.pdf", "notes.txt"):
+        (tmp_path / name).write_text("mine")
+    with pytest.raises(OutputError, match=r"density\.pdf, which would go, beside notes\.txt"):
+        refuse_others(tmp_path)
+    (tmp_path / "notes.txt").unlink()
+    refuse_others(tmp_path)  # as an earlier plot left it
+    refuse_others(tmp_path / "not there yet")

@@ -87,7 +87,7 @@ def test_a_spike_is_measured_where_it_is_long_enough() -> None:
 def test_similar_shapes_are_alike(name: str, turn: float, scale: float, x: float) -> None:
     ring = SHAPES[name] if name in SHAPES else np.asarray(animal(name).normal)
     moved = scale * (ring @ rotation_matrix(turn).T + [x, -x])
-    for function in (least_neck, narrowest_neck, narrowest_slit):
+    for function in (narrowest_neck, narrowest_slit):
         before, after = function(ring), function(moved[::-1])
         assert (before is None) == (after is None)
         if before is not None and after is not None:
@@ -141,7 +141,7 @@ def test_quick_enough_for_a_list_of_tiles(ring: Array) -> None:
 @pytest.mark.parametrize("case", [*USELESS, *NOT_SIMPLE])
 def test_what_is_no_polygon_is_refused(case: str) -> None:
     ring = USELESS[case] if case in USELESS else NOT_SIMPLE[case]
-    for function in (least_neck, narrowest_neck, narrowest_slit):
+    for function in (narrowest_neck, narrowest_slit):
         with pytest.raises(OrbiflowError):
             function(ring)
     for share in (hair_share, slit_share):

@@ -106,7 +106,7 @@ def _fit(
         wanted=enough,
     )
     if not found:
-        raise CertificationError(f"{kind.name}: all tiles near the silhouette cross themselves")
+        raise CertificationError("all tiles near the silhouette cross themselves")
     found = found[: enough + 1]  # one to spare, if one is not certified
     overlaps = [Overlap(target.normal * (1.0, -1.0 if hand.mirrored else 1.0)) for hand in both]
     placed = [placed_best(bent, overlaps[bent.hand.mirrored]) for bent in found]

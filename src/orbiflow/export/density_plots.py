@@ -25,9 +25,11 @@ from orbiflow.figures.density_scale import SCALES
 from orbiflow.figures.density_square import density_picture, samples_picture
 from orbiflow.figures.sheet import FORMATS, FigureFormat, Picture, Sheet, pdf_pages
 from orbiflow.files import make_folder, write_atomic, write_set
+from orbiflow.folders import LITTER
 from orbiflow.threads import one_thread
 
 MODEL = "density.safetensors"
+REPORT = "report.json"
 PAGE = "surface.html"
 NAMES = ("density", "flow", "samples")
 PICTURES = (*(f"{name}.{form}" for form in FORMATS for name in NAMES), PAGE)
@@ -119,6 +121,8 @@ def plot_density(
     """
     settings, out = settings or PlotSettings(), as_path(out, "the folder to draw into")
     single = is_one_file(out)
+    if not single:
+        refuse_others(out)
     plots = DensityPlots.of(density, settings, data)
     if single:
         pictures = plots.pictures(Sheet.column(settings.width or "single", "pdf"), told)
@@ -135,6 +139,23 @@ def plot_density(
         contents[PAGE] = plots.page()
     paths = write_set(out, PICTURES, contents)
     return Plotted(tuple(paths), _words(pictures.values()))
+
+
+def refuse_others(out: Path) -> None:
+    """Pictures that would go, beside files that orbiflow did not write, may be somebody's own.
+
+    Raises:
+        OutputError: for such a folder.
+    """
+    if not out.is_dir():
+        return
+    inside = {path.name for path in out.iterdir()} - LITTER
+    foreign, old = sorted(inside - {MODEL, REPORT, *PICTURES}), sorted(inside & set(PICTURES))
+    if foreign and old:
+        raise OutputError(
+            f"{out} holds {old[0]}, which would go, beside {foreign[0]}, which orbiflow did not write: "
+            "choose another --out or move it"
+        )
 
 
 def is_one_file(out: Path) -> bool:

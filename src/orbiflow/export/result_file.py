@@ -81,7 +81,8 @@ def read_result(path: str | Path, which: str | int = 1) -> ExportTile:
         y_down = bool(document["input"]["y_down"])
         source = Path(str(document["input"]["source"])).stem
     except (KeyError, TypeError) as error:
-        raise InputFileError(f"{file}: not a result of orbiflow escherize: {error}") from error
+        missing = f"it lacks {error}" if isinstance(error, KeyError) else str(error)
+        raise InputFileError(f"{file}: not a result of orbiflow escherize: {missing}") from error
     index = _index(names, which, file)
     try:
         tile = _tile(entries[index])

@@ -13,8 +13,6 @@ from orbiflow.export.density_plots import MODEL
 from orbiflow.jobs.events import Note
 from orbiflow.jobs.run import Sink
 
-REPORT = "report.json"
-
 
 def model_at(path: Path) -> tuple[SymmetricDensity, dict[str, Any]]:
     """The density in a file or in the folder of a fit, and what was saved with it."""

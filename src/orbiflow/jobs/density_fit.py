@@ -15,10 +15,10 @@ from orbiflow.cancel import Cancel
 from orbiflow.density import DensityEstimator, density_to_bytes
 from orbiflow.density.fitting.report import FitReport
 from orbiflow.density.tables import Table
-from orbiflow.export.density_plots import MODEL, PICTURES
+from orbiflow.export.density_plots import MODEL, PICTURES, REPORT
 from orbiflow.files import write_atomic
 from orbiflow.folders import ResultFolder
-from orbiflow.jobs.density_data import REPORT, read_data, unit_of
+from orbiflow.jobs.density_data import read_data, unit_of
 from orbiflow.jobs.density_requests import DensityFitRequest
 from orbiflow.jobs.events import Finished, Note, Progress, Written
 from orbiflow.jobs.run import Sink

@@ -84,6 +84,10 @@ def _settings(request: ExportRequest) -> ExportSettings:
     ending = request.out.suffix.lower().lstrip(".") if request.out else ""
     if "format" not in asked and ending in FORMATS:
         asked["format"] = ending
+    elif "format" not in asked and ending:
+        raise RecordError(
+            f"{{out}} ends in .{ending}; say {{format}}, or end it in .{', .'.join(FORMATS)}"
+        )
     elif ending in FORMATS and asked["format"] != ending:
         raise RecordError(
             f"{{out}} ends in .{ending} but {{format}} is {asked['format']}; make them the same"
