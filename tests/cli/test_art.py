@@ -180,8 +180,8 @@ def test_the_page_of_documentation_names_every_option_and_palette(orbiflow) -> N
 def test_the_snippet_of_the_documentation(tmp_path: Path, monkeypatch) -> None:
     (snippet,) = re.findall(r"```python\n(.*?)```", DOCS, flags=re.DOTALL)
     monkeypatch.chdir(tmp_path)
-    write_run(tmp_path / "out" / "barbet", "IH6")
-    low, high = squirrel("IH6").covered[:2]
+    write_run(tmp_path / "out" / "barbet", "IH5")
+    low, high = squirrel("IH5").covered[:2]
     box = " ".join(str(value) for value in (*low, *(high - low)))
     (tmp_path / "examples" / "artwork").mkdir(parents=True)
     drawing = f'<svg viewBox="{box}"><circle cx="{EYE[0]}" cy="{EYE[1]}" r="20"/></svg>'
