@@ -80,7 +80,7 @@ def test_what_orbiflow_did_not_write_is_refused_by_its_name(name: str, tmp_path:
     else:
         fill(out, name)
     before = files(tmp_path)
-    message = "which orbiflow did not write: choose another --out or move it"
+    message = "which is of no earlier run: choose another --out or move it"
     with pytest.raises(OutputError, match=message) as caught:
         folder_at(out)
     assert str(out) in str(caught.value)
@@ -160,7 +160,7 @@ def test_a_link_within_is_no_folder_of_ours(tmp_path: Path) -> None:
     fill(tmp_path / "elsewhere", "tile.svg")
     fill(tmp_path / "out", "result.json")
     (tmp_path / "out" / "IH4").symlink_to(tmp_path / "elsewhere")
-    with pytest.raises(OutputError, match="holds IH4, which orbiflow did not write"):
+    with pytest.raises(OutputError, match="holds IH4, which is of no earlier run"):
         folder_at(tmp_path / "out")
 
 

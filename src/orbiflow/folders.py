@@ -87,7 +87,7 @@ class ResultFolder:
             folder = path.is_dir() and not path.is_symlink()
             if name not in (above if folder else known):
                 raise OutputError(
-                    f"{self.path} holds {name}, which orbiflow did not write: choose another "
+                    f"{self.path} holds {name}, which is of no earlier run: choose another "
                     "--out or move it"
                 )
             if folder:

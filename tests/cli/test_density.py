@@ -258,7 +258,7 @@ def test_a_fit_does_not_touch_what_it_did_not_write(tmp_path: Path, orbiflow) ->
         "density", "fit", data, "--space", "torus", "--unit", "degrees", *FIT, "--out", model
     )
     assert refused.status == 2
-    assert "holds density.png, which orbiflow did not write" in refused.err
+    assert "holds density.png, which is of no earlier run" in refused.err
     assert (model / "density.png").read_text() == "mine"
 
 

@@ -20,7 +20,7 @@ from orbiflow.escher import (
 )
 from orbiflow.export import index_page, overview_png, write_gallery
 from orbiflow.export.gallery import folder_names, written_files
-from orbiflow.export.measures import measures
+from orbiflow.export.measures import is_poor, measures
 from orbiflow.silhouette import Target
 
 BOOT = [(60, 20), (210, 20), (230, 80), (170, 95), (160, 190), (100, 145), (45, 80)]
@@ -154,3 +154,29 @@ def test_the_page_is_one_of_the_files_of_a_run(tmp_path: Path) -> None:
     known = written_files(tmp_path)
     assert {"index.html", "overview.png", "IH4/field.png", "IH4/tiling.png"} <= known
     assert folder_names(["IH4", "IH4"]) == ["IH4", "IH4-2"]
+
+
+def test_what_was_decided_and_what_failed_is_on_the_sheets(
+    target: Target, bent: TileResult
+) -> None:
+    noted = replace(target, notes=("filled 3 holes <of> it",))
+    page = Page(index_page([bent], noted, ["IH4"]))
+    assert "filled 3 holes <of> it" in page.words
+    assert not [item for item in Page(index_page([bent], target, ["IH4"])).all("ul")
+                if item.get("class") == "notes"]  # fmt: skip
+    plain = overview_png([bent], target)
+    assert overview_png([bent], target, failures=[ClassFailure("IH7", "no tile")]) != plain
+
+
+def test_scores_are_called_poor_where_the_words_say_so(
+    bent: TileResult, flowed: TileResult
+) -> None:
+    assert bent.fidelity is not None
+    said = set()
+    for cost in np.geomspace(1e-3, 1e3, 13):
+        scored = replace(bent, fidelity=replace(bent.fidelity, cost=float(cost)), thinnest=None)
+        poor = is_poor(scored)
+        assert poor == measures(scored)[0].words.startswith("a poor")
+        said.add(poor)
+    assert said == {False, True}
+    assert is_poor(flowed) == measures(flowed)[0].words.startswith("a poor")

@@ -66,7 +66,7 @@ def test_a_run_takes_the_place_of_an_earlier_one_and_of_nothing_else(
         write_folder([found], target, out, figures=figures)
         assert (out / "IH4" / "overlay.pdf").is_file() == figures
     (out / "notes.txt").write_text("mine")
-    with pytest.raises(OutputError, match=r"notes\.txt, which orbiflow did not write"):
+    with pytest.raises(OutputError, match=r"notes\.txt, which is of no earlier run"):
         write_folder([found], target, out)
     with pytest.raises(OrbiflowError, match="no tile to write"):
         write_folder([], target, tmp_path / "none")

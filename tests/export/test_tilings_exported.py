@@ -129,3 +129,12 @@ def test_decimals_follow_the_tolerance() -> None:
     assert re.search(r"\d\.\d{5}", fine.split("<use")[0])
     assert not re.search(r"\d\.\d{4}", coarse.split("<use")[0])
     assert math.log10(len(fine)) > math.log10(len(coarse))
+
+
+def test_what_the_user_should_know_is_noted() -> None:
+    tile = tile_of("IH4")
+    few = ExportSettings(tile_size=20, area=(100, 80), palette="ff0000")
+    assert "the palette has 1" in scenes(tile, few)[1][-1]
+    assert scenes(tile, ExportSettings(tile_size=20, area=(100, 80)))[1] == ()
+    thin = ExportSettings.preset("laser", tile_size=20, area=(100, 80))
+    assert "0.01 mm hardly show" in scenes(tile, thin)[1][-1]

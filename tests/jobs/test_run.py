@@ -64,7 +64,7 @@ def test_a_second_run_takes_the_place_of_the_first(tmp_path: Path) -> None:
     assert {p.name for p in out.iterdir()} == {"IH4", "index.html", "overview.png", "result.json"}
     (out / "IH4" / "notes.txt").write_text("mine")
     before = (out / "result.json").read_bytes()
-    with pytest.raises(OrbiflowError, match=r"holds IH4/notes.txt, which orbiflow did not write"):
+    with pytest.raises(OrbiflowError, match=r"holds IH4/notes.txt, which is of no earlier run"):
         run(boot_request(tmp_path, "IH6"))
     assert (out / "result.json").read_bytes() == before
     assert sorted(p.name for p in tmp_path.iterdir()) == ["boot.json", "out"]

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from orbiflow.cli.tile_options import Palette, Result, Tile
+from orbiflow.cli.tile_options import Palette, Result, Tile, file_option
 from orbiflow.cli.work import do
 from orbiflow.jobs import AnimateRequest
 
@@ -25,12 +25,8 @@ def animate(
     result: Result,
     out: Annotated[
         Path | None,
-        typer.Option(
-            "--out",
-            "-o",
-            help="The file: .gif, .svg, or .mp4, which needs ffmpeg; default a GIF named after the "
-            "tile.",
-            show_default=False,
+        file_option(
+            "The file: .gif, .svg, or .mp4, which needs ffmpeg; default a GIF named after the tile."
         ),
     ] = None,
     tile: Tile = "1",

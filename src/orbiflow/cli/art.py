@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from orbiflow.cli.tile_options import Palette, Result, Tile, option
+from orbiflow.cli.tile_options import Palette, Result, Tile, file_option, option
 from orbiflow.cli.work import do
 from orbiflow.jobs import ArtRequest
 
@@ -32,13 +32,7 @@ class Strokes(StrEnum):
 def art(
     result: Result,
     out: Annotated[
-        Path | None,
-        typer.Option(
-            "--out",
-            "-o",
-            help="A .png or .svg; default a PNG named after the tile.",
-            show_default=False,
-        ),
+        Path | None, file_option("A .png or .svg; default a PNG named after the tile.")
     ] = None,
     tile: Tile = "1",
     picture: Annotated[

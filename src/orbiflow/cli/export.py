@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from orbiflow.cli.tile_options import Palette, Result, Tile, option
+from orbiflow.cli.tile_options import Palette, Result, Tile, file_option, option
 from orbiflow.cli.work import do
 from orbiflow.jobs import ExportRequest
 
@@ -45,9 +45,7 @@ def export(
     result: Result,
     out: Annotated[
         Path | None,
-        typer.Option(
-            "--out", "-o", help="The file; default one named after the tile.", show_default=False
-        ),
+        file_option("The file; default one named after the tile."),
     ] = None,
     tile: Tile = "1",
     purpose: Annotated[

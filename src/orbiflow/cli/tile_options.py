@@ -25,6 +25,11 @@ Palette = Annotated[
 ]
 
 
+def file_option(text: str) -> typer.models.OptionInfo:
+    """The file that a command writes."""
+    return typer.Option("--out", "-o", help=text, show_default=False)
+
+
 def option(text: str) -> typer.models.OptionInfo:
     """An option whose default goes without saying."""
     return typer.Option(help=text, show_default=False)

@@ -153,7 +153,7 @@ def refuse_others(out: Path) -> None:
     foreign, old = sorted(inside - {MODEL, REPORT, *PICTURES}), sorted(inside & set(PICTURES))
     if foreign and old:
         raise OutputError(
-            f"{out} holds {old[0]}, which would go, beside {foreign[0]}, which orbiflow did not write: "
+            f"{out} holds {old[0]}, which would go, beside {foreign[0]}, which is of no earlier run: "
             "choose another --out or move it"
         )
 

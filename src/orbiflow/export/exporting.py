@@ -23,9 +23,13 @@ from orbiflow.export.sheets import calibrated, split
 from orbiflow.export.skeleton_scene import skeleton_scene
 from orbiflow.export.svg_writer import write_svg
 from orbiflow.export.tiling_scene import tiling_scene
+from orbiflow.figures.palette import palette
 from orbiflow.files import write_atomic
 from orbiflow.likeness.thinnest import narrowest_neck
-from orbiflow.tilings import Certificate, certify
+from orbiflow.tilings import Certificate, certify, colouring
+
+VISIBLE = 0.05
+"""Width in mm of a line that one sees on a screen."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +104,7 @@ def scenes(
     given = ExportTile.of(tile)
     certificate = require_certified(given, force=force)
     placed = layout(given.tile, settings, y_down=given.y_down)
-    notes = (*placed.notes, *_neck_notes(placed))
+    notes = (*placed.notes, *_neck_notes(placed), *_colour_notes(given, settings))
     made = [_described(scene, given, settings, certificate) for scene in _made(placed, settings)]
     if settings.calibrate:
         # the strip at the foot is the last sheet's; pieces have one on each
@@ -156,6 +160,15 @@ def _described(
         "tolerance": settings.deviation,
     }
     return replace(scene, title=title, notes=tuple(notes), facts=facts)
+
+
+def _colour_notes(given: ExportTile, settings: ExportSettings) -> tuple[str, ...]:
+    if settings.cut == "none":
+        return palette(settings.palette).shortage(colouring(given.tile).count)
+    width = settings.stroke_width
+    if width is None or width >= VISIBLE:
+        return ()
+    return (f"its lines of {width:g} mm hardly show on a screen; a cutter follows them",)
 
 
 def _neck_notes(placed: Layout) -> list[str]:

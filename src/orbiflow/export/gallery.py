@@ -56,7 +56,7 @@ def write_gallery(
         with contextlib.closing(work(draw, range(len(results)), workers)) as news:
             for _ in news:
                 pass
-    write_atomic(out / OVERVIEW, overview_png(results, target, colours))
+    write_atomic(out / OVERVIEW, overview_png(results, target, colours, failures=failures))
     extra = [figure_files(result) if figures else () for result in results]
     page = index_page(results, target, names, failures=failures, figures=extra)
     write_atomic(out / INDEX, page)

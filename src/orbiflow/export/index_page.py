@@ -69,6 +69,8 @@ def _head(name: str, target: Target, count: int, *, compared: bool) -> str:
     style = resources.files("orbiflow.export").joinpath("index_page.css").read_text("utf-8")
     title = html.escape(f"Tiles that look like {name}")
     tiles = "One tile" if count == 1 else f"{count} tiles, best first"
+    notes = "".join(f"<li>{html.escape(note)}</li>\n" for note in target.notes)
+    decided = f'<ul class="notes" aria-label="Decided for you">\n{notes}</ul>\n' if notes else ""
     front = ', by deformation and overlap: <a href="front.png">front.png</a>' if compared else ""
     return f"""<!DOCTYPE html>
 <html lang="en">
@@ -87,7 +89,7 @@ def _head(name: str, target: Target, count: int, *, compared: bool) -> str:
 <h1>{title}</h1>
 <p>{tiles}. Everything in numbers: <a href="result.json">result.json</a>; on one sheet:
 <a href="overview.png">overview.png</a>{front}.</p>
-</div>
+{decided}</div>
 </header>
 <main>
 """

@@ -70,13 +70,22 @@ def measures(result: TileResult) -> list[Measure]:
     return found
 
 
+POOR_MATCH, POOR_LIKENESS = 0.4, 0.2
+"""Scores up to which a tile is called poor, after a search for overlap and for likeness."""
+
+
+def is_poor(result: TileResult) -> bool:
+    """Whether nobody would know the silhouette in it."""
+    return result.score <= (POOR_MATCH if result.fidelity is None else POOR_LIKENESS)
+
+
 def _score(result: TileResult) -> Measure:
     if result.fidelity is None:
         words = _word(
             -result.score,
             (-0.8, "a close match"),
             (-0.6, "a fair match"),
-            (-0.4, "a loose match"),
+            (-POOR_MATCH, "a loose match"),
             "a poor match",
         )
         meaning = "Overlap and recognisability together, 0 to 1; tiles are ranked by it."
@@ -85,7 +94,7 @@ def _score(result: TileResult) -> Measure:
             -result.score,
             (-0.6, "a good likeness"),
             (-0.4, "a middling likeness"),
-            (-0.2, "a loose likeness"),
+            (-POOR_LIKENESS, "a loose likeness"),
             "a poor likeness",
         )
         meaning = "How much of the outline's shape bending left, 0 to 1; tiles are ranked by it."

@@ -9,7 +9,8 @@ from typing import NamedTuple
 
 from PIL import Image, ImageDraw
 
-from orbiflow.escher.result import TileResult
+from orbiflow.escher.result import ClassFailure, TileResult
+from orbiflow.export.measures import measures
 from orbiflow.figures.bending import bending_raster
 from orbiflow.figures.captioned import window_of
 from orbiflow.figures.raster import Raster, font
@@ -34,7 +35,11 @@ class _Place(NamedTuple):
 
 
 def overview_png(
-    results: Sequence[TileResult], target: Target, colours: Sequence[Colouring] | None = None
+    results: Sequence[TileResult],
+    target: Target,
+    colours: Sequence[Colouring] | None = None,
+    *,
+    failures: Sequence[ClassFailure] = (),
 ) -> bytes:
     """PNG of all tiles, best first: each one's tiling, large, and beside its name what bent.
 
@@ -44,6 +49,7 @@ def overview_png(
         results: of one search, at least one.
         target: of the search.
         colours: of each tiling, if they are at hand.
+        failures: classes without a tile, to be named.
     """
     columns = {1: 1, 2: 2, 4: 2}.get(len(results), 3)
     width = 1320 if columns == 1 else _WIDTH
@@ -52,7 +58,7 @@ def overview_png(
     rows = -(-len(results) // columns)
     sheet = Image.new("RGB", (width, _HEADER + rows * (height + _GAP)), "white")
     pen = ImageDraw.Draw(sheet)
-    _header(sheet, pen, target, len(results))
+    _header(sheet, pen, target, len(results), [failure.name for failure in failures])
     for k, result in enumerate(results):
         row, column = divmod(k, columns)
         place = _Place(_MARGIN + column * (cell + _GAP), _HEADER + row * (height + _GAP), cell)
@@ -81,7 +87,9 @@ def verdict(result: TileResult) -> str:
     return f"{how}    IoU {result.metrics.iou:.2f}    score {result.score:.2f}"
 
 
-def _header(sheet: Image.Image, pen: ImageDraw.ImageDraw, target: Target, count: int) -> None:
+def _header(
+    sheet: Image.Image, pen: ImageDraw.ImageDraw, target: Target, count: int, failed: list[str]
+) -> None:
     window = window_of([target.outline])
     small = Raster(window, _fitting(window), y_down=target.y_down)
     small.fill([target.outline], INK)
@@ -90,9 +98,12 @@ def _header(sheet: Image.Image, pen: ImageDraw.ImageDraw, target: Target, count:
     left, middle = _MARGIN + picture.width + 28, _HEADER // 2
     name = PurePath(target.source).name
     pen.text((left, middle - 6), name, INK, font(_TITLE), anchor="ls")
-    tiles = "1 tile" if count == 1 else f"{count} tiles, best first"
-    text = f"{tiles}: each one's tiling, and below it the silhouette in its place"
+    tiles = "1 tile: its" if count == 1 else f"{count} tiles, best first: each one's"
+    text = f"{tiles} tiling, and below it the silhouette in its place"
     pen.text((left, middle + 40), text, FAINT, font(_WORDS), anchor="ls")
+    if failed:
+        text = f"No tile of {', '.join(failed)}"
+        pen.text((left, middle + 76), text, WARNING, font(_WORDS), anchor="ls")
 
 
 def _below(place: _Place) -> int:
@@ -107,9 +118,10 @@ def _write_words(pen: ImageDraw.ImageDraw, result: TileResult, place: _Place, ra
     pen.text((left, below + 34), name, INK, font(_NAME), anchor="ls")
     pen.text((left, below + 76), verdict(result), INK, font(_WORDS), anchor="ls")
     valid = result.certificate.valid
-    words = "certified to tile the plane" if valid else "NOT CERTIFIED"
+    likeness = next(m.words for m in measures(result) if m.name == "Score")
+    words = f"{likeness}, certified" if valid else "NOT CERTIFIED"
     if result.front is not None:
-        words = f"for {result.objective}, {words.split(' to')[0]}"
+        words = f"for {result.objective}, {words.split(', ')[-1]}"
     colour = FAINT if valid else WARNING
     pen.text((left, below + 114), words, colour, font(_WORDS), anchor="ls")
 

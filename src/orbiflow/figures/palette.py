@@ -20,6 +20,21 @@ class Palette(NamedTuple):
         turn, place = divmod(index, len(self.colours))
         return _mixed(self.colours[place], self.paper, 0.5**turn)
 
+    def shortage(self, count: int) -> tuple[str, ...]:
+        """What to tell whoever asks for more colours than there are; nothing where there are enough.
+
+        >>> palette("e76f51").shortage(3)
+        ('3 colours are needed and the palette has 1: the others are paler shades of it',)
+        """
+        own = len(self.colours)
+        if own >= count:
+            return ()
+        first = "it" if own == 1 else "the first"
+        return (
+            f"{count} colours are needed and the palette has {own}: the others are paler shades of "
+            f"{first}",
+        )
+
     def ink(self, index: int) -> str:
         """What lines on colour number `index` are drawn in: of outline and paper the one that shows.
 

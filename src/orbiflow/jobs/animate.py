@@ -7,12 +7,14 @@ from pathlib import Path
 from orbiflow.cancel import Cancel
 from orbiflow.export.animation import AnimationSettings, animation
 from orbiflow.export.result_file import read_result
+from orbiflow.figures.palette import palette
 from orbiflow.files import write_atomic
 from orbiflow.jobs.asked import given
 from orbiflow.jobs.events import Finished, Note, Progress, Written
 from orbiflow.jobs.place import check_place
 from orbiflow.jobs.run import Sink
 from orbiflow.jobs.tile_requests import AnimateRequest
+from orbiflow.tilings import colouring
 
 
 def animate(request: AnimateRequest, tell: Sink, cancel: Cancel) -> Finished:
@@ -34,6 +36,8 @@ def animate(request: AnimateRequest, tell: Sink, cancel: Cancel) -> Finished:
         cancel.check()
         tell(Progress(share, "drawing"))
 
+    for note in palette(settings.palette).shortage(colouring(tile.tile).count):
+        tell(Note(note))
     content = animation(tile, settings, force=request.force, told=told)
     cancel.check()
     data = content.encode() if isinstance(content, str) else content

@@ -20,6 +20,7 @@ from orbiflow.escher.methods import Settings
 from orbiflow.escher.report import report
 from orbiflow.export.folder import FIELD_FILES, figure_files
 from orbiflow.export.gallery import OVERVIEW, written_files
+from orbiflow.export.measures import is_poor
 from orbiflow.export.run_folder import fill_run
 from orbiflow.folders import ResultFolder
 from orbiflow.jobs.asked import given
@@ -38,6 +39,12 @@ from orbiflow.jobs.run import Sink
 from orbiflow.jobs.tile_requests import EscherizeRequest
 from orbiflow.silhouette import Emphasis, Pins, Target
 from orbiflow.tilings import CLASSES, isohedral_class
+
+POOR = (
+    "even the first tile hardly looks like it; another pose, fewer or thicker limbs, all nine classes "
+    "or more effort may do better"
+)
+"""Said where nothing that was found looks like the silhouette."""
 
 
 def escherize(request: EscherizeRequest, tell: Sink, cancel: Cancel) -> Finished:
@@ -86,6 +93,8 @@ def escherize(request: EscherizeRequest, tell: Sink, cancel: Cancel) -> Finished
     )
     if document["objective"] == "both" and results:
         tell(Note(_chosen(results, found)))
+    if results and is_poor(results[0]):
+        tell(Note(POOR))
     interrupted = {failure.name for failure in failures if failure.reason == search.INTERRUPTED}
     # a first look at a class that was interrupted is less than an earlier run's tiles
     earlier = folder.has_a_run and (request.out / OVERVIEW).is_file()

@@ -6,6 +6,7 @@ One page without scripts that refers to nothing but files beside it.
 from __future__ import annotations
 
 import html
+import re
 from collections.abc import Sequence
 from importlib import resources
 
@@ -109,15 +110,20 @@ def _ours(one: Shown) -> str:
     return _paragraphs(one.findings.found) + reasons
 
 
+def _words(text: str) -> str:
+    """Text as HTML, R_c with its index below."""
+    return re.sub(r"\b([A-Z])_(\w+)", r"\1<sub>\2</sub>", html.escape(text))
+
+
 def _paragraphs(text: str) -> str:
-    return "".join(f"<p>{html.escape(part)}</p>\n" for part in text.split("\n\n"))
+    return "".join(f"<p>{_words(part)}</p>\n" for part in text.split("\n\n"))
 
 
 def _picture(picture: Picture) -> str:
     links = ", ".join(
         f'<a href="{html.escape(f)}">{html.escape(name)}</a>' for name, f in picture.others
     )
-    caption = html.escape(picture.caption)
+    caption = _words(picture.caption)
     return (
         f'<figure><a href="{picture.file}"><img src="{picture.file}" alt="{html.escape(picture.alt)}" '
         f'width="{picture.width}" height="{picture.height}" loading="lazy"></a>'
@@ -130,14 +136,14 @@ def _tables(findings: Findings | None) -> str:
 
 
 def _table(table: Table) -> str:
-    head = "".join(f'<th scope="col">{html.escape(text)}</th>' for text in table.headings)
+    head = "".join(f'<th scope="col">{_words(text)}</th>' for text in table.headings)
     rows = "".join(
-        f'<tr><th scope="row">{html.escape(row[0])}</th>'
-        + "".join(f"<td>{html.escape(cell)}</td>" for cell in row[1:])
+        f'<tr><th scope="row">{_words(row[0])}</th>'
+        + "".join(f"<td>{_words(cell)}</td>" for cell in row[1:])
         + "</tr>\n"
         for row in table.rows
     )
     return (
-        f'<div class="scroll" tabindex="0"><table>\n<caption>{html.escape(table.caption)}</caption>\n'
+        f'<div class="scroll" tabindex="0"><table>\n<caption>{_words(table.caption)}</caption>\n'
         f"<thead><tr>{head}</tr></thead>\n<tbody>\n{rows}</tbody></table></div>\n"
     )

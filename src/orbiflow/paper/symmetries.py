@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -113,7 +114,7 @@ def _draw(canvas: Canvas, _extent: Extent, _values: list[Any]) -> Findings:
         figure.text(
             box[0] + box[2] / 2,
             0.055,
-            kind.equation,
+            re.sub(r"([A-Z])_(\w)", r"$\\mathrm{\1}_\\mathrm{\2}$", kind.equation),
             ha="center",
             fontsize=text_size(figure),
             color=INK,

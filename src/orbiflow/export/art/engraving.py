@@ -24,6 +24,9 @@ USUAL_EYE = 0.032
 CLEAR = 1.7
 """Radii about an eye that lines keep out of."""
 
+STEP, SHORTEST = 0.008, 12
+"""Of an echo in square roots of the tile's area, and how many steps a piece of it has at least."""
+
 
 class Eye(NamedTuple):
     """An eye on the tile: its middle, radius and what is drawn, in the tile's units."""
@@ -156,14 +159,16 @@ def _echo(body: Body, part: shapely.Polygon, depth: float) -> list[Array]:
     total = arc_lengths(ring)[-1] if len(ring) > 2 else 0.0
     if total < 0.12:
         return []
-    count = max(24, int(total / 0.008))
+    count = max(24, int(total / STEP))
     points = resampled(ring, count)
     fade = 1 - depth / body.thickest
     dark = shade(body.inward(points))
     # in the light only the first lines run on
     width = 0.0085 * fade**0.7 * np.clip(1.25 * dark + 1.1 * fade - 0.85, 0, 1)
     width = _smooth(width, 5)
-    return [stroke(points[own], width[own]) for own in _arcs(width > 0.0012)]
+    # shorter ones look like strays
+    arcs = [own for own in _arcs(width > 0.0012) if len(own) >= min(SHORTEST, count)]
+    return [stroke(points[own], width[own]) for own in arcs]
 
 
 def _feathers(body: Body) -> list[Array]:

@@ -89,7 +89,8 @@ def artwork(
     if settings.engrave is not None:
         parts += engraved(tile, settings.engrave, around)
     parts += tuple(part for eye in around for part in eye.parts)
-    said = (*tile.notes, *notes, *page.notes)
+    short = palette(settings.palette).shortage(page.count)
+    said = (*tile.notes, *notes, *page.notes, *short)
     return Artwork(tile, settings, page, picture, Motif(parts), said)
 
 
