@@ -74,10 +74,10 @@ def plain_prose(
 
 
 def plain_types(
-    _app: Any, what: str, _name: str, _obj: Any, _options: Any, signature: str, returns: str
+    _app: Any, _what: str, _name: str, _obj: Any, _options: Any, signature: str, returns: str
 ) -> tuple[str, str] | None:
     """Signatures with aliases by their names alone."""
-    if what == "module":
+    if not signature:
         return None
     known = re.compile(r"TypeAliasForwardRef\('(\w+)'\)")
     return known.sub(r"\1", signature or ""), known.sub(r"\1", returns or "")
