@@ -18,10 +18,11 @@ from orbiflow.density.fitting.automatic import (
     fit_automatic,
     flow_settings,
 )
-from orbiflow.density.fitting.flow import MOST_DIM, fit_density
+from orbiflow.density.fitting.flow import fit_density
 from orbiflow.density.fitting.neural import NeuralSettings, fit_neural
 from orbiflow.density.fitting.report import FitReport, Progress
 from orbiflow.density.fitting.settings import FitSettings
+from orbiflow.density.models.still import MOST_DIM
 from orbiflow.density.models.symmetric import SymmetricDensity
 from orbiflow.density.spaces.catalogue import space_class
 from orbiflow.density.spaces.space import Space

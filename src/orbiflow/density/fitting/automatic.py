@@ -14,7 +14,7 @@ from orbiflow.density.fitting.assembly import assembled
 from orbiflow.density.fitting.budget import Budget
 from orbiflow.density.fitting.evidence import Candidates, PartEvidence, candidates_of, judged
 from orbiflow.density.fitting.families import ChainFamily, Family, KernelFamily, MixtureFamily
-from orbiflow.density.fitting.flow import MOST_DIM, fit_density
+from orbiflow.density.fitting.flow import fit_density
 from orbiflow.density.fitting.folds import LEAST_PLACES, Folds, folds_of
 from orbiflow.density.fitting.kernels import NARROWEST
 from orbiflow.density.fitting.repeats import Repeats, repeats_of
@@ -23,6 +23,7 @@ from orbiflow.density.fitting.settings import FitSettings
 from orbiflow.density.fitting.training import training
 from orbiflow.density.fitting.weights import gain_of, sparse_weights, stacked, stacking_weights
 from orbiflow.density.models.blend import BlendedDensity
+from orbiflow.density.models.still import MOST_DIM
 from orbiflow.density.models.symmetric import SymmetricDensity
 from orbiflow.density.spaces.flat import whole_turn
 from orbiflow.density.spaces.space import Space

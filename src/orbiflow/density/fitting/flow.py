@@ -25,14 +25,12 @@ from orbiflow.density.fitting.settings import FitSettings
 from orbiflow.density.fitting.stages import MOST_HELD, refine_in_stages
 from orbiflow.density.fitting.training import training
 from orbiflow.density.models.bases import Base, UniformBase, VonMisesBase
+from orbiflow.density.models.still import MOST_DIM
 from orbiflow.density.models.symmetric import SymmetricDensity
 from orbiflow.density.spaces.space import Space
 from orbiflow.errors import OrbiflowError
 from orbiflow.fields import SplineField
 from orbiflow.flows import Flow
-
-MOST_DIM = 3
-"""Dimensions of a spline's grid; beyond, it would be too large."""
 
 MOST_STEPS = 256
 """Runge-Kutta steps a segment to which they are doubled, in the end, until the integral is right."""
