@@ -21,6 +21,7 @@ from orbiflow.density.fitting.automatic import (
 from orbiflow.density.fitting.flow import fit_density
 from orbiflow.density.fitting.neural import NeuralSettings, fit_neural
 from orbiflow.density.fitting.report import FitReport, Progress
+from orbiflow.density.fitting.rows import mean_of, weighed
 from orbiflow.density.fitting.settings import FitSettings
 from orbiflow.density.models.still import MOST_DIM
 from orbiflow.density.models.symmetric import SymmetricDensity
@@ -117,13 +118,22 @@ class DensityEstimator:
         self.seed = seed
 
     def fit(
-        self, X: ArrayLike, y: object = None, *, progress: Progress | None = None
+        self,
+        X: ArrayLike,
+        y: object = None,
+        sample_weight: ArrayLike | None = None,
+        *,
+        progress: Progress | None = None,
     ) -> DensityEstimator:
         """Fit to data (N, k) in the space's own units; `y` is ignored.
 
+        Args:
+            sample_weight: of the rows (N,), at least 0: how much each counts in everything that is
+                fitted and judged. Only ratios count, equal ones are none.
+
         Raises:
-            OrbiflowError: for data that are not of the space, too few points, a setting out of range,
-                or one that has no meaning on a torus of so many angles.
+            OrbiflowError: for data that are not of the space, too few points, weights that are none, a
+                setting out of range, or one that has no meaning on a torus of so many angles.
         """
         del y
         chosen, alone = self._parts(), self._flow_settings()
@@ -142,10 +152,19 @@ class DensityEstimator:
                 seconds=self.seconds,
                 seed=self.seed,
             )
-            found = fit_automatic(self.space_, points, settings, progress=progress)
+            found = fit_automatic(
+                self.space_, points, settings, weights=sample_weight, progress=progress
+            )
         elif self.space_.dim <= MOST_DIM:
-            found = fit_density(self.space_, points, alone, progress=progress)
+            found = fit_density(
+                self.space_, points, alone, weights=sample_weight, progress=progress
+            )
         else:
+            if sample_weight is not None:
+                raise OrbiflowError(
+                    "neural flows take no weights of rows: leave them out, or fit other parts, "
+                    "parts='kernels,mixture,chains' (--parts kernels,mixture,chains)"
+                )
             many = NeuralSettings(
                 refinement=min(NeuralSettings.refinement, self.evaluations),
                 validation=self.validation,
@@ -164,10 +183,14 @@ class DensityEstimator:
             points = self.space_.to_chart(np.asarray(X))
             return density.log_prob(points, measure=measure).numpy()
 
-    def score(self, X: ArrayLike, y: object = None) -> float:
-        """Mean log density of data (N, k), in natural measure."""
+    def score(
+        self, X: ArrayLike, y: object = None, sample_weight: ArrayLike | None = None
+    ) -> float:
+        """Mean log density of data (N, k), weighted, in natural measure."""
         del y
-        return float(self.score_samples(X).mean())
+        scores = torch.tensor(self.score_samples(X))
+        rows = weighed(scores[:, None], sample_weight)
+        return mean_of(rows.points[:, 0], rows.weights)
 
     def sample(self, n_samples: int = 1, random_state: RandomState = None) -> Array:
         """New data (n_samples, k) in the space's own units.

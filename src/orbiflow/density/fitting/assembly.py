@@ -7,6 +7,7 @@ from torch import Tensor
 
 from orbiflow.density.fitting.evidence import Candidates
 from orbiflow.density.fitting.families import Family
+from orbiflow.density.fitting.rows import Rows
 from orbiflow.density.fitting.scales import even_kernels, joined
 from orbiflow.density.models.bases import Base, UniformBase
 from orbiflow.density.models.blend import BlendedDensity
@@ -25,7 +26,7 @@ def assembled(
     families: list[Family],
     candidates: Candidates,
     weights: Tensor,
-    rows: Tensor,
+    rows: Rows,
     flow: SymmetricDensity | None,
     share: float,
 ) -> BlendedDensity:
@@ -45,7 +46,7 @@ def assembled(
             _sort(part, weight, kernels, chains)
     floor = float(weights[candidates.floor].sum())
     if not kernels:  # a blend has some: half of the floor, as one
-        center = rows.new_full((1, space.dim), 0.5)
+        center = rows.points.new_full((1, space.dim), 0.5)
         floor /= 2
         kernels = [(even_kernels(space, center, FLAT), floor)]
     sizes = [[weight for _, weight in part] for part in (kernels, chains)]

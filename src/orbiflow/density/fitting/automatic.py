@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import torch
 from torch import Tensor
@@ -19,6 +19,7 @@ from orbiflow.density.fitting.folds import LEAST_PLACES, Folds, folds_of
 from orbiflow.density.fitting.kernels import NARROWEST
 from orbiflow.density.fitting.repeats import Repeats, repeats_of
 from orbiflow.density.fitting.report import FitReport, Progress, mean_nll, own_points, steps_note
+from orbiflow.density.fitting.rows import effective_rows, mean_of, weighed, weights_note
 from orbiflow.density.fitting.settings import FitSettings
 from orbiflow.density.fitting.training import training
 from orbiflow.density.fitting.weights import gain_of, sparse_weights, stacked, stacking_weights
@@ -88,6 +89,7 @@ def fit_automatic(
     points: Tensor,
     settings: AutomaticSettings | None = None,
     *,
+    weights: Any = None,
     progress: Progress | None = None,
 ) -> tuple[BlendedDensity, FitReport]:
     """Fit what suits the data best: a mixture of densities with weights by rows held out.
@@ -102,6 +104,7 @@ def fit_automatic(
         space: any.
         points: (N, d) in the chart, N >= 10 different ones.
         settings: default `AutomaticSettings()`.
+        weights: of the points (N,), at least 0; only their ratios count; default equal.
         progress: told how far it is.
 
     Returns:
@@ -114,8 +117,8 @@ def fit_automatic(
     check_kind(settings, AutomaticSettings, "settings")
     say = progress or (lambda _share, _what: None)
     budget = Budget(seconds=settings.seconds)
-    rows = own_points(space, points)
-    found = repeats_of(space, rows)
+    rows = weighed(own_points(space, points), weights)
+    found = repeats_of(space, rows.points)
     if found.places < LEAST_PLACES:
         raise OrbiflowError(
             f"a density needs at least {LEAST_PLACES} different points, got {found.places} among "
@@ -127,7 +130,7 @@ def fit_automatic(
     candidates = candidates_of(
         space, families, folds, lambda done, what: say(BEFORE_FLOW * done, what), budget
     )
-    weights = sparse_weights(candidates.table, candidates.floor)
+    weights = sparse_weights(candidates.table, candidates.floor, candidates.row_weights)
     tried = _try_flow(space, folds, candidates, weights, settings, budget, say)
     say(1.0, "putting together")
     density = assembled(space, families, candidates, weights, folds.rows, tried.flow, tried.share)
@@ -196,21 +199,23 @@ def _try_flow(
     if not wanted or (len(folds.rows) < LEAST_FLOW_ROWS and not only):
         return _Tried()
     chosen = settings.flow or flow_settings(space, len(folds.rows), settings.seed)
+    train = folds.train(0)
     density, report = fit_density(
         space,
-        folds.train(0),
+        train.points,
         replace(chosen, seconds=min(chosen.seconds, budget.seconds_left)),
+        weights=train.weights,
         progress=lambda done, what: say(BEFORE_FLOW + (1 - BEFORE_FLOW) * done, f"flow: {what}"),
     )
     held = folds.held(0)
     with torch.no_grad():
-        own = density.log_prob(held)
+        own = density.log_prob(held.points)
     first = candidates.table[:, : candidates.first]
     others = stacked(first, weights)
     table = torch.stack([others, own])
-    both = stacking_weights(table)
-    gain = gain_of(stacked(table, both), others)
-    alone = float((own - first[-1]).mean())
+    both = stacking_weights(table, held.weights)
+    gain = gain_of(stacked(table, both), others, held.weights)
+    alone = held.mean(own - first[-1])
     # a weight chosen on these rows gains one nat among all of them by chance
     kept = gain.nats * len(held) >= 1
     share = float(both[1]) if kept else 0.0
@@ -246,16 +251,18 @@ def _report(
     settings: AutomaticSettings,
     budget: Budget,
 ) -> FitReport:
-    held = float(stacked(candidates.table, weights).mean())
+    own_weights = candidates.row_weights
+    held = mean_of(stacked(candidates.table, weights), own_weights)
     held += sum(part.gain for part in parts if part.name == "flow")
     flow = tried.report if tried.share else None
     error = flow.integration_error if flow else 0.0
     total = candidates.table.shape[1]
     chosen = [
         f"chosen by {total} rows held out, in {folds.used} parts of a tenth each: "
-        f"{held - float(candidates.table[-1].mean()):.4f} nats above uniform",
+        f"{held - mean_of(candidates.table[-1], own_weights):.4f} nats above uniform",
         *map(str, parts),
     ]
+    some = folds.rows[:SCORED]
     mass = None
     if density.space.dim == 2:
         mass = density.mass_with(flow.mass) if flow and flow.mass is not None else 1.0
@@ -264,8 +271,8 @@ def _report(
         duplicates=found.rows,
         train=len(folds.rows),
         validation=total,
-        start_nll=-float(candidates.table[-1].mean()),
-        train_nll=mean_nll(density, folds.rows[:SCORED]),
+        start_nll=-mean_of(candidates.table[-1], own_weights),
+        train_nll=mean_nll(density, some.points, some.weights),
         validation_nll=-held,
         stages=flow.stages if flow else (),
         steps=density.flow.steps,
@@ -274,7 +281,9 @@ def _report(
         shares=tuple(density.shares.tolist()),
         parts=parts,
         repeats=found,
+        effective=None if folds.rows.weights is None else effective_rows(folds.rows.weights),
         notes=(
+            *weights_note(folds.rows),
             *chosen,
             *found.notes(settings.repeats),
             *budget.notes(),
