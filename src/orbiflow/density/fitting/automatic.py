@@ -17,15 +17,30 @@ from orbiflow.density.fitting.families import ChainFamily, Family, KernelFamily,
 from orbiflow.density.fitting.flow import fit_density
 from orbiflow.density.fitting.folds import LEAST_PLACES, Folds, folds_of
 from orbiflow.density.fitting.kernels import NARROWEST
+from orbiflow.density.fitting.missing import (
+    MARGINAL_PARTS,
+    check_missing,
+    is_whole,
+    missing_notes,
+    observed_points,
+)
 from orbiflow.density.fitting.repeats import Repeats, repeats_of
 from orbiflow.density.fitting.report import FitReport, Progress, mean_nll, own_points, steps_note
-from orbiflow.density.fitting.rows import effective_rows, mean_of, weighed, weights_note
+from orbiflow.density.fitting.rows import (
+    Rows,
+    effective_rows,
+    mean_of,
+    weighed,
+    weights_note,
+    weights_of,
+)
 from orbiflow.density.fitting.settings import FitSettings
 from orbiflow.density.fitting.training import training
 from orbiflow.density.fitting.weights import gain_of, sparse_weights, stacked, stacking_weights
 from orbiflow.density.models.blend import BlendedDensity
 from orbiflow.density.models.still import MOST_DIM
 from orbiflow.density.models.symmetric import SymmetricDensity
+from orbiflow.density.partial import at_observed
 from orbiflow.density.spaces.flat import whole_turn
 from orbiflow.density.spaces.space import Space
 from orbiflow.errors import OrbiflowError
@@ -60,6 +75,8 @@ class AutomaticSettings:
       spaces of three dimensions at most.
     - `repeats`: "places": new rows repeat the old ones as often as these repeat each other; "rounding":
       repeated values are an accident, and the density is to have no peaks at them.
+    - `missing`: "refuse" points that lack angles (NaN), or "marginalise": on tori a row counts by the
+      density of the angles that it has, and the parts are kernels and mixtures.
     - `flow`: its settings; None for what suits the number of rows.
     - `seconds`: after which nothing further is tried; a fit that it ends depends on the machine.
     - `seed`: of the folds and the starts.
@@ -67,6 +84,7 @@ class AutomaticSettings:
 
     parts: tuple[str, ...] = PARTS
     repeats: str = "places"
+    missing: str = "refuse"
     flow: FitSettings | None = None
     seconds: float = math.inf
     seed: int = 0
@@ -79,6 +97,7 @@ class AutomaticSettings:
             raise OrbiflowError(
                 f"repeats must be one of {', '.join(REPEATS)}, got {self.repeats!r}"
             )
+        check_missing(self.missing)
         check_range("seconds", self.seconds, 0, math.inf)
         check_range("seed", self.seed, -(2**63), 2**64 - 1, integer=True)
 
@@ -117,12 +136,13 @@ def fit_automatic(
     check_kind(settings, AutomaticSettings, "settings")
     say = progress or (lambda _share, _what: None)
     budget = Budget(seconds=settings.seconds)
-    rows = weighed(own_points(space, points), weights)
-    found = repeats_of(space, rows.points)
+    rows, settings, notes = _rows(space, points, weights, settings)
+    found = repeats_of(space, rows[is_whole(rows)].points)
+    whole = " that lack no angle" if found.places + found.rows < len(rows) else ""
     if found.places < LEAST_PLACES:
         raise OrbiflowError(
-            f"a density needs at least {LEAST_PLACES} different points, got {found.places} among "
-            f"{len(rows)}"
+            f"a density needs at least {LEAST_PLACES} different points{whole}, got {found.places} "
+            f"among {len(rows)}"
         )
     generator = torch.Generator().manual_seed(settings.seed)
     folds = folds_of(rows, together=settings.repeats == "rounding", generator=generator)
@@ -136,8 +156,27 @@ def fit_automatic(
     density = assembled(space, families, candidates, weights, folds.rows, tried.flow, tried.share)
     parts = (*tried.evidence, *_shrunk(judged(candidates, weights), tried.share))
     return density, _report(
-        density, folds, candidates, weights, tried, parts, found, settings, budget
+        density, folds, candidates, weights, tried, parts, found, settings, budget, notes
     )
+
+
+def _rows(
+    space: Space, points: Any, weights: Any, settings: AutomaticSettings
+) -> tuple[Rows, AutomaticSettings, list[str]]:
+    """Rows that say anything, the parts that can be fitted to them, and what to say of it."""
+    if settings.missing == "refuse":
+        return weighed(own_points(space, points), weights), settings, []
+    own, known = observed_points(space, points)
+    rows = weighed(own, None if weights is None else weights_of(weights, known))
+    if not bool(rows.points.isnan().any()):
+        return rows, settings, missing_notes(rows, int((~known).sum()))
+    chosen = tuple(part for part in settings.parts if part in MARGINAL_PARTS)
+    if not chosen or (settings.parts != PARTS and chosen != settings.parts):
+        raise OrbiflowError(
+            f"{' and '.join(part for part in settings.parts if part not in MARGINAL_PARTS)} cannot be "
+            "fitted to rows that lack angles: choose of kernels and mixture, or leave those rows out"
+        )
+    return rows, replace(settings, parts=chosen), missing_notes(rows, int((~known).sum()))
 
 
 def _families(
@@ -250,6 +289,7 @@ def _report(
     found: Repeats,
     settings: AutomaticSettings,
     budget: Budget,
+    notes: list[str],
 ) -> FitReport:
     own_weights = candidates.row_weights
     held = mean_of(stacked(candidates.table, weights), own_weights)
@@ -272,7 +312,9 @@ def _report(
         train=len(folds.rows),
         validation=total,
         start_nll=-mean_of(candidates.table[-1], own_weights),
-        train_nll=mean_nll(density, some.points, some.weights),
+        train_nll=-mean_of(at_observed(density, some.points), some.weights)
+        if notes
+        else mean_nll(density, some.points, some.weights),
         validation_nll=-held,
         stages=flow.stages if flow else (),
         steps=density.flow.steps,
@@ -283,6 +325,7 @@ def _report(
         repeats=found,
         effective=None if folds.rows.weights is None else effective_rows(folds.rows.weights),
         notes=(
+            *notes,
             *weights_note(folds.rows),
             *chosen,
             *found.notes(settings.repeats),

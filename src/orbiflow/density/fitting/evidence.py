@@ -10,6 +10,7 @@ from torch import Tensor
 from orbiflow.density.fitting.budget import Budget
 from orbiflow.density.fitting.families import Family
 from orbiflow.density.fitting.folds import Folds
+from orbiflow.density.fitting.missing import log_prob_of_rows
 from orbiflow.density.fitting.report import PartEvidence, Progress
 from orbiflow.density.fitting.rows import Rows, mean_of
 from orbiflow.density.fitting.weights import (
@@ -78,8 +79,9 @@ def candidates_of(
             found = family.fitted(number, train, held, tell)
             fitted[family.name].append(found)
             with torch.no_grad():
-                block |= {(family.name, name): p.log_prob(held.points) for name, p in found.items()}
-        block[FLOOR, FLOOR] = UniformBase(space).log_prob(held.points)
+                for name, part in found.items():
+                    block[family.name, name] = log_prob_of_rows(part, held.points)
+        block[FLOOR, FLOOR] = log_prob_of_rows(UniformBase(space), held.points)
         blocks.append(block)
         weights.append(held.weights)
         if number == 0:

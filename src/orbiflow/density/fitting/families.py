@@ -12,6 +12,7 @@ from torch import Tensor
 from orbiflow.density.fitting.budget import Budget
 from orbiflow.density.fitting.chains import fit_chain_mixture
 from orbiflow.density.fitting.kernels import NARROWEST
+from orbiflow.density.fitting.missing import is_whole, log_prob_of_rows, with_incomplete
 from orbiflow.density.fitting.mixtures import fit_mixture
 from orbiflow.density.fitting.rows import Rows
 from orbiflow.density.fitting.scales import joined, kernel_estimates
@@ -81,13 +82,20 @@ class KernelFamily(Family):
         return [found[name] for name in names]
 
     def _estimates(self, rows: Rows) -> dict[str, AdaptiveKernels]:
-        return kernel_estimates(
+        known = is_whole(rows)
+        whole = rows[known]
+        found = kernel_estimates(
             self.space,
-            rows.points,
+            whole.points,
             narrowest=self.narrowest,
             repeats=self.repeats,
-            row_weights=rows.weights,
+            row_weights=whole.weights,
         )
+        if len(whole) == len(rows):
+            return found
+        total = float(len(whole)) if whole.weights is None else float(whole.weights.sum())
+        rest = rows[~known]
+        return {name: with_incomplete(part, rest, total) for name, part in found.items()}
 
 
 @dataclass
@@ -106,6 +114,7 @@ class MixtureFamily(Family):
 
     def fitted(self, number: int, train: Rows, held: Rows, say: Say) -> dict[str, Base]:
         train = train[:MOST_MIXED]
+        whole = int(is_whole(train).sum())
         generator = torch.Generator().manual_seed(self.seed + number)
 
         def fit(size: int) -> Base:
@@ -120,7 +129,7 @@ class MixtureFamily(Family):
             )
 
         if self.sizes is None:
-            return _grown(fit, [k for k in SIZES if k == 1 or MIXTURE_ROWS * k <= len(train)], held)
+            return _grown(fit, [k for k in SIZES if k == 1 or MIXTURE_ROWS * k <= whole], held)
         return {str(size): fit(size) for size in self.sizes}
 
     def final(self, rows: Rows, folds: list[dict[str, Base]], names: list[str]) -> list[Base]:
@@ -203,7 +212,7 @@ def _grown(fit: Callable[[int], Base], sizes: Iterable[int], held: Rows) -> dict
     for size in sizes:
         part = found[str(size)] = fit(size)
         with torch.no_grad():
-            score = part.log_prob(held.points)
+            score = log_prob_of_rows(part, held.points)
         if best is not None:
             gain = gain_of(score, best, held.weights)
             if gain.nats < -CLEARLY * gain.error:

@@ -43,25 +43,37 @@ def fit_mixture(
     concentration finite.
 
     Args:
-        train: canonical points (N, d), N >= components.
+        train: canonical points (N, d), N >= components. On tori, angles may be missing (NaN): such a
+            row counts by its marginal likelihood (Ghahramani and Jordan, Supervised learning from
+            incomplete data via an EM approach, 1994). As many rows as components are whole.
         components: their number.
         iterations: of EM at most.
         narrowest: concentration at most.
         generator: of the start (k-means++).
         row_weights: of the points (N,), of mean 1; default equal.
     """
-    blocks = space.features(train).split(BLOCK, dim=1)
+    absent = train.isnan()
+    whole = ~absent.any(dim=1)
+    images = space.features(train.nan_to_num(0.0))
+    if not bool(whole.all()):
+        images = images * ~torch.cat([absent, absent], dim=1)
+    blocks = images.split(BLOCK, dim=1)
     owns = [None] * len(blocks) if row_weights is None else row_weights.split(BLOCK)
-    mean = _spread_out(space.features(train), components, generator, row_weights)
+    gaps = [None] * len(blocks) if bool(whole.all()) else absent.to(images).split(BLOCK)
+    start = None if row_weights is None else row_weights[whole]
+    mean = _spread_out(images[:, whole], components, generator, start)
     width = 1 if space.is_round else space.dim
     kappa = mean.new_full((components, width), 10.0)
     weights = mean.new_full((components,), 1 / components)
     last = -math.inf
     for _ in range(iterations):
-        count, total, score = _expectation(space, blocks, owns, mean, kappa, weights)
+        found = _expectation(
+            space, list(zip(blocks, owns, gaps, strict=True)), mean, kappa, weights
+        )
+        count, known, total, score = found
         weights = (count + 0.01) / (count + 0.01).sum()
         mean, length = _directions(space, total)
-        resultant = (length + PRIOR * PRIOR_RESULTANT) / (count[:, None] + PRIOR)
+        resultant = (length + PRIOR * PRIOR_RESULTANT) / (known + PRIOR)
         kappa = (_round_concentration if space.is_round else concentration)(resultant)
         kappa = kappa.clamp(WIDEST / 100, narrowest)
         if score - last < CONVERGED * len(train):
@@ -89,18 +101,28 @@ def _spread_out(
 
 def _expectation(
     space: Space,
-    blocks: Sequence[Tensor],
-    owns: Sequence[Tensor | None],
+    blocks: Sequence[tuple[Tensor, Tensor | None, Tensor | None]],
     mean: Tensor,
     kappa: Tensor,
     weights: Tensor,
-) -> tuple[Tensor, Tensor, float]:
-    """Points (K,) of each component, sums (K, m) of their nearest images' features, log-likelihood."""
+) -> tuple[Tensor, Tensor, Tensor, float]:
+    """What belongs to each component, and the log-likelihood.
+
+    Args:
+        blocks: features of points, 0 where they are missing, their weights, and what is missing.
+
+    Returns:
+        Points (K,) of each component, those of them that know each angle (K, 1) or (K, d), sums (K, m)
+        of their nearest images' features, the log-likelihood.
+    """
     rows, offsets = kernel_rows(space, mean, kappa)
     rows, offsets = rows.mT.contiguous(), offsets + weights.log()
     count, total, score = torch.zeros_like(weights), torch.zeros_like(mean), 0.0
-    for images, own in zip(blocks, owns, strict=True):
+    unknown: Tensor | float = 0.0
+    for images, own, absent in blocks:
         joint = images @ rows + offsets
+        if absent is not None:  # a factor that is not there has no constant either
+            joint += absent @ (torch.special.i0e(kappa).log() + kappa).mT
         top = joint.amax(dim=(0, 2), keepdim=True)
         share = (joint - top).clamp_min_(FAINT).exp_()
         every = share.sum(dim=(0, 2), keepdim=True)
@@ -110,9 +132,11 @@ def _expectation(
             share *= own[:, None]
             likelihood = likelihood[0, :, 0] * own
         count += share.sum(dim=(0, 1))
+        if absent is not None:
+            unknown = unknown + share[0].mT @ absent
         total += torch.einsum("enk,enm->km", share, images)
         score += float(likelihood.sum())
-    return count, total, score
+    return count, count[:, None] - unknown, total, score
 
 
 def _directions(space: Space, total: Tensor) -> tuple[Tensor, Tensor]:

@@ -51,6 +51,20 @@ def effective_rows(weights: Tensor) -> float:
     return float(weights.sum() ** 2 / weights.square().sum())
 
 
+def weights_of(weights: Any, known: Tensor) -> Tensor:
+    """Weights of the rows that are `known` (N,).
+
+    Raises:
+        OrbiflowError: for another number of weights than rows.
+    """
+    own = float_tensor(weights, "weights")
+    if own.shape != known.shape:
+        raise OrbiflowError(
+            f"expected a weight for each of {len(known)} rows, got an array {tuple(own.shape)}"
+        )
+    return own[known]
+
+
 def weighed(points: Tensor, weights: Any) -> Rows:
     """Rows with a weight, and their weights of mean 1: only their ratios count.
 

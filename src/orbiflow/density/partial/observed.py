@@ -62,6 +62,12 @@ def density_at(
     return (table + shares.log()[:, None]).logsumexp(dim=0)
 
 
+def _some_at(part: Part, points: Tensor, observed: list[int]) -> Tensor:
+    if isinstance(part, BlendedDensity):
+        return density_at(part, points, observed)
+    return part_at(part, points, observed)
+
+
 @one_thread()
 @torch.no_grad()
 def log_prob_observed(density: SymmetricDensity, points: Tensor, *, measure: str = CHART) -> Tensor:
@@ -81,6 +87,11 @@ def log_prob_observed(density: SymmetricDensity, points: Tensor, *, measure: str
         raise OrbiflowError(f"expected points (N, {space.dim}), got {tuple(points.shape)}")
     if bool(points.isinf().any()):
         raise OrbiflowError("angles may be missing (NaN), but not infinite")
+    return at_observed(density, points, measure=measure)
+
+
+def at_observed(part: Part, points: Tensor, *, measure: str = CHART) -> Tensor:
+    """As `log_prob_observed`, of a part or a density, at float64 points (N, d) that are checked."""
     found = torch.zeros(len(points), dtype=torch.float64)
     patterns, number = torch.unique(~points.isnan(), dim=0, return_inverse=True)
     for k, pattern in enumerate(patterns):
@@ -88,8 +99,8 @@ def log_prob_observed(density: SymmetricDensity, points: Tensor, *, measure: str
         if not observed:
             continue
         some = points[rows][:, observed]
-        own = Torus(len(observed), unit=str(space.unit))
-        whole = len(observed) == space.dim
-        value = density.log_prob(some) if whole else density_at(density, some, observed)
+        own = Torus(len(observed), unit=str(part.space.unit))
+        whole = len(observed) == part.space.dim
+        value = part.log_prob(some) if whole else _some_at(part, some, observed)
         found[rows] = value + own.log_density_factor(some, measure)
     return found
