@@ -65,7 +65,11 @@ def marginal(density: SymmetricDensity, axes: Iterable[int] | int) -> BlendedDen
     return _derived(density, Split(space.dim, kept_axes(axes, space.dim)), space)
 
 
-def conditional(density: SymmetricDensity, given: Mapping[int, float]) -> BlendedDensity:
+def conditional(
+    density: SymmetricDensity,
+    given: Mapping[int, float],
+    axes: Iterable[int] | int | None = None,
+) -> BlendedDensity:
     """The density of a torus' other angles where some are known.
 
     As `marginal`: the parts' conditional densities, each with the share that what is known leaves it.
@@ -73,6 +77,7 @@ def conditional(density: SymmetricDensity, given: Mapping[int, float]) -> Blende
     Args:
         density: of two angles or more.
         given: values of angles in turns (points of the chart), by the angles' numbers from 0.
+        axes: of the other angles, the numbers of those to keep; default all.
 
     Raises:
         OrbiflowError: for other spaces, no such angles, all angles, or three and more that are left
@@ -81,9 +86,12 @@ def conditional(density: SymmetricDensity, given: Mapping[int, float]) -> Blende
     space = check_torus(
         check_kind(density, SymmetricDensity, "density").space, "conditional densities"
     )
-    axes, values = given_axes(given, space.dim)
-    kept = tuple(axis for axis in range(space.dim) if axis not in axes)
-    return _derived(density, Split(space.dim, kept, axes, values), space)
+    known, values = given_axes(given, space.dim)
+    left = [axis for axis in range(space.dim) if axis not in known]
+    kept = kept_axes(left if axes is None else axes, space.dim)
+    if set(kept) & set(known):
+        raise OrbiflowError(f"axes {sorted(set(kept) & set(known))} are given and cannot be kept")
+    return _derived(density, Split(space.dim, kept, known, values), space)
 
 
 @one_thread()
