@@ -129,7 +129,7 @@ def check_finite(
         raise InputFileError(
             f"{path}: {len(rows)} cell{'s' * (len(rows) > 1)} empty, NaN or infinite, the first in "
             f"{unit} {lines[rows[0]]}, column {quote(columns[int(at[0])])}; fill them in "
-            "or leave their rows out with --drop-missing"
+            "or leave their rows out with --drop-missing (on tori --missing marginalise keeps them)"
         )
 
 
