@@ -13,6 +13,7 @@ from orbiflow.density.fitting.assembly import mixed
 from orbiflow.density.fitting.folds import FOLDS, folds_of
 from orbiflow.density.fitting.mixtures import fit_mixture
 from orbiflow.density.fitting.repeats import repeats_of
+from orbiflow.density.fitting.rows import Rows
 from orbiflow.density.fitting.scales import joined, kernel_estimates
 from orbiflow.density.fitting.weights import (
     TOLERANCE,
@@ -134,13 +135,13 @@ def test_folds_part_the_rows(seed: int, count: int, together: bool) -> None:
     generator = torch.Generator().manual_seed(seed)
     points = torch.rand(20, 2, dtype=torch.float64, generator=generator)
     points = points[torch.randint(20, (count,), generator=generator)]
-    folds = folds_of(points, together=together, generator=generator)
-    assert torch.equal(folds.rows.sort(dim=0).values, points.sort(dim=0).values)
+    folds = folds_of(Rows(points), together=together, generator=generator)
+    assert torch.equal(folds.rows.points.sort(dim=0).values, points.sort(dim=0).values)
     assert sum(len(folds.held(k)) for k in range(FOLDS)) == count
     for train, held in folds:
         assert len(train) + len(held) == count
         if together:
-            apart = (train[:, None] != held).any(dim=-1)
+            apart = (train.points[:, None] != held.points).any(dim=-1)
             assert bool(apart.all())
 
 

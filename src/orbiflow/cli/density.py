@@ -13,14 +13,18 @@ from orbiflow.cli.density_options import (
     DropMissing,
     Format,
     Measure,
+    Missing,
+    MissingOption,
     Model,
     NoHeader,
     Repeats,
     Scale,
     Space,
     Unit,
+    Weights,
     named_columns,
 )
+from orbiflow.cli.density_partial import conditional, marginal
 from orbiflow.cli.density_patches import patches
 from orbiflow.cli.work import do
 from orbiflow.jobs import (
@@ -48,6 +52,8 @@ def fit(
     columns: Columns = None,
     no_header: NoHeader = False,
     drop_missing: DropMissing = False,
+    missing: MissingOption = Missing.REFUSE,
+    weights: Weights = None,
     unit: Annotated[
         Unit | None,
         typer.Option(
@@ -101,6 +107,8 @@ def fit(
         columns=named_columns(columns),
         header=False if no_header else None,
         drop_missing=drop_missing,
+        missing=missing.value,
+        weights=weights,
         unit=None if unit is None else unit.value,
         parts=named_columns(parts),
         repeats=repeats.value,
@@ -123,6 +131,8 @@ def score(
     columns: Columns = None,
     no_header: NoHeader = False,
     drop_missing: DropMissing = False,
+    missing: MissingOption = Missing.REFUSE,
+    weights: Weights = None,
     measure: Annotated[
         Measure,
         typer.Option(help="Natural: the data's own units, or steradians. Uniform: against chance."),
@@ -136,6 +146,8 @@ def score(
         columns=named_columns(columns),
         header=False if no_header else None,
         drop_missing=drop_missing,
+        missing=missing.value,
+        weights=weights,
         measure=measure.value,
     )
     do(request)
@@ -235,4 +247,6 @@ def plot(
     do(request)
 
 
+density.command()(marginal)
+density.command()(conditional)
 density.command()(patches)

@@ -34,6 +34,14 @@ class Repeats(StrEnum):
     ROUNDING = "rounding"
 
 
+class Missing(StrEnum):
+    """What is done with rows that lack an angle."""
+
+    REFUSE = "refuse"
+    DROP = "drop"
+    MARGINALISE = "marginalise"
+
+
 class Measure(StrEnum):
     """What a density is per."""
 
@@ -79,6 +87,21 @@ NoHeader = Annotated[
 ]
 DropMissing = Annotated[
     bool, typer.Option("--drop-missing", help="Leave out rows that lack a value.")
+]
+MissingOption = Annotated[
+    Missing,
+    typer.Option(
+        "--missing",
+        help="Rows that lack a value: refuse, drop, or, on tori, marginalise: they count by the angles "
+        "that they have.",
+    ),
+]
+Weights = Annotated[
+    str | None,
+    typer.Option(
+        help="Column, by name or number, that says how much each row counts; only ratios matter.",
+        show_default=False,
+    ),
 ]
 Model = Annotated[
     Path, typer.Option("--model", "-m", help="Folder that `fit` wrote.", show_default=False)

@@ -25,6 +25,7 @@ from orbiflow.density.models import (
     kl_by_quadrature,
     midpoints,
 )
+from orbiflow.density.partial import conditional, log_prob_observed, marginal
 from orbiflow.density.spaces import (
     MEASURES,
     SPACES,
@@ -67,13 +68,16 @@ __all__ = [
     "VonMisesChains",
     "blend_kernels",
     "clear_rotation",
+    "conditional",
     "density_to_bytes",
     "fit_automatic",
     "fit_density",
     "fit_neural",
     "from_klein",
     "kl_by_quadrature",
+    "log_prob_observed",
     "make_space",
+    "marginal",
     "midpoints",
     "read_density",
     "to_klein",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import math
 import numbers
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, TypeAlias
 
@@ -18,11 +19,22 @@ from orbiflow.density.fitting.automatic import (
     fit_automatic,
     flow_settings,
 )
-from orbiflow.density.fitting.flow import MOST_DIM, fit_density
+from orbiflow.density.fitting.flow import fit_density
+from orbiflow.density.fitting.missing import check_missing
 from orbiflow.density.fitting.neural import NeuralSettings, fit_neural
 from orbiflow.density.fitting.report import FitReport, Progress
+from orbiflow.density.fitting.rows import mean_of, weighed
 from orbiflow.density.fitting.settings import FitSettings
+from orbiflow.density.models.still import MOST_DIM
 from orbiflow.density.models.symmetric import SymmetricDensity
+from orbiflow.density.partial import (
+    axes_named,
+    chart_of_observed,
+    conditional,
+    given_named,
+    log_prob_observed,
+    marginal,
+)
 from orbiflow.density.spaces.catalogue import space_class
 from orbiflow.density.spaces.space import Space
 from orbiflow.errors import OrbiflowError
@@ -54,6 +66,8 @@ class DensityEstimator:
         parts: "auto": of flow, kernels, mixture and chains what rows held out speak for
             (`fit_automatic`). Or those that may be used, such as "kernels" or "flow,chains"; "flow" is
             a flow alone (`fit_density`).
+        missing: "refuse" rows that lack an angle (NaN), or, on tori, "marginalise": fit kernels and
+            mixtures to them, and score them, by the density of the angles that they have.
         repeats: "places": rows that repeat another are real mass; "rounding": they are an accident.
         detail: largest wave number of the flow, in waves along a side of the square.
         segments: stationary pieces of the flow.
@@ -67,7 +81,7 @@ class DensityEstimator:
     parameters of flows of splines must be left at their defaults.
 
     After `fit`: `space_`, `density_` (a `SymmetricDensity`), `report_` (a `FitReport`),
-    `n_features_in_`.
+    `n_features_in_`, and `feature_names_in_` where the data, a data frame, name their columns.
 
     >>> rng = np.random.default_rng(0)
     >>> angles = rng.vonmises([0.0, 1.0], 4.0, (200, 2))
@@ -83,6 +97,7 @@ class DensityEstimator:
         unit: str = "radians",
         parts: str = AUTO,
         repeats: str = "places",
+        missing: str = "refuse",
         detail: int | None = None,
         segments: int | None = None,
         smoothness: float = 2.0,
@@ -101,6 +116,7 @@ class DensityEstimator:
         self.unit = unit
         self.parts = parts
         self.repeats = repeats
+        self.missing = missing
         self.detail = detail
         self.segments = segments
         self.smoothness = smoothness
@@ -116,35 +132,60 @@ class DensityEstimator:
         self.seed = seed
 
     def fit(
-        self, X: ArrayLike, y: object = None, *, progress: Progress | None = None
+        self,
+        X: ArrayLike,
+        y: object = None,
+        sample_weight: ArrayLike | None = None,
+        *,
+        progress: Progress | None = None,
     ) -> DensityEstimator:
         """Fit to data (N, k) in the space's own units; `y` is ignored.
 
+        Args:
+            sample_weight: of the rows (N,), at least 0: how much each counts in everything that is
+                fitted and judged. Only ratios count, equal ones are none.
+
         Raises:
-            OrbiflowError: for data that are not of the space, too few points, a setting out of range,
-                or one that has no meaning on a torus of so many angles.
+            OrbiflowError: for data that are not of the space, too few points, weights that are none, a
+                setting out of range, or one that has no meaning on a torus of so many angles.
         """
         del y
         chosen, alone = self._parts(), self._flow_settings()
         data = np.asarray(X)
         self.space_ = self._space_for(data)
-        points = self.space_.to_chart(data)
+        points = self._chart(data)
         self.density_: SymmetricDensity
         self.report_: FitReport
         if self.space_.dim > MOST_DIM:
             self._refuse_settings_of_splines()
+        whole = self.kernels or chosen == ("flow",)
+        if whole and self.missing != "refuse":
+            raise OrbiflowError(
+                "flows cannot be fitted to rows that lack angles: leave out missing, or parts and "
+                "kernels"
+            )
         if not self.kernels and chosen != ("flow",):
             settings = AutomaticSettings(
                 parts=chosen,
                 repeats=self.repeats,
+                missing=self.missing,
                 flow=self._flow_beside(len(points)),
                 seconds=self.seconds,
                 seed=self.seed,
             )
-            found = fit_automatic(self.space_, points, settings, progress=progress)
+            found = fit_automatic(
+                self.space_, points, settings, weights=sample_weight, progress=progress
+            )
         elif self.space_.dim <= MOST_DIM:
-            found = fit_density(self.space_, points, alone, progress=progress)
+            found = fit_density(
+                self.space_, points, alone, weights=sample_weight, progress=progress
+            )
         else:
+            if sample_weight is not None:
+                raise OrbiflowError(
+                    "neural flows take no weights of rows: leave them out, or fit other parts, "
+                    "parts='kernels,mixture,chains' (--parts kernels,mixture,chains)"
+                )
             many = NeuralSettings(
                 refinement=min(NeuralSettings.refinement, self.evaluations),
                 validation=self.validation,
@@ -154,19 +195,68 @@ class DensityEstimator:
             found = fit_neural(self.space_, points, many, progress=progress)
         self.density_, self.report_ = found
         self.n_features_in_ = int(data.shape[1])
+        names = getattr(X, "columns", None)
+        if names is not None and all(isinstance(name, str) for name in names):
+            self.feature_names_in_ = np.array(list(names), dtype=object)
+        elif hasattr(self, "feature_names_in_"):
+            del self.feature_names_in_  # of an earlier fit
         return self
 
+    def marginal(self, *columns: str | int) -> DensityEstimator:
+        """An estimator of some of the angles alone, by their columns' names or numbers from 0.
+
+        Raises:
+            OrbiflowError: before `fit`, for other spaces than tori and unknown columns; see
+                `orbiflow.density.marginal`.
+
+        >>> angles = np.random.default_rng(0).vonmises([0.0, 1.0], 4.0, (60, 2))
+        >>> fit = DensityEstimator("torus", parts="kernels").fit(angles)
+        >>> fit.marginal("angle2").score_samples([[1.0]]).shape
+        (1,)
+        """
+        density, names = self._fitted(), self._column_names()
+        axes = axes_named(columns, names)
+        return self._of(marginal(density, axes), [names[axis] for axis in axes])
+
+    def conditional(
+        self, given: Mapping[str | int, float] | None = None, /, **angles: float
+    ) -> DensityEstimator:
+        """An estimator of the other angles where some are known, in the data's unit.
+
+        Args:
+            given: values by the columns' names or numbers from 0.
+            angles: as well, by names: `conditional(psi=-45)`.
+
+        Raises:
+            OrbiflowError: before `fit`, for other spaces than tori and unknown columns; see
+                `orbiflow.density.conditional`.
+        """
+        density, names = self._fitted(), self._column_names()
+        both: list[tuple[str | int, float]] = [*(given or {}).items(), *angles.items()]
+        known = given_named(self.space_, both, names)
+        left = [name for axis, name in enumerate(names) if axis not in known]
+        return self._of(conditional(density, known), left)
+
     def score_samples(self, X: ArrayLike, *, measure: str = "natural") -> Array:
-        """Log densities (N,) in nats at data (N, k), with respect to `measure` (see `MEASURES`)."""
+        """Log densities (N,) in nats at data (N, k), with respect to `measure` (see `MEASURES`).
+
+        Of rows that lack angles (NaN), with `missing="marginalise"`, of the angles that they have.
+        """
         density = self._fitted()
         with torch.no_grad():
-            points = self.space_.to_chart(np.asarray(X))
+            points = self._chart(np.asarray(X))
+            if bool(points.isnan().any()):
+                return log_prob_observed(density, points, measure=measure).numpy()
             return density.log_prob(points, measure=measure).numpy()
 
-    def score(self, X: ArrayLike, y: object = None) -> float:
-        """Mean log density of data (N, k), in natural measure."""
+    def score(
+        self, X: ArrayLike, y: object = None, sample_weight: ArrayLike | None = None
+    ) -> float:
+        """Mean log density of data (N, k), weighted, in natural measure."""
         del y
-        return float(self.score_samples(X).mean())
+        scores = torch.tensor(self.score_samples(X))
+        rows = weighed(scores[:, None], sample_weight)
+        return mean_of(rows.points[:, 0], rows.weights)
 
     def sample(self, n_samples: int = 1, random_state: RandomState = None) -> Array:
         """New data (n_samples, k) in the space's own units.
@@ -270,6 +360,23 @@ class DensityEstimator:
                 f"the flow is neural: leave {'it' if len(set_) == 1 else 'them'} out, or call "
                 "`fit_neural` with `NeuralSettings`"
             )
+
+    def _chart(self, data: np.ndarray) -> torch.Tensor:
+        """Points of data (N, k); with missing angles where they may be."""
+        if check_missing(self.missing) == "marginalise" and self.space_.is_torus:
+            return chart_of_observed(self.space_, data)
+        return self.space_.to_chart(data)
+
+    def _column_names(self) -> list[str]:
+        return [str(name) for name in getattr(self, "feature_names_in_", self.space_.columns)]
+
+    def _of(self, density: SymmetricDensity, names: list[str]) -> DensityEstimator:
+        """A fitted estimator of a density that was derived."""
+        found = DensityEstimator(**{**self.get_params(), "space": density.space})
+        found.space_, found.density_ = density.space, density
+        found.n_features_in_ = density.space.dim
+        found.feature_names_in_ = np.array(names, dtype=object)
+        return found
 
     def _fitted(self) -> SymmetricDensity:
         if not hasattr(self, "density_"):

@@ -30,6 +30,9 @@ from orbiflow.threads import one_thread
 
 MODEL = "density.safetensors"
 REPORT = "report.json"
+TABLE = "density.csv"
+"""What the folder of a marginal or conditional density of one or two angles has beside its model."""
+
 PAGE = "surface.html"
 NAMES = ("density", "flow", "samples")
 PICTURES = (*(f"{name}.{form}" for form in FORMATS for name in NAMES), PAGE)
@@ -150,7 +153,10 @@ def refuse_others(out: Path) -> None:
     if not out.is_dir():
         return
     inside = {path.name for path in out.iterdir()} - LITTER
-    foreign, old = sorted(inside - {MODEL, REPORT, *PICTURES}), sorted(inside & set(PICTURES))
+    foreign, old = (
+        sorted(inside - {MODEL, REPORT, TABLE, *PICTURES}),
+        sorted(inside & set(PICTURES)),
+    )
     if foreign and old:
         raise OutputError(
             f"{out} holds {old[0]}, which would go, beside {foreign[0]}, which is of no earlier run: "

@@ -10,7 +10,9 @@ True
 
 from orbiflow.cancel import Cancel
 from orbiflow.jobs.density_requests import (
+    DensityConditionalRequest,
     DensityFitRequest,
+    DensityMarginalRequest,
     DensityPlotRequest,
     DensitySampleRequest,
     DensityScoreRequest,
@@ -47,7 +49,9 @@ __all__ = [
     "ArtRequest",
     "Cancel",
     "ClassFailed",
+    "DensityConditionalRequest",
     "DensityFitRequest",
+    "DensityMarginalRequest",
     "DensityPlotRequest",
     "DensitySampleRequest",
     "DensityScoreRequest",

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from orbiflow.density import SymmetricDensity, read_density
 from orbiflow.density.tables import Table, is_identifier, read_table
@@ -27,10 +31,12 @@ def read_data(
     *,
     has_header: bool | None = None,
     drop_missing: bool = False,
+    keep_missing: bool = False,
 ) -> Table:
     """The columns asked for, else those of numbers, `width` of them, less identifiers; tells notes."""
     chosen = None if columns is None else list(columns)
     how: dict[str, Any] = {"has_header": has_header, "drop_missing": drop_missing}
+    how["keep_missing"] = keep_missing
     if chosen is not None:
         table = read_table(data, columns=chosen, width=None, **how)
     else:
@@ -59,6 +65,46 @@ def _without_identifiers(table: Table, tell: Sink) -> Table:
     return table
 
 
+def read_weighed(
+    data: Path,
+    columns: tuple[str, ...] | None,
+    width: int | None,
+    weights: str | None,
+    tell: Sink,
+    **how: Any,
+) -> tuple[Table, NDArray[np.float64] | None]:
+    """As `read_data`, and the weights (N,) of the rows, from a column that is no other's.
+
+    Raises:
+        OrbiflowError: as `read_data`, and for weights that are missing or wanted as data as well.
+    """
+    if weights is None:
+        return read_data(data, columns, width, tell, **how), None
+    own = {name: value for name, value in how.items() if name != "keep_missing"}
+    column = read_table(data, columns=[weights], width=1, **own)
+    name = column.columns[0]
+    table = read_data(data, columns, None if columns is None else width, tell, **how)
+    if columns is None and name in table.columns and len(table.columns) > 1:
+        table = table.without(table.columns.index(name))
+    if name in table.columns:
+        raise InputFileError(
+            f"{data}: {name!r} holds the rows' weights and cannot be a column of the data as well"
+        )
+    if width is not None and len(table.columns) != width:
+        raise InputFileError(
+            f"{data}: {width} columns must be taken beside the weights {name!r}, there are "
+            f"{', '.join(table.columns)}; choose with --columns"
+        )
+    kept = np.isin(table.lines, column.lines)
+    table = replace(
+        table,
+        values=table.values[kept],
+        lines=table.lines[kept],
+        dropped=table.dropped | column.dropped,
+    )
+    return table, column.values[np.isin(column.lines, table.lines), 0]
+
+
 def unit_of(space: str, unit: str | None, table: Table, tell: Sink) -> str:
     """The unit of angles: as said, else radians where all values are within a turn either way.
 
@@ -67,10 +113,10 @@ def unit_of(space: str, unit: str | None, table: Table, tell: Sink) -> str:
     """
     if unit is not None or space not in ("torus", "klein-bottle"):
         return unit or "radians"
-    beyond = abs(table.values).max(axis=0) > 2 * math.pi + 1e-9
+    beyond = np.nanmax(abs(table.values), axis=0, initial=0) > 2 * math.pi + 1e-9
     if beyond.any():
         column = int(beyond.argmax())
-        most = table.values[abs(table.values[:, column]).argmax(), column]
+        most = table.values[np.nanargmax(abs(table.values[:, column])), column]
         raise OrbiflowError(
             f"column {table.columns[column]!r} has {most:g}, beyond 2 pi: say --unit degrees, radians "
             "or turns"

@@ -15,10 +15,10 @@ from orbiflow.cancel import Cancel
 from orbiflow.density import DensityEstimator, density_to_bytes
 from orbiflow.density.fitting.report import FitReport
 from orbiflow.density.tables import Table
-from orbiflow.export.density_plots import MODEL, PICTURES, REPORT
+from orbiflow.export.density_plots import MODEL, PICTURES, REPORT, TABLE
 from orbiflow.files import write_atomic
 from orbiflow.folders import ResultFolder
-from orbiflow.jobs.density_data import read_data, unit_of
+from orbiflow.jobs.density_data import read_weighed, unit_of
 from orbiflow.jobs.density_requests import DensityFitRequest
 from orbiflow.jobs.events import Finished, Note, Progress, Written
 from orbiflow.jobs.run import Sink
@@ -27,6 +27,9 @@ from orbiflow.threads import one_thread
 
 MOST_SCORED = 4_000
 """Rows over which the mean log density is taken."""
+
+SETTINGS = ("parts", "repeats", "missing", "weights", "detail", "segments", "kernels", "seed")
+"""Of a request, told in the report."""
 
 WIDTH = {"sphere": None, "projective-plane": None, "klein-bottle": 2, "torus": None}
 
@@ -43,26 +46,29 @@ def density_fit(request: DensityFitRequest, tell: Sink, cancel: Cancel) -> Finis
         Cancelled: if it was told to stop; nothing is written.
     """
     begin = time.perf_counter()
-    table = read_data(
+    table, weights = read_weighed(
         request.data,
         request.columns,
         WIDTH[request.space],
+        request.weights,
         tell,
         has_header=request.header,
-        drop_missing=request.drop_missing,
+        drop_missing=request.drop_missing or request.missing == "drop",
+        keep_missing=request.missing == "marginalise",
     )
     estimator = DensityEstimator(
         request.space,
         unit=unit_of(request.space, request.unit, table, tell),
         parts="auto" if request.parts is None else ",".join(request.parts),
         repeats=request.repeats,
+        missing="marginalise" if request.missing == "marginalise" else "refuse",
         detail=request.detail,
         segments=request.segments,
         kernels=request.kernels,
         seconds=math.inf if request.seconds is None else request.seconds,
         seed=request.seed,
     )
-    folder = ResultFolder(request.out, _written_files)
+    folder = ResultFolder(request.out, written_files)
 
     reached = 0.0
 
@@ -72,8 +78,8 @@ def density_fit(request: DensityFitRequest, tell: Sink, cancel: Cancel) -> Finis
         reached = max(reached, share)
         tell(Progress(reached, what))
 
-    estimator.fit(table.values, progress=progress)
-    document = _document(request, table, estimator, begin)
+    estimator.fit(table.values, sample_weight=weights, progress=progress)
+    document = _document(request, table, weights, estimator, begin)
     with folder.replaced() as staged:
         saved = density_to_bytes(estimator.density_, columns=list(table.columns))
         write_atomic(staged / MODEL, saved)
@@ -86,30 +92,31 @@ def density_fit(request: DensityFitRequest, tell: Sink, cancel: Cancel) -> Finis
     return Finished("done", {"folder": str(request.out), "rows": len(table.values), **summary})
 
 
-def _written_files(folder: Path) -> set[str]:
+def written_files(folder: Path) -> set[str]:
     """What an earlier fit wrote into the folder, and pictures of its model."""
     try:
         document = json.loads((folder / REPORT).read_text(encoding="utf-8"))
         ours = "space" in document and "report" in document
     except (OSError, ValueError, TypeError, RecursionError):
         ours = False
-    return {MODEL, REPORT, *PICTURES} if ours else set()
+    return {MODEL, REPORT, TABLE, *PICTURES} if ours else set()
 
 
 def _document(
-    request: DensityFitRequest, table: Table, estimator: DensityEstimator, begin: float
+    request: DensityFitRequest,
+    table: Table,
+    weights: Array | None,
+    estimator: DensityEstimator,
+    begin: float,
 ) -> dict[str, Any]:
     """Of report.json."""
     report = estimator.report_
     return {
         "space": {"name": estimator.space_.name, **estimator.space_.settings()},
         "columns": table.columns,
-        "settings": {
-            name: getattr(request, name)
-            for name in ("parts", "repeats", "detail", "segments", "kernels", "seed")
-        },
+        "settings": {name: getattr(request, name) for name in SETTINGS},
         "log_likelihood": {
-            "natural": estimator.score(_some(table)),
+            "natural": _score(estimator, table, weights),
             "uniform": -math.log(estimator.space_.volume),
             "square_train": -report.train_nll,
             "square_validation": -report.validation_nll,
@@ -130,9 +137,15 @@ def _told(request: DensityFitRequest, document: dict[str, Any], rows: int) -> tu
     )
 
 
-def _some(table: Table) -> Array:
-    """Rows enough for a mean: each costs all kernels."""
-    return table.values[:: math.ceil(len(table.values) / MOST_SCORED)]
+def _score(estimator: DensityEstimator, table: Table, weights: Array | None) -> float:
+    """Mean log density of the rows that lack nothing, of enough of them: each costs all kernels."""
+    whole = np.flatnonzero(~np.isnan(table.values).any(axis=1))
+    if weights is not None:
+        whole = whole[weights[whole] > 0]
+    some = whole[:: max(1, math.ceil(len(whole) / MOST_SCORED))]
+    return estimator.score(
+        table.values[some], sample_weight=None if weights is None else weights[some]
+    )
 
 
 def _plain(report: FitReport) -> dict[str, Any]:

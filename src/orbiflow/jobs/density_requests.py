@@ -14,6 +14,7 @@ MOST_SAMPLES = 100_000_000
 SpaceName = Literal["torus", "sphere", "klein-bottle", "projective-plane"]
 Unit = Literal["radians", "degrees", "turns"]
 Measure = Literal["natural", "square", "uniform"]
+Missing = Literal["refuse", "drop", "marginalise"]
 PARTS = (
     "flow",
     "kernels",
@@ -29,6 +30,9 @@ class DensityFitRequest(Request):
     - `data`: the table. `out`: folder for the model and its report.
     - `columns`: names or numbers, None for what the space takes.
     - `header`: whether a text's first line names the columns, None to look.
+    - `missing`: of rows that lack an angle of a torus: "refuse" them, "drop" them as `drop_missing`
+      does, or "marginalise": they count by the angles that they have.
+    - `weights`: the column that says how much each row counts.
     - `drop_missing`: leave out rows that lack a value.
     - `unit`: of angles; None for radians if no value is beyond 2 pi.
     - `parts`: of flow, kernels, mixture and chains those that may be used; None lets rows held out
@@ -47,6 +51,8 @@ class DensityFitRequest(Request):
     columns: tuple[str, ...] | None = None
     header: bool | None = None
     drop_missing: bool = False
+    missing: Missing = "refuse"
+    weights: str | None = None
     unit: Unit | None = None
     parts: tuple[str, ...] | None = None
     repeats: Literal["places", "rounding"] = "places"
@@ -58,6 +64,7 @@ class DensityFitRequest(Request):
 
     def check(self) -> None:
         _columns_named(self.columns)
+        _check_missing(self.drop_missing, self.missing)
         unknown = [part for part in self.parts or () if part not in PARTS]
         if unknown or self.parts == ():
             raise RecordError(
@@ -71,7 +78,8 @@ class DensityFitRequest(Request):
 class DensityScoreRequest(Request):
     """Add log densities to a table; see `orbiflow density score --help`.
 
-    `columns`, `header`, `drop_missing`: as for a fit; rows left out get an empty cell.
+    `columns`, `header`, `drop_missing`, `missing`, `weights`: as for a fit; rows left out get an empty
+    cell, weights are of the mean.
     """
 
     KIND = "density-score"
@@ -82,10 +90,13 @@ class DensityScoreRequest(Request):
     columns: tuple[str, ...] | None = None
     header: bool | None = None
     drop_missing: bool = False
+    missing: Missing = "refuse"
+    weights: str | None = None
     measure: Measure = "natural"
 
     def check(self) -> None:
         _columns_named(self.columns)
+        _check_missing(self.drop_missing, self.missing)
 
 
 @dataclass(frozen=True)
@@ -148,6 +159,53 @@ class PatchesRequest(Request):
         _columns_named(self.columns)
         if self.farthest is not None and not self.farthest >= 0:
             raise RecordError(f"{{farthest}} must be at least 0, got {self.farthest:g}")
+
+
+@dataclass(frozen=True)
+class DensityMarginalRequest(Request):
+    """The density of some angles of a torus; see `orbiflow density marginal --help`.
+
+    - `columns`: names or numbers, from 1, of the fit's columns, in the order that is wanted.
+    - `out`: folder of the new model, its table and its picture.
+    """
+
+    KIND = "density-marginal"
+
+    model: Path
+    columns: tuple[str, ...]
+    out: Path = Path("marginal")
+
+    def check(self) -> None:
+        _columns_named(self.columns)
+
+
+@dataclass(frozen=True)
+class DensityConditionalRequest(Request):
+    """The density of a torus' other angles where some are known; see `density conditional --help`.
+
+    - `given`: such as "psi=-45", in the model's unit.
+    - `columns`: of those that are left, the ones to keep; None for all.
+    - `out`: as of a marginal.
+    """
+
+    KIND = "density-conditional"
+
+    model: Path
+    given: tuple[str, ...]
+    columns: tuple[str, ...] | None = None
+    out: Path = Path("conditional")
+
+    def check(self) -> None:
+        _columns_named(self.columns)
+        if not self.given:
+            raise RecordError("{given} says nothing; give what is known, as in psi=-45")
+
+
+def _check_missing(drop: bool, missing: str) -> None:
+    if drop and missing == "marginalise":
+        raise RecordError(
+            "{drop_missing} leaves out the rows that {missing} marginalise is for: give one"
+        )
 
 
 def _columns_named(columns: tuple[str, ...] | None) -> None:

@@ -4,16 +4,22 @@ from __future__ import annotations
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
+from torch import Tensor
 
 from orbiflow.cancel import Cancel
+from orbiflow.density import log_prob_observed
+from orbiflow.density.fitting.rows import mean_of, weighed
+from orbiflow.density.partial import chart_of_observed
 from orbiflow.density.spaces.patches import to_klein
 from orbiflow.density.tables import append_column, to_csv
 from orbiflow.errors import OrbiflowError
 from orbiflow.files import write_atomic
-from orbiflow.jobs.density_data import model_at, read_data, same_columns
+from orbiflow.jobs.density_data import model_at, read_data, read_weighed, same_columns
 from orbiflow.jobs.density_requests import DensitySampleRequest, DensityScoreRequest, PatchesRequest
 from orbiflow.jobs.events import Finished, Note, Progress, Written
 from orbiflow.jobs.run import Sink
+from orbiflow.symmetry.isometry import Array
 from orbiflow.threads import one_thread
 
 BLOCK = 65_536
@@ -24,7 +30,8 @@ def density_score(request: DensityScoreRequest, tell: Sink, cancel: Cancel) -> F
     """Add log densities to a table.
 
     Returns:
-        `summary`: `file`, `rows`, and the `mean` log density in nats.
+        `summary`: `file`, `rows`, and the `mean` log density in nats, weighted, of the rows that lack
+        nothing.
 
     Raises:
         OrbiflowError: for anything that the user can mend.
@@ -32,30 +39,57 @@ def density_score(request: DensityScoreRequest, tell: Sink, cancel: Cancel) -> F
     """
     density, extra = model_at(request.model)
     columns = request.columns or same_columns(request.data, extra)
-    table = read_data(
+    keep = request.missing == "marginalise"
+    table, weights = read_weighed(
         request.data,
         columns,
         None,
+        request.weights,
         tell,
         has_header=request.header,
-        drop_missing=request.drop_missing,
+        drop_missing=request.drop_missing or request.missing == "drop",
+        keep_missing=keep,
     )
-    points = density.space.to_chart(table.values)
+    space = density.space
+    points = chart_of_observed(space, table.values) if keep else space.to_chart(table.values)
+    known = ~points.isnan()
+    lacking = int((~known.all(dim=1)).sum())
+    log_prob = log_prob_observed if lacking else type(density).log_prob
     parts = []
     with torch.no_grad():
         for start in range(0, len(points), BLOCK):
             cancel.check()
             block = points[start : start + BLOCK]
-            parts.append(density.log_prob(block, measure=request.measure))
+            parts.append(log_prob(density, block, measure=request.measure))
             tell(Progress(min(1.0, (start + BLOCK) / len(points)), "scoring"))
     scores = torch.cat(parts).numpy()
-    write_atomic(request.out, append_column(table, request.data, "log_prob", scores))
+    name = "log_prob_marginal" if lacking else "log_prob"
+    write_atomic(request.out, append_column(table, request.data, name, scores))
     tell(Written(request.out))
-    mean = float(scores.mean())
-    tell(
-        Note(f"mean log density {mean:.4f} nats over {len(scores)} rows; written to {request.out}")
-    )
+    if lacking:
+        tell(Note(_said_of_missing(known, name)))
+    mean = _mean(scores, weights, known.all(dim=1).numpy())
+    over = f"{len(scores)} rows" if not lacking else f"the {len(scores) - lacking} whole rows"
+    weighted = "" if weights is None else f", weighted by {request.weights}"
+    tell(Note(f"mean log density {mean:.4f} nats over {over}{weighted}; written to {request.out}"))
     return Finished("done", {"file": str(request.out), "rows": len(scores), "mean": mean})
+
+
+def _said_of_missing(known: Tensor, name: str) -> str:
+    """In words, of rows and which of their angles are known."""
+    lacking, empty = int((~known.all(dim=1)).sum()), int((~known.any(dim=1)).sum())
+    nothing = f"; {empty} of them have none, hence 0" if empty else ""
+    return (
+        f"{lacking} of {len(known)} rows lack some angles: {name} is the log density of those "
+        f"that they have{nothing}"
+    )
+
+
+def _mean(scores: Array, weights: Array | None, whole: NDArray[np.bool_]) -> float:
+    """Of the whole rows: densities of fewer angles are in another unit."""
+    chosen = whole if whole.any() else np.ones_like(whole)
+    rows = weighed(torch.tensor(scores[chosen, None]), None if weights is None else weights[chosen])
+    return mean_of(rows.points[:, 0], rows.weights)
 
 
 @one_thread()

@@ -6,7 +6,9 @@ Importing this takes no time: no numerical library.
 from __future__ import annotations
 
 from orbiflow.jobs.density_requests import (
+    DensityConditionalRequest,
     DensityFitRequest,
+    DensityMarginalRequest,
     DensityPlotRequest,
     DensitySampleRequest,
     DensityScoreRequest,
@@ -33,6 +35,8 @@ REQUESTS: dict[str, type[Request]] = {
         DensityScoreRequest,
         DensitySampleRequest,
         DensityPlotRequest,
+        DensityMarginalRequest,
+        DensityConditionalRequest,
         PatchesRequest,
         PaperRequest,
     )

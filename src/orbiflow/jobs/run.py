@@ -24,6 +24,8 @@ _MODULES = {
     "density-score": "density_use",
     "density-sample": "density_use",
     "density-plot": "density_plot",
+    "density-marginal": "density_partial",
+    "density-conditional": "density_partial",
     "density-patches": "density_use",
     "paper": "paper",
 }

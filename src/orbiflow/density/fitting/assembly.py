@@ -7,17 +7,15 @@ from torch import Tensor
 
 from orbiflow.density.fitting.evidence import Candidates
 from orbiflow.density.fitting.families import Family
-from orbiflow.density.fitting.flow import MOST_DIM
+from orbiflow.density.fitting.rows import Rows
 from orbiflow.density.fitting.scales import even_kernels, joined
 from orbiflow.density.models.bases import Base, UniformBase
 from orbiflow.density.models.blend import BlendedDensity
 from orbiflow.density.models.chains import VonMisesChains
 from orbiflow.density.models.kernels import AdaptiveKernels
-from orbiflow.density.models.neural import NeuralFlow, NeuralTorusField
+from orbiflow.density.models.still import still_flow
 from orbiflow.density.models.symmetric import SymmetricDensity
 from orbiflow.density.spaces.space import Space
-from orbiflow.fields import SplineField
-from orbiflow.flows import Flow
 
 FLAT = 1e-6
 """Concentration of a kernel that is as good as uniform."""
@@ -28,7 +26,7 @@ def assembled(
     families: list[Family],
     candidates: Candidates,
     weights: Tensor,
-    rows: Tensor,
+    rows: Rows,
     flow: SymmetricDensity | None,
     share: float,
 ) -> BlendedDensity:
@@ -48,7 +46,7 @@ def assembled(
             _sort(part, weight, kernels, chains)
     floor = float(weights[candidates.floor].sum())
     if not kernels:  # a blend has some: half of the floor, as one
-        center = rows.new_full((1, space.dim), 0.5)
+        center = rows.points.new_full((1, space.dim), 0.5)
         floor /= 2
         kernels = [(even_kernels(space, center, FLAT), floor)]
     sizes = [[weight for _, weight in part] for part in (kernels, chains)]
@@ -56,7 +54,7 @@ def assembled(
     shares = (1 - share) * shares / shares.sum()
     shares[0] = share
     mixture = joined([part for part, _ in kernels], torch.tensor(sizes[0], dtype=torch.float64))
-    carried = _still(space) if flow is None else flow.flow
+    carried = still_flow(space) if flow is None else flow.flow
     return BlendedDensity(
         space,
         carried,
@@ -90,10 +88,3 @@ def mixed(parts: list[VonMisesChains], shares: Tensor) -> VonMisesChains:
         torch.cat([part.concentrations for part in parts]),
         torch.cat([part.order for part in parts]),
     )
-
-
-def _still(space: Space) -> Flow:
-    """A flow that moves nothing: a new field is zero."""
-    if space.dim > MOST_DIM:
-        return NeuralFlow(NeuralTorusField(space.dim, width=1, depth=1, waves=1), steps=1)
-    return Flow([SplineField(space.group, 1)], steps=1, warn=False)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import torch
 from torch import Tensor
@@ -14,16 +14,33 @@ from orbiflow.density.fitting.assembly import assembled
 from orbiflow.density.fitting.budget import Budget
 from orbiflow.density.fitting.evidence import Candidates, PartEvidence, candidates_of, judged
 from orbiflow.density.fitting.families import ChainFamily, Family, KernelFamily, MixtureFamily
-from orbiflow.density.fitting.flow import MOST_DIM, fit_density
+from orbiflow.density.fitting.flow import fit_density
 from orbiflow.density.fitting.folds import LEAST_PLACES, Folds, folds_of
 from orbiflow.density.fitting.kernels import NARROWEST
+from orbiflow.density.fitting.missing import (
+    MARGINAL_PARTS,
+    check_missing,
+    is_whole,
+    missing_notes,
+    observed_points,
+)
 from orbiflow.density.fitting.repeats import Repeats, repeats_of
 from orbiflow.density.fitting.report import FitReport, Progress, mean_nll, own_points, steps_note
+from orbiflow.density.fitting.rows import (
+    Rows,
+    effective_rows,
+    mean_of,
+    weighed,
+    weights_note,
+    weights_of,
+)
 from orbiflow.density.fitting.settings import FitSettings
 from orbiflow.density.fitting.training import training
 from orbiflow.density.fitting.weights import gain_of, sparse_weights, stacked, stacking_weights
 from orbiflow.density.models.blend import BlendedDensity
+from orbiflow.density.models.still import MOST_DIM
 from orbiflow.density.models.symmetric import SymmetricDensity
+from orbiflow.density.partial import at_observed
 from orbiflow.density.spaces.flat import whole_turn
 from orbiflow.density.spaces.space import Space
 from orbiflow.errors import OrbiflowError
@@ -58,6 +75,8 @@ class AutomaticSettings:
       spaces of three dimensions at most.
     - `repeats`: "places": new rows repeat the old ones as often as these repeat each other; "rounding":
       repeated values are an accident, and the density is to have no peaks at them.
+    - `missing`: "refuse" points that lack angles (NaN), or "marginalise": on tori a row counts by the
+      density of the angles that it has, and the parts are kernels and mixtures.
     - `flow`: its settings; None for what suits the number of rows.
     - `seconds`: after which nothing further is tried; a fit that it ends depends on the machine.
     - `seed`: of the folds and the starts.
@@ -65,6 +84,7 @@ class AutomaticSettings:
 
     parts: tuple[str, ...] = PARTS
     repeats: str = "places"
+    missing: str = "refuse"
     flow: FitSettings | None = None
     seconds: float = math.inf
     seed: int = 0
@@ -77,6 +97,7 @@ class AutomaticSettings:
             raise OrbiflowError(
                 f"repeats must be one of {', '.join(REPEATS)}, got {self.repeats!r}"
             )
+        check_missing(self.missing)
         check_range("seconds", self.seconds, 0, math.inf)
         check_range("seed", self.seed, -(2**63), 2**64 - 1, integer=True)
 
@@ -87,6 +108,7 @@ def fit_automatic(
     points: Tensor,
     settings: AutomaticSettings | None = None,
     *,
+    weights: Any = None,
     progress: Progress | None = None,
 ) -> tuple[BlendedDensity, FitReport]:
     """Fit what suits the data best: a mixture of densities with weights by rows held out.
@@ -101,6 +123,7 @@ def fit_automatic(
         space: any.
         points: (N, d) in the chart, N >= 10 different ones.
         settings: default `AutomaticSettings()`.
+        weights: of the points (N,), at least 0; only their ratios count; default equal.
         progress: told how far it is.
 
     Returns:
@@ -113,12 +136,13 @@ def fit_automatic(
     check_kind(settings, AutomaticSettings, "settings")
     say = progress or (lambda _share, _what: None)
     budget = Budget(seconds=settings.seconds)
-    rows = own_points(space, points)
-    found = repeats_of(space, rows)
+    rows, settings, notes = _rows(space, points, weights, settings)
+    found = repeats_of(space, rows[is_whole(rows)].points)
+    whole = " that lack no angle" if found.places + found.rows < len(rows) else ""
     if found.places < LEAST_PLACES:
         raise OrbiflowError(
-            f"a density needs at least {LEAST_PLACES} different points, got {found.places} among "
-            f"{len(rows)}"
+            f"a density needs at least {LEAST_PLACES} different points{whole}, got {found.places} "
+            f"among {len(rows)}"
         )
     generator = torch.Generator().manual_seed(settings.seed)
     folds = folds_of(rows, together=settings.repeats == "rounding", generator=generator)
@@ -126,14 +150,33 @@ def fit_automatic(
     candidates = candidates_of(
         space, families, folds, lambda done, what: say(BEFORE_FLOW * done, what), budget
     )
-    weights = sparse_weights(candidates.table, candidates.floor)
+    weights = sparse_weights(candidates.table, candidates.floor, candidates.row_weights)
     tried = _try_flow(space, folds, candidates, weights, settings, budget, say)
     say(1.0, "putting together")
     density = assembled(space, families, candidates, weights, folds.rows, tried.flow, tried.share)
     parts = (*tried.evidence, *_shrunk(judged(candidates, weights), tried.share))
     return density, _report(
-        density, folds, candidates, weights, tried, parts, found, settings, budget
+        density, folds, candidates, weights, tried, parts, found, settings, budget, notes
     )
+
+
+def _rows(
+    space: Space, points: Any, weights: Any, settings: AutomaticSettings
+) -> tuple[Rows, AutomaticSettings, list[str]]:
+    """Rows that say anything, the parts that can be fitted to them, and what to say of it."""
+    if settings.missing == "refuse":
+        return weighed(own_points(space, points), weights), settings, []
+    own, known = observed_points(space, points)
+    rows = weighed(own, None if weights is None else weights_of(weights, known))
+    if not bool(rows.points.isnan().any()):
+        return rows, settings, missing_notes(rows, int((~known).sum()))
+    chosen = tuple(part for part in settings.parts if part in MARGINAL_PARTS)
+    if not chosen or (settings.parts != PARTS and chosen != settings.parts):
+        raise OrbiflowError(
+            f"{' and '.join(part for part in settings.parts if part not in MARGINAL_PARTS)} cannot be "
+            "fitted to rows that lack angles: choose of kernels and mixture, or leave those rows out"
+        )
+    return rows, replace(settings, parts=chosen), missing_notes(rows, int((~known).sum()))
 
 
 def _families(
@@ -195,21 +238,23 @@ def _try_flow(
     if not wanted or (len(folds.rows) < LEAST_FLOW_ROWS and not only):
         return _Tried()
     chosen = settings.flow or flow_settings(space, len(folds.rows), settings.seed)
+    train = folds.train(0)
     density, report = fit_density(
         space,
-        folds.train(0),
+        train.points,
         replace(chosen, seconds=min(chosen.seconds, budget.seconds_left)),
+        weights=train.weights,
         progress=lambda done, what: say(BEFORE_FLOW + (1 - BEFORE_FLOW) * done, f"flow: {what}"),
     )
     held = folds.held(0)
     with torch.no_grad():
-        own = density.log_prob(held)
+        own = density.log_prob(held.points)
     first = candidates.table[:, : candidates.first]
     others = stacked(first, weights)
     table = torch.stack([others, own])
-    both = stacking_weights(table)
-    gain = gain_of(stacked(table, both), others)
-    alone = float((own - first[-1]).mean())
+    both = stacking_weights(table, held.weights)
+    gain = gain_of(stacked(table, both), others, held.weights)
+    alone = held.mean(own - first[-1])
     # a weight chosen on these rows gains one nat among all of them by chance
     kept = gain.nats * len(held) >= 1
     share = float(both[1]) if kept else 0.0
@@ -244,17 +289,20 @@ def _report(
     found: Repeats,
     settings: AutomaticSettings,
     budget: Budget,
+    notes: list[str],
 ) -> FitReport:
-    held = float(stacked(candidates.table, weights).mean())
+    own_weights = candidates.row_weights
+    held = mean_of(stacked(candidates.table, weights), own_weights)
     held += sum(part.gain for part in parts if part.name == "flow")
     flow = tried.report if tried.share else None
     error = flow.integration_error if flow else 0.0
     total = candidates.table.shape[1]
     chosen = [
         f"chosen by {total} rows held out, in {folds.used} parts of a tenth each: "
-        f"{held - float(candidates.table[-1].mean()):.4f} nats above uniform",
+        f"{held - mean_of(candidates.table[-1], own_weights):.4f} nats above uniform",
         *map(str, parts),
     ]
+    some = folds.rows[:SCORED]
     mass = None
     if density.space.dim == 2:
         mass = density.mass_with(flow.mass) if flow and flow.mass is not None else 1.0
@@ -263,8 +311,10 @@ def _report(
         duplicates=found.rows,
         train=len(folds.rows),
         validation=total,
-        start_nll=-float(candidates.table[-1].mean()),
-        train_nll=mean_nll(density, folds.rows[:SCORED]),
+        start_nll=-mean_of(candidates.table[-1], own_weights),
+        train_nll=-mean_of(at_observed(density, some.points), some.weights)
+        if notes
+        else mean_nll(density, some.points, some.weights),
         validation_nll=-held,
         stages=flow.stages if flow else (),
         steps=density.flow.steps,
@@ -273,7 +323,10 @@ def _report(
         shares=tuple(density.shares.tolist()),
         parts=parts,
         repeats=found,
+        effective=None if folds.rows.weights is None else effective_rows(folds.rows.weights),
         notes=(
+            *notes,
+            *weights_note(folds.rows),
             *chosen,
             *found.notes(settings.repeats),
             *budget.notes(),

@@ -11,6 +11,7 @@ import torch
 from torch import Tensor
 
 from orbiflow.density.fitting.budget import Budget
+from orbiflow.density.fitting.rows import mean_of
 from orbiflow.density.fitting.training import training
 from orbiflow.density.models.chains import SCALES, VonMisesChains, averaged, chained, waves
 from orbiflow.density.models.log_sum import shares_of
@@ -128,8 +129,8 @@ def _mean(log_sum: Tensor, count: int) -> float:
     return float(log_sum.mean()) - math.log(count)
 
 
-def _nll(mixture: VonMisesChains, points: Tensor) -> float:
-    return -float(mixture.log_prob(points).mean())
+def _nll(mixture: VonMisesChains, points: Tensor, weights: Tensor | None = None) -> float:
+    return -mean_of(mixture.log_prob(points), weights)
 
 
 @torch.no_grad()
@@ -145,20 +146,23 @@ def fit_chain_mixture(
     *,
     patience: int = PATIENCE,
     worthwhile: float = 0.0,
+    row_weights: Tensor | None = None,
+    held_weights: Tensor | None = None,
 ) -> VonMisesChains:
     """EM from seeds that are spread out; the iterate that was best on `validation`.
 
-    It ends after more looks than `patience` that bring no more than `worthwhile` nats.
+    It ends after more looks than `patience` that bring no more than `worthwhile` nats. `row_weights`
+    (N,), of mean 1, and `held_weights` (M,) are of the rows of the two; default equal.
     """
-    step = _Maximization(train, order)
-    mixture = _started(space, step.angle, count, order, generator)
-    best, least, idle = mixture, _nll(mixture, validation), 0
+    step = _Maximization(train, order, row_weights)
+    mixture = _started(space, step.angle, count, order, generator, row_weights)
+    best, least, idle = mixture, _nll(mixture, validation, held_weights), 0
     for iteration in range(1, iterations + 1):
         late = budget.is_spent
         if not late:
             mixture = step(mixture, bent=iteration > STRAIGHT)
         if iteration % EVERY == 0 or iteration == iterations or late:
-            score = _nll(mixture, validation)
+            score = _nll(mixture, validation, held_weights)
             idle = 0 if score < least - worthwhile else idle + 1
             if score < least:
                 best, least = mixture, score
@@ -170,13 +174,22 @@ def fit_chain_mixture(
 
 
 def _started(
-    space: Space, angle: Tensor, count: int, order: Tensor, generator: torch.Generator
+    space: Space,
+    angle: Tensor,
+    count: int,
+    order: Tensor,
+    generator: torch.Generator,
+    row_weights: Tensor | None,
 ) -> VonMisesChains:
     """A uniform component and `count` round ones at points far from each other (k-means++)."""
-    chosen = [int(torch.randint(len(angle), (), generator=generator))]
+    own = 1.0 if row_weights is None else row_weights
+    if row_weights is None:
+        chosen = [int(torch.randint(len(angle), (), generator=generator))]
+    else:
+        chosen = [int(torch.multinomial(row_weights, 1, generator=generator))]
     far = (1 - (angle - angle[chosen[0]]).cos()).sum(dim=1)
     for _ in range(count - 1):
-        chosen.append(int(torch.multinomial(far + 1e-12, 1, generator=generator)))
+        chosen.append(int(torch.multinomial(own * (far + 1e-12), 1, generator=generator)))
         far = torch.minimum(far, (1 - (angle - angle[chosen[-1]]).cos()).sum(dim=1))
     d = angle.shape[1]
     means = angle.new_zeros(count + 1, d, 1 + 2 * d)
@@ -190,7 +203,8 @@ def _started(
 class _Maximization:
     """The E and M steps on fixed points, of chains of one order (d,); component 0 stays uniform."""
 
-    def __init__(self, points: Tensor, order: Tensor) -> None:
+    def __init__(self, points: Tensor, order: Tensor, row_weights: Tensor | None = None) -> None:
+        self.row_weights = row_weights
         self.points, self.allowed = points, chained(order)
         self.angle = 2 * math.pi * points
         self.waves = waves(self.angle)
@@ -200,6 +214,8 @@ class _Maximization:
     def __call__(self, mixture: VonMisesChains, *, bent: bool) -> VonMisesChains:
         joint = mixture.joint(self.points)
         share = shares_of(joint.flatten(1)).reshape(joint.shape)  # (N, L, K)
+        if self.row_weights is not None:
+            share = share * self.row_weights[:, None, None]
         weight = share[..., 1:].sum(dim=1)  # (N, K) of each component
         precise = (share[..., 1:] / self.scale[:, None]).sum(dim=1)  # each as far as it counts
         center = torch.atan2(precise.mT @ self.angle.sin(), precise.mT @ self.angle.cos())

@@ -10,7 +10,9 @@ from torch import Tensor
 from orbiflow.density.fitting.budget import Budget
 from orbiflow.density.fitting.families import Family
 from orbiflow.density.fitting.folds import Folds
+from orbiflow.density.fitting.missing import log_prob_of_rows
 from orbiflow.density.fitting.report import PartEvidence, Progress
+from orbiflow.density.fitting.rows import Rows, mean_of
 from orbiflow.density.fitting.weights import (
     NEGLIGIBLE,
     Gain,
@@ -36,6 +38,7 @@ class Candidates:
     - `families`, `names`: of each row of `table` (P, N); the last is the uniform floor.
     - `fitted`: of each family, what was fitted to each fold.
     - `first`: rows of the first fold, which stand first.
+    - `row_weights`: of the rows (N,), None where all weigh the same.
     """
 
     families: list[str]
@@ -43,6 +46,7 @@ class Candidates:
     table: Tensor
     fitted: dict[str, list[dict[str, Base]]]
     first: int
+    row_weights: Tensor | None = None
 
     @property
     def floor(self) -> Tensor:
@@ -59,6 +63,7 @@ def candidates_of(
 ) -> Candidates:
     """Fit all families to all folds; after the first, only what may be of use."""
     blocks: list[dict[tuple[str, str], Tensor]] = []
+    weights: list[Tensor | None] = []
     fitted: dict[str, list[dict[str, Base]]] = {family.name: [] for family in families}
     for number, (train, held) in enumerate(folds):
         if number and budget.is_spent:
@@ -74,11 +79,13 @@ def candidates_of(
             found = family.fitted(number, train, held, tell)
             fitted[family.name].append(found)
             with torch.no_grad():
-                block |= {(family.name, name): p.log_prob(held) for name, p in found.items()}
-        block[FLOOR, FLOOR] = UniformBase(space).log_prob(held)
+                for name, part in found.items():
+                    block[family.name, name] = log_prob_of_rows(part, held.points)
+        block[FLOOR, FLOOR] = log_prob_of_rows(UniformBase(space), held.points)
         blocks.append(block)
+        weights.append(held.weights)
         if number == 0:
-            _narrow(families, block)
+            _narrow(families, block, held)
     keys = [key for key in blocks[-1] if all(key in block for block in blocks)]
     table = torch.cat([torch.stack([block[key] for key in keys]) for block in blocks], dim=1)
     return Candidates(
@@ -87,36 +94,38 @@ def candidates_of(
         table,
         fitted,
         len(blocks[0][FLOOR, FLOOR]),
+        None if weights[0] is None else torch.cat([own for own in weights if own is not None]),
     )
 
 
-def _narrow(families: list[Family], block: dict[tuple[str, str], Tensor]) -> None:
+def _narrow(families: list[Family], block: dict[tuple[str, str], Tensor], held: Rows) -> None:
     """Of each family keep what has most weight in the first fold, and the best alone."""
     keys = list(block)
-    weights = stacking_weights(torch.stack([block[key] for key in keys])).tolist()
+    weights = stacking_weights(torch.stack([block[key] for key in keys]), held.weights).tolist()
     for family in families:
         own = {name: w for (f, name), w in zip(keys, weights, strict=True) if f == family.name}
         if own:
-            best = max(own, key=lambda name, f=family.name: float(block[f, name].mean()))
+            best = max(own, key=lambda name, f=family.name: held.mean(block[f, name]))
             weighty = [name for name, w in own.items() if w >= NEGLIGIBLE]
             family.keep({best, *sorted(weighty, key=lambda name, w=own: -w[name])[:KEPT]})
 
 
 def judged(candidates: Candidates, weights: Tensor) -> list[PartEvidence]:
     """What each family is worth in the mixture of these weights (P,)."""
-    table = candidates.table
+    table, own_weights = candidates.table, candidates.row_weights
     whole, uniform = stacked(table, weights), table[-1]
     found = []
     names = [name for name in dict.fromkeys(candidates.families) if name != FLOOR]
     for name in names:
         own = candidates.of(name)
-        alone = stacked(table[own], sparse_weights(table[own], candidates.floor[own]))
+        alone = stacked(table[own], sparse_weights(table[own], candidates.floor[own], own_weights))
         share = float(weights[own & ~candidates.floor].sum())
         gain = Gain(0.0, 0.0)
         if share:
             rest = ~own | candidates.floor
-            without = stacked(table[rest], sparse_weights(table[rest], candidates.floor[rest]))
-            gain = gain_of(whole, without)
-        above = float((alone - uniform).mean())
+            others = sparse_weights(table[rest], candidates.floor[rest], own_weights)
+            without = stacked(table[rest], others)
+            gain = gain_of(whole, without, own_weights)
+        above = mean_of(alone - uniform, own_weights)
         found.append(PartEvidence(name, share, above, gain.nats, gain.error, table.shape[1]))
     return found

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
@@ -13,8 +12,11 @@ from torch import Tensor
 from orbiflow.density.fitting.budget import Budget
 from orbiflow.density.fitting.chains import fit_chain_mixture
 from orbiflow.density.fitting.kernels import NARROWEST
+from orbiflow.density.fitting.missing import is_whole, log_prob_of_rows, with_incomplete
 from orbiflow.density.fitting.mixtures import fit_mixture
+from orbiflow.density.fitting.rows import Rows
 from orbiflow.density.fitting.scales import joined, kernel_estimates
+from orbiflow.density.fitting.weights import gain_of
 from orbiflow.density.models.bases import Base
 from orbiflow.density.models.chains import VonMisesChains, averaged
 from orbiflow.density.models.kernels import AdaptiveKernels
@@ -48,11 +50,11 @@ class Family(ABC):
     name: str
 
     @abstractmethod
-    def fitted(self, number: int, train: Tensor, held: Tensor, say: Say) -> dict[str, Base]:
+    def fitted(self, number: int, train: Rows, held: Rows, say: Say) -> dict[str, Base]:
         """What is fitted to the training rows of a fold, to be judged by the rows held out."""
 
     @abstractmethod
-    def final(self, rows: Tensor, folds: list[dict[str, Base]], names: list[str]) -> list[Base]:
+    def final(self, rows: Rows, folds: list[dict[str, Base]], names: list[str]) -> list[Base]:
         """What the density is made of, given all rows and what was fitted to each fold."""
 
     def keep(self, names: set[str]) -> None:
@@ -69,18 +71,31 @@ class KernelFamily(Family):
     repeats: bool = True
     name = "kernels"
 
-    def fitted(self, number: int, train: Tensor, held: Tensor, say: Say) -> dict[str, Base]:
+    def fitted(self, number: int, train: Rows, held: Rows, say: Say) -> dict[str, Base]:
         del number, held
         say("kernels")
         return dict(self._estimates(train))
 
-    def final(self, rows: Tensor, folds: list[dict[str, Base]], names: list[str]) -> list[Base]:
+    def final(self, rows: Rows, folds: list[dict[str, Base]], names: list[str]) -> list[Base]:
         del folds
         found = self._estimates(rows)
         return [found[name] for name in names]
 
-    def _estimates(self, rows: Tensor) -> dict[str, AdaptiveKernels]:
-        return kernel_estimates(self.space, rows, narrowest=self.narrowest, repeats=self.repeats)
+    def _estimates(self, rows: Rows) -> dict[str, AdaptiveKernels]:
+        known = is_whole(rows)
+        whole = rows[known]
+        found = kernel_estimates(
+            self.space,
+            whole.points,
+            narrowest=self.narrowest,
+            repeats=self.repeats,
+            row_weights=whole.weights,
+        )
+        if len(whole) == len(rows):
+            return found
+        total = float(len(whole)) if whole.weights is None else float(whole.weights.sum())
+        rest = rows[~known]
+        return {name: with_incomplete(part, rest, total) for name, part in found.items()}
 
 
 @dataclass
@@ -97,21 +112,27 @@ class MixtureFamily(Family):
     sizes: tuple[int, ...] | None = None
     name = "mixture"
 
-    def fitted(self, number: int, train: Tensor, held: Tensor, say: Say) -> dict[str, Base]:
+    def fitted(self, number: int, train: Rows, held: Rows, say: Say) -> dict[str, Base]:
         train = train[:MOST_MIXED]
+        whole = int(is_whole(train).sum())
         generator = torch.Generator().manual_seed(self.seed + number)
 
         def fit(size: int) -> Base:
             say(f"mixture of {size}")
             return fit_mixture(
-                self.space, train, size, narrowest=self.narrowest, generator=generator
+                self.space,
+                train.points,
+                size,
+                narrowest=self.narrowest,
+                generator=generator,
+                row_weights=train.weights,
             )
 
         if self.sizes is None:
-            return _grown(fit, [k for k in SIZES if k == 1 or MIXTURE_ROWS * k <= len(train)], held)
+            return _grown(fit, [k for k in SIZES if k == 1 or MIXTURE_ROWS * k <= whole], held)
         return {str(size): fit(size) for size in self.sizes}
 
-    def final(self, rows: Tensor, folds: list[dict[str, Base]], names: list[str]) -> list[Base]:
+    def final(self, rows: Rows, folds: list[dict[str, Base]], names: list[str]) -> list[Base]:
         del rows
         found: list[Base] = []
         for name in names:
@@ -140,7 +161,7 @@ class ChainFamily(Family):
     name = "chains"
     _first: dict[str, Base] = field(default_factory=dict)
 
-    def fitted(self, number: int, train: Tensor, held: Tensor, say: Say) -> dict[str, Base]:
+    def fitted(self, number: int, train: Rows, held: Rows, say: Say) -> dict[str, Base]:
         train = train[:MOST_CHAINED]
         generator = torch.Generator().manual_seed(self.seed + number)
         natural = torch.arange(self.space.dim)
@@ -151,8 +172,8 @@ class ChainFamily(Family):
             order = torch.randperm(self.space.dim, generator=generator) if turn else natural
             return fit_chain_mixture(
                 self.space,
-                train,
-                held,
+                train.points,
+                held.points,
                 size,
                 order,
                 ITERATIONS,
@@ -160,6 +181,8 @@ class ChainFamily(Family):
                 Budget(),
                 patience=0,
                 worthwhile=IDLE,
+                row_weights=train.weights,
+                held_weights=held.weights,
             )
 
         if self.sizes is None:
@@ -170,7 +193,7 @@ class ChainFamily(Family):
             for size in self.sizes
         }
 
-    def final(self, rows: Tensor, folds: list[dict[str, Base]], names: list[str]) -> list[Base]:
+    def final(self, rows: Rows, folds: list[dict[str, Base]], names: list[str]) -> list[Base]:
         del rows
         found: list[Base] = []
         for name in names:
@@ -182,19 +205,18 @@ class ChainFamily(Family):
         self.sizes = tuple(sorted(map(int, names)))
 
 
-def _grown(fit: Callable[[int], Base], sizes: Iterable[int], held: Tensor) -> dict[str, Base]:
+def _grown(fit: Callable[[int], Base], sizes: Iterable[int], held: Rows) -> dict[str, Base]:
     """Fits of growing size, until one is clearly worse on the held-out rows than the best before."""
     found: dict[str, Base] = {}
     best: Tensor | None = None
     for size in sizes:
         part = found[str(size)] = fit(size)
         with torch.no_grad():
-            score = part.log_prob(held)
+            score = log_prob_of_rows(part, held.points)
         if best is not None:
-            gain = score - best
-            error = float(gain.std()) / math.sqrt(len(gain))
-            if float(gain.mean()) < -CLEARLY * error:
+            gain = gain_of(score, best, held.weights)
+            if gain.nats < -CLEARLY * gain.error:
                 break
-        if best is None or float(score.mean()) > float(best.mean()):
+        if best is None or held.mean(score) > held.mean(best):
             best = score
     return found

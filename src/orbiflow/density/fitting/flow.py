@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import torch
 from torch import Tensor
 
@@ -18,21 +20,20 @@ from orbiflow.density.fitting.report import (
     own_points,
     repeats_note,
     settle,
-    split,
+    sides,
     steps_note,
 )
+from orbiflow.density.fitting.rows import Rows, effective_rows, weighed, weights_note
 from orbiflow.density.fitting.settings import FitSettings
 from orbiflow.density.fitting.stages import MOST_HELD, refine_in_stages
 from orbiflow.density.fitting.training import training
 from orbiflow.density.models.bases import Base, UniformBase, VonMisesBase
+from orbiflow.density.models.still import MOST_DIM
 from orbiflow.density.models.symmetric import SymmetricDensity
 from orbiflow.density.spaces.space import Space
 from orbiflow.errors import OrbiflowError
 from orbiflow.fields import SplineField
 from orbiflow.flows import Flow
-
-MOST_DIM = 3
-"""Dimensions of a spline's grid; beyond, it would be too large."""
 
 MOST_STEPS = 256
 """Runge-Kutta steps a segment to which they are doubled, in the end, until the integral is right."""
@@ -47,6 +48,7 @@ def fit_density(
     points: Tensor,
     settings: FitSettings | None = None,
     *,
+    weights: Any = None,
     progress: Progress | None = None,
 ) -> tuple[SymmetricDensity, FitReport]:
     """Fit a flow of spline fields to canonical points by flow matching, then by likelihood.
@@ -57,13 +59,15 @@ def fit_density(
         space: of three dimensions at most; see `fit_neural` for tori of more.
         points: (N, d) in the chart, anything that NumPy takes, N >= 10 different ones.
         settings: default `FitSettings()`.
+        weights: of the points (N,), at least 0; only their ratios count; default equal.
         progress: told how far it is.
 
     Returns:
         The density, float64, and the report.
 
     Raises:
-        OrbiflowError: for a space of four and more dimensions, points of another shape or too few.
+        OrbiflowError: for a space of four and more dimensions, points of another shape or too few, or
+            weights that are none.
     """
     settings = FitSettings() if settings is None else settings
     check_kind(settings, FitSettings, "settings")
@@ -74,24 +78,34 @@ def fit_density(
         )
     say = progress or (lambda _share, _what: None)
     generator = torch.Generator().manual_seed(settings.seed)
-    points = own_points(space, points)
-    train, validation, duplicates = split(points, settings.validation, generator)
+    rows = weighed(own_points(space, points), weights)
+    order, out, duplicates = sides(rows.points, settings.validation, generator)
+    train, validation = (rows[order[side]] for side in (~out, out))
     say(0.0, "matching")
     density = _start(space, train, settings, generator)
-    start_nll = mean_nll(density, validation.to(next(density.flow.parameters()).dtype))
+    start_nll = mean_nll(
+        density, validation.points.to(next(density.flow.parameters()).dtype), validation.weights
+    )
     budget = Budget(settings.evaluations, settings.seconds)
     stages = refine_in_stages(density, train, validation, settings, say, budget)
     density.flow.double()
-    error, mass = settle(density, validation[:MOST_HELD], MOST_STEPS)
+    error, mass = settle(density, validation.points[:MOST_HELD], MOST_STEPS)
     notes = [
-        *repeats_note(len(points), duplicates),
+        *weights_note(rows),
+        *repeats_note(len(rows), duplicates),
         *budget.notes(),
         *steps_note(density, error),
     ]
     shares = None
     if settings.kernels:
         say(1.0, "kernels")
-        density = blend_kernels(density, train, validation)
+        density = blend_kernels(
+            density,
+            train.points,
+            validation.points,
+            row_weights=train.weights,
+            held_weights=validation.weights,
+        )
         mass = None if mass is None else density.mass_with(mass)
         shares = tuple(density.shares.tolist())
         flow, kernels, floor = (f"{share:.1%}" for share in shares)
@@ -99,25 +113,31 @@ def fit_density(
             f"the density is a blend: flow {flow}, kernels {kernels}, uniform floor {floor}"
         )
     report = FitReport(
-        points=len(points),
+        points=len(rows),
         duplicates=duplicates,
         train=len(train),
         validation=len(validation),
         start_nll=start_nll,
-        train_nll=mean_nll(density, train[:MOST_REPORTED]),
-        validation_nll=mean_nll(density, validation[:MOST_REPORTED]),
+        train_nll=_nll(density, train),
+        validation_nll=_nll(density, validation),
         stages=tuple(stages),
         steps=density.flow.steps,
         mass=mass,
         integration_error=error,
         shares=shares,
+        effective=None if rows.weights is None else effective_rows(rows.weights),
         notes=(*notes, *_mass_note(space, mass)),
     )
     return density, report
 
 
+def _nll(density: SymmetricDensity, rows: Rows) -> float:
+    some = rows[:MOST_REPORTED]
+    return mean_nll(density, some.points, some.weights)
+
+
 def _start(
-    space: Space, train: Tensor, settings: FitSettings, generator: torch.Generator
+    space: Space, train: Rows, settings: FitSettings, generator: torch.Generator
 ) -> SymmetricDensity:
     """The closed-form start, by flow matching."""
     base: Base = UniformBase(space) if settings.base == "uniform" else VonMisesBase(space)
@@ -127,7 +147,7 @@ def _start(
         SplineField(space.group, frequency, smoothness=settings.smoothness, dtype=dtype)
         for _ in range(settings.segments)
     ]
-    chosen = train[:MOST_MATCHED]
+    chosen = _matched(train, generator)
     start, move = coupled(space, base.sample(len(chosen), generator), chosen)
     match_flow(
         segments,
@@ -138,6 +158,20 @@ def _start(
         generator=generator,
     )
     return SymmetricDensity(space, Flow(segments, steps=settings.steps, warn=False), base)
+
+
+def _matched(train: Rows, generator: torch.Generator) -> Tensor:
+    """Points that are matched: base points have one weight, so heavy rows come more often."""
+    if train.weights is None:
+        return train.points[:MOST_MATCHED]
+    count = min(len(train), MOST_MATCHED)
+    ends = train.weights.cumsum(0) / train.weights.sum()
+    even = (
+        torch.arange(count) + torch.rand(count, dtype=torch.float64, generator=generator)
+    ) / count
+    rows = torch.searchsorted(ends, even).clamp_max(len(train) - 1)
+    # in random order, as pairs are sought among neighbours in it
+    return train.points[rows[torch.randperm(count, generator=generator)]]
 
 
 def max_frequency(space: Space, detail: int) -> int:

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
+from orbiflow.density.fitting.rows import Rows
+
 FOLDS = 10
 """Each holds out a tenth of the rows."""
 
@@ -23,39 +25,38 @@ MOST_HELD = 2_000
 
 @dataclass(frozen=True)
 class Folds:
-    """Rows (N, d) in random order, and the fold (N,) of each.
+    """Rows in random order, and the fold (N,) of each.
 
     - `used`: folds that are held out in turn, from the first.
     """
 
-    rows: Tensor
+    rows: Rows
     fold: Tensor
     used: int
 
-    def train(self, number: int) -> Tensor:
+    def train(self, number: int) -> Rows:
         """All rows but those of a fold."""
         return self.rows[self.fold != number]
 
-    def held(self, number: int) -> Tensor:
+    def held(self, number: int) -> Rows:
         """Rows of a fold, `MOST_HELD` at most."""
         return self.rows[self.fold == number][:MOST_HELD]
 
-    def __iter__(self) -> Iterator[tuple[Tensor, Tensor]]:
+    def __iter__(self) -> Iterator[tuple[Rows, Rows]]:
         for number in range(self.used):
             yield self.train(number), self.held(number)
 
 
-def folds_of(points: Tensor, *, together: bool, generator: torch.Generator) -> Folds:
-    """Tenths of the points (N, d) at random, N >= 10 different ones.
+def folds_of(rows: Rows, *, together: bool, generator: torch.Generator) -> Folds:
+    """Tenths of the rows at random, N >= 10 different ones.
 
     A new row of the same source repeats an old one as often as the old ones repeat each other, and so
     do rows held out at random. Where equal rows are an accident of rounding, that would reward peaks
     at the values that happened to be recorded: then they are kept `together`, in one fold.
     """
-    order = torch.randperm(len(points), generator=generator)
-    rows = points[order]
+    rows = rows[torch.randperm(len(rows), generator=generator)]
     if together:
-        _, place = places(rows)
+        _, place = places(rows.points)
         group = torch.randperm(int(place.max()) + 1, generator=generator)[place]
     else:
         group = torch.arange(len(rows))

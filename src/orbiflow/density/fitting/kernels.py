@@ -11,6 +11,7 @@ from scipy.spatial import KDTree
 from torch import Tensor
 
 from orbiflow.density.arguments import check_kind, points_tensor
+from orbiflow.density.fitting.rows import mean_of
 from orbiflow.density.fitting.training import training
 from orbiflow.density.models.bases import UniformBase
 from orbiflow.density.models.blend import BlendedDensity
@@ -33,7 +34,14 @@ FLOOR = 1e-3
 
 
 @training()
-def blend_kernels(density: SymmetricDensity, train: Tensor, held: Tensor) -> BlendedDensity:
+def blend_kernels(
+    density: SymmetricDensity,
+    train: Tensor,
+    held: Tensor,
+    *,
+    row_weights: Tensor | None = None,
+    held_weights: Tensor | None = None,
+) -> BlendedDensity:
     """A fitted density blended with adaptive kernels about the training points and a uniform floor.
 
     Each kernel's variance is a share of the mean square distance to its nearest neighbours (Breiman,
@@ -43,6 +51,7 @@ def blend_kernels(density: SymmetricDensity, train: Tensor, held: Tensor) -> Ble
     Args:
         density: a flow's.
         train, held: canonical points (N, d).
+        row_weights, held_weights: of the two (N,); default equal.
 
     Raises:
         OrbiflowError: for points of another shape, fewer than three different ones to train on, or none
@@ -51,7 +60,9 @@ def blend_kernels(density: SymmetricDensity, train: Tensor, held: Tensor) -> Ble
     space = check_kind(density, SymmetricDensity, "density").space
     train = points_tensor(train, space.dim, "training points", flat=True).double()
     held = points_tensor(held, space.dim, "held points", flat=True).double()
-    centers, counts = torch.unique(train, dim=0, return_counts=True)
+    centers, place, counts = torch.unique(train, dim=0, return_inverse=True, return_counts=True)
+    if row_weights is not None:
+        counts = row_weights.new_zeros(len(centers)).index_add_(0, place, row_weights)
     if len(centers) > MOST_KERNELS:
         chosen = torch.randperm(len(centers), generator=torch.Generator().manual_seed(0))
         centers, counts = centers[chosen[:MOST_KERNELS]], counts[chosen[:MOST_KERNELS]]
@@ -62,6 +73,7 @@ def blend_kernels(density: SymmetricDensity, train: Tensor, held: Tensor) -> Ble
         )
     weights = counts.double() / counts.sum()
     held = held[:MOST_HELD]
+    held_weights = None if held_weights is None else held_weights[:MOST_HELD]
     found_spreads = spreads(space, centers, [m for m in NEIGHBOURS if m < len(centers)])
     uniform = UniformBase(space).log_prob(held)
     with torch.no_grad():
@@ -73,14 +85,16 @@ def blend_kernels(density: SymmetricDensity, train: Tensor, held: Tensor) -> Ble
         kappa = 1 / (scale * ((1 - share) * spread + share * mean))
         kernels = AdaptiveKernels(space, centers, kappa.clamp(WIDEST, NARROWEST), weights)
         parts = torch.stack([flow, kernels.log_prob(held), uniform])
-        shares, score = proportions(parts)
+        shares, score = proportions(parts, row_weights=held_weights)
         if score > best:
             best, found = score, BlendedDensity(space, density.flow, density.base, kernels, shares)
     assert found is not None
     return found
 
 
-def proportions(parts: Tensor, *, iterations: int = 60) -> tuple[Tensor, float]:
+def proportions(
+    parts: Tensor, *, iterations: int = 60, row_weights: Tensor | None = None
+) -> tuple[Tensor, float]:
     """Proportions (3,) that suit log densities `parts` (3, N) best, by EM; and their score.
 
     The last is kept at `FLOOR` or more.
@@ -88,10 +102,11 @@ def proportions(parts: Tensor, *, iterations: int = 60) -> tuple[Tensor, float]:
     shares = torch.full_like(parts[:, 0], 1 / len(parts))
     for _ in range(iterations):
         joint = parts + shares.log()[:, None]
-        shares = (joint - joint.logsumexp(dim=0)).exp().mean(dim=1)
+        each = (joint - joint.logsumexp(dim=0)).exp()
+        shares = each.mean(dim=1) if row_weights is None else each @ row_weights / row_weights.sum()
     shares[-1] = shares[-1].clamp_min(FLOOR)
     shares = shares.clamp_min(1e-12) / shares.clamp_min(1e-12).sum()
-    return shares, float((parts + shares.log()[:, None]).logsumexp(dim=0).mean())
+    return shares, mean_of((parts + shares.log()[:, None]).logsumexp(dim=0), row_weights)
 
 
 def spreads(space: Space, centers: Tensor, neighbours: list[int]) -> list[Tensor]:

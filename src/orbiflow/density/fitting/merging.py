@@ -9,7 +9,9 @@ LEVELS = 5
 """Halvings of the cells at most: a point is then known to 1/32 of a cell."""
 
 
-def merged(points: Tensor, cells: int, crowd: int) -> tuple[Tensor, Tensor]:
+def merged(
+    points: Tensor, cells: int, crowd: int, row_weights: Tensor | None = None
+) -> tuple[Tensor, Tensor]:
     """Means of the points in each cell of a grid that is finer where points crowd, and their shares.
 
     A smooth log density summed over the points changes by half its curvature times their variance
@@ -19,6 +21,7 @@ def merged(points: Tensor, cells: int, crowd: int) -> tuple[Tensor, Tensor]:
     Args:
         points: (N, d) in [0, 1]^d.
         cells: along a side, of the coarsest grid.
+        row_weights: of the points (N,); default equal.
         crowd: points in a cell, at most; more only where cells have been halved `LEVELS` times.
 
     Returns:
@@ -40,6 +43,11 @@ def merged(points: Tensor, cells: int, crowd: int) -> tuple[Tensor, Tensor]:
         if not len(left):
             break
     _, where, counts = torch.unique(group, return_inverse=True, return_counts=True)
+    if row_weights is not None:
+        points = points * row_weights[:, None]
+        counts = row_weights.new_zeros(len(counts)).index_add_(0, where, row_weights)
+        sums = points.new_zeros(len(counts), points.shape[1]).index_add_(0, where, points)
+        return sums / counts[:, None], (counts / counts.sum()).to(points)
     sums = points.new_zeros(len(counts), points.shape[1]).index_add_(0, where, points)
     return sums / counts[:, None], counts.to(points) / len(points)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import torch
 from torch import Tensor
@@ -32,6 +33,7 @@ def fit_mixture(
     iterations: int = 60,
     narrowest: float = NARROWEST,
     generator: torch.Generator,
+    row_weights: Tensor | None = None,
 ) -> AdaptiveKernels:
     """A mixture of components whose places, widths and weights are all fitted.
 
@@ -41,23 +43,37 @@ def fit_mixture(
     concentration finite.
 
     Args:
-        train: canonical points (N, d), N >= components.
+        train: canonical points (N, d), N >= components. On tori, angles may be missing (NaN): such a
+            row counts by its marginal likelihood (Ghahramani and Jordan, Supervised learning from
+            incomplete data via an EM approach, 1994). As many rows as components are whole.
         components: their number.
         iterations: of EM at most.
         narrowest: concentration at most.
         generator: of the start (k-means++).
+        row_weights: of the points (N,), of mean 1; default equal.
     """
-    blocks = space.features(train).split(BLOCK, dim=1)
-    mean = _spread_out(space.features(train), components, generator)
+    absent = train.isnan()
+    whole = ~absent.any(dim=1)
+    images = space.features(train.nan_to_num(0.0))
+    if not bool(whole.all()):
+        images = images * ~torch.cat([absent, absent], dim=1)
+    blocks = images.split(BLOCK, dim=1)
+    owns = [None] * len(blocks) if row_weights is None else row_weights.split(BLOCK)
+    gaps = [None] * len(blocks) if bool(whole.all()) else absent.to(images).split(BLOCK)
+    start = None if row_weights is None else row_weights[whole]
+    mean = _spread_out(images[:, whole], components, generator, start)
     width = 1 if space.is_round else space.dim
     kappa = mean.new_full((components, width), 10.0)
     weights = mean.new_full((components,), 1 / components)
     last = -math.inf
     for _ in range(iterations):
-        count, total, score = _expectation(space, blocks, mean, kappa, weights)
+        found = _expectation(
+            space, list(zip(blocks, owns, gaps, strict=True)), mean, kappa, weights
+        )
+        count, known, total, score = found
         weights = (count + 0.01) / (count + 0.01).sum()
         mean, length = _directions(space, total)
-        resultant = (length + PRIOR * PRIOR_RESULTANT) / (count[:, None] + PRIOR)
+        resultant = (length + PRIOR * PRIOR_RESULTANT) / (known + PRIOR)
         kappa = (_round_concentration if space.is_round else concentration)(resultant)
         kappa = kappa.clamp(WIDEST / 100, narrowest)
         if score - last < CONVERGED * len(train):
@@ -66,34 +82,61 @@ def fit_mixture(
     return AdaptiveKernels(space, _points(space, mean), kappa, weights)
 
 
-def _spread_out(images: Tensor, count: int, generator: torch.Generator) -> Tensor:
+def _spread_out(
+    images: Tensor, count: int, generator: torch.Generator, row_weights: Tensor | None
+) -> Tensor:
     """Features (K, m) of points far from each other over their images (E, N, m): k-means++."""
     own = images[0]
-    chosen = [int(torch.randint(len(own), (), generator=generator))]
+    weights = 1.0 if row_weights is None else row_weights
+    if row_weights is None:
+        chosen = [int(torch.randint(len(own), (), generator=generator))]
+    else:
+        chosen = [int(torch.multinomial(row_weights, 1, generator=generator))]
     far = ((images - own[chosen[0]]) ** 2).sum(dim=-1).amin(dim=0)
     for _ in range(count - 1):
-        chosen.append(int(torch.multinomial(far + 1e-12, 1, generator=generator)))
+        chosen.append(int(torch.multinomial(weights * (far + 1e-12), 1, generator=generator)))
         far = torch.minimum(far, ((images - own[chosen[-1]]) ** 2).sum(dim=-1).amin(dim=0))
     return own[chosen].clone()
 
 
 def _expectation(
-    space: Space, blocks: tuple[Tensor, ...], mean: Tensor, kappa: Tensor, weights: Tensor
-) -> tuple[Tensor, Tensor, float]:
-    """Points (K,) of each component, sums (K, m) of their nearest images' features, log-likelihood."""
+    space: Space,
+    blocks: Sequence[tuple[Tensor, Tensor | None, Tensor | None]],
+    mean: Tensor,
+    kappa: Tensor,
+    weights: Tensor,
+) -> tuple[Tensor, Tensor, Tensor, float]:
+    """What belongs to each component, and the log-likelihood.
+
+    Args:
+        blocks: features of points, 0 where they are missing, their weights, and what is missing.
+
+    Returns:
+        Points (K,) of each component, those of them that know each angle (K, 1) or (K, d), sums (K, m)
+        of their nearest images' features, the log-likelihood.
+    """
     rows, offsets = kernel_rows(space, mean, kappa)
     rows, offsets = rows.mT.contiguous(), offsets + weights.log()
     count, total, score = torch.zeros_like(weights), torch.zeros_like(mean), 0.0
-    for images in blocks:
+    unknown: Tensor | float = 0.0
+    for images, own, absent in blocks:
         joint = images @ rows + offsets
+        if absent is not None:  # a factor that is not there has no constant either
+            joint += absent @ (torch.special.i0e(kappa).log() + kappa).mT
         top = joint.amax(dim=(0, 2), keepdim=True)
         share = (joint - top).clamp_min_(FAINT).exp_()
         every = share.sum(dim=(0, 2), keepdim=True)
         share /= every
+        likelihood = every.log() + top
+        if own is not None:
+            share *= own[:, None]
+            likelihood = likelihood[0, :, 0] * own
         count += share.sum(dim=(0, 1))
+        if absent is not None:
+            unknown = unknown + share[0].mT @ absent
         total += torch.einsum("enk,enm->km", share, images)
-        score += float((every.log() + top).sum())
-    return count, total, score
+        score += float(likelihood.sum())
+    return count, count[:, None] - unknown, total, score
 
 
 def _directions(space: Space, total: Tensor) -> tuple[Tensor, Tensor]:

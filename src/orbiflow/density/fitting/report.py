@@ -12,6 +12,7 @@ from torch import Tensor
 from orbiflow.density.arguments import check_kind, points_tensor
 from orbiflow.density.fitting.likelihood import Refinement
 from orbiflow.density.fitting.repeats import Repeats
+from orbiflow.density.fitting.rows import mean_of
 from orbiflow.density.models.symmetric import SymmetricDensity
 from orbiflow.density.spaces.space import Space
 from orbiflow.errors import OrbiflowError
@@ -73,6 +74,7 @@ class FitReport:
     - `shares`: of flow, kernels, uniform floor and, if there are, chains; None for a flow alone.
     - `parts`: of a fit by evidence, what each part is worth.
     - `repeats`: of a fit by evidence, what was found of rows that repeat another.
+    - `effective`: rows of equal weight that say as much (Kish); None where all weigh the same.
     - `notes`: what the user should know, in words.
     """
 
@@ -90,6 +92,7 @@ class FitReport:
     shares: tuple[float, ...] | None = None
     parts: tuple[PartEvidence, ...] = ()
     repeats: Repeats | None = None
+    effective: float | None = None
     notes: tuple[str, ...] = field(default=())
 
 
@@ -109,6 +112,17 @@ def split(points: Tensor, share: float, generator: torch.Generator) -> tuple[Ten
     Raises:
         OrbiflowError: if there are fewer than ten different points.
     """
+    order, held, repeats = sides(points, share, generator)
+    points = points[order]
+    return points[~held], points[held], repeats
+
+
+def sides(points: Tensor, share: float, generator: torch.Generator) -> tuple[Tensor, Tensor, int]:
+    """An order of points (N, d), which of them (N,) are held out in it, how many repeat another.
+
+    Raises:
+        OrbiflowError: if there are fewer than ten different points.
+    """
     # rounding keeps together what differs by the projection's last digit
     unique, where = torch.unique((points * 1e9).round(), dim=0, return_inverse=True)
     if len(unique) < 10:
@@ -120,19 +134,20 @@ def split(points: Tensor, share: float, generator: torch.Generator) -> tuple[Ten
         True
     )
     order = torch.randperm(len(points), generator=generator)
-    points, held = points[order], held[where][order]
-    return points[~held], points[held], len(points) - len(unique)
+    return order, held[where][order], len(points) - len(unique)
 
 
 @torch.no_grad()
-def mean_nll(density: SymmetricDensity, points: Tensor) -> float:
-    """Mean negative log density at `points` (N, d), per area of the square."""
-    return -float(density.log_prob(points).mean())
+def mean_nll(density: SymmetricDensity, points: Tensor, weights: Tensor | None = None) -> float:
+    """Mean negative log density at `points` (N, d), weighted, per area of the square."""
+    return -mean_of(density.log_prob(points), weights)
 
 
-def nll_at(density: SymmetricDensity, points: Tensor, steps: int) -> float:
+def nll_at(
+    density: SymmetricDensity, points: Tensor, steps: int, weights: Tensor | None = None
+) -> float:
     """`mean_nll` with another number of Runge-Kutta steps a segment."""
-    return mean_nll(density.with_steps(steps), points)
+    return mean_nll(density.with_steps(steps), points, weights)
 
 
 def step_error(density: SymmetricDensity, points: Tensor) -> float:

@@ -28,7 +28,12 @@ LADDER = 27
 
 
 def kernel_estimates(
-    space: Space, train: Tensor, *, narrowest: float = NARROWEST, repeats: bool = True
+    space: Space,
+    train: Tensor,
+    *,
+    narrowest: float = NARROWEST,
+    repeats: bool = True,
+    row_weights: Tensor | None = None,
 ) -> dict[str, AdaptiveKernels]:
     """Estimates about training points (N, d) in random order, by their names.
 
@@ -39,16 +44,24 @@ def kernel_estimates(
     Args:
         narrowest: concentration at most.
         repeats: whether places of several points count as such.
+        row_weights: of the points (N,); default equal.
     """
     train = train[:MOST_CENTERS]
+    own = (
+        None
+        if row_weights is None
+        else row_weights[:MOST_CENTERS] / row_weights[:MOST_CENTERS].sum()
+    )
     found = {}
     for kappa in np.geomspace(WIDEST, narrowest, LADDER):
-        found[f"width {kappa**-0.5:.2g}"] = even_kernels(space, train, float(kappa))
+        found[f"width {kappa**-0.5:.2g}"] = even_kernels(space, train, float(kappa), own)
     counts, place = places(train)
     first = torch.full((len(counts),), len(train)).scatter_reduce(
         0, place, torch.arange(len(train)), "amin"
     )
     centers, weights = train[first], counts.double() / len(train)
+    if own is not None:
+        weights = torch.zeros_like(weights).index_add_(0, place, own)
     neighbours = [m for m in NEIGHBOURS if m < len(centers)]
     shrinkage = (1.0,) if space.is_round or space.dim == 1 else ISOTROPY
     for number, spread in zip(neighbours, spreads(space, centers, neighbours), strict=True):

@@ -11,6 +11,7 @@ from orbiflow.density.fitting.budget import Budget
 from orbiflow.density.fitting.likelihood import Refinement, refine
 from orbiflow.density.fitting.merging import merged
 from orbiflow.density.fitting.report import MASS_TOLERANCE, Progress, nll_at, step_error
+from orbiflow.density.fitting.rows import Rows
 from orbiflow.density.fitting.settings import FitSettings
 from orbiflow.density.models.symmetric import SymmetricDensity
 
@@ -29,8 +30,8 @@ MERGED, CROWD = 4096, 2
 
 def refine_in_stages(
     density: SymmetricDensity,
-    train: Tensor,
-    validation: Tensor,
+    train: Rows,
+    validation: Rows,
     settings: FitSettings,
     say: Progress,
     budget: Budget,
@@ -47,13 +48,15 @@ def refine_in_stages(
     points, weights = (
         part.to(dtype)
         for part in merged(
-            train,
+            train.points,
             max(LEAST_CELLS, CELLS * settings.detail),
             crowd=math.ceil(CROWD * len(train) / MERGED),
+            row_weights=train.weights,
         )
     )
     # never merged: means of cells would call overfitting to means of cells good
-    held = validation[:MOST_HELD].to(dtype)
+    held = validation[:MOST_HELD]
+    held = Rows(held.points.to(dtype), held.weights)
     count = len(settings.roughness)
     while len(stages) < count and not budget.is_spent:
         number = len(stages)
@@ -66,8 +69,9 @@ def refine_in_stages(
         stage = refine(
             density,
             points,
-            held,
+            held.points,
             weights=weights,
+            held_weights=_shares(held),
             iterations=settings.iterations,
             kinetic=settings.kinetic,
             roughness=settings.roughness[number],
@@ -81,7 +85,7 @@ def refine_in_stages(
             density.flow = density.flow.with_steps(2 * density.flow.steps)
             continue
         stages.append(stage)
-        unconverged = step_error(density, held) > MASS_TOLERANCE
+        unconverged = step_error(density, held.points) > MASS_TOLERANCE
         if unconverged and density.flow.steps < MOST_STEPS:
             density.flow = density.flow.with_steps(2 * density.flow.steps)
         elif number > 1 and stage.best == 0:
@@ -89,11 +93,16 @@ def refine_in_stages(
     return stages
 
 
-def _exploits(density: SymmetricDensity, held: Tensor, stage: Refinement) -> bool:
+def _exploits(density: SymmetricDensity, held: Rows, stage: Refinement) -> bool:
     if stage.best == 0:
         return False
-    honest = nll_at(density, held, 4 * density.flow.steps)
+    honest = nll_at(density, held.points, 4 * density.flow.steps, held.weights)
     return not honest <= stage.validation[0] + MASS_TOLERANCE
+
+
+def _shares(rows: Rows) -> Tensor | None:
+    """Weights of sum 1, in the points' dtype."""
+    return None if rows.weights is None else (rows.weights / rows.weights.sum()).to(rows.points)
 
 
 @torch.no_grad()

@@ -8,6 +8,8 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
+from orbiflow.density.fitting.rows import effective_rows, mean_of
+
 TOLERANCE = 1e-4
 """Nats by which the weights may be off the best ones."""
 
@@ -25,9 +27,14 @@ class Gain(NamedTuple):
     error: float
 
 
-def gain_of(better: Tensor, worse: Tensor) -> Gain:
-    """Of two log densities (N,) at the same rows."""
+def gain_of(better: Tensor, worse: Tensor, row_weights: Tensor | None = None) -> Gain:
+    """Of two log densities (N,) at the same rows, which may be weighted."""
     difference = better - worse
+    if row_weights is not None:
+        mean = mean_of(difference, row_weights)
+        rows = effective_rows(row_weights)
+        variance = mean_of((difference - mean) ** 2, row_weights)
+        return Gain(mean, math.sqrt(variance / (rows - 1)) if rows > 1 else math.nan)
     spread = float(difference.std()) if len(difference) > 1 else math.nan
     return Gain(float(difference.mean()), spread / math.sqrt(len(difference)))
 
@@ -37,12 +44,12 @@ def stacked(table: Tensor, weights: Tensor) -> Tensor:
     return (table + weights.log()[:, None]).logsumexp(dim=0)
 
 
-def stacking_weights(table: Tensor) -> Tensor:
+def stacking_weights(table: Tensor, row_weights: Tensor | None = None) -> Tensor:
     """Proportions (P,) that give held-out rows the greatest mean log density, from a table (P, N).
 
     The problem is concave; EM finds its only optimum (Smyth and Wolpert, Linearly combining density
     estimators via stacking, 1999). The largest mean ratio of a density to the mixture, less 1, bounds
-    what is missing.
+    what is missing. Rows may be weighted (N,).
 
     >>> table = torch.tensor([[0.0, 0.0], [-1.0, -1.0]])
     >>> stacking_weights(table).round(decimals=2)
@@ -50,8 +57,10 @@ def stacking_weights(table: Tensor) -> Tensor:
     """
     relative = (table - table.amax(dim=0)).exp()
     weights = torch.full_like(table[:, 0], 1 / len(table))
+    row_share = None if row_weights is None else (row_weights / row_weights.sum()).to(table)
     for iteration in range(ITERATIONS):
-        ratio = (relative / (weights @ relative)).mean(dim=1)
+        ratio = relative / (weights @ relative)
+        ratio = ratio.mean(dim=1) if row_share is None else ratio @ row_share
         if iteration % EVERY == 0 and float(ratio.max()) - 1 < TOLERANCE:
             break
         weights = weights * ratio
@@ -59,16 +68,16 @@ def stacking_weights(table: Tensor) -> Tensor:
     return weights
 
 
-def sparse_weights(table: Tensor, always: Tensor) -> Tensor:
+def sparse_weights(table: Tensor, always: Tensor, row_weights: Tensor | None = None) -> Tensor:
     """As `stacking_weights`, without those that are `NEGLIGIBLE`; but `always` (P,) has a little.
 
     The least weight of what must be there is half a row's: nothing is impossible that as many rows
     could not rule out.
     """
-    weights = stacking_weights(table)
+    weights = stacking_weights(table, row_weights)
     kept = (weights >= NEGLIGIBLE) | always
     found = torch.zeros_like(weights)
-    found[kept] = stacking_weights(table[kept])
+    found[kept] = stacking_weights(table[kept], row_weights)
     least = 0.5 / (table.shape[1] + 1)
     found[always] = found[always].clamp_min(least)
     return found / found.sum()

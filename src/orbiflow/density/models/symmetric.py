@@ -41,6 +41,10 @@ class SymmetricDensity(Distribution):
     arg_constraints: ClassVar[dict[str, Any]] = {}
     has_rsample = True
 
+    error: float = 0.0
+    """Nats, root mean square, by which a density with tabulated parts is off what it stands for; see
+    `orbiflow.density.marginal`."""
+
     def __init__(self, space: Space, flow: Flow, base: Base | None = None) -> None:
         self.space = check_kind(space, Space, "space", "see `make_space`")
         self.flow = check_kind(flow, Flow, "flow")

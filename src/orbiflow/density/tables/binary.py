@@ -32,6 +32,7 @@ def read_npy(
     width: int | None,
     max_rows: int,
     drop_missing: bool = False,
+    keep_missing: bool = False,
 ) -> Table:
     shape, dtype = _npy_header(path)
     check_count(path, shape[0], max_rows, "rows")
@@ -50,7 +51,9 @@ def read_npy(
             values = np.stack([part.astype(np.float64) for part in parts], axis=1)
     except (OSError, ValueError, TypeError, IndexError, OverflowError) as exc:
         raise _damaged(path, exc) from exc
-    return _numbered(path, values, tuple(names[i] for i in picked), notes, drop_missing)
+    return _numbered(
+        path, values, tuple(names[i] for i in picked), notes, drop_missing, keep_missing
+    )
 
 
 def _npy_header(path: Path) -> tuple[tuple[int, ...], np.dtype]:
@@ -87,6 +90,7 @@ def read_parquet(
     width: int | None,
     max_rows: int,
     drop_missing: bool = False,
+    keep_missing: bool = False,
 ) -> Table:
     try:
         arrow = importlib.import_module("pyarrow")
@@ -115,7 +119,7 @@ def read_parquet(
         raise
     except (arrow.ArrowException, OSError, ValueError, KeyError, MemoryError) as exc:
         raise _damaged(path, exc) from exc
-    return _numbered(path, np.concatenate(blocks), names, notes, drop_missing)
+    return _numbered(path, np.concatenate(blocks), names, notes, drop_missing, keep_missing)
 
 
 def _numbered(
@@ -124,12 +128,13 @@ def _numbered(
     names: tuple[str, ...],
     notes: list[str],
     drop_missing: bool,
+    keep_missing: bool,
 ) -> Table:
     rows, dropped = np.arange(1, len(values) + 1, dtype=np.int64), frozenset()
     if drop_missing and len(values):
         values, rows, dropped, more = without_missing(path, values, rows, "row")
         notes = [*notes, *more]
-    check_finite(path, values, rows, names, "row")
+    check_finite(path, values, rows, names, "row", keep_missing)
     return Table(values, names, rows, tuple(notes), None, None, dropped=dropped)
 
 

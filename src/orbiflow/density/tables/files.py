@@ -29,6 +29,7 @@ def read_table(
     max_rows: int = 20_000_000,
     has_header: bool | None = None,
     drop_missing: bool = False,
+    keep_missing: bool = False,
 ) -> Table:
     """Read columns of finite numbers from a text, `.npy` or Parquet file.
 
@@ -41,7 +42,8 @@ def read_table(
     first, then without regard to case), else by its 1-based number as text ("3"). None takes all
     columns of numbers. `width` is how many columns there must be, None for any number. `has_header`
     says whether a text file's first line names the columns, None to look. With `drop_missing`, rows
-    that lack a value in a chosen column are left out. Decimal commas are read where they cannot be
+    that lack a value in a chosen column are left out; with `keep_missing` they stay, with NaN. Decimal
+    commas are read where they cannot be
     taken for anything else.
 
     Raises `InputFileError` naming the file, the line and the column at fault; `OrbiflowError` for
@@ -50,9 +52,9 @@ def read_table(
     path = Path(path)
     kind = _kind(path)
     if kind == "text":
-        return read_text(path, columns, width, max_rows, drop_missing, has_header)
+        return read_text(path, columns, width, max_rows, drop_missing, has_header, keep_missing)
     read = {"npy": read_npy, "parquet": read_parquet}[kind]
-    return read(path, columns, width, max_rows, drop_missing)
+    return read(path, columns, width, max_rows, drop_missing, keep_missing)
 
 
 def append_column(table: Table, path_of_source: str | Path, name: str, values: ArrayLike) -> bytes:

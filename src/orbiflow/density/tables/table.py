@@ -19,7 +19,7 @@ BLOCK = 65_536  # rows
 class Table:
     """The chosen columns of a file.
 
-    - `values`: (N, k) float64, all finite.
+    - `values`: (N, k) float64, all finite; NaN where a value is missing, if that was asked for.
     - `columns`: k names; a column without one is called "column3", after its 1-based number.
     - `lines`: (N,) int64, 1-based number of each row's line (of the row, in npy and Parquet).
     - `notes`: what was decided for the user, in plain words.
@@ -115,15 +115,21 @@ def check_finite(
     lines: NDArray[np.int64],
     columns: Sequence[str],
     unit: str,
+    missing: bool = False,
 ) -> None:
+    """
+    Raises:
+        InputFileError: for no rows, and for cells that are empty, NaN or infinite; with `missing`
+            the first two may be.
+    """
     if not len(values):
         raise InputFileError(f"{path}: holds no rows of numbers; export it again")
-    rows, at = np.nonzero(~np.isfinite(values))
+    rows, at = np.nonzero(np.isinf(values) if missing else ~np.isfinite(values))
     if len(rows):
         raise InputFileError(
             f"{path}: {len(rows)} cell{'s' * (len(rows) > 1)} empty, NaN or infinite, the first in "
             f"{unit} {lines[rows[0]]}, column {quote(columns[int(at[0])])}; fill them in "
-            "or leave their rows out with --drop-missing"
+            "or leave their rows out with --drop-missing (on tori --missing marginalise keeps them)"
         )
 
 

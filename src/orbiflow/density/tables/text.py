@@ -63,6 +63,7 @@ def read_text(
     max_rows: int,
     drop_missing: bool = False,
     has_header: bool | None = None,
+    keep_missing: bool = False,
 ) -> Table:
     layout = layout_of(path, columns, has_header)
     picked, notes = choose(path, layout.names, layout.numeric, columns, width)
@@ -88,7 +89,7 @@ def read_text(
     if drop_missing and len(lines):
         rows, at, dropped, more = without_missing(path, rows, at, "line")
         notes += more
-    check_finite(path, rows, at, names, "line")
+    check_finite(path, rows, at, names, "line", keep_missing)
     if layout.decimal == ",":
         notes.append("read decimal commas")
     if layout.header is not None:

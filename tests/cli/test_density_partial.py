@@ -1,0 +1,134 @@
+"""`density marginal` and `conditional`, weights and missing angles, by the public command."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cli.conftest import Run
+from orbiflow.density import DensityEstimator, density_to_bytes
+
+KERNELS = ("--parts", "kernels", "--space", "torus", "--unit", "degrees")
+
+
+def table(path: Path, *, gaps: bool = False) -> Path:
+    """Angles phi, psi and chi in degrees, and what each row weighs."""
+    rng = np.random.default_rng(0)
+    angles = rng.normal([20.0, 60.0, -100.0], 25.0, (60, 3))
+    rows = [[f"{v:.3f}" for v in row] + [str(1 + k % 3)] for k, row in enumerate(angles)]
+    if gaps:
+        rows[3][1] = rows[4][0] = ""
+        rows[5][:3] = ["", "NaN", ""]
+    path.write_text("phi,psi,chi,count\n" + "".join(",".join(row) + "\n" for row in rows))
+    return path
+
+
+@pytest.fixture(scope="module")
+def model(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("model")
+    values = np.loadtxt(table(folder / "data.csv"), delimiter=",", skiprows=1)[:, :3]
+    fit = DensityEstimator("torus", unit="degrees", parts="kernels").fit(values)
+    saved = density_to_bytes(fit.density_, columns=["phi", "psi", "chi"])
+    (folder / "density.safetensors").write_bytes(saved)
+    return folder
+
+
+def test_marginal_and_conditional(tmp_path: Path, model: Path, orbiflow: Run) -> None:
+    one, two = tmp_path / "one", tmp_path / "two"
+    done = orbiflow("density", "marginal", "--model", model, "--columns", "PSI", "--out", one)
+    assert done.status == 0, done.err
+    assert "the density of psi, per degree, in closed form" in done.out
+    names = {path.name for path in one.iterdir()}
+    assert names == {"density.csv", "density.png", "density.safetensors", "report.json"}
+    values = np.loadtxt(one / "density.csv", delimiter=",", skiprows=1)
+    assert (one / "density.csv").read_text().startswith("psi,density\n")
+    assert values[:, 1].sum() * 0.5 == pytest.approx(1, abs=1e-4)  # steps of half a degree
+
+    given = ("density", "conditional", "--model", model, "--given", "chi=-100")
+    assert orbiflow(*given, "--out", two).status == 0
+    values = np.loadtxt(two / "density.csv", delimiter=",", skiprows=1)
+    assert values[:, 2].sum() * 9 == pytest.approx(1, abs=1e-3)
+    report = json.loads((two / "report.json").read_text())
+    assert report["given"] == {"chi": -100.0}
+    assert report["columns"] == ["phi", "psi"]
+    done = orbiflow(*given, "--columns", "psi", "--out", two)  # over what was there
+    assert done.status == 0, done.err
+    drawn = tmp_path / "drawn.csv"
+    assert orbiflow("density", "sample", "--model", two, "-n", 5, "--out", drawn).status == 0
+    assert drawn.read_text().startswith("psi\n")
+    scored = orbiflow(
+        *("density", "score", drawn, "--model", two, "--out", tmp_path / "scores.csv")
+    )
+    assert scored.status == 0, scored.err
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ("conditional --given chi", "such as psi=-45, got 'chi'"),
+        ("conditional --given chi=much", "such as psi=-45"),
+        ("conditional --given chi=nan", "finite number"),
+        ("conditional --given omega=3", "no column 'omega'; there are phi, psi, chi"),
+        ("conditional --given chi=3,chi=4", "given twice"),
+        ("conditional --given phi=1,psi=2,chi=3", "nothing is left"),
+        ("conditional --given chi=3 --columns chi", "both among --columns and --given"),
+        ("conditional --given ,", "--given says nothing"),
+        ("marginal --columns ,", "--columns names no column"),
+        ("marginal --columns 4", "no column '4'"),
+        ("marginal --columns phi,1", "each once"),
+    ],
+)
+def test_mistakes(words: str, message: str, tmp_path: Path, model: Path, orbiflow: Run) -> None:
+    command, *options = words.split()
+    done = orbiflow("density", command, "--model", model, *options, "--out", tmp_path / "out")
+    assert done.status == 2
+    assert message in done.err
+    assert not (tmp_path / "out").exists()
+
+
+def test_weights_and_missing_angles(tmp_path: Path, orbiflow: Run) -> None:
+    data, model, out = table(tmp_path / "gaps.csv", gaps=True), tmp_path / "m", tmp_path / "s.csv"
+    fit = ("density", "fit", data, *KERNELS, "--weights", "count", "--out", model)
+    done = orbiflow(*fit, "--missing", "marginalise")
+    assert done.status == 0, done.err
+    assert "2 of 59 rows lack some angles" in done.out
+    assert "1 rows lack all angles and were left out" in done.out
+    assert "rows say as much as" in done.out
+    assert json.loads((model / "report.json").read_text())["columns"] == ["phi", "psi", "chi"]
+    done = orbiflow(
+        *("density", "score", data, "--model", model, "--out", out),
+        *("--missing", "marginalise", "--weights", "count"),
+    )
+    assert done.status == 0, done.err
+    assert "3 of 60 rows lack some angles" in done.out
+    header, *rows = out.read_text().splitlines()
+    assert header == "phi,psi,chi,count,log_prob_marginal"
+    assert rows[5].endswith(",0")
+    values = np.array([float(row.split(",")[-1]) for row in rows])
+    whole = np.delete(np.arange(60), [3, 4, 5])
+    mean = np.average(values[whole], weights=1 + whole % 3)
+    assert f"mean log density {mean:.4f} nats over the 57 whole rows, weighted by count" in done.out
+    refused = orbiflow(*fit)
+    assert "--drop-missing" in refused.err
+    assert "--missing marginalise" in refused.err
+    assert orbiflow(*fit, "--missing", "drop").status == 0
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ("--weights weight", "no column 'weight'"),
+        ("--weights phi --columns phi,psi", "cannot be a column of the data as well"),
+        ("--weights chi", "at least 0; row 1 has -"),
+        ("--missing marginalise --drop-missing", "is for: give one"),
+        ("--missing marginalise --space sphere --columns phi,psi", "missing"),
+    ],
+)
+def test_mistakes_of_rows(options: str, message: str, tmp_path: Path, orbiflow: Run) -> None:
+    data = table(tmp_path / "data.csv", gaps="sphere" in options)
+    done = orbiflow(*("density", "fit", data, *KERNELS, "--out", tmp_path / "m", *options.split()))
+    assert done.status == 2
+    assert message in done.err

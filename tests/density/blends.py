@@ -1,0 +1,62 @@
+"""Random densities on tori, of all parts that a fit may find."""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+
+from orbiflow.density import AdaptiveKernels, BlendedDensity, Torus, UniformBase, VonMisesChains
+from orbiflow.density.models.chains import SCALES, chained
+from orbiflow.density.models.still import still_flow
+from orbiflow.fields import SplineField
+from orbiflow.flows import Flow
+
+
+def random_chains(rng: np.random.Generator, space: Torus, count: int = 3) -> VonMisesChains:
+    """Components in random orders, bent by the angles before."""
+    d = space.dim
+    order = torch.stack([torch.tensor(rng.permutation(d)) for _ in range(count)])
+    means = torch.tensor(0.6 * rng.normal(size=(count, d, 1 + 2 * d))) * chained(order)
+    weights = torch.tensor(rng.dirichlet(np.ones(count * len(SCALES)))).reshape(count, -1)
+    concentrations = torch.tensor(rng.uniform(0.5, 12.0, (count, d)))
+    return VonMisesChains(space, weights.log(), means, concentrations, order)
+
+
+def random_kernels(rng: np.random.Generator, space: Torus, count: int = 4) -> AdaptiveKernels:
+    return AdaptiveKernels(
+        space,
+        torch.tensor(rng.uniform(size=(count, space.dim))),
+        torch.tensor(rng.uniform(0.5, 15.0, (count, space.dim))),
+        torch.tensor(rng.dirichlet(np.ones(count))),
+    )
+
+
+def random_blend(seed: int, dim: int, *, chains: bool = True, flow: bool = False) -> BlendedDensity:
+    rng = np.random.default_rng(seed)
+    space = Torus(dim, unit="degrees")
+    moving = still_flow(space)
+    if flow:
+        field = SplineField(space.group, 2)
+        with torch.no_grad():
+            field.parameters_.copy_(
+                torch.tensor(0.01 * rng.normal(size=tuple(field.parameters_.shape)))
+            )
+        moving = Flow([field], steps=2, warn=False)
+    shares = torch.tensor(rng.dirichlet(3 * np.ones(4 if chains else 3)))
+    if not flow:
+        shares[0] = 0
+        shares = shares / shares.sum()
+    return BlendedDensity(
+        space,
+        moving,
+        UniformBase(space),
+        random_kernels(rng, space),
+        shares,
+        chains=random_chains(rng, space) if chains else None,
+    )
+
+
+def even_grid(count: int, dim: int) -> torch.Tensor:
+    """(count^dim, dim) points of the cube, a period apart at its sides."""
+    line = torch.arange(count, dtype=torch.float64) / count
+    return torch.cartesian_prod(*[line] * dim).reshape(-1, dim)

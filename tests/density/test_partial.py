@@ -1,0 +1,179 @@
+"""Marginal and conditional densities: against the joint density, integrated on a grid."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy import stats
+
+from density.blends import even_grid, random_blend
+from orbiflow.density import (
+    SymmetricDensity,
+    Torus,
+    conditional,
+    density_to_bytes,
+    log_prob_observed,
+    make_space,
+    marginal,
+    read_density,
+)
+from orbiflow.density.models.still import still_flow
+from orbiflow.errors import OrbiflowError
+
+seeds = st.integers(0, 2**31)
+few = settings(deadline=None, max_examples=12)
+GRID = {2: 256, 3: 64}
+"""Points an angle that resolve what `random_blend` makes."""
+
+
+def integrated(density: SymmetricDensity, points: torch.Tensor, kept: list[int]) -> torch.Tensor:
+    """Log of the joint density integrated over the angles that are not kept, at points (N, r)."""
+    d = density.space.dim
+    hidden = [axis for axis in range(d) if axis not in kept]
+    nodes = even_grid(GRID[d], len(hidden))
+    whole = points.new_empty(len(points), len(nodes), d)
+    whole[:, :, kept], whole[:, :, hidden] = points[:, None], nodes
+    with torch.no_grad():
+        return density.log_prob(whole).logsumexp(dim=1) - math.log(len(nodes))
+
+
+@given(seeds, st.integers(2, 3), st.data())
+@few
+def test_a_marginal_is_the_integral_of_the_joint(seed: int, dim: int, data: st.DataObject) -> None:
+    density = random_blend(seed, dim)
+    kept = data.draw(st.permutations(range(dim)))[: data.draw(st.integers(1, dim - 1))]
+    found = marginal(density, kept)
+    points = torch.tensor(np.random.default_rng(seed).uniform(size=(20, len(kept))))
+    expected = integrated(density, points, list(kept))
+    assert (found.log_prob(points) - expected).abs().max() < 2e-4 + 5 * found.error
+    assert float(found.log_prob(even_grid(128, len(kept))).exp().mean()) == pytest.approx(
+        1, abs=1e-6
+    )
+
+
+@given(seeds, st.integers(2, 3), st.data())
+@few
+def test_conditional_times_marginal_is_joint(seed: int, dim: int, data: st.DataObject) -> None:
+    density = random_blend(seed, dim)
+    order = data.draw(st.permutations(range(dim)))
+    known = order[: data.draw(st.integers(1, dim - 1))]
+    left = [axis for axis in range(dim) if axis not in known]
+    rng = np.random.default_rng(seed)
+    at = rng.uniform(-1, 2, len(known))
+    found = conditional(density, dict(zip(known, at.tolist(), strict=True)))
+    points = torch.tensor(rng.uniform(size=(20, dim)))
+    points[:, known] = torch.tensor(at)
+    product = found.log_prob(points[:, left]) + marginal(density, known).log_prob(points[:, known])
+    assert (product - density.log_prob(points)).abs().max() < 5e-4 + 5 * found.error
+    assert float(found.log_prob(even_grid(128, len(left))).exp().mean()) == pytest.approx(
+        1, abs=1e-6
+    )
+
+
+@given(seeds)
+@settings(deadline=None, max_examples=2)
+def test_flows_are_integrated(seed: int) -> None:
+    density = random_blend(seed, 2, flow=True)
+    points = even_grid(17, 1)
+    found = marginal(density, 1)
+    assert (found.log_prob(points) - integrated(density, points, [1])).abs().max() < 1e-4
+    slice_ = conditional(density, {0: 0.3})
+    whole = torch.cat([torch.full_like(points, 0.3), points], dim=1)
+    with torch.no_grad():
+        expected = density.log_prob(whole) - integrated(density, points[:1] * 0 + 0.3, [0])
+    assert (slice_.log_prob(points) - expected).abs().max() < 1e-4
+    assert max(found.error, slice_.error) < 1e-4
+
+
+@given(seeds, st.data())
+@few
+def test_many_angles_without_tables(seed: int, data: st.DataObject) -> None:
+    """Kernels are closed in any number of angles."""
+    density = random_blend(seed, 6, chains=False)
+    known = data.draw(st.permutations(range(6)))[:3]
+    at = {axis: 0.1 * (axis + 1) for axis in known}
+    left = [axis for axis in range(6) if axis not in at]
+    found = conditional(density, at)
+    points = torch.tensor(np.random.default_rng(seed).uniform(size=(9, 6)))
+    for axis, value in at.items():
+        points[:, axis] = value
+    product = found.log_prob(points[:, left]) + marginal(density, known).log_prob(points[:, known])
+    assert (product - density.log_prob(points)).abs().max() < 1e-9
+    assert found.error == 0
+
+
+@pytest.mark.parametrize("given_", [None, {0: 0.2}])
+def test_samples_are_of_the_density(given_: dict[int, float] | None) -> None:
+    density = random_blend(3, 2)
+    found = marginal(density, [1]) if given_ is None else conditional(density, given_)
+    drawn = found.sample((4000,), torch.Generator().manual_seed(0)).flatten().numpy()
+    line = even_grid(8192, 1)
+    cumulative = np.concatenate([[0], np.cumsum(found.log_prob(line).exp().numpy()) / len(line)])
+    test = stats.kstest(
+        drawn, lambda x: np.interp(x, np.arange(len(line) + 1) / len(line), cumulative)
+    )
+    assert test[1] > 0.01  # type: ignore[operator]
+    if given_ is None:
+        joint = density.sample((4000,), torch.Generator().manual_seed(1))[:, 1].numpy()
+        assert stats.ks_2samp(drawn, joint)[1] > 0.01  # type: ignore[operator]
+
+
+@given(seeds)
+@few
+def test_rows_that_lack_angles_have_their_marginal_density(seed: int) -> None:
+    density = random_blend(seed, 3)
+    rng = np.random.default_rng(seed)
+    points = torch.tensor(rng.uniform(size=(7, 3)))
+    points[torch.tensor(rng.uniform(size=(7, 3)) < 0.4)] = torch.nan
+    found = log_prob_observed(density, points, measure="natural")
+    for row, value in zip(points, found.tolist(), strict=True):
+        kept = torch.nonzero(~row.isnan())[:, 0].tolist()
+        if not kept:
+            assert value == 0
+        elif len(kept) == 3:
+            assert value == pytest.approx(float(density.log_prob(row, measure="natural")), abs=1e-9)
+        else:
+            own = float(integrated(density, row[kept][None], kept)) - len(kept) * math.log(360)
+            # several hidden angles may have quasi-random nodes
+            assert value == pytest.approx(own, abs=1e-5 if len(kept) == 2 else 2e-3)
+
+
+def test_what_comes_out_is_saved(tmp_path) -> None:
+    found = conditional(random_blend(5, 3), {1: 0.4})
+    (tmp_path / "d").write_bytes(density_to_bytes(found))
+    again, _ = read_density(tmp_path / "d")
+    points = even_grid(9, 2)
+    assert torch.equal(again.log_prob(points), found.log_prob(points))
+    assert isinstance(again.space, Torus)
+    assert again.space.unit == "degrees"
+
+
+@pytest.mark.parametrize("name", ["sphere", "projective-plane", "klein-bottle"])
+def test_other_spaces_are_refused(name: str) -> None:
+    space = make_space(name)
+    density = SymmetricDensity(space, still_flow(space))
+    for call in (lambda: marginal(density, 0), lambda: conditional(density, {0: 0.5})):
+        with pytest.raises(OrbiflowError, match=f"on a torus; on the {name}"):
+            call()
+    with pytest.raises(OrbiflowError, match="torus"):
+        log_prob_observed(density, torch.zeros(1, 2))
+
+
+def test_mistakes_are_named() -> None:
+    density = random_blend(0, 3)
+    for axes in ([], [3], [0, 0], ["phi"], [-1], [True], None):
+        with pytest.raises(OrbiflowError, match="axes"):
+            marginal(density, axes)  # type: ignore[arg-type]
+    with pytest.raises(OrbiflowError, match="given"):
+        conditional(density, {})
+    with pytest.raises(OrbiflowError, match="nothing is left"):
+        conditional(density, {0: 0.1, 1: 0.1, 2: 0.1})
+    with pytest.raises(OrbiflowError, match="finite"):
+        conditional(density, {0: math.nan})
+    with pytest.raises(OrbiflowError, match="infinite"):
+        log_prob_observed(density, torch.tensor([[0.1, math.inf, 0.2]]))

@@ -1,0 +1,195 @@
+"""Rows that count more than others: as repeated rows where the method allows, else close."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from orbiflow.density import DensityEstimator, density_to_bytes, make_space
+from orbiflow.density.fitting.budget import Budget
+from orbiflow.density.fitting.chains import fit_chain_mixture
+from orbiflow.density.fitting.likelihood import Objective
+from orbiflow.density.fitting.merging import merged
+from orbiflow.density.fitting.mixtures import fit_mixture
+from orbiflow.density.fitting.rows import effective_rows, mean_of, weighed
+from orbiflow.density.fitting.scales import kernel_estimates
+from orbiflow.density.fitting.weights import gain_of, sparse_weights, stacked, stacking_weights
+from orbiflow.errors import OrbiflowError
+
+seeds = st.integers(0, 2**31)
+PLACES = [[0.3, 0.3], [0.7, 0.7]]
+few = settings(deadline=None, max_examples=15)
+
+
+def repeated(seed: int, count: int) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+    """Points on the torus, integer weights, and each point as often as its weight says."""
+    rng = np.random.default_rng(seed)
+    points = make_space("torus").project(torch.tensor(0.5 + 0.15 * rng.normal(size=(count, 2))))
+    weights = torch.tensor(rng.integers(1, 5, count))
+    return points, weights.double(), points.repeat_interleave(weights, dim=0)
+
+
+@given(seeds)
+@few
+def test_kernels_of_weighted_rows_are_those_of_repeated_ones(seed: int) -> None:
+    points, weights, rows = repeated(seed, 40)
+    space = make_space("torus")
+    found = kernel_estimates(space, points, repeats=False, row_weights=weights)
+    expected = kernel_estimates(space, rows, repeats=False)
+    at = space.uniform(30, torch.Generator().manual_seed(seed))
+    assert found.keys() == expected.keys()
+    for name, part in found.items():
+        assert torch.allclose(part.log_prob(at), expected[name].log_prob(at), atol=1e-9)
+
+
+@given(seeds)
+@few
+def test_stacking_of_weighted_rows_is_that_of_repeated_ones(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    counts = torch.tensor(rng.integers(1, 6, 60))
+    table = torch.tensor(2 * rng.normal(size=(5, 60)))
+    whole = table.repeat_interleave(counts, dim=1)
+    own = counts.double()
+    assert torch.allclose(stacking_weights(table, own), stacking_weights(whole), atol=1e-9)
+    always = torch.arange(5) == 4
+    found = sparse_weights(table, always, own)
+    assert mean_of(stacked(table, found), own) == pytest.approx(
+        float(stacked(whole, sparse_weights(whole, always)).mean()), abs=2e-3
+    )
+    assert gain_of(table[0], table[1], own).nats == pytest.approx(
+        gain_of(whole[0], whole[1]).nats, abs=1e-9
+    )
+
+
+@given(seeds)
+@few
+def test_mixtures_and_chains_of_one_component_are_those_of_repeated_rows(seed: int) -> None:
+    points, weights, rows = repeated(seed, 60)
+    space = make_space("torus")
+    at = space.uniform(30, torch.Generator().manual_seed(seed))
+
+    def generator() -> torch.Generator:
+        return torch.Generator().manual_seed(0)
+
+    one = fit_mixture(space, points, 1, generator=generator(), row_weights=weights)
+    other = fit_mixture(space, rows, 1, generator=generator())
+    assert torch.allclose(one.log_prob(at), other.log_prob(at), atol=1e-6)
+    order = torch.arange(2)
+    chains = [
+        fit_chain_mixture(
+            space,
+            train,
+            train,
+            1,
+            order,
+            40,
+            generator(),
+            Budget(),
+            row_weights=own,
+            held_weights=own,
+        )
+        for train, own in ((points, weights), (rows, None))
+    ]
+    # EM from starts that are drawn nears one optimum, and is not told to reach it
+    scores = [float(mixture.log_prob(rows).mean()) for mixture in chains]
+    assert scores[0] == pytest.approx(scores[1], abs=0.02)
+
+
+@given(seeds, st.integers(2, 9))
+@few
+def test_merged_points_carry_their_weights(seed: int, cells: int) -> None:
+    points, weights, rows = repeated(seed, 80)
+    found, shares = merged(points, cells, 10**6, weights)
+    expected, counts = merged(rows, cells, 10**6)
+    assert torch.allclose(found, expected)
+    assert torch.allclose(shares, counts)
+
+
+def test_a_flow_descends_on_the_weighted_likelihood() -> None:
+    points, weights, rows = repeated(0, 200)
+    estimator = DensityEstimator("torus", parts="flow", detail=2, segments=2, iterations=3)
+    density = estimator.fit(points.numpy() * 2 * math.pi, sample_weight=weights.numpy()).density_
+    both = [
+        Objective(density, part, own, kinetic=0.0, roughness=1e-3)
+        for part, own in ((points, weights / weights.sum()), (rows, None))
+    ]
+    (loss, slope), (expected, also) = (one(one.get()) for one in both)
+    assert loss == pytest.approx(expected, abs=1e-9)
+    assert slope == pytest.approx(also, abs=1e-9)
+
+
+@pytest.mark.parametrize("options", [{}, {"parts": "flow"}, {"kernels": True}])
+def test_equal_weights_are_none(options: dict[str, object]) -> None:
+    angles = np.random.default_rng(0).vonmises([0.0, 1.0], 4.0, (310, 2))
+    few_waves = {"detail": 2, "segments": 1, "iterations": 3}
+    first, second = (
+        DensityEstimator("torus", **few_waves, **options).fit(angles, sample_weight=weight)  # type: ignore[arg-type]
+        for weight in (None, np.full(310, 0.3))
+    )
+    assert density_to_bytes(first.density_) == density_to_bytes(second.density_)
+    assert first.report_.effective is second.report_.effective is None
+
+
+@pytest.mark.parametrize("space", ["torus", "sphere", "klein-bottle", "projective-plane"])
+def test_a_fit_follows_its_weights(space: str) -> None:
+    """Of two clusters, one weighs nine times the other; and rows of weight 0 are not there."""
+    rng = np.random.default_rng(1)
+    chart = np.repeat(PLACES, 50, axis=0) + 0.02 * rng.normal(size=(100, 2))
+    made = make_space(space)
+    data = made.from_chart(torch.tensor(chart))
+    weights = np.repeat([0.9, 0.1], 50)
+    some = DensityEstimator(made, parts="kernels").fit(data, sample_weight=weights)
+    drawn = some.density_.sample((3000,), torch.Generator().manual_seed(0))
+    near, far = (made.distance(torch.tensor(at).expand(3000, 2), drawn) for at in PLACES)
+    assert float((near < far).double().mean()) == pytest.approx(0.9, abs=0.05)
+    assert some.report_.effective == pytest.approx(effective_rows(torch.tensor(weights)))
+    assert any("100 rows say as much as" in note for note in some.report_.notes)
+    ghosts = np.concatenate([data, data[::-1]]), np.concatenate([weights, np.zeros(100)])
+    again = DensityEstimator(made, parts="kernels").fit(ghosts[0], sample_weight=ghosts[1])
+    assert density_to_bytes(again.density_) == density_to_bytes(some.density_)
+
+
+def test_the_score_is_the_weighted_mean() -> None:
+    angles = np.random.default_rng(0).vonmises([0.0, 1.0], 4.0, (60, 2))
+    fit = DensityEstimator("torus", parts="kernels").fit(angles)
+    weights = np.arange(60.0)
+    own = fit.score_samples(angles)
+    assert fit.score(angles, sample_weight=weights) == pytest.approx(
+        np.average(own, weights=weights)
+    )
+    assert fit.score(angles) == pytest.approx(own.mean())
+
+
+@pytest.mark.parametrize(
+    ("weights", "message"),
+    [
+        (np.ones(7), "weight for each of 60 rows"),
+        (np.ones((60, 1)), "weight for each of 60 rows"),
+        (-np.eye(60)[3], "row 4 has -1"),
+        (np.where(np.arange(60) == 5, np.nan, 1.0), "row 6 has nan"),
+        (np.full(60, np.inf), "row 1 has inf"),
+        (np.zeros(60), "all weights are 0"),
+        (["much"] * 60, "real numbers"),
+    ],
+)
+def test_weights_that_are_none_are_refused(weights: object, message: str) -> None:
+    points = np.random.default_rng(0).uniform(size=(60, 2))
+    with pytest.raises(OrbiflowError, match=message):
+        DensityEstimator("torus").fit(points, sample_weight=weights)  # type: ignore[arg-type]
+
+
+@given(st.lists(st.floats(1e-3, 1e3), min_size=2, max_size=30), st.floats(1e-100, 1e100))
+def test_only_ratios_count(values: list[float], factor: float) -> None:
+    points = torch.zeros(len(values), 1)
+    one, other = (weighed(points, [v * f for v in values]) for f in (1.0, factor))
+    if one.weights is None or other.weights is None:
+        assert max(values) <= min(values) * (1 + 1e-12)
+        return
+    assert torch.allclose(one.weights, other.weights)
+    assert float(one.weights.mean()) == pytest.approx(1)
+    assert 1 <= effective_rows(one.weights) <= len(values)
