@@ -1,0 +1,228 @@
+"""Which of several models gives held-out rows the greater density, and whether the rows can tell."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from orbiflow.arguments import numbers, number, whole
+from orbiflow.density.comparing.resampling import Groups, resampled_sums
+from orbiflow.errors import OrbiflowError
+from orbiflow.symmetry.isometry import Array
+
+RESAMPLES, LEVEL = 2000, 0.95
+MOST_RESAMPLES = 1_000_000
+
+
+@dataclass(frozen=True)
+class ModelScore:
+    """The mean log density of a model at held-out rows, in nats, and its standard error."""
+
+    name: str
+    mean: float
+    error: float
+
+
+@dataclass(frozen=True)
+class Difference:
+    """Log density of `first` less that of `second`, row by row, in nats.
+
+    - `mean`, `error`: the mean over rows and its standard error, paired.
+    - `low`, `high`: interval that holds all differences of the comparison at once.
+    - `p`: of a mean of 0, adjusted for all differences.
+    - `share`: of the rows, to which `first` gives the greater density; half of equal ones.
+    - `better`: name of the better model; None if the rows cannot tell.
+    """
+
+    first: str
+    second: str
+    mean: float
+    error: float
+    low: float
+    high: float
+    p: float
+    share: float
+    better: str | None
+
+    def __str__(self) -> str:
+        told = "the rows cannot tell" if self.better is None else f"{self.better} is better"
+        return (
+            f"{self.first} - {self.second}: {self.mean:+.4f} ± {self.error:.4f} nats a row, "
+            f"{self.low:+.4f} to {self.high:+.4f} (p {self.p:.2g}): {told}"
+        )
+
+
+@dataclass(frozen=True)
+class ModelComparison:
+    """Models at the same held-out rows.
+
+    - `scores`: best first. `differences`: of all pairs, the better one by its mean first.
+    - `rows`, `groups`: how many; `groups` is None if rows are independent.
+    - `level`, `resamples`, `seed`: of the intervals.
+    - `best`: the model that is better than all others; None if the rows cannot tell.
+    - `notes`: what the user should know, in words.
+    """
+
+    scores: tuple[ModelScore, ...]
+    differences: tuple[Difference, ...]
+    rows: int
+    groups: int | None
+    level: float
+    resamples: int
+    seed: int
+    best: str | None
+    notes: tuple[str, ...] = ()
+
+    def to_json(self) -> dict[str, Any]:
+        """An object for `json.dumps`."""
+        return {"kind": "models", **asdict(self), "verdict": self.verdict}
+
+    @property
+    def verdict(self) -> str:
+        """Which is best, in words."""
+        if self.best is not None:
+            return f"{self.best} is better than {_listed([s.name for s in self.scores[1:]])}"
+        top = self.scores[0].name
+        open_ = [
+            d.second for d in self.differences if d.first == top and d.better is None
+        ]
+        return f"the rows cannot tell {_listed([top, *open_])} apart"
+
+
+def compare_scores(
+    scores: Mapping[str, ArrayLike],
+    *,
+    groups: ArrayLike | None = None,
+    resamples: int = RESAMPLES,
+    level: float = LEVEL,
+    seed: int = 0,
+) -> ModelComparison:
+    """Compare log densities of several models at the same held-out rows.
+
+    Intervals are by the symmetric bootstrap-t, of the largest of all pairs' |t|, so that all hold at
+    once (Efron and Tibshirani, An introduction to the bootstrap, 1993, ch. 12; Romano and Wolf,
+    Stepwise multiple testing, 2005). Whole groups are resampled, and the standard error is that of
+    a ratio of sums over groups.
+
+    Args:
+        scores: (N,) a model, in nats and with respect to one measure.
+        groups: a label (N,) a row; rows of one group are not independent. None: all are.
+        resamples: of the bootstrap, 100 or more.
+        level: of the intervals.
+        seed: of the resamples.
+
+    Raises:
+        OrbiflowError: for fewer than two models, scores of different lengths or not finite, or fewer
+            than five rows or groups.
+
+    >>> rng = np.random.default_rng(0)
+    >>> base = rng.normal(size=500)
+    >>> found = compare_scores({"a": base, "b": base - 0.2 + 0.5 * rng.normal(size=500)})
+    >>> found.best, found.differences[0].error < 0.03
+    ('a', True)
+    """
+    resamples = whole(resamples, "resamples", 100, MOST_RESAMPLES)
+    level = number(level, "level", 0.5, 0.999)
+    table = _table(scores)
+    members = Groups.of(groups, len(table))
+    members.require()
+    means, errors = _means(table, members)
+    order = np.argsort(-means, kind="stable")
+    names = [list(scores)[k] for k in order]
+    table, means, errors = table[:, order], means[order], errors[order]
+    pairs = list(itertools.combinations(range(len(names)), 2))
+    rows = np.stack([table[:, i] - table[:, j] for i, j in pairs], axis=1)
+    mean, error = _means(rows, members)
+    largest = _largest_t(rows - mean, members, resamples, seed)
+    reach = float(np.quantile(largest, level, method="higher"))
+    found = []
+    for k, (i, j) in enumerate(pairs):
+        low, high = mean[k] - reach * error[k], mean[k] + reach * error[k]
+        t = _ratio(abs(mean[k]), error[k])
+        found.append(
+            Difference(
+                names[i],
+                names[j],
+                float(mean[k]),
+                float(error[k]),
+                float(low),
+                float(high),
+                float((1 + (largest >= t).sum()) / (1 + resamples)) if t else 1.0,
+                float((rows[:, k] > 0).mean() + (rows[:, k] == 0).mean() / 2),
+                names[i] if low > 0 else None,
+            )
+        )
+    beaten = {d.second for d in found if d.first == names[0] and d.better is not None}
+    same = [f"{d.first} and {d.second} are equal at every row" for d in found if _equal(d)]
+    return ModelComparison(
+        tuple(ModelScore(*s) for s in zip(names, means.tolist(), errors.tolist(), strict=True)),
+        tuple(found),
+        len(table),
+        members.count if members.given else None,
+        level,
+        resamples,
+        seed,
+        names[0] if len(beaten) == len(names) - 1 else None,
+        (*members.notes(), *same),
+    )
+
+
+def _table(scores: Mapping[str, ArrayLike]) -> Array:
+    """Scores (N, M), checked."""
+    if not isinstance(scores, Mapping) or len(scores) < 2:
+        raise OrbiflowError("a comparison needs the scores of two models or more, by their names")
+    columns = [numbers(v, f"scores of {name}", ("N",)) for name, v in scores.items()]
+    lengths = {name: len(column) for name, column in zip(scores, columns, strict=True)}
+    if len(set(lengths.values())) > 1:
+        raise OrbiflowError(f"models must be scored at the same rows, got {lengths}")
+    return np.stack(columns, axis=1)
+
+
+def _means(table: Array, groups: Groups) -> tuple[Array, Array]:
+    """Means (k,) over rows of a table (N, k), and their standard errors over groups."""
+    mean = table.mean(axis=0)
+    residuals = groups.sums(table - mean)
+    spread = (residuals**2).sum(axis=0) * groups.count / (groups.count - 1)
+    error = np.sqrt(spread) / len(table)
+    # what rounding leaves of equal differences is none
+    return mean, np.where(error > 1e-14 * (1 + abs(mean)), error, 0.0)
+
+
+def _largest_t(centered: Array, groups: Groups, resamples: int, seed: int) -> Array:
+    """(B,): of each resample the largest |t| of the columns of `centered` (N, k)."""
+    sums = groups.sums(centered)
+    sizes = np.bincount(groups.index, minlength=groups.count).astype(np.float64)[:, None]
+    parts = (sizes, sizes**2, sums, sums**2, sums * sizes)
+    drawn = resampled_sums(np.concatenate(parts, axis=1), resamples, np.random.default_rng(seed))
+    n, n2, rest = drawn[:, :1], drawn[:, 1:2], drawn[:, 2:]
+    s, s2, sn = np.split(rest, 3, axis=1)
+    mean = s / n
+    spread = s2 - 2 * mean * sn + mean**2 * n2
+    # a resample that misses the only rows with a difference has no spread: it gets one group's
+    spread = np.maximum(spread, (sums**2).mean(axis=0))
+    error = np.sqrt(spread * groups.count / (groups.count - 1)) / n
+    return _ratio(abs(mean), error).max(axis=1)
+
+
+def _ratio(size: Any, error: Any) -> Any:
+    """|t|: without a spread, 0 if there is no difference and infinite if there is."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        t = np.asarray(size) / np.asarray(error)
+    return np.where(np.asarray(size) <= 1e-14, 0.0, t)
+
+
+def _equal(difference: Difference) -> bool:
+    return difference.mean == 0 and difference.error == 0
+
+
+def _listed(names: list[str]) -> str:
+    """
+    >>> _listed(["a", "b", "c"])
+    'a, b and c'
+    """
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
