@@ -54,9 +54,13 @@ def _global(
 
 def _option(field: str) -> str:
     """What a field of a request is called here."""
-    return {"count": "-n", "purpose": "--for", "eyes": "--eye", "animation": "--kind"}.get(
-        field, "--" + field.replace("_", "-")
-    )
+    return {
+        "count": "-n",
+        "purpose": "--for",
+        "eyes": "--eye",
+        "animation": "--kind",
+        "models": "--model",
+    }.get(field, "--" + field.replace("_", "-"))
 
 
 def main() -> None:

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from orbiflow.cli.density_compare import compare
 from orbiflow.cli.density_options import (
     Columns,
     Data,
@@ -26,6 +27,7 @@ from orbiflow.cli.density_options import (
 )
 from orbiflow.cli.density_partial import conditional, marginal
 from orbiflow.cli.density_patches import patches
+from orbiflow.cli.density_region import region_of
 from orbiflow.cli.work import do
 from orbiflow.jobs import (
     DensityFitRequest,
@@ -137,6 +139,14 @@ def score(
         Measure,
         typer.Option(help="Natural: the data's own units, or steradians. Uniform: against chance."),
     ] = Measure.NATURAL,
+    region: Annotated[
+        bool,
+        typer.Option(
+            "--region",
+            help="Add a column hdr: the mass of the smallest region of highest density that holds "
+            "the row.",
+        ),
+    ] = False,
 ) -> None:
     """Add a column log_prob, in nats, to a table."""
     request = DensityScoreRequest(
@@ -149,6 +159,7 @@ def score(
         missing=missing.value,
         weights=weights,
         measure=measure.value,
+        region=region,
     )
     do(request)
 
@@ -249,4 +260,6 @@ def plot(
 
 density.command()(marginal)
 density.command()(conditional)
+density.command()(compare)
+density.command("region")(region_of)
 density.command()(patches)

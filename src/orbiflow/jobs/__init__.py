@@ -9,6 +9,7 @@ True
 """
 
 from orbiflow.cancel import Cancel
+from orbiflow.jobs.density_compare_requests import DensityCompareRequest, DensityRegionRequest
 from orbiflow.jobs.density_requests import (
     DensityConditionalRequest,
     DensityFitRequest,
@@ -49,10 +50,12 @@ __all__ = [
     "ArtRequest",
     "Cancel",
     "ClassFailed",
+    "DensityCompareRequest",
     "DensityConditionalRequest",
     "DensityFitRequest",
     "DensityMarginalRequest",
     "DensityPlotRequest",
+    "DensityRegionRequest",
     "DensitySampleRequest",
     "DensityScoreRequest",
     "EscherizeRequest",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orbiflow.density import SymmetricDensity, read_density
-from orbiflow.density.tables import Table, is_identifier, read_table
+from orbiflow.density.tables import (
+    Table,
+    column_names,
+    is_identifier,
+    read_table,
+)
+from orbiflow.density.tables.table import listing
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.export.density_plots import MODEL
 from orbiflow.jobs.events import Note
@@ -125,13 +132,27 @@ def unit_of(space: str, unit: str | None, table: Table, tell: Sink) -> str:
     return "radians"
 
 
-def same_columns(data: Path, extra: dict[str, Any]) -> tuple[str, ...] | None:
-    """The columns of the fit, if the file has a header that names them all."""
-    names = extra.get("columns")
-    if not names:
+def same_columns(
+    data: Path, extra: dict[str, Any], tell: Sink, *, has_header: bool | None = None
+) -> tuple[str, ...] | None:
+    """The columns of the fit, which a file that names its columns must have; else None, which is said.
+
+    Raises:
+        OrbiflowError: if the file names other columns.
+    """
+    names = tuple(extra.get("columns") or ())
+    if not names or all(re.fullmatch(r"column\d+", name) for name in names):
+        return None  # they had no names
+    own = column_names(data, wanted=names, has_header=has_header)
+    if own is None:
+        tell(Note(f"{data} has no header: its columns were taken for {', '.join(names)}"))
         return None
-    try:
-        read_table(data, columns=names, width=None, max_rows=10**9)
-    except OrbiflowError:
-        return None
-    return tuple(names)
+    known = {name.casefold() for name in own}
+    missing = [name for name in names if name.casefold() not in known]
+    if missing:
+        raise OrbiflowError(
+            f"{data}: the model was fitted to {', '.join(names)}, and the file has "
+            f"{'no ' + ', '.join(missing) + ' among ' if len(missing) < len(names) else ''}"
+            f"{listing(own)}: say with --columns which they are, in this order"
+        )
+    return names

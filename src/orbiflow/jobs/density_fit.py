@@ -13,6 +13,7 @@ import numpy as np
 
 from orbiflow.cancel import Cancel
 from orbiflow.density import DensityEstimator, density_to_bytes
+from orbiflow.density.comparing import RowSketch
 from orbiflow.density.fitting.report import FitReport
 from orbiflow.density.tables import Table
 from orbiflow.export.density_plots import MODEL, PICTURES, REPORT, TABLE
@@ -81,7 +82,11 @@ def density_fit(request: DensityFitRequest, tell: Sink, cancel: Cancel) -> Finis
     estimator.fit(table.values, sample_weight=weights, progress=progress)
     document = _document(request, table, weights, estimator, begin)
     with folder.replaced() as staged:
-        saved = density_to_bytes(estimator.density_, columns=list(table.columns))
+        whole = table.values[~np.isnan(table.values).any(axis=1)]
+        fitted = RowSketch.of(estimator.space_, whole).to_json() if len(whole) else None
+        saved = density_to_bytes(
+            estimator.density_, columns=list(table.columns), fitted_rows=fitted
+        )
         write_atomic(staged / MODEL, saved)
         write_atomic(staged / REPORT, json.dumps(document, allow_nan=False, indent=1))
     for name in (MODEL, REPORT):

@@ -45,7 +45,7 @@ def density_plot(request: DensityPlotRequest, tell: Sink, cancel: Cancel) -> Fin
     settings = _settings(request, density.space, extra.get("columns"))
     points = None
     if request.data is not None:
-        columns = request.columns or same_columns(request.data, extra)
+        columns = request.columns or same_columns(request.data, extra, tell)
         points = read_data(request.data, columns, None, tell).values
 
     def told(share: float, what: str) -> None:

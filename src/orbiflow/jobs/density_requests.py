@@ -63,7 +63,7 @@ class DensityFitRequest(Request):
     seed: int = 0
 
     def check(self) -> None:
-        _columns_named(self.columns)
+        columns_named(self.columns)
         _check_missing(self.drop_missing, self.missing)
         unknown = [part for part in self.parts or () if part not in PARTS]
         if unknown or self.parts == ():
@@ -78,8 +78,9 @@ class DensityFitRequest(Request):
 class DensityScoreRequest(Request):
     """Add log densities to a table; see `orbiflow density score --help`.
 
-    `columns`, `header`, `drop_missing`, `missing`, `weights`: as for a fit; rows left out get an empty
-    cell, weights are of the mean.
+    - `columns`, `header`, `drop_missing`, `missing`, `weights`: as for a fit; rows left out get an empty
+      cell, weights are of the mean.
+    - `region`: add the mass of the smallest highest-density region that holds each row, too.
     """
 
     KIND = "density-score"
@@ -93,10 +94,13 @@ class DensityScoreRequest(Request):
     missing: Missing = "refuse"
     weights: str | None = None
     measure: Measure = "natural"
+    region: bool = False
 
     def check(self) -> None:
-        _columns_named(self.columns)
+        columns_named(self.columns)
         _check_missing(self.drop_missing, self.missing)
+        if self.region and self.missing == "marginalise":
+            raise RecordError("{region} is of whole rows: leave it out, or {missing} marginalise")
 
 
 @dataclass(frozen=True)
@@ -140,7 +144,7 @@ class DensityPlotRequest(Request):
     seed: int = 0
 
     def check(self) -> None:
-        _columns_named(self.columns)
+        columns_named(self.columns)
 
 
 @dataclass(frozen=True)
@@ -156,7 +160,7 @@ class PatchesRequest(Request):
     farthest: float | None = None
 
     def check(self) -> None:
-        _columns_named(self.columns)
+        columns_named(self.columns)
         if self.farthest is not None and not self.farthest >= 0:
             raise RecordError(f"{{farthest}} must be at least 0, got {self.farthest:g}")
 
@@ -176,7 +180,7 @@ class DensityMarginalRequest(Request):
     out: Path = Path("marginal")
 
     def check(self) -> None:
-        _columns_named(self.columns)
+        columns_named(self.columns)
 
 
 @dataclass(frozen=True)
@@ -196,7 +200,7 @@ class DensityConditionalRequest(Request):
     out: Path = Path("conditional")
 
     def check(self) -> None:
-        _columns_named(self.columns)
+        columns_named(self.columns)
         if not self.given:
             raise RecordError("{given} says nothing; give what is known, as in psi=-45")
 
@@ -208,6 +212,6 @@ def _check_missing(drop: bool, missing: str) -> None:
         )
 
 
-def _columns_named(columns: tuple[str, ...] | None) -> None:
+def columns_named(columns: tuple[str, ...] | None) -> None:
     if columns == ():
         raise RecordError("{columns} names no column; give their names or numbers, as in lat,lon")

@@ -9,10 +9,12 @@ from torch import Tensor
 
 from orbiflow.cancel import Cancel
 from orbiflow.density import log_prob_observed
+from orbiflow.density.comparing import scores_of
 from orbiflow.density.fitting.rows import mean_of, weighed
 from orbiflow.density.partial import chart_of_observed
+from orbiflow.density.regions import DensityLevels
 from orbiflow.density.spaces.patches import to_klein
-from orbiflow.density.tables import append_column, to_csv
+from orbiflow.density.tables import append_columns, to_csv
 from orbiflow.errors import OrbiflowError
 from orbiflow.files import write_atomic
 from orbiflow.jobs.density_data import model_at, read_data, read_weighed, same_columns
@@ -38,7 +40,7 @@ def density_score(request: DensityScoreRequest, tell: Sink, cancel: Cancel) -> F
         Cancelled: if it was told to stop; nothing is written.
     """
     density, extra = model_at(request.model)
-    columns = request.columns or same_columns(request.data, extra)
+    columns = request.columns or same_columns(request.data, extra, tell, has_header=request.header)
     keep = request.missing == "marginalise"
     table, weights = read_weighed(
         request.data,
@@ -64,7 +66,17 @@ def density_score(request: DensityScoreRequest, tell: Sink, cancel: Cancel) -> F
             tell(Progress(min(1.0, (start + BLOCK) / len(points)), "scoring"))
     scores = torch.cat(parts).numpy()
     name = "log_prob_marginal" if lacking else "log_prob"
-    write_atomic(request.out, append_column(table, request.data, name, scores))
+    added = {name: scores}
+    if request.region:
+        tell(Progress(1.0, "drawing samples"))
+        natural = scores_of(density, table.values) if request.measure != "natural" else scores
+        added["hdr"] = DensityLevels(density).hdr_of(natural)
+        tell(
+            Note(
+                "hdr: the mass of the smallest highest-density region that holds the row, ± 0.0035"
+            )
+        )
+    write_atomic(request.out, append_columns(table, request.data, added))
     tell(Written(request.out))
     if lacking:
         tell(Note(_said_of_missing(known, name)))

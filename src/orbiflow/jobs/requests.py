@@ -5,6 +5,7 @@ Importing this takes no time: no numerical library.
 
 from __future__ import annotations
 
+from orbiflow.jobs.density_compare_requests import DensityCompareRequest, DensityRegionRequest
 from orbiflow.jobs.density_requests import (
     DensityConditionalRequest,
     DensityFitRequest,
@@ -37,6 +38,8 @@ REQUESTS: dict[str, type[Request]] = {
         DensityPlotRequest,
         DensityMarginalRequest,
         DensityConditionalRequest,
+        DensityCompareRequest,
+        DensityRegionRequest,
         PatchesRequest,
         PaperRequest,
     )

@@ -26,6 +26,8 @@ _MODULES = {
     "density-plot": "density_plot",
     "density-marginal": "density_partial",
     "density-conditional": "density_partial",
+    "density-compare": "density_compare",
+    "density-region": "density_region",
     "density-patches": "density_use",
     "paper": "paper",
 }

@@ -61,7 +61,9 @@ class DataComparison:
         one, other = self.names
         if self.differ:
             return f"{one} and {other} come from different densities (p {self.test.p:.2g})"
-        return f"the data cannot tell the densities of {one} and {other} apart (p {self.test.p:.2g})"
+        return (
+            f"the data cannot tell the densities of {one} and {other} apart (p {self.test.p:.2g})"
+        )
 
     def words(self) -> list[str]:
         """All of it, a line each."""
@@ -120,8 +122,10 @@ def compare_samples(
     whole(permutations, "permutations", 19, MOST_PERMUTATIONS)
     whole(resamples, "resamples", 100, MOST_RESAMPLES)
     level = number(level, "level", 0.5, 0.999)
-    own = space if isinstance(space, Space) else space_class(space).for_data(
-        np.concatenate(tables), unit=unit, seed=seed
+    own = (
+        space
+        if isinstance(space, Space)
+        else space_class(space).for_data(np.concatenate(tables), unit=unit, seed=seed)
     )
     points = torch.cat([own.to_chart(table) for table in tables])
     first = np.arange(len(points)) < len(tables[0])
@@ -182,7 +186,9 @@ def _labels(
     if groups is None:
         return None
     if not isinstance(groups, Mapping) or set(groups) != set(names):
-        raise OrbiflowError(f"groups must have labels for {names[0]} and {names[1]}, by these names")
+        raise OrbiflowError(
+            f"groups must have labels for {names[0]} and {names[1]}, by these names"
+        )
     found = []
     for name, table in zip(names, tables, strict=True):
         labels = np.asarray(groups[name])

@@ -104,7 +104,9 @@ def cross_fitted(
         Estimate(float(v), float(s), float(low), float(high))
         for v, s, low, high in zip(found, spread.std(axis=0), *ends, strict=True)
     ]
-    return Divergence(accuracy=made[1], jensen_shannon=made[0], first_to_second=made[2], second_to_first=made[3])
+    return Divergence(
+        accuracy=made[1], jensen_shannon=made[0], first_to_second=made[2], second_to_first=made[3]
+    )
 
 
 def _figures(sums: Array) -> Array:
@@ -133,6 +135,7 @@ def _held_out_ratio(
 
 def _trust(own: Array, weights: Array) -> float:
     """What to multiply log odds with, so that they score best: few rows make them too bold."""
+
     def loss(trust: float) -> float:
         return float((weights * np.logaddexp(0.0, -trust * own)).sum())
 

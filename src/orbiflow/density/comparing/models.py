@@ -47,7 +47,9 @@ def compare_models(
     return compare_scores(scores, groups=groups, resamples=resamples, level=level, seed=seed)
 
 
-def density_of(model: SymmetricDensity | DensityEstimator, name: str = "the model") -> SymmetricDensity:
+def density_of(
+    model: SymmetricDensity | DensityEstimator, name: str = "the model"
+) -> SymmetricDensity:
     """The density of a fitted estimator, or itself.
 
     Raises:
@@ -70,8 +72,8 @@ def require_one_space(spaces: Mapping[str, Space]) -> None:
     for name, other in others:
         if (one.name, one.dim) != (other.name, other.dim):
             raise OrbiflowError(
-                f"{first} is on the {_said(one)}, {name} on the {_said(other)}: their densities have no "
-                "common measure; compare models of one space"
+                f"{first} is on the {_said(one)}, {name} on the {_said(other)}: their densities "
+                "have no common measure; compare models of one space"
             )
         if one.unit != other.unit:
             raise OrbiflowError(

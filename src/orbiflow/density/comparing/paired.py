@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from orbiflow.arguments import numbers, number, whole
+from orbiflow.arguments import number, numbers, whole
 from orbiflow.density.comparing.resampling import Groups, resampled_sums
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry.isometry import Array
@@ -88,9 +88,7 @@ class ModelComparison:
         if self.best is not None:
             return f"{self.best} is better than {_listed([s.name for s in self.scores[1:]])}"
         top = self.scores[0].name
-        open_ = [
-            d.second for d in self.differences if d.first == top and d.better is None
-        ]
+        open_ = [d.second for d in self.differences if d.first == top and d.better is None]
         return f"the rows cannot tell {_listed([top, *open_])} apart"
 
 

@@ -48,7 +48,9 @@ class Groups:
             return cls(np.arange(rows), rows, False)
         array = np.asarray(labels)
         if array.shape != (rows,):
-            raise OrbiflowError(f"groups: expected a label for each of {rows} rows, got {described(labels)}")
+            raise OrbiflowError(
+                f"groups: expected a label for each of {rows} rows, got {described(labels)}"
+            )
         if array.dtype.kind == "O":
             array = array.astype(str)
         names, index = np.unique(array, return_inverse=True)

@@ -86,7 +86,9 @@ def mmd_test(
     spread = table.std(axis=1, keepdims=True)
     largest = ((table - table.mean(axis=1, keepdims=True)) / np.maximum(spread, 1e-300)).max(axis=0)
     as_large = int((largest[1:] >= largest[0] - 1e-12).sum())
-    return TestResult((1 + as_large) / (1 + permutations), float(largest[0]), permutations, len(points))
+    return TestResult(
+        (1 + as_large) / (1 + permutations), float(largest[0]), permutations, len(points)
+    )
 
 
 def chosen_rows(first: Array, groups: Groups, most: int, seed: int = 0) -> Array:

@@ -1,7 +1,17 @@
 """Tables of numbers in CSV, TSV, whitespace-separated text, `.npy` and Parquet files."""
 
-from orbiflow.density.tables.files import append_column, read_table, to_csv
+from orbiflow.density.tables.files import append_column, append_columns, read_table, to_csv
 from orbiflow.density.tables.identifiers import is_identifier
+from orbiflow.density.tables.labels import column_names, read_labels
 from orbiflow.density.tables.table import Table
 
-__all__ = ["Table", "append_column", "is_identifier", "read_table", "to_csv"]
+__all__ = [
+    "Table",
+    "append_column",
+    "append_columns",
+    "column_names",
+    "is_identifier",
+    "read_labels",
+    "read_table",
+    "to_csv",
+]

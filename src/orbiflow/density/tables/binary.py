@@ -6,6 +6,7 @@ import importlib
 import math
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -84,6 +85,43 @@ def _npy_header(path: Path) -> tuple[tuple[int, ...], np.dtype]:
     return shape, dtype
 
 
+def npy_names(path: Path) -> tuple[str, ...] | None:
+    """Of the fields of a structured array, None for a plain one."""
+    return _npy_header(path)[1].names
+
+
+def parquet_names(path: Path) -> tuple[str, ...]:
+    """Of all columns."""
+    arrow, parquet = _arrow(path)
+    try:
+        with parquet.ParquetFile(path) as file:
+            return tuple(file.schema_arrow.names)
+    except (arrow.ArrowException, OSError, ValueError) as exc:
+        raise _damaged(path, exc) from exc
+
+
+def parquet_labels(path: Path, column: str) -> list[str]:
+    """A column's cells as text, "" where there is none."""
+    arrow, parquet = _arrow(path)
+    name = parquet_names(path)[find(path, parquet_names(path), column)]
+    try:
+        with parquet.ParquetFile(path) as file:
+            batches = file.iter_batches(BLOCK, columns=[name])
+            cells = [cell for batch in batches for cell in batch.column(0).to_pylist()]
+    except (arrow.ArrowException, OSError, ValueError, KeyError, MemoryError) as exc:
+        raise _damaged(path, exc) from exc
+    return ["" if cell is None else str(cell).strip() for cell in cells]
+
+
+def _arrow(path: Path) -> tuple[Any, Any]:
+    try:
+        return importlib.import_module("pyarrow"), importlib.import_module("pyarrow.parquet")
+    except ImportError as exc:
+        raise OrbiflowError(
+            f"{path}: reading Parquet needs pyarrow: pip install 'orbiflow[parquet]'"
+        ) from exc
+
+
 def read_parquet(
     path: Path,
     columns: Sequence[str] | None,
@@ -92,13 +130,7 @@ def read_parquet(
     drop_missing: bool = False,
     keep_missing: bool = False,
 ) -> Table:
-    try:
-        arrow = importlib.import_module("pyarrow")
-        parquet = importlib.import_module("pyarrow.parquet")
-    except ImportError as exc:
-        raise OrbiflowError(
-            f"{path}: reading Parquet needs pyarrow: pip install 'orbiflow[parquet]'"
-        ) from exc
+    arrow, parquet = _arrow(path)
     try:
         with parquet.ParquetFile(path) as file:
             check_count(path, file.metadata.num_rows, max_rows, "rows")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -50,7 +50,7 @@ def read_table(
     a Parquet file without pyarrow.
     """
     path = Path(path)
-    kind = _kind(path)
+    kind = kind_of_file(path)
     if kind == "text":
         return read_text(path, columns, width, max_rows, drop_missing, has_header, keep_missing)
     read = {"npy": read_npy, "parquet": read_parquet}[kind]
@@ -58,39 +58,49 @@ def read_table(
 
 
 def append_column(table: Table, path_of_source: str | Path, name: str, values: ArrayLike) -> bytes:
-    """The source file with one more column, as UTF-8 text that ends its lines with a newline.
+    """As `append_columns`, of one column: `values` (N,)."""
+    return append_columns(table, path_of_source, {name: values})
 
-    `values` is (N,), one for each row of `table`, written with 10 significant digits. A text file
+
+def append_columns(
+    table: Table, path_of_source: str | Path, columns: Mapping[str, ArrayLike]
+) -> bytes:
+    """The source file with more columns, as UTF-8 text that ends its lines with a newline.
+
+    Each is (N,), a value for each row of `table`, written with 10 significant digits. A text file
     keeps its delimiter, its other columns and its comments, and loses its blank lines; it gets the
-    new name only where it has a header. Rows that were left out get an empty cell. From npy and
+    new names only where it has a header. Rows that were left out get an empty cell. From npy and
     Parquet come `table`'s columns, as CSV. A name that is taken gets a number: "density_2".
 
     Raises `InputFileError` where the source has changed since it was read, `ValueError` where
     `values` has another shape.
     """
-    values = np.asarray(values, dtype=np.float64)
-    if values.shape != table.lines.shape:
-        raise ValueError(f"values must have shape {table.lines.shape}, not {values.shape}")
+    values = [np.asarray(column, dtype=np.float64) for column in columns.values()]
+    for column in values:
+        if column.shape != table.lines.shape:
+            raise ValueError(f"values must have shape {table.lines.shape}, not {column.shape}")
     if table.delimiter is None:
-        names = (*table.columns, _free_name(name, table.columns))
-        return to_csv(names, np.column_stack([table.values, values]))
+        names = _free_names(columns, table.columns)
+        return to_csv((*table.columns, *names), np.column_stack([table.values, *values]))
     path, end, done, out = Path(path_of_source), table.delimiter, 0, bytearray()
     header, lines = table.header, [*table.lines.tolist(), -1]
     changed = InputFileError(f"{path}: the file changed after it was read; run this again")
     for number, line, is_comment in text_lines(path):
         if is_comment:
             out += f"{line}\n".encode()
-        elif header is not None:
-            out += f"{line}{end}{_name_cell(_free_name(name, header), end)}\n".encode()
+            continue
+        if header is not None:
+            cells = [_name_cell(name, end) for name in _free_names(columns, header)]
             header = None
         elif number in table.dropped:
-            out += f"{line}{end}{_missing_cell(end)}\n".encode()
+            cells = [_missing_cell(end)] * len(values)
         elif lines[done] == number:
-            out += f"{line}{end}{_number_cell(values[done], table)}\n".encode()
+            cells = [_number_cell(column[done], table) for column in values]
             done += 1
         else:
             raise changed
-    if done < len(values):
+        out += f"{end.join([line, *cells])}\n".encode()
+    if done < len(table.lines):
         raise changed
     return bytes(out)
 
@@ -119,6 +129,13 @@ def _missing_cell(delimiter: str) -> str:
     return "nan" if delimiter == " " else ""
 
 
+def _free_names(wanted: Iterable[str], taken: Sequence[str]) -> list[str]:
+    found: list[str] = []
+    for name in wanted:
+        found.append(_free_name(name, (*taken, *found)))
+    return found
+
+
 def _free_name(name: str, taken: Sequence[str]) -> str:
     used = {other.casefold() for other in taken}
     free, i = name, 1
@@ -138,7 +155,7 @@ def _name_cell(name: str, delimiter: str) -> str:
     return name
 
 
-def _kind(path: Path) -> str:
+def kind_of_file(path: Path) -> str:
     """ "text", "npy" or "parquet", by the first bytes, which an extension must not belie."""
     try:
         size, is_file, head = path.stat().st_size, path.is_file(), b""

@@ -1,0 +1,66 @@
+"""`orbiflow density region`: where a density is highest."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from orbiflow.cli.density_options import Model
+from orbiflow.cli.work import do
+from orbiflow.jobs import DensityRegionRequest, RecordError
+
+
+def region_of(
+    model: Model,
+    out: Annotated[
+        Path,
+        typer.Option("--out", "-o", help=".geojson (of directions and axes), .json or .csv."),
+    ] = Path("regions.json"),
+    mass: Annotated[
+        str | None,
+        typer.Option(help="That regions hold, such as 0.5,0.9 (default).", show_default=False),
+    ] = None,
+    level: Annotated[
+        str | None,
+        typer.Option(
+            help="Log densities, as `score` gives them, above which regions lie.",
+            show_default=False,
+        ),
+    ] = None,
+    samples: Annotated[
+        int, typer.Option(help="By which masses are known: 20000 for 0.35 % of a half.")
+    ] = 20_000,
+    budget: Annotated[
+        int, typer.Option(help="Evaluations after which outlines get no finer.")
+    ] = 300_000,
+    seed: Annotated[int, typer.Option(help="Same seed, same result.")] = 0,
+) -> None:
+    """Find the smallest regions that hold a mass: threshold, size, and boundary as closed polygons.
+
+    Of a torus of more or fewer than two angles: threshold and size.
+    """
+    request = DensityRegionRequest(
+        model=model,
+        out=out,
+        mass=_numbers(mass, "mass"),
+        level=_numbers(level, "level"),
+        samples=samples,
+        budget=budget,
+        seed=seed,
+    )
+    do(request)
+
+
+def _numbers(text: str | None, field: str) -> tuple[float, ...] | None:
+    """
+    >>> _numbers("0.5, 0.9", "mass")
+    (0.5, 0.9)
+    """
+    if text is None:
+        return None
+    try:
+        return tuple(float(part) for part in text.split(",") if part.strip())
+    except ValueError as error:
+        raise RecordError(f"{{{field}}} must be numbers such as 0.5,0.9, got {text!r}") from error

@@ -1,0 +1,168 @@
+"""A function on a grid that is fine only where it crosses certain levels."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orbiflow.symmetry.isometry import Array
+
+Function = Callable[[Array], Array]
+"""Points (N, 2) to values (N,)."""
+
+Flags = NDArray[np.bool_]
+
+ROUNDS = 200
+"""Of evaluating what lies beside a crossing, at most, a level of the grid."""
+
+
+@dataclass(frozen=True, eq=False)
+class Seeds:
+    """Points (S, 2) at which the function is known, so that islands between the nodes are found."""
+
+    points: Array
+    values: Array
+
+
+@dataclass(frozen=True, eq=False)
+class LevelGrid:
+    """Values (n + 1, m + 1) at the nodes of n x m even cells between `low` and `high`.
+
+    True at both ends of every side of a cell whose ends are on different sides of a level; elsewhere
+    interpolated from coarser cells. `missed`: (n, m, levels) cells all of whose nodes are on one side
+    of a level and some seed is on the other.
+    """
+
+    low: Array
+    step: Array
+    values: Array
+    missed: NDArray[np.bool_]
+    evaluations: int
+
+    @classmethod
+    def refined(
+        cls,
+        function: Function,
+        low: Array,
+        high: Array,
+        cells: tuple[int, int],
+        levels: Array,
+        seeds: Seeds,
+        doublings: int,
+        budget: int,
+    ) -> LevelGrid:
+        """Evaluate everywhere on `cells`, then halve them where a level is crossed.
+
+        Args:
+            levels: (T,).
+            doublings: of the grid, at most.
+            budget: no further doubling after as many evaluations.
+        """
+        maker = _Maker(function, low, high, cells, levels, seeds)
+        for _ in range(doublings):
+            if maker.evaluations >= budget:
+                break
+            maker.double()
+        return cls(low, maker.step, maker.values, maker.missed(), maker.evaluations)
+
+
+class _Maker:
+    def __init__(
+        self,
+        function: Function,
+        low: Array,
+        high: Array,
+        cells: tuple[int, int],
+        levels: Array,
+        seeds: Seeds,
+    ) -> None:
+        self.function, self.low, self.high, self.levels, self.seeds = (
+            function,
+            low,
+            high,
+            levels,
+            seeds,
+        )
+        self.values = np.zeros((cells[0] + 1, cells[1] + 1))
+        self.known = np.zeros(self.values.shape, dtype=bool)
+        self.evaluations = 0
+        self._evaluate(~self.known)
+
+    @property
+    def step(self) -> Array:
+        return (self.high - self.low) / (np.array(self.values.shape) - 1)
+
+    def double(self) -> None:
+        """Halve the cells; evaluate about what crosses, and where seeds were missed."""
+        wanted = self.missed().any(axis=2)
+        self.values, self.known = _doubled(self.values), _spread(self.known)
+        self._evaluate(_corners(np.repeat(np.repeat(wanted, 2, axis=0), 2, axis=1)))
+        for _ in range(ROUNDS):
+            if not self._evaluate(_corners(self._mixed())):
+                return
+
+    def missed(self) -> NDArray[np.bool_]:
+        """(n, m, T)"""
+        shape = np.array(self.values.shape) - 1
+        cell = np.clip(
+            np.floor((self.seeds.points - self.low) / self.step).astype(int), 0, shape - 1
+        )
+        found = np.zeros((*shape, len(self.levels)), dtype=bool)
+        for k, level in enumerate(self.levels):
+            least, most = _extremes(self.values >= level)
+            above = self.seeds.values >= level
+            i, j = cell.T
+            lost = np.where(above, ~most[i, j], least[i, j])
+            found[i[lost], j[lost], k] = True
+        return found
+
+    def _mixed(self) -> Flags:
+        """(n, m): cells that cross a level."""
+        found = np.zeros(np.array(self.values.shape) - 1, dtype=bool)
+        for level in self.levels:
+            least, most = _extremes(self.values >= level)
+            found |= most & ~least
+        return found
+
+    def _evaluate(self, wanted: Flags) -> int:
+        """Evaluate at nodes that are not known; how many."""
+        index = np.argwhere(wanted & ~self.known)
+        if len(index):
+            found = self.function(self.low + index * self.step)
+            self.values[tuple(index.T)] = found
+            self.known[tuple(index.T)] = True
+            self.evaluations += len(index)
+        return len(index)
+
+
+def _extremes(above: Flags) -> tuple[Flags, Flags]:
+    """Whether all, and any, of a cell's four nodes are."""
+    four = (above[:-1, :-1], above[1:, :-1], above[:-1, 1:], above[1:, 1:])
+    return np.logical_and.reduce(four), np.logical_or.reduce(four)
+
+
+def _corners(cells: Flags) -> Flags:
+    """Nodes of cells."""
+    found = np.zeros(np.array(cells.shape) + 1, dtype=bool)
+    for i in (0, 1):
+        for j in (0, 1):
+            found[i : i + cells.shape[0], j : j + cells.shape[1]] |= cells
+    return found
+
+
+def _doubled(values: Array) -> Array:
+    """Interpolated on cells of half the size."""
+    found = np.empty(2 * np.array(values.shape) - 1)
+    found[::2, ::2] = values
+    found[1::2, ::2] = (values[1:] + values[:-1]) / 2
+    found[:, 1::2] = (found[:, 2::2] + found[:, :-2:2]) / 2
+    return found
+
+
+def _spread(known: Flags) -> Flags:
+    found = np.zeros(2 * np.array(known.shape) - 1, dtype=bool)
+    found[::2, ::2] = known
+    return found
