@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from orbiflow.density import DensityEstimator, read_density
     from orbiflow.escher import BendingSettings, DescentSettings, escherize, load_saved
+    from orbiflow.export import load
     from orbiflow.fields import FourierField, symmetrize
     from orbiflow.flows import Flow
     from orbiflow.silhouette import Target
@@ -27,6 +28,7 @@ __version__ = "0.1.0"
 _ROOMS = {
     "density": ("DensityEstimator", "read_density"),
     "escher": ("BendingSettings", "DescentSettings", "escherize", "load_saved"),
+    "export": ("load",),
     "fields": ("FourierField", "symmetrize"),
     "flows": ("Flow",),
     "silhouette": ("Target",),
@@ -48,6 +50,7 @@ __all__ = [
     "certify",
     "escherize",
     "isohedral_class",
+    "load",
     "load_saved",
     "read_density",
     "symmetrize",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 import math
 import numbers
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, TypeAlias
 
@@ -13,6 +13,7 @@ import numpy as np
 import torch
 from numpy.typing import ArrayLike
 
+from orbiflow.density.arguments import check_kind
 from orbiflow.density.fitting.automatic import (
     PARTS,
     AutomaticSettings,
@@ -236,6 +237,35 @@ class DensityEstimator:
         known = given_named(self.space_, both, names)
         left = [name for axis, name in enumerate(names) if axis not in known]
         return self._of(conditional(density, known), left)
+
+    @classmethod
+    def fitted(
+        cls,
+        density: SymmetricDensity,
+        report: FitReport | None = None,
+        columns: Sequence[str] | None = None,
+        **params: Any,
+    ) -> DensityEstimator:
+        """An estimator of a density that is there already, such as one that was read from a file.
+
+        Args:
+            density: any.
+            report: of its fit, if it is known; else there is no `report_`.
+            columns: of the data, if they are known; else there is no `feature_names_in_`.
+            params: of the constructor, for fits to come.
+
+        Raises:
+            OrbiflowError: for what is no density, or a parameter that there is not.
+        """
+        check_kind(density, SymmetricDensity, "density")
+        made = cls(density.space).set_params(**params)
+        made.space_, made.density_ = density.space, density
+        if report is not None:
+            made.report_ = report
+        if columns:
+            made.feature_names_in_ = np.array(list(columns), dtype=object)
+        made.n_features_in_ = len(density.space.columns)
+        return made
 
     def score_samples(self, X: ArrayLike, *, measure: str = "natural") -> Array:
         """Log densities (N,) in nats at data (N, k), with respect to `measure` (see `MEASURES`).

@@ -20,6 +20,7 @@ from orbiflow.export.folder import write_tile_folder
 from orbiflow.export.gallery import write_gallery
 from orbiflow.export.index_page import index_page
 from orbiflow.export.json_writer import write_json
+from orbiflow.export.loading import LoadedRun, LoadedTile, load
 from orbiflow.export.overview import overview_png
 from orbiflow.export.pdf_writer import write_pdf
 from orbiflow.export.png_writer import write_png
@@ -40,6 +41,8 @@ __all__ = [
     "ExportTile",
     "Exported",
     "Layer",
+    "LoadedRun",
+    "LoadedTile",
     "PlotSettings",
     "Plotted",
     "Scene",
@@ -51,6 +54,7 @@ __all__ = [
     "draw_art",
     "export",
     "index_page",
+    "load",
     "overview_png",
     "plot_density",
     "read_art_tile",

@@ -140,7 +140,7 @@ def same_columns(
     Raises:
         OrbiflowError: if the file names other columns.
     """
-    names = tuple(extra.get("columns") or ())
+    names: tuple[str, ...] = tuple(extra.get("columns") or ())
     if not names or all(re.fullmatch(r"column\d+", name) for name in names):
         return None  # they had no names
     own = column_names(data, wanted=names, has_header=has_header)

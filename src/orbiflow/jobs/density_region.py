@@ -44,7 +44,8 @@ def density_region(request: DensityRegionRequest, tell: Sink, cancel: Cancel) ->
     if kind == ".csv" and space.dim != 2:
         raise OrbiflowError(
             f"{request.out}: a table is of outlines, which are drawn in two dimensions; this "
-            f"{space.name} has {space.dim}: write .json, and `orbiflow density score --region` for the rows inside"
+            f"{space.name} has {space.dim}: write .json, and `orbiflow density "
+            "score --region` for the rows inside"
         )
     tell(Progress(0.0, "drawing samples"))
     cancel.check()

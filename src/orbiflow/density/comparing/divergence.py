@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import torch
@@ -139,7 +140,8 @@ def _trust(own: Array, weights: Array) -> float:
     def loss(trust: float) -> float:
         return float((weights * np.logaddexp(0.0, -trust * own)).sum())
 
-    return float(minimize_scalar(loss, bounds=(0.0, 2.0), method="bounded").x)
+    found: Any = minimize_scalar(loss, bounds=(0.0, 2.0), method="bounded")
+    return float(found.x)
 
 
 def _fit(space: Space, train: Tensor, seed: int) -> BlendedDensity:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -94,6 +95,35 @@ class FitReport:
     repeats: Repeats | None = None
     effective: float | None = None
     notes: tuple[str, ...] = field(default=())
+
+
+def report_from_json(document: Mapping[str, Any]) -> FitReport:
+    """A report from the object that `dataclasses.asdict` makes of it, infinite figures as None.
+
+    Raises:
+        OrbiflowError: for what is no such object.
+    """
+    try:
+        values: dict[str, Any] = dict(document) | {"notes": tuple(document["notes"])}
+        stages = tuple(
+            Refinement(**{**stage, **{k: _figures(stage[k]) for k in ("train", "validation")}})
+            for stage in values.pop("stages")
+        )
+        parts = tuple(PartEvidence(**part) for part in values.pop("parts"))
+        repeats, shares = values.pop("repeats"), values.pop("shares")
+        return FitReport(
+            stages=stages,
+            parts=parts,
+            repeats=None if repeats is None else Repeats(**repeats),
+            shares=None if shares is None else tuple(shares),
+            **values,
+        )
+    except (AttributeError, KeyError, TypeError, ValueError) as error:
+        raise OrbiflowError(f"not the report of a fit: {error}") from error
+
+
+def _figures(values: list[float | None]) -> tuple[float, ...]:
+    return tuple(math.inf if value is None else value for value in values)
 
 
 def own_points(space: Space, points: Any) -> Tensor:

@@ -22,9 +22,9 @@ def to_geojson(outlines: Sequence[Outline]) -> dict[str, Any]:
     map there. Sides are straight in longitude and latitude (3.1.1). Of axes northern ends are drawn.
 
     Properties of each: `mass` (asked for, or null), `held` and `held_error` (by samples of the
-    density), `log_prob` (the threshold, nats per steradian) and its interval of 95 %, `area` in steradians,
-    `fraction` of the space, `polygons_mass` and `polygons_mass_error` (by new samples inside the
-    polygons).
+    density), `log_prob` (the threshold, nats per steradian) and its interval of 95 %, `area` in
+    steradians, `fraction` of the space, `polygons_mass` and `polygons_mass_error` (of new samples
+    inside the polygons).
 
     Raises:
         OrbiflowError: for a space that is not round.

@@ -32,14 +32,14 @@ class LevelGrid:
     """Values (n + 1, m + 1) at the nodes of n x m even cells between `low` and `high`.
 
     True at both ends of every side of a cell whose ends are on different sides of a level; elsewhere
-    interpolated from coarser cells. `missed`: (n, m, levels) cells all of whose nodes are on one side
-    of a level and some seed is on the other.
+    interpolated from coarser cells. `missed`: (n, m, levels) of cells all of whose nodes are on one
+    side of a level, how many seeds are on the other.
     """
 
     low: Array
     step: Array
     values: Array
-    missed: NDArray[np.bool_]
+    missed: NDArray[np.int64]
     evaluations: int
 
     @classmethod
@@ -97,26 +97,26 @@ class _Maker:
 
     def double(self) -> None:
         """Halve the cells; evaluate about what crosses, and where seeds were missed."""
-        wanted = self.missed().any(axis=2)
+        wanted = (self.missed() > 0).any(axis=2)
         self.values, self.known = _doubled(self.values), _spread(self.known)
         self._evaluate(_corners(np.repeat(np.repeat(wanted, 2, axis=0), 2, axis=1)))
         for _ in range(ROUNDS):
             if not self._evaluate(_corners(self._mixed())):
                 return
 
-    def missed(self) -> NDArray[np.bool_]:
+    def missed(self) -> NDArray[np.int64]:
         """(n, m, T)"""
         shape = np.array(self.values.shape) - 1
         cell = np.clip(
             np.floor((self.seeds.points - self.low) / self.step).astype(int), 0, shape - 1
         )
-        found = np.zeros((*shape, len(self.levels)), dtype=bool)
+        found = np.zeros((*shape, len(self.levels)), dtype=np.int64)
         for k, level in enumerate(self.levels):
             least, most = _extremes(self.values >= level)
             above = self.seeds.values >= level
             i, j = cell.T
             lost = np.where(above, ~most[i, j], least[i, j])
-            found[i[lost], j[lost], k] = True
+            np.add.at(found[:, :, k], (i[lost], j[lost]), 1)
         return found
 
     def _mixed(self) -> Flags:

@@ -38,7 +38,9 @@ def with_specks(
         The shape, the evaluations made, and the cells left.
     """
     most = max(1, budget // (PARTS + 1) ** 2)
-    cells = np.argwhere(grid.missed[:, :, number])
+    seeds = grid.missed[:, :, number]
+    cells = np.argwhere(seeds)
+    cells = cells[np.argsort(-seeds[tuple(cells.T)], kind="stable")]  # the largest first
     left = max(0, len(cells) - most)
     cells = cells[:most]
     done = np.zeros(grid.missed.shape[:2], dtype=bool)

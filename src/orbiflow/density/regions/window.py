@@ -40,7 +40,7 @@ class Window:
         """Natural area of a polygon or several: steradians on the globe, where sides are straight in
         longitude and latitude."""
         if not self.on_globe:
-            return float(shape.area)
+            return float(shapely.area(shape))
         return sum(_on_globe(part) for part in shapely.get_parts(shape))
 
 
