@@ -218,7 +218,8 @@ def test_the_model_is_whole_and_readable(tmp_path: Path, orbiflow) -> None:
     data, model = table(tmp_path), tmp_path / "model"
     orbiflow("density", "fit", data, "--space", "sphere", "--out", model, *FIT)
     density, extra = read_density(model / "density.safetensors")
-    assert extra == {"columns": ["lat", "lon"]}
+    assert extra["columns"] == ["lat", "lon"]
+    assert extra["fitted_rows"]["rows"] == 100
     assert density.mass(128) == pytest.approx(1.0, abs=2e-3)
 
 

@@ -91,6 +91,8 @@ class DensityEstimator:
     (1,)
     """
 
+    feature_names_in_: np.ndarray
+
     def __init__(
         self,
         space: str | Space = "torus",

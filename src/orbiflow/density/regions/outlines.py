@@ -37,6 +37,9 @@ CHECKED = 100_000
 TOLERANCE = 0.005
 """Of that mass, beyond what samples leave open; more is said aloud."""
 
+LONGEST = 4.0
+"""Degrees of a side on the globe, so that it hardly matters which lines a reader draws."""
+
 SIMPLIFIED = 0.03
 """Of a cell: by how much vertices that are left out may lie off the line."""
 
@@ -141,9 +144,9 @@ def outlines(
         told(min(0.9, spent / budget), "drawing outlines")
         shape, off = filled(grid.values, grid.low, grid.step, region.log_prob, function)
         left = (budget - spent) // (len(regions) - number)
-        shape, more, missed = with_specks(shape, grid, region.log_prob, number, function, left)
+        shape, more, missed = with_specks(shape, grid, region.log_prob, seeds, function, left)
         spent += more
-        shape = _polygons(shape, float(grid.step.min()))
+        shape = _polygons(shape, float(grid.step.min()), LONGEST if window.on_globe else np.inf)
         inside = _share_inside(shape, fresh)
         error = float(np.sqrt(max(inside * (1 - inside), 1 / CHECKED) / CHECKED))
         found.append(
@@ -170,10 +173,13 @@ def _peaks(density: SymmetricDensity) -> Tensor:
     return places[chosen[:MOST_PEAKS]]
 
 
-def _polygons(shape: shapely.Geometry, step: float) -> shapely.MultiPolygon:
+def _polygons(shape: shapely.Geometry, step: float, longest: float) -> shapely.MultiPolygon:
     parts = [p for p in shapely.get_parts(shape) if isinstance(p, shapely.Polygon)]
     simple = [shapely.simplify(p, SIMPLIFIED * min(step, np.sqrt(p.area))) for p in parts]
-    return shapely.MultiPolygon([orient(p) for p in simple if p.is_valid and p.area > 0])
+    kept = [orient(p) for p in simple if p.is_valid and p.area > 0]
+    if longest < np.inf:
+        kept = [shapely.segmentize(p, longest) for p in kept]
+    return shapely.MultiPolygon(kept)
 
 
 def _share_inside(shape: shapely.MultiPolygon, points: Array) -> float:

@@ -1,4 +1,4 @@
-"""Islands and holes smaller than a grid's cells, about seeds that lie in them."""
+"""What is as small as a grid's cells, drawn anew about seeds that lie in it."""
 
 from __future__ import annotations
 
@@ -7,14 +7,17 @@ import shapely
 from numpy.typing import NDArray
 
 from orbiflow.density.regions.contours import filled
-from orbiflow.density.regions.grid import Function, LevelGrid
+from orbiflow.density.regions.grid import Function, LevelGrid, Seeds
 from orbiflow.symmetry.isometry import Array
 
 PARTS = 12
 """A cell is cut into, each way."""
 
-ROUNDS = 3
-"""Of following islands into the cells beside them."""
+ROUNDS = 4
+"""Of following what a grid was too coarse for into the cells beside."""
+
+OFF = 2
+"""Parts of a cell's side on which the grid is wrong, for the cell beside to be looked at."""
 
 BLOCK = 500
 """Cells evaluated at a time."""
@@ -24,29 +27,25 @@ def with_specks(
     shape: shapely.Geometry,
     grid: LevelGrid,
     level: float,
-    number: int,
+    seeds: Seeds,
     function: Function,
     budget: int,
 ) -> tuple[shapely.Geometry, int, int]:
-    """A shape drawn on the grid, with what its cells were too coarse for.
+    """A shape drawn on the grid, drawn anew in cells that have seeds on its wrong side.
 
     Args:
-        number: of the level among the grid's.
-        budget: of evaluations; cells beyond it are left as they are.
+        budget: of evaluations; cells beyond it are left as they are, those of most seeds are first.
 
     Returns:
         The shape, the evaluations made, and the cells left.
     """
     most = max(1, budget // (PARTS + 1) ** 2)
-    seeds = grid.missed[:, :, number]
-    cells = np.argwhere(seeds)
-    cells = cells[np.argsort(-seeds[tuple(cells.T)], kind="stable")]  # the largest first
+    cells = _wrong(shape, grid, level, seeds)
     left = max(0, len(cells) - most)
-    cells = cells[:most]
-    done = np.zeros(grid.missed.shape[:2], dtype=bool)
-    above = grid.values >= level
+    done = np.zeros(np.array(grid.values.shape) - 1, dtype=bool)
     drawn: list[shapely.Geometry] = []
     for _ in range(ROUNDS):
+        cells = cells[: most - len(drawn)]
         if not len(cells):
             break
         done[tuple(cells.T)] = True
@@ -55,13 +54,24 @@ def with_specks(
             _drawn(grid, cell, block, level, function)
             for cell, block in zip(cells, blocks, strict=True)
         ]
-        cells = _beside(cells, blocks >= level, above, done)
-        most -= len(drawn)
-        cells = cells[: max(0, most)]
-    boxes = [_box(grid, cell) for cell in np.argwhere(done) if above[tuple(cell)]]
-    whole = shapely.difference(shape, shapely.union_all(boxes)) if boxes else shape
-    merged = shapely.union_all([whole, *drawn])
+        cells = _beside(cells, blocks, level, done)
+    if not drawn:
+        return shape, 0, left
+    boxes = shapely.union_all([_box(grid, cell) for cell in np.argwhere(done)])
+    merged = shapely.union_all([shapely.difference(shape, boxes), *drawn])
     return merged, len(drawn) * (PARTS + 1) ** 2, left
+
+
+def _wrong(
+    shape: shapely.Geometry, grid: LevelGrid, level: float, seeds: Seeds
+) -> NDArray[np.int64]:
+    """Cells (C, 2) with seeds on the wrong side, those with most first."""
+    shapely.prepare(shape)
+    wrong = shapely.intersects_xy(shape, *seeds.points.T) != (seeds.values >= level)
+    most = np.array(grid.values.shape) - 2
+    at = np.clip(np.floor((seeds.points[wrong] - grid.low) / grid.step).astype(int), 0, most)
+    cells, counts = np.unique(at, axis=0, return_counts=True)
+    return cells[np.argsort(-counts, kind="stable")]
 
 
 def _evaluated(grid: LevelGrid, cells: NDArray[np.int64], function: Function) -> Array:
@@ -84,26 +94,23 @@ def _drawn(
 
 
 def _beside(
-    cells: NDArray[np.int64], block: Array, above: NDArray[np.bool_], done: NDArray[np.bool_]
+    cells: NDArray[np.int64], blocks: Array, level: float, done: NDArray[np.bool_]
 ) -> NDArray[np.int64]:
-    """Even cells into which what is in a block goes on."""
-    n, m = done.shape
+    """Cells beside those of `blocks`, of whose common side the grid is wrong."""
+    t = np.arange(PARTS + 1) / PARTS
     sides = (
-        ((-1, 0), block[:, 0]),
-        ((1, 0), block[:, -1]),
-        ((0, -1), block[:, :, 0]),
-        ((0, 1), block[:, :, -1]),
+        ((-1, 0), blocks[:, 0]),
+        ((1, 0), blocks[:, -1]),
+        ((0, -1), blocks[:, :, 0]),
+        ((0, 1), blocks[:, :, -1]),
     )
     found = []
     for move, side in sides:
+        drawn = side[:, :1] + t * (side[:, -1:] - side[:, :1])
+        off = ((side >= level) != (drawn >= level)).sum(axis=1) >= OFF
         to = cells + move
-        fits = (to >= 0).all(axis=1) & (to < (n, m)).all(axis=1)
-        to, ends = to[fits], side[fits]
-        i, j = to.T
-        four = np.stack([above[i + a, j + b] for a in (0, 1) for b in (0, 1)])
-        even = four.all(axis=0) | ~four.any(axis=0)
-        goes_on = (ends != four[0][:, None]).any(axis=1)
-        found.append(to[even & goes_on & ~done[i, j]])
+        fits = (to >= 0).all(axis=1) & (to < done.shape).all(axis=1) & off
+        found.append(to[fits][~done[tuple(to[fits].T)]])
     return np.unique(np.concatenate(found), axis=0)
 
 

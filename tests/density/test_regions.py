@@ -1,0 +1,250 @@
+"""Regions of highest density: known caps, edges that are glued, islands, and mistakes."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+import shapely
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.stats import kstest
+
+from known_densities import angle_between, cap_height, kernels_about
+from orbiflow.density import DensityEstimator, make_space
+from orbiflow.density.regions import DensityLevels, highest_density_region, outlines, to_geojson
+from orbiflow.density.regions.contours import filled
+from orbiflow.density.regions.grid import LevelGrid, Seeds
+from orbiflow.errors import OrbiflowError
+
+SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")
+NO_SEEDS = Seeds(np.zeros((0, 2)), np.zeros(0))
+
+
+@given(st.floats(0.2, 0.8), st.floats(0.2, 0.8), st.floats(0.05, 0.19), st.floats(-1.0, 1.0))
+@settings(max_examples=20, deadline=None)
+def test_a_disc_on_the_grid_is_a_disc(x: float, y: float, radius: float, level: float) -> None:
+    def function(points: np.ndarray) -> np.ndarray:
+        return level + 4 * (radius - np.hypot(*(points - [x, y]).T))
+
+    levels = np.array([level])
+    low, high = np.zeros(2), np.ones(2)
+    grid = LevelGrid.refined(function, low, high, (16, 16), levels, NO_SEEDS, 4, 10**6)
+    assert grid.evaluations < 6000  # of 66,049 nodes
+    shape, off = filled(grid.values, grid.low, grid.step, level, function)
+    assert off < 2e-3
+    assert shapely.area(shape) == pytest.approx(math.pi * radius**2, rel=2e-3)
+    vertices = shapely.get_coordinates(shape)
+    assert abs(np.hypot(*(vertices - [x, y]).T) - radius).max() < 5e-4
+
+
+def test_a_region_is_cut_at_the_border_and_may_have_holes() -> None:
+    def function(points: np.ndarray) -> np.ndarray:
+        return np.sin(2 * math.pi * points[:, 0])  # half of the window, at its left edge
+
+    low, high = np.zeros(2), np.ones(2)
+    grid = LevelGrid.refined(function, low, high, (8, 8), np.zeros(1), NO_SEEDS, 3, 10**6)
+    shape, _ = filled(grid.values, low, grid.step, 0.0, function)
+    assert shapely.area(shape) == pytest.approx(0.5, abs=1e-9)
+    assert shape.bounds == pytest.approx((0, 0, 0.5, 1), abs=1e-9)
+    everything, _ = filled(np.ones((4, 4)), low, np.full(2, 1 / 3), 0.0, function)
+    assert shapely.area(everything) == pytest.approx(1.0)
+    assert filled(-np.ones((4, 4)), low, np.full(2, 1 / 3), 0.0, function)[0].is_empty
+
+    def ring(points: np.ndarray) -> np.ndarray:
+        return 0.1 - abs(np.hypot(*(points - 0.5).T) - 0.3)
+
+    grid = LevelGrid.refined(ring, low, high, (16, 16), np.zeros(1), NO_SEEDS, 3, 10**6)
+    shape, _ = filled(grid.values, low, grid.step, 0.0, ring)
+    assert isinstance(shape, shapely.Polygon)
+    assert len(shape.interiors) == 1
+    assert shape.area == pytest.approx(math.pi * (0.4**2 - 0.2**2), rel=1e-3)
+
+
+PLACES = [(20.0, 30.0), (5.0, 179.5), (88.0, 60.0), (-90.0, 0.0), (0.0, -180.0)]
+
+
+@pytest.mark.parametrize(("lat", "lon"), PLACES)
+def test_caps_on_the_sphere(lat: float, lon: float) -> None:
+    space, kappa, mass = make_space("sphere"), 30.0, 0.8
+    density = kernels_about(space, [[lat, lon]], [kappa], [1.0])
+    levels = DensityLevels(density, samples=20_000)
+    region = levels.highest(mass)
+    (outline,) = outlines(levels, [region])
+    height = cap_height(mass, kappa)
+    slack = 4 * region.error / mass
+    assert outline.size == pytest.approx(2 * math.pi * height, rel=slack)
+    assert region.size == pytest.approx(2 * math.pi * height, rel=slack)
+    # the polygons themselves are those of the threshold, far closer than the threshold is known
+    own = (
+        1
+        - (region.log_prob - math.log(kappa / (2 * math.pi * -math.expm1(-2 * kappa))) + kappa)
+        / kappa
+    )
+    assert outline.size == pytest.approx(2 * math.pi * own, rel=2e-3)
+    assert outline.mass == pytest.approx(mass, abs=4 * math.hypot(region.error, outline.error))
+    rng = np.random.default_rng(0)
+    vectors = rng.normal(size=(20_000, 3)) * 0.4 + make_vectors(lat, lon)
+    data = space.from_chart(
+        make_space("sphere").to_chart(vectors / np.linalg.norm(vectors, axis=1)[:, None])
+    )
+    inside = shapely.contains_xy(outline.shape, data[:, 1], data[:, 0])
+    angle, edge = angle_between(data, lat, lon), math.acos(1 - own)
+    clear = abs(angle - edge) > 1e-3
+    assert (inside == (angle < edge))[clear].all()
+    assert (region.contains(data) == (angle < edge))[clear].all()
+
+
+def make_vectors(lat: float, lon: float) -> np.ndarray:
+    a, b = np.radians([lat, lon])
+    return np.array([np.cos(a) * np.cos(b), np.cos(a) * np.sin(b), np.sin(a)])
+
+
+def test_geojson() -> None:
+    space = make_space("sphere")
+    places = [[10.0, 180.0], [89.0, 0.0], [-30.0, 20.0]]
+    density = kernels_about(space, places, [50.0, 50.0, 50.0], [1, 1, 1])
+    levels = DensityLevels(density)
+    drawn = outlines(levels, [levels.highest(0.5), levels.highest(0.95)])
+    document = json.loads(json.dumps(to_geojson(drawn), allow_nan=False))
+    assert document["type"] == "FeatureCollection"
+    assert [f["properties"]["mass"] for f in document["features"]] == [0.5, 0.95]
+    for feature, outline in zip(document["features"], drawn, strict=True):
+        assert feature["geometry"]["type"] == "MultiPolygon"
+        polygons = feature["geometry"]["coordinates"]
+        assert len(polygons) == 4  # that at the antimeridian is cut in two
+        total = 0.0
+        for rings in polygons:
+            for number, ring in enumerate(rings):
+                assert ring[0] == ring[-1]
+                assert len(ring) >= 4
+                x, y = np.array(ring).T
+                assert (abs(x) <= 180).all()
+                assert (abs(y) <= 90).all()
+                assert shapely.LinearRing(ring).is_ccw == (number == 0)
+                # sides are short: none goes round the globe
+                assert abs(np.diff(x)).max() <= 4.001
+            total += shapely.Polygon(rings[0], rings[1:]).area
+        shape = shapely.geometry.shape(feature["geometry"])
+        assert shape.is_valid
+        assert total == pytest.approx(outline.shape.area, rel=1e-4)
+        assert feature["properties"]["area"] == pytest.approx(outline.size)
+        assert {180.0, -180.0} == {round(v, 6) for v in (shape.bounds[0], shape.bounds[2])}
+        assert shape.bounds[3] == 90
+
+
+@pytest.mark.parametrize("name", SPACES)
+def test_polygons_hold_what_the_region_holds_and_edges_are_glued(name: str) -> None:
+    space = make_space(name)
+    rng = np.random.default_rng(0)
+    # about the edges of each window
+    if space.is_round:
+        centers = [[1.0, 100.0], [-4.0, -179.0], [60.0, 3.0]]
+    else:
+        centers = [[0.02, 0.7], [3.12, -1.5], [1.5, 1.6]]
+    density = kernels_about(space, centers, [8.0, 25.0, 60.0], [3, 2, 1])
+    levels = DensityLevels(density, seed=2)
+    regions = [levels.highest(0.3), levels.highest(0.9), levels.above(-40.0)]
+    drawn = outlines(levels, regions)
+    points = space.uniform(20_000, torch.Generator().manual_seed(1))
+    data, flat = space.from_chart(points), drawn[0].window.from_chart(points)
+    for outline in drawn:
+        assert outline.notes == ()
+        inside = shapely.contains_xy(outline.shape, *flat.T)
+        assert (inside != outline.region.contains(data)).mean() < 5e-4
+        share = inside.mean() if not space.is_round else None
+        if share is not None:
+            assert outline.fraction == pytest.approx(share, abs=0.012)
+        assert outline.size == pytest.approx(
+            outline.region.size, abs=5 * outline.region.size_error + 1e-4
+        )
+        assert outline.mass == pytest.approx(outline.region.held, abs=0.02)
+        assert all(part.is_valid and part.exterior.is_ccw for part in outline.shape.geoms)
+    assert drawn[2].fraction == pytest.approx(1.0, abs=1e-6)
+    low, high = drawn[0].window.low, drawn[0].window.high
+    assert drawn[1].shape.bounds[0] == low[0]
+    assert drawn[1].shape.bounds[2] == high[0]
+    del rng
+
+
+def test_islands_between_the_nodes_are_found() -> None:
+    space = make_space("torus", dim=2, unit="degrees")
+    rng = np.random.default_rng(3)
+    specks = rng.uniform(-180, 180, (40, 2))
+    wide = np.concatenate([specks, [[0.0, 0.0]]])
+    density = kernels_about(space, wide, [2e5] * 40 + [5.0], [0.5 / 40] * 40 + [0.5])
+    levels = DensityLevels(density, samples=5000)
+    (outline,) = outlines(levels, [levels.highest(0.4)])
+    near = shapely.buffer(outline.shape, 0.2)
+    assert shapely.contains_xy(near, *specks.T).all()
+    assert outline.mass == pytest.approx(outline.region.held, abs=0.03)
+    assert outline.notes == ()
+    (rough,) = outlines(levels, [levels.highest(0.4)], budget=1)
+    assert any("too small to outline" in note for note in rough.notes)
+
+
+@pytest.mark.parametrize("dim", [1, 2, 4])
+def test_thresholds_in_any_dimension(dim: int) -> None:
+    rng = np.random.default_rng(dim)
+    data = rng.vonmises(np.zeros(dim), 3.0, (300, dim))
+    estimator = DensityEstimator(parts="mixture").fit(data)
+    levels = DensityLevels(estimator, samples=4000)
+    fresh = estimator.sample(2000, random_state=1)
+    assert kstest(levels.hdr(fresh), "uniform").pvalue > 1e-4
+    for mass in (0.2, 0.9):
+        region = levels.highest(mass)
+        assert region.held == pytest.approx(mass, abs=1e-3)
+        assert region.contains(fresh).mean() == pytest.approx(mass, abs=5 * region.error + 0.02)
+        assert region.log_prob_low <= region.log_prob <= region.log_prob_high
+        assert (region.contains(fresh) == (levels.hdr(fresh) < mass)).mean() > 0.999
+        again = levels.above(region.log_prob)
+        assert again.held == region.held
+        assert again.mass is None
+    sizes = [levels.highest(mass).size for mass in (0.1, 0.5, 0.9)]
+    assert sizes == sorted(sizes)
+    json.dumps(region.to_json(), allow_nan=False)
+    if dim != 2:
+        with pytest.raises(OrbiflowError, match=f"this torus has {dim}"):
+            outlines(levels, [region])
+
+
+def test_a_level_that_nothing_reaches() -> None:
+    density = kernels_about(make_space("torus"), [[0.0, 0.0]], [4.0], [1.0])
+    levels = DensityLevels(density, samples=1000)
+    (outline,) = outlines(levels, [levels.above(10.0)])
+    assert outline.shape.is_empty
+    assert (outline.size, outline.mass, outline.region.held) == (0.0, 0.0, 0.0)
+    assert outline.region.error > 0
+    assert outlines(levels, []) == []
+
+
+TORUS = kernels_about(make_space("torus"), [[0.0, 0.0]], [4.0], [1.0])
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: highest_density_region(TORUS, 0.0), "mass must be"),
+        (lambda: highest_density_region(TORUS, 1.0), "the whole space"),
+        (lambda: highest_density_region(TORUS, 0.999999), "cannot be told from 1"),
+        (lambda: highest_density_region(TORUS, "0.5%"), "mass must be"),  # pyright: ignore[reportArgumentType]
+        (lambda: highest_density_region(DensityEstimator(), 0.5), "not fitted"),
+        (lambda: highest_density_region("quakes", 0.5), "SymmetricDensity"),  # pyright: ignore[reportArgumentType]
+        (lambda: DensityLevels(TORUS, samples=3), "samples"),
+        (lambda: DensityLevels(TORUS).above(math.inf), "level"),
+        (lambda: highest_density_region(TORUS, 0.5).contains([[1.0, 2.0, 3.0]]), "2 angles"),
+        (lambda: to_geojson(outlines(*both())), "not for the angles of a torus"),
+    ],
+)
+def test_mistakes(call: Any, message: str) -> None:
+    with pytest.raises(OrbiflowError, match=message):
+        call()
+
+
+def both() -> tuple[DensityLevels, list[Any]]:
+    levels = DensityLevels(TORUS, samples=1000)
+    return levels, [levels.highest(0.5)]

@@ -1,0 +1,155 @@
+"""Two data sets: a test that is exact, powerful and mindful of groups; divergences; row sketches."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+from scipy.stats import vonmises
+
+from orbiflow.density import Sphere, make_space
+from orbiflow.density.comparing import RowSketch, compare_samples, mmd_test
+from orbiflow.density.comparing.resampling import Groups
+from orbiflow.density.comparing.two_samples import chosen_rows
+from orbiflow.errors import OrbiflowError
+
+SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")
+
+
+def p_of(space: str, points: torch.Tensor, first: np.ndarray, labels: Any, seed: int) -> float:
+    groups = Groups.of(labels, len(points))
+    return mmd_test(make_space(space), points, first, groups, permutations=99, seed=seed).p
+
+
+@pytest.mark.parametrize("space", SPACES)
+def test_p_is_even_without_a_difference_and_small_with_one(space: str) -> None:
+    made = make_space(space)
+    none, some = [], []
+    for trial in range(24):
+        torch.manual_seed(trial)
+        points = made.project(0.4 + 0.15 * torch.randn(60, 2, dtype=torch.float64))
+        first = np.arange(60) < 25
+        none.append(p_of(space, points, first, None, trial))
+        moved = made.project(points + 0.2 * torch.as_tensor(first)[:, None])
+        some.append(p_of(space, moved, first, None, trial))
+    assert 0.3 < np.mean(none) < 0.7
+    assert np.mean(np.array(none) <= 0.1) < 0.3
+    assert np.mean(np.array(some) <= 0.05) > 0.8
+
+
+def test_rows_of_a_group_are_no_evidence_of_a_difference() -> None:
+    by_group, by_row, shared = [], [], []
+    for trial in range(20):
+        rng = np.random.default_rng(trial)
+        centers, labels = rng.uniform(size=(20, 2)), np.repeat(np.arange(20), 6)
+        points = torch.tensor((centers[labels] + 0.03 * rng.normal(size=(120, 2))) % 1)
+        first = labels < 9
+        by_group.append(p_of("torus", points, first, labels, trial))
+        by_row.append(p_of("torus", points, first, None, trial))
+        mixed = np.arange(120) % 2 == 0  # every group has rows in both
+        shared.append(p_of("torus", points, mixed, labels, trial))
+    assert np.median(by_row) < 0.02
+    assert 0.25 < np.mean(by_group) < 0.75
+    assert 0.25 < np.mean(shared) < 0.75
+
+
+def test_whole_groups_are_drawn() -> None:
+    labels = np.random.default_rng(0).integers(0, 40, 1000)
+    groups = Groups.of(labels, 1000)
+    kept = chosen_rows(labels < 15, groups, 300)
+    assert 200 < len(kept) <= 300
+    for label in np.unique(labels[kept]):
+        assert (labels[kept] == label).sum() == (labels == label).sum()
+    assert chosen_rows(labels < 15, groups, 5000).tolist() == list(range(1000))
+
+
+def test_divergences_are_near_those_of_the_densities() -> None:
+    rng = np.random.default_rng(0)
+    kappa, shift, rows = 3.0, 1.2, 700
+    one = rng.vonmises([0.0, 0.0], kappa, (rows, 2))
+    other = rng.vonmises([0.0, shift], kappa, (rows, 2))
+    found = compare_samples({"a": one, "b": other}, permutations=99, resamples=300).divergence
+    assert found is not None
+    t = (np.arange(4000) + 0.5) / 4000 * 2 * math.pi - math.pi
+    p, q = vonmises(kappa).pdf(t), vonmises(kappa, loc=shift).pdf(t)
+    step = 2 * math.pi / 4000
+    jensen = step * (p * np.log(2 * p / (p + q)) + q * np.log(2 * q / (p + q))).sum() / 2
+    kl = step * (p * np.log(p / q)).sum()
+    accuracy = step * np.maximum(p, q).sum() / 2
+    assert jensen * 0.7 < found.jensen_shannon.value < jensen + 3 * found.jensen_shannon.error
+    assert found.accuracy.value == pytest.approx(accuracy, abs=3 * found.accuracy.error + 0.01)
+    for estimate in (found.first_to_second, found.second_to_first):
+        assert estimate.value == pytest.approx(kl, rel=0.25)
+        assert estimate.low < estimate.value < estimate.high
+
+
+def test_data_far_apart_and_few_rows() -> None:
+    rng = np.random.default_rng(1)
+    far = compare_samples(
+        {"a": rng.vonmises(0, 50, (60, 2)), "b": rng.vonmises(3, 50, (60, 2))}, resamples=100
+    )
+    assert far.differ
+    assert far.divergence is not None
+    assert far.divergence.jensen_shannon.value == pytest.approx(math.log(2), abs=0.05)
+    assert far.divergence.accuracy.value > 0.98
+    few = compare_samples({"a": rng.vonmises(0, 1, (8, 2)), "b": rng.vonmises(0, 1, (9, 2))})
+    assert few.divergence is None
+    assert any("not estimated" in note for note in few.notes)
+    assert json.loads(json.dumps(few.to_json(), allow_nan=False))["divergence"] is None
+    same = rng.vonmises(0, 1, (30, 2))
+    assert not compare_samples({"a": same, "b": same}, permutations=99, resamples=100).differ
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda a: compare_samples({"a": a}), "two data sets"),
+        (lambda a: compare_samples({"a": a, "b": a[:, :1]}), "2 and 1 columns"),
+        (lambda a: compare_samples({"a": a, "b": a[:0]}), "no rows"),
+        (lambda a: compare_samples({"a": a, "b": a[:2]}), "of their own"),
+        (lambda a: compare_samples({"a": a, "b": a}, "cube"), "unknown space"),
+        (lambda a: compare_samples({"a": a, "b": a}, groups={"a": [1]}), "by these names"),
+        (lambda a: compare_samples({"a": a, "b": a}, groups={"a": [1], "b": [2]}), "20 rows"),
+        (lambda a: compare_samples({"a": a, "b": a}, permutations=3), "permutations"),
+        (
+            lambda a: compare_samples({"a": a, "b": a}, groups={"a": [1] * 20, "b": [2] * 20}),
+            "2 groups are too few",
+        ),
+    ],
+)
+def test_mistakes(call: Any, message: str) -> None:
+    with pytest.raises(OrbiflowError, match=message):
+        call(np.random.default_rng(0).vonmises(0, 1, (20, 2)))
+
+
+@pytest.mark.parametrize("name", SPACES)
+def test_rows_are_known_again_however_they_are_written(name: str) -> None:
+    rng = np.random.default_rng(0)
+    space, data = make_space(name), rng.uniform(-1, 1, (5000, 2)).round(4)
+    sketch = RowSketch.from_json(json.loads(json.dumps(RowSketch.of(space, data).to_json())))
+    new = rng.uniform(-1, 1, (3000, 2))
+    known, looked_up = sketch.known(space, np.concatenate([data[:1000], new]))
+    assert 0.3 * 4000 < looked_up < 0.5 * 4000
+    assert known == sketch.known(space, data[:1000])[1]
+    assert sketch.known(space, new)[0] == 0
+    if not space.is_round:
+        turned = data + 2 * np.pi * np.array([1, -2])
+        assert sketch.known(space, turned)[0] >= 0.99 * sketch.known(space, data)[0]
+
+
+def test_directions_are_known_in_another_form_and_frame() -> None:
+    rng = np.random.default_rng(0)
+    data = np.degrees(rng.uniform(-1, 1, (500, 2)))
+    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    sketch = RowSketch.of(Sphere(), data)
+    other = Sphere(form="vector", rotation=turn)
+    vectors = Sphere(form="vector").from_chart(Sphere().to_chart(data))
+    assert sketch.known(other, vectors)[0] >= 0.99 * 500
+    with pytest.raises(OrbiflowError, match="sketch"):
+        RowSketch.from_json({"rows": 3, "whole": True, "hashes": [3, 2]})
+    with pytest.raises(OrbiflowError, match="sketch"):
+        RowSketch.from_json([])
