@@ -16,8 +16,10 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.jobs import (
     AnimateRequest,
     ArtRequest,
+    DensityCompareRequest,
     DensityFitRequest,
     DensityPlotRequest,
+    DensityRegionRequest,
     DensitySampleRequest,
     DensityScoreRequest,
     EscherizeRequest,
@@ -121,6 +123,28 @@ REQUESTS = st.one_of(
         center=st.none() | st.text(),
         scale=st.sampled_from(["auto", "linear", "log"]),
         dots=st.booleans(),
+    ),
+    st.builds(
+        DensityCompareRequest,
+        data=paths.map(lambda path: (path,)),
+        models=st.lists(paths, min_size=2, unique=True).map(tuple),
+        columns=columns,
+        group=st.none() | st.text(),
+        bootstrap=st.integers(100, 10**6),
+        level=st.floats(0.5, 0.999),
+        seed=seeds,
+    ),
+    st.builds(
+        DensityCompareRequest, data=st.tuples(paths, paths), space=spaces, unit=st.none() | units
+    ),
+    st.builds(
+        DensityRegionRequest,
+        model=paths,
+        out=st.sampled_from(["a.geojson", "b.JSON", "c.csv"]).map(Path),
+        mass=st.none() | st.lists(st.floats(0.01, 0.99), min_size=1, max_size=9).map(tuple),
+        level=st.none() | st.lists(st.floats(-99, 99), min_size=1, max_size=9).map(tuple),
+        samples=st.integers(1000, 10**7),
+        seed=seeds,
     ),
     st.builds(
         ExportRequest,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -96,6 +97,9 @@ class DensityRegionRequest(Request):
         for share in self.mass or ():
             if not 0 < share < 1:
                 raise RecordError(f"{{mass}} must be between 0 and 1, got {share:g}")
+        for value in self.level or ():
+            if not math.isfinite(value):
+                raise RecordError(f"{{level}} must be finite, got {value:g}")
         if self.mass == () or self.level == ():
             raise RecordError("{mass} and {level} need a number each, or several, as in 0.5,0.9")
         if len(self.mass or ()) + len(self.level or ()) > 50:

@@ -1,0 +1,264 @@
+"""`orbiflow density compare` and `region`, `score --region`, columns by their names, and mistakes."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import shapely
+
+from orbiflow.density import DensityEstimator, density_to_bytes
+
+KERNELS = ("--parts", "mixture")
+
+
+def write(path: Path, header: str, rows: np.ndarray, labels: list[str] | None = None) -> Path:
+    lines = [",".join(f"{v:.5f}" for v in row) for row in rows]
+    if labels is not None:
+        lines = [f"{label},{line}" for label, line in zip(labels, lines, strict=True)]
+    path.write_text("\n".join([header, *lines]) + "\n")
+    return path
+
+
+def table_of(path: Path) -> list[dict[str, str]]:
+    return list(csv.DictReader(path.read_text().splitlines()))
+
+
+def angles(seed: int, rows: int = 120, kappa: float = 6.0) -> np.ndarray:
+    return np.degrees(np.random.default_rng(seed).vonmises([0.5, -1.0], kappa, (rows, 2)))
+
+
+@pytest.fixture(name="folder")
+def folder_fixture(tmp_path: Path, orbiflow: Any) -> Path:
+    """Two models of phi, psi, one good and one that has the columns the other way round."""
+    write(tmp_path / "good.csv", "phi,psi", angles(0))
+    write(tmp_path / "poor.csv", "psi,phi", angles(1, kappa=0.5)[:, ::-1])
+    write(
+        tmp_path / "held.csv",
+        "name,psi,phi",
+        angles(2)[:, ::-1],
+        [f"p{k % 30}" for k in range(120)],
+    )
+    for name in ("good", "poor"):
+        done = orbiflow(
+            "density", "fit", tmp_path / f"{name}.csv", "--space", "torus", "--unit", "degrees",
+            *KERNELS, "--out", tmp_path / name,
+        )  # fmt: skip
+        assert done.status == 0, done.err
+    return tmp_path
+
+
+def test_models_are_compared_by_the_names_of_their_columns(folder: Path, orbiflow: Any) -> None:
+    models = ("-m", folder / "poor", "-m", folder / "good")
+    out = folder / "c.json"
+    done = orbiflow("density", "compare", *models, "--data", folder / "held.csv", "--out", out)
+    assert done.status == 0, done.err
+    assert "good is better than poor" in done.out
+    assert "WARNING" not in done.out
+    found = json.loads(out.read_text())
+    assert found["kind"] == "models"
+    assert found["best"] == "good"
+    assert found["groups"] is None
+    good = next(s for s in found["scores"] if s["name"] == "good")
+    # phi and psi by name: as if the file had them in the order of the fit
+    plain = write(folder / "plain.csv", "phi,psi", angles(2))
+    scored = orbiflow(
+        "density", "score", plain, "--model", folder / "good", "--out", folder / "s.csv"
+    )
+    assert scored.status == 0, scored.err
+    rows = table_of(folder / "s.csv")
+    assert np.mean([float(row["log_prob"]) for row in rows]) == pytest.approx(
+        good["mean"], abs=1e-6
+    )
+    grouped = orbiflow(
+        "density", "compare", *models, "--data", folder / "held.csv", "--group", "name",
+        "--out", folder / "c.csv",
+    )  # fmt: skip
+    assert grouped.status == 0, grouped.err
+    assert "rows in 30 groups" in grouped.out
+    (row,) = table_of(folder / "c.csv")
+    assert (row["first"], row["better"]) == ("good", "good")
+
+
+def test_rows_that_a_model_was_fitted_to_are_known(folder: Path, orbiflow: Any) -> None:
+    models = ("-m", folder / "good", "-m", folder / "poor")
+    done = orbiflow("density", "compare", *models, "--data", folder / "good.csv")
+    assert done.status == 0, done.err
+    assert "WARNING: good seems to have been fitted to these rows (120 of 120" in done.out
+    mixed = write(folder / "mixed.csv", "phi,psi", np.concatenate([angles(0)[:20], angles(3)]))
+    done = orbiflow("density", "compare", *models, "--data", mixed)
+    assert "20 of 140 rows that were looked up equal one that good was fitted to" in done.out
+    extra = DensityEstimator(unit="degrees", parts="mixture").fit(angles(0))
+    (folder / "old.safetensors").write_bytes(density_to_bytes(extra.density_))
+    done = orbiflow(
+        "density", "compare", "-m", folder / "good", "-m", folder / "old.safetensors",
+        "--columns", "phi,psi", "--data", mixed,
+    )  # fmt: skip
+    assert done.status == 0, done.err
+    assert "old has no record of the rows" in done.out
+
+
+def test_data_sets_are_compared(folder: Path, orbiflow: Any) -> None:
+    flipped = write(folder / "b.csv", "psi,phi", angles(5)[:, ::-1])
+    how = ("--space", "torus", "--unit", "degrees", "--permutations", 99, "--bootstrap", 200)
+    done = orbiflow("density", "compare", "-d", folder / "good.csv", "-d", flipped, *how)
+    assert done.status == 0, done.err
+    assert "the data cannot tell the densities of good and b apart" in done.out
+    out = folder / "d.csv"
+    done = orbiflow(
+        "density",
+        "compare",
+        "-d",
+        folder / "good.csv",
+        "-d",
+        folder / "poor.csv",
+        *how,
+        "--out",
+        out,
+    )
+    assert "good and poor come from different densities" in done.out
+    rows = {row["figure"]: row for row in table_of(out)}
+    assert float(rows["p"]["value"]) == pytest.approx(0.01)
+    assert float(rows["accuracy"]["low"]) > 0.5
+
+
+def test_groups_of_data_sets_are_no_columns_of_theirs(folder: Path, orbiflow: Any) -> None:
+    labels = [str(k % 7) for k in range(18)]
+    for name, seed in (("x", 1), ("y", 2)):
+        write(folder / f"{name}.csv", "station,phi,psi", angles(seed)[:18], labels)
+    done = orbiflow(
+        "density", "compare", "-d", folder / "x.csv", "-d", folder / "y.csv", "--group", "station",
+        "--space", "torus", "--unit", "degrees", "--permutations", 49, "--out", folder / "xy.json",
+    )  # fmt: skip
+    assert done.status == 0, done.err
+    found = json.loads((folder / "xy.json").read_text())
+    assert (found["groups"], found["rows"], found["divergence"]) == (7, [18, 18], None)
+
+
+def test_regions(folder: Path, orbiflow: Any) -> None:
+    out = folder / "r.json"
+    done = orbiflow("density", "region", "-m", folder / "good", "--mass", "0.5, 0.9", "--out", out)
+    assert done.status == 0, done.err
+    found = json.loads(out.read_text())
+    assert found["size_unit"] == "degrees^2"
+    assert [r["mass"] for r in found["regions"]] == [0.5, 0.9]
+    for region in found["regions"]:
+        shape = shapely.MultiPolygon([(rings[0], rings[1:]) for rings in region["polygons"]])
+        assert shape.is_valid
+        assert shape.area == pytest.approx(region["polygons_size"])
+        assert region["polygons_mass"] == pytest.approx(region["mass"], abs=0.02)
+    table = folder / "r.csv"
+    done = orbiflow("density", "region", "-m", folder / "good", "--level", "-9", "--out", table)
+    assert done.status == 0, done.err
+    header, first, *_ = table.read_text().splitlines()
+    assert header == "region,mass,log_prob,polygon,ring,angle1,angle2"
+    assert first.startswith("1,,-9,1,0,")
+    refused = orbiflow("density", "region", "-m", folder / "good", "--out", folder / "r.geojson")
+    assert refused.status == 2
+    assert "not for the angles of a torus" in refused.err
+    scored = folder / "s.csv"
+    done = orbiflow(
+        "density", "score", folder / "held.csv", "-m", folder / "good", "--region", "--out", scored
+    )
+    assert done.status == 0, done.err
+    rows = table_of(scored)
+    assert list(rows[0]) == ["name", "psi", "phi", "log_prob", "hdr"]
+    level = found["regions"][1]["log_prob"]
+    for row in rows:
+        inside = float(row["log_prob"]) >= level
+        assert inside == (float(row["hdr"]) < 0.9)
+
+
+def test_geojson_of_directions_and_thresholds_of_many_angles(tmp_path: Path, orbiflow: Any) -> None:
+    rng = np.random.default_rng(0)
+    write(
+        tmp_path / "d.csv",
+        "lat,lon",
+        np.stack([rng.normal(0, 20, 90).clip(-80, 80), rng.normal(170, 30, 90)], axis=1),
+    )
+    fit = orbiflow(
+        "density", "fit", tmp_path / "d.csv", "--space", "sphere", *KERNELS, "--out", tmp_path / "m"
+    )
+    assert fit.status == 0, fit.err
+    out = tmp_path / "r.geojson"
+    done = orbiflow("density", "region", "-m", tmp_path / "m", "--mass", "0.8", "--out", out)
+    assert done.status == 0, done.err
+    (feature,) = json.loads(out.read_text())["features"]
+    xs = np.concatenate([np.array(rings[0])[:, 0] for rings in feature["geometry"]["coordinates"]])
+    assert xs.max() == 180
+    assert xs.min() == -180
+    assert feature["properties"]["held"] == 0.8
+    write(tmp_path / "t.csv", "a,b,c", rng.normal(0, 1, (90, 3)))
+    fit = orbiflow(
+        "density", "fit", tmp_path / "t.csv", "--space", "torus", *KERNELS, "--out", tmp_path / "t"
+    )
+    assert fit.status == 0, fit.err
+    done = orbiflow("density", "region", "-m", tmp_path / "t", "--out", tmp_path / "t.json")
+    assert done.status == 0, done.err
+    assert "outlines are drawn in two dimensions" in done.out
+    found = json.loads((tmp_path / "t.json").read_text())
+    assert found["size_unit"] == "radians^3"
+    assert "polygons" not in found["regions"][0]
+    refused = orbiflow("density", "region", "-m", tmp_path / "t", "--out", tmp_path / "t.csv2")
+    assert refused.status == 2
+
+
+def test_score_refuses_other_columns(folder: Path, orbiflow: Any) -> None:
+    other = write(folder / "other.csv", "chi1,chi2", angles(4))
+    score = ("density", "score", other, "--model", folder / "good", "--out", folder / "s.csv")
+    refused = orbiflow(*score)
+    assert refused.status == 2
+    assert (
+        "the model was fitted to phi, psi, and the file has chi1, chi2: say with --columns"
+        in refused.err
+    )
+    assert not (folder / "s.csv").exists()
+    assert orbiflow(*score, "--columns", "chi1,chi2").status == 0
+    half = write(folder / "half.csv", "phi,chi2", angles(4))
+    assert "no psi among phi, chi2" in orbiflow("density", "score", half, "-m", folder / "good").err
+    bare = folder / "bare.csv"
+    bare.write_text("\n".join(f"{a},{b}" for a, b in angles(4)) + "\n")
+    done = orbiflow("density", "score", bare, "-m", folder / "good", "--out", folder / "b.csv")
+    assert done.status == 0, done.err
+    assert "has no header: its columns were taken for phi, psi" in done.out
+
+
+PAIR = ("compare", "-m", "good", "-m", "poor", "-d", "held.csv")
+
+MISTAKES: dict[str, tuple[tuple[object, ...], str]] = {
+    "one model": (("compare", "-m", "good", "-d", "held.csv"), "--model must be given twice"),
+    "one model twice": (("compare", "-m", "good", "-m", "good", "-d", "held.csv"), "one folder twice"),
+    "two tables": ((*PAIR, "-d", "a"), "one --data"),
+    "a space": ((*PAIR, "--space", "torus"), "leave it out"),
+    "no space": (("compare", "-d", "good.csv", "-d", "poor.csv"), "need their --space"),
+    "nothing": (("compare", "-d", "good.csv"), "give two --model or more"),
+    "ending": ((*PAIR, "-o", "c.txt"), "end in .json, .csv"),
+    "level": ((*PAIR, "--level", "95"), "--level must be"),
+    "no group": ((*PAIR, "--group", "who"), "no column 'who'"),
+    "no file": ((*PAIR[:-1], "none.csv"), "no such file"),
+    "no model": (("compare", "-m", "good", "-m", "nope", "-d", "held.csv"), "nope"),
+    "other columns": (
+        ("compare", "-d", "good.csv", "-d", "held.csv", "--space", "torus", "--unit", "degrees"),
+        "say with --columns which to compare",
+    ),
+    "no unit": (("compare", "-d", "good.csv", "-d", "poor.csv", "--space", "torus"), "say --unit"),
+    "mass": (("region", "-m", "good", "--mass", "95"), "--mass must be between 0 and 1"),
+    "mass of words": (("region", "-m", "good", "--mass", "half"), "--mass must be numbers"),
+    "no mass": (("region", "-m", "good", "--mass", ","), "need a number each"),
+    "level nan": (("region", "-m", "good", "--level", "nan"), "finite"),
+    "samples": (("region", "-m", "good", "--samples", "3"), "--samples must be"),
+    "place": (("region", "-m", "good", "-o", "none/r.json"), "no folder none"),
+}  # fmt: skip
+
+
+def test_mistakes(folder: Path, orbiflow: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(folder)
+    for case, (arguments, message) in MISTAKES.items():
+        done = orbiflow("density", *arguments)
+        assert done.status == 2, case
+        assert message in done.err, f"{case}: {done.err}"
+        assert "Traceback" not in done.err
