@@ -1,0 +1,29 @@
+"""What docs/comparing.md says in Python runs."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+TEXT = (Path(__file__).parents[2] / "docs" / "comparing.md").read_text(encoding="utf-8")
+
+
+def test_the_snippet(capsys: pytest.CaptureFixture[str]) -> None:
+    first, *_ = re.findall(r"```python\n(.*?)```", TEXT, flags=re.DOTALL)
+    exec(compile(first, "comparing.md", "exec"), {})
+    said = capsys.readouterr().out.splitlines()
+    assert said[2] == "[ True False]"
+    assert said[1].split()[0] in ("True", "False")
+
+
+def test_the_commands_are_there() -> None:
+    from orbiflow.cli.density import density
+
+    names = {
+        command.name or getattr(command.callback, "__name__", "")
+        for command in density.registered_commands
+    }
+    for name in re.findall(r"^orbiflow density (\w+)", TEXT, flags=re.MULTILINE):
+        assert name in names
