@@ -286,7 +286,7 @@ def _number(path: Path, line: int, name: str, cell: str) -> float:
     if kind == "missing":
         return math.nan
     if kind == "number":
-        return float(cell)
+        return float(cell.strip())  # of what float takes for no space, such as \x1c
     comma = _class(cell.replace(",", ".")) == "number"
     raise InputFileError(
         f"{path}: line {line}: column {quote(name)}: {quote(cell)} is not a number; "
