@@ -7,7 +7,7 @@ import math
 import numbers
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 import torch
@@ -36,6 +36,7 @@ from orbiflow.density.partial import (
     log_prob_observed,
     marginal,
 )
+from orbiflow.density.random_state import RandomState, seed_of
 from orbiflow.density.spaces.catalogue import space_class
 from orbiflow.density.spaces.space import Space
 from orbiflow.errors import OrbiflowError
@@ -51,9 +52,6 @@ OF_FLOWS = (*ONLY_SPLINES[:-1], "evaluations", "validation")
 """Parameters of a flow, alone or beside other parts."""
 
 AUTO = "auto"
-
-RandomState: TypeAlias = int | np.integer | np.random.RandomState | np.random.Generator | None
-"""As scikit-learn has it, and NumPy's newer generators."""
 
 
 class DensityEstimator:
@@ -304,7 +302,7 @@ class DensityEstimator:
         density = self._fitted()
         if not isinstance(n_samples, numbers.Integral) or n_samples < 1:
             raise OrbiflowError(f"n_samples must be an integer of at least 1, got {n_samples!r}")
-        generator = torch.Generator().manual_seed(_seed_of(random_state))
+        generator = torch.Generator().manual_seed(seed_of(random_state))
         return self.space_.from_chart(density.sample((int(n_samples),), generator))
 
     def get_params(self, deep: bool = True) -> dict[str, Any]:
@@ -404,28 +402,10 @@ class DensityEstimator:
 
     def _of(self, density: SymmetricDensity, names: list[str]) -> DensityEstimator:
         """A fitted estimator of a density that was derived."""
-        found = DensityEstimator(**{**self.get_params(), "space": density.space})
-        found.space_, found.density_ = density.space, density
-        found.n_features_in_ = density.space.dim
-        found.feature_names_in_ = np.array(names, dtype=object)
-        return found
+        params = {name: v for name, v in self.get_params().items() if name != "space"}
+        return DensityEstimator.fitted(density, columns=names, **params)
 
     def _fitted(self) -> SymmetricDensity:
         if not hasattr(self, "density_"):
             raise OrbiflowError("this estimator is not fitted yet: call fit first")
         return self.density_
-
-
-def _seed_of(random_state: RandomState) -> int:
-    if random_state is None:
-        return int(np.random.randint(2**31))  # noqa: NPY002  scikit-learn's convention
-    if isinstance(random_state, np.random.RandomState):
-        return int(random_state.randint(2**31))
-    if isinstance(random_state, np.random.Generator):
-        return int(random_state.integers(2**31))
-    if isinstance(random_state, numbers.Integral) and not isinstance(random_state, bool):
-        return int(random_state) % 2**63
-    raise OrbiflowError(
-        "random_state must be None, an integer, a NumPy RandomState or Generator, got "
-        f"{random_state!r}"
-    )

@@ -149,23 +149,21 @@ def _estimator(path: Path) -> DensityEstimator:
     density, extra = read_density(file)
     report, settings = None, {}
     beside = file.with_name(REPORT)
-    if file.name == MODEL and beside.is_file():
-        document = _json(beside)
-        try:
+    document = _json(beside) if file.name == MODEL and beside.is_file() else {}
+    try:
+        if "settings" in document:  # a marginal or a conditional was not fitted
             report = report_from_json(document["report"])
             settings = _settings(dict(document["settings"]))
-        except (KeyError, TypeError, ValueError) as error:
-            raise InputFileError(f"{beside}: not the report of a density: {error}") from error
-    try:
         return DensityEstimator.fitted(density, report, extra.get("columns"), **settings)
-    except OrbiflowError as error:
+    except (KeyError, TypeError, ValueError) as error:
         raise InputFileError(f"{beside}: not the report of a density: {error}") from error
 
 
 def _settings(settings: dict[str, Any]) -> dict[str, Any]:
     """Of a request, as the estimator has them."""
     parts = settings.get("parts")
-    known = {name: settings[name] for name in ("repeats", "detail", "segments", "kernels", "seed")}
+    own = ("repeats", "missing", "detail", "segments", "kernels", "seed")
+    known = {name: settings[name] for name in own if name in settings}
     return known | {"parts": "auto" if parts is None else ",".join(parts)}
 
 
