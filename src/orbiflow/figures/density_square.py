@@ -12,16 +12,16 @@ from torch import Tensor
 from orbiflow.density.models.blend import BlendedDensity
 from orbiflow.density.models.symmetric import SymmetricDensity, midpoints
 from orbiflow.figures.density_axes import INK, check_plane, dress, space_title, view_of
-from orbiflow.figures.density_frame import Framed, colour_bar, framed, side_by_side
+from orbiflow.figures.density_bar import shade_bar
+from orbiflow.figures.density_frame import framed, side_by_side
 from orbiflow.figures.density_legend import caption, legend
-from orbiflow.figures.density_scale import Shade, bar_label, bar_ticks, minor_places, shading
-from orbiflow.figures.density_values import density_on_grid, is_sharp, takes_logarithms
+from orbiflow.figures.density_scale import bar_label, bar_ticks, shading
+from orbiflow.figures.density_values import chosen_scale, density_on_grid, is_sharp
 from orbiflow.figures.sheet import Picture, Sheet
 from orbiflow.symmetry.isometry import Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.image import AxesImage
 
 COLOURS = "viridis"
 MAX_DOTS = 3000
@@ -95,7 +95,8 @@ def density_picture(
     middles = (torch.arange(count, dtype=torch.float64) + 0.5) / count
     values = density_on_grid(density, middles + view.low[0], middles + view.low[1], measure)
     areas = space.log_area(midpoints(space, count)).exp().numpy().reshape(count, count)
-    shade = shading(values, areas, log=takes_logarithms(density, measure, scale))
+    chosen = chosen_scale(density, measure, scale)
+    shade = shading(values, areas, log=chosen.log)
     label = bar_label(shade, space, measure)
     frame = framed(sheet, view, label, [tick.text for tick in bar_ticks(shade)])
     image = frame.axes.imshow(
@@ -103,12 +104,14 @@ def density_picture(
         interpolation="bicubic", vmin=0, vmax=1,
     )  # fmt: skip
     if samples is not None:
-        draw_dots(frame.axes, view.places(samples), 0.55, shrink=_dot_shrink(sheet, frame.side))
-    _shade_bar(image, frame, sheet, shade, label)
+        draw_dots(frame.axes, view.places(samples), 0.55, shrink=dot_shrink(sheet, frame.side))
+    shade_bar(image, frame, sheet, shade, label)
     dress(frame.axes, view, sheet)
     title = f"Density on the {space_title(space)}"
     signs: dict[str, Any] = {"dots": samples is not None}
-    signs["notes"] = [average_note(count)] if is_sharp(density, 1 / count) else []
+    signs["notes"] = [chosen.why]
+    if is_sharp(density, 1 / count):
+        signs["notes"].append(average_note(count))
     if not sheet.printed:
         frame.axes.set_title(title, fontsize=1.15 * sheet.text, pad=14)
         legend(frame.figure, space, sheet, **signs)
@@ -161,7 +164,7 @@ def samples_picture(
     both = [view.places(points) for points in (data, drawn)]
     count = min(len(points) for points in both) or MAX_DOTS
     figure, panels, side = side_by_side(sheet, view)
-    shrink = _dot_shrink(sheet, side)
+    shrink = dot_shrink(sheet, side)
     heads = ("data", "samples")
     for axes, name, points in zip(panels, heads, both, strict=True):
         axes.set_facecolor("#f4f4f1")
@@ -211,14 +214,6 @@ def thinned(points: Array, limit: int = MAX_DOTS) -> Array:
     return points[np.random.default_rng(0).choice(len(points), limit, replace=False)]
 
 
-def _dot_shrink(sheet: Sheet, side: float) -> float:
+def dot_shrink(sheet: Sheet, side: float) -> float:
     """Of dots in a square of so many inches: those on a screen have one of 5.6."""
     return max(0.2, (side / 5.6) ** 2) if sheet.printed else 1.0
-
-
-def _shade_bar(image: AxesImage, frame: Framed, sheet: Sheet, shade: Shade, label: str) -> None:
-    extend = {(True, False): "max", (False, True): "min"}.get((shade.cut, shade.faint), "neither")
-    colour_bar(image, frame, sheet, label, extend)
-    ticks = bar_ticks(shade)
-    frame.bar.set_yticks([tick.at for tick in ticks], [tick.text for tick in ticks])
-    frame.bar.set_yticks(minor_places(shade), minor=True)
