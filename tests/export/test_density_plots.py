@@ -14,7 +14,8 @@ from orbiflow.density import DensityEstimator, SymmetricDensity, Torus, density_
 from orbiflow.density.spaces.round import Sphere
 from orbiflow.errors import OrbiflowError, OutputError
 from orbiflow.export import PlotSettings, plot_density
-from orbiflow.export.density_plots import MODEL, PICTURES, refuse_others
+from orbiflow.export.density_figures import MODEL
+from orbiflow.export.density_plots import PICTURES, refuse_others
 from orbiflow.fields import FourierField
 from orbiflow.flows import Flow
 
@@ -27,7 +28,7 @@ def _coarse(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("orbiflow.figures.density_page._CELLS", 8)
     monkeypatch.setattr("orbiflow.figures.density_values._COARSE", 12)
     monkeypatch.setattr("orbiflow.figures.field._SAMPLES", 20)
-    monkeypatch.setattr("orbiflow.export.density_plots.SAMPLES", 50)
+    monkeypatch.setattr("orbiflow.export.density_figures.SAMPLES", 50)
 
 
 def example(space: Any = None) -> SymmetricDensity:

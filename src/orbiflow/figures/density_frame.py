@@ -85,22 +85,28 @@ def framed(
     return Framed(figure, axes(left, below, side, inner), bar, side, room.under)
 
 
-def side_by_side(sheet: Sheet, view: View) -> tuple[Figure, tuple[Axes, Axes], float]:
-    """A figure with two squares, and their side in inches: ticks have texts below, and at the left."""
-    angles = view.space.name in ANGLE_AXES
-    left, right, gap, below = (5.4, 1.6, 3.0, 4.2) if angles else (1.0, 1.0, 1.6, 1.0)
-    side = (sheet.width - sheet.em * (left + gap + right)) / 2
-    height = side + sheet.em * (below + 2.4)
+def two_panels(
+    sheet: Sheet, room: Room, aspect: float = 1.0, *, stacked: bool = False
+) -> tuple[Figure, tuple[Axes, Axes], float]:
+    """A figure with two equal axes, `room.gap` apart, side by side or the first above the second.
+
+    Returns:
+        The figure, its axes, and their width in inches.
+    """
+    left, gap, right = (sheet.em * room[k] for k in (0, 4, 2))
+    side = sheet.width - left - right
+    side = side if stacked else (side - gap) / 2
+    inner = side / aspect
+    below = sheet.em * room.below
+    height = below + sheet.em * room.above + (2 * inner + gap if stacked else inner)
     figure = sheet.figure(height)
+    corners = [(left, below + inner + gap), (left, below)]
+    if not stacked:
+        corners = [(left + k * (side + gap), below) for k in (0, 1)]
     first, second = (
-        figure.add_axes(
-            (
-                (sheet.em * left + k * (side + sheet.em * gap)) / sheet.width,
-                sheet.em * below / height, side / sheet.width, side / height,
-            )
-        )
-        for k in (0, 1)
-    )  # fmt: skip
+        figure.add_axes((x / sheet.width, y / height, side / sheet.width, inner / height))
+        for x, y in corners
+    )
     return figure, (first, second), side
 
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from orbiflow.density.spaces.space import Space
-from orbiflow.figures.density_axes import EDGE_COLOURS, INK, cones
+from orbiflow.figures.density_axes import EDGE_COLOURS, INK, LETTER, cones
 from orbiflow.figures.marks import CENTER_COLOURS, center_sign
 from orbiflow.figures.sheet import Sheet
 
@@ -73,3 +74,17 @@ SIGNS = {2: "Lenses", 4: "Squares"}
 
 def _orders(space: Space) -> list[int]:
     return sorted({order for _, order in cones(space.group)}, reverse=True)
+
+
+def wrapped_words(words: str, sheet: Sheet) -> list[str]:
+    """Lines of a caption below a picture on a screen."""
+    return textwrap.wrap(words, int(0.94 * 72 * sheet.width / (0.9 * LETTER * sheet.small)))
+
+
+def write_below(figure: Figure, words: str, sheet: Sheet) -> None:
+    """The caption in the lower left corner."""
+    lines = "\n".join(wrapped_words(words, sheet))
+    figure.text(
+        0.03, 0.6 * sheet.em / figure.get_size_inches()[1], lines, fontsize=sheet.small, color=INK,
+        va="bottom", linespacing=1.35, parse_math=False,
+    )  # fmt: skip

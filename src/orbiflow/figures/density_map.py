@@ -18,12 +18,13 @@ from orbiflow.figures.azimuthal import Azimuthal
 from orbiflow.figures.density_axes import chart_points, space_title
 from orbiflow.figures.density_bar import shade_bar
 from orbiflow.figures.density_frame import NARROW, Room, bar_beside, bar_under, framed
-from orbiflow.figures.density_scale import bar_label, bar_ticks, shading
-from orbiflow.figures.density_square import COLOURS, dot_shrink, draw_dots
+from orbiflow.figures.density_legend import wrapped_words, write_below
+from orbiflow.figures.density_scale import Shade, bar_label, bar_ticks, shading
+from orbiflow.figures.density_square import COLOURS, MAX_DOTS, dot_shrink, draw_dots
 from orbiflow.figures.density_values import chosen_scale, density_on_map, is_sharp_on_map
 from orbiflow.figures.map_axes import aspect, dress_map, set_limits
 from orbiflow.figures.map_choice import chosen_map
-from orbiflow.figures.map_words import caption, subtitle, wrapped_words, write_below
+from orbiflow.figures.map_words import caption, subtitle
 from orbiflow.figures.projections import Projection
 from orbiflow.figures.sheet import Picture, Sheet
 from orbiflow.symmetry.isometry import Array
@@ -57,6 +58,7 @@ def map_picture(
     scale: str = "linear",
     sheet: Sheet | None = None,
     about: Tensor | None = None,
+    most: int = MAX_DOTS,
     **options: Unpack[MapOptions],
 ) -> Picture:
     """A density on a map with its graticule.
@@ -69,6 +71,7 @@ def map_picture(
         samples: data or samples to draw as dots, chart points (N, 2).
         measure, scale: as for `orbiflow.figures.density_square.density_picture`.
         sheet: default a screen of 1600 pixels.
+        most: dots, of more samples a random choice that is always the same.
         about: chart points (N, 2) that the map should show, default `samples`.
 
     Raises:
@@ -78,28 +81,24 @@ def map_picture(
     if about is None:
         about = torch.empty(0, 2) if samples is None else samples
     projection, coasts = map_and_coasts(space, about, options)
-    pixels = pixels_of(projection)
-    points = axis_points(space, pixels.latlon)
-    values = density_on_map(density, points, measure, pixels.angle)
-    chosen = chosen_scale(density, measure, scale)
-    shade = shading(values[pixels.within], pixels.areas[pixels.within], log=chosen.log)
+    drawn = coloured_map(density, projection, measure, scale)
+    shade = drawn.shade
     label = bar_label(shade, space, measure)
     dots = None if samples is None else places_on(space, projection, samples)
-    notes = [chosen.why]
-    if is_sharp_on_map(density, pixels.angle):
-        notes.append(f"peaks narrower than {math.degrees(pixels.angle):.2g}° are averaged over it")
-    words = caption(
-        space, projection, notes, dots=None if dots is None else len(dots), coasts=bool(coasts)
-    )
+    notes = [drawn.why]
+    if is_sharp_on_map(density, drawn.pixels.angle):
+        size = f"{math.degrees(drawn.pixels.angle):.2g}°"
+        notes.append(f"peaks narrower than {size} are averaged over it")
+    counts = None if dots is None else (min(most, len(dots)), len(dots))
+    words = caption(space, projection, notes, dots=counts, coasts=bool(coasts))
     room = _room(sheet, projection, label, [tick.text for tick in bar_ticks(shade)], words)
     frame = framed(sheet, None, room=room, aspect=aspect(projection))
     set_limits(frame.axes, projection)
-    image = _draw(frame.axes, projection, pixels, shade.places(values))
+    image = drawn.on(frame.axes)
     if dots is not None:
         shrink = dot_shrink(sheet, max(1.0, frame.side / aspect(projection)))
-        draw_dots(frame.axes, dots, 0.55, shrink=shrink)
-    form = cast(RoundSpace, space).form
-    dress_map(frame.axes, projection, sheet, frame.side, coastlines=coasts, signed=form == "vector")
+        draw_dots(frame.axes, dots, 0.55, limit=most, shrink=shrink)
+    dress_map(frame.axes, projection, sheet, frame.side, coastlines=coasts)
     shade_bar(image, frame, sheet, shade, label)
     title = f"Density on the {space_title(space)}"
     if not sheet.printed:
@@ -128,6 +127,51 @@ def map_and_coasts(
     if isinstance(asked.get("projection"), Projection):
         return asked["projection"], coasts
     return chosen_map(space, chart_points(space, about), **asked), coasts
+
+
+class ColouredMap(NamedTuple):
+    """A density on a map.
+
+    - `places`: (N,) of its pixels on the colour bar.
+    - `why`: the scale is linear or logarithmic.
+    """
+
+    projection: Projection
+    pixels: Pixels
+    places: Array
+    shade: Shade
+    why: str
+
+    def on(self, axes: Axes) -> AxesImage:
+        """One picture cut out along the outline: neither seams nor steps at the rim."""
+        from matplotlib.patches import Polygon
+
+        table = np.zeros(self.pixels.shown.shape)
+        table[self.pixels.shown] = self.places
+        image = axes.imshow(
+            table, extent=self.pixels.extent, origin="lower", cmap=COLOURS,
+            interpolation="bicubic", vmin=0, vmax=1, aspect="auto", zorder=1,
+        )  # fmt: skip
+        set_limits(axes, self.projection)
+        ring = self.projection.outline().tolist()
+        image.set_clip_path(Polygon(ring, closed=True, transform=axes.transData))
+        return image
+
+
+def coloured_map(
+    density: SymmetricDensity, projection: Projection, measure: str, scale: str
+) -> ColouredMap:
+    """The colours of a density on a map.
+
+    Raises:
+        OrbiflowError: for an unknown measure or scale.
+    """
+    pixels = pixels_of(projection)
+    points = cast(RoundSpace, density.space).vectors_to_chart(to_vectors(pixels.latlon))
+    values = density_on_map(density, points, measure, pixels.angle)
+    chosen = chosen_scale(density, measure, scale)
+    shade = shading(values[pixels.within], pixels.areas[pixels.within], log=chosen.log)
+    return ColouredMap(projection, pixels, shade.places(values), shade, chosen.why)
 
 
 class Pixels(NamedTuple):
@@ -163,7 +207,6 @@ def pixels_of(projection: Projection, count: int | None = None) -> Pixels:
     places = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
     outline = Path(ring)
     within = outline.contains_points(places)
-    # a margin in both senses of the ring: matplotlib's sign of a radius depends on it
     shown = within.reshape(counts[::-1])
     for _ in range(_MARGIN):
         shown = _grown(shown)
@@ -196,11 +239,6 @@ def _areas(projection: Projection, latlon: Array) -> Array:
     return np.cos(np.radians(latlon[:, 0]))
 
 
-def axis_points(space: Space, latlon: Array) -> Tensor:
-    """Chart points (N, 2) of directions."""
-    return cast(RoundSpace, space).vectors_to_chart(to_vectors(latlon))
-
-
 def places_on(space: Space, projection: Projection, points: Tensor) -> Array:
     """Places (M, 2) of chart points (N, 2), of axes at the end that the map shows; those on it alone.
 
@@ -212,22 +250,6 @@ def places_on(space: Space, projection: Projection, points: Tensor) -> Array:
         vectors = np.where(vectors @ projection.frame[2] < 0, -1.0, 1.0)[:, None] * vectors
     latlon = to_latlon(vectors)
     return projection.forward(latlon[projection.contains(latlon)])
-
-
-def _draw(axes: Axes, projection: Projection, pixels: Pixels, values: Array) -> AxesImage:
-    """One picture cut out along the outline: neither seams nor steps at the rim."""
-    from matplotlib.patches import Polygon
-
-    table = np.zeros(pixels.shown.shape)
-    table[pixels.shown] = values
-    image = axes.imshow(
-        table, extent=pixels.extent, origin="lower", cmap=COLOURS, interpolation="bicubic",
-        vmin=0, vmax=1, aspect="auto", zorder=1,
-    )  # fmt: skip
-    set_limits(axes, projection)
-    cut = Polygon(projection.outline().tolist(), closed=True, transform=axes.transData)
-    image.set_clip_path(cut)
-    return image
 
 
 def _room(

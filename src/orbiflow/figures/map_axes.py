@@ -44,14 +44,12 @@ def dress_map(
     side: float,
     *,
     coastlines: Sequence[Array] = (),
-    signed: bool = False,
     light: bool = False,
 ) -> None:
     """Outline, graticule, labels and coastlines of a map `side` inches wide.
 
     Args:
         coastlines: lines (M, 2) of latitude and longitude.
-        signed: whether degrees have signs, in place of N, E, S and W.
         light: whether the map is drawn on a light ground.
     """
     ring = projection.outline()
@@ -64,7 +62,7 @@ def dress_map(
         for piece in projection.pieces(each):
             axes.plot(*piece.T, **style)
     _coasts(axes, projection, sheet, side, coastlines, "#55554f" if light else COAST)
-    texts = _Texts(axes, projection, sheet, side, signed, light)
+    texts = _Texts(axes, projection, sheet, side, light)
     if isinstance(projection, WorldMap):
         texts.round_the_world(lats, lons)
     else:
@@ -144,13 +142,12 @@ class _Texts:
         projection: Projection,
         sheet: Sheet,
         side: float,
-        signed: bool,
         light: bool,
     ) -> None:
         self.axes, self.projection, self.sheet, self.light = axes, projection, sheet, light
         self.size = 72 * side / float(np.ptp(projection.outline()[:, 0]))  # points a unit
         net = isinstance(projection, Azimuthal) and projection.flipped
-        self.north_south, self.east_west = ("", "") if signed or net else ("NS", "EW")
+        self.north_south, self.east_west = ("", "") if net else ("NS", "EW")
         self.net = net
         self.boxes: list[Array] = []
 
@@ -225,26 +222,30 @@ class _Texts:
                 ha = "left" if way[0] > 0.3 else "right" if way[0] < -0.3 else "center"
                 va = "bottom" if way[1] > 0.3 else "top" if way[1] < -0.3 else "center"
                 shift = 0.45 * self.sheet.small * way
-                done = self._outside(text, end, tuple(shift), ha=ha, va=va) or done
+                done = self._outside(text, end, shift, ha=ha, va=va) or done
         return done
 
     def _outside(self, text: str, place: Array, shift: Any, *, ha: str, va: str) -> bool:
         if not self._free(text, self.size * place + shift, ha, va):
             return False
         self.axes.annotate(
-            text, place.tolist(), xytext=shift, textcoords="offset points", ha=ha, va=va,
+            text, (float(place[0]), float(place[1])), xytext=tuple(shift), ha=ha, va=va,
+            textcoords="offset points",
             fontsize=self.sheet.small, color=INK, annotation_clip=False,
         )  # fmt: skip
         return True
 
     def _inside(self, text: str, place: Array) -> None:
+        projection = self.projection
+        if isinstance(projection, Azimuthal) and np.hypot(*place) > 0.92 * projection.rim:
+            return
         if not self._free(text, self.size * place, "center", "center"):
             return
         box = {"boxstyle": "round,pad=0.15", "linewidth": 0.0}
         box |= {"facecolor": "#ffffff" if self.light else "#000000", "alpha": 0.4}
         self.axes.text(
-            *place.tolist(), text, ha="center", va="center", fontsize=self.sheet.small,
-            color=INK if self.light else "#ffffff", bbox=box, zorder=6,
+            float(place[0]), float(place[1]), text, ha="center", va="center",
+            fontsize=self.sheet.small, color=INK if self.light else "#ffffff", bbox=box, zorder=6,
         )  # fmt: skip
 
     def _free(self, text: str, at: Array, ha: str, va: str) -> bool:

@@ -2,20 +2,12 @@
 
 from __future__ import annotations
 
-import textwrap
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from orbiflow.density.spaces.space import Space
 from orbiflow.figures.azimuthal import Azimuthal
-from orbiflow.figures.density_axes import INK, LETTER
-from orbiflow.figures.density_square import MAX_DOTS
 from orbiflow.figures.map_axes import degrees, graticule
 from orbiflow.figures.projections import Projection
-from orbiflow.figures.sheet import Sheet
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 def subtitle(projection: Projection) -> str:
@@ -30,10 +22,13 @@ def caption(
     projection: Projection,
     notes: Sequence[str] = (),
     *,
-    dots: int | None = None,
+    dots: tuple[int, int] | None = None,
     coasts: bool = False,
 ) -> str:
     """Projection, centre, what is one point, what lines and dots are; then `notes`.
+
+    Args:
+        dots: how many are drawn, and of how many points.
 
     >>> from orbiflow.density.spaces.round import Sphere
     >>> from orbiflow.figures.world_maps import Mollweide
@@ -54,8 +49,8 @@ def caption(
         lines = f"Parallels every {lats[1] - lats[0]:g}°, meridians every {lons[1] - lons[0]:g}°"
         parts.append(lines + (", white coastlines" if coasts else ""))
     if dots is not None:
-        few = f"{MAX_DOTS} of the {dots}" if dots > MAX_DOTS else f"{dots}"
-        parts.append(f"Dots are {few} points")
+        shown, known = dots
+        parts.append(f"Dots are {f'{shown} of ' if shown < known else ''}{known} points")
     parts += [note[0].upper() + note[1:] for note in notes]
     return " ".join(f"{part}." for part in parts)
 
@@ -82,24 +77,9 @@ def _projected(space: Space, projection: Projection) -> str:
         where = "the north pole" if lat > 0 else "the south pole"
     else:
         where = f"{degrees(lat, 'NS')}, {degrees((lon + 180) % 360 - 180, 'EW')}"
-    return (
-        f"{within[0].upper()}{within[1:]} about {where} in {projection.title}, from outside{frame}"
-    )
+    seen = f"about {where} in {projection.title}, seen from outside{frame}"
+    return f"{within[0].upper()}{within[1:]} {seen}"
 
 
 def _is_net(projection: Projection) -> bool:
     return isinstance(projection, Azimuthal) and projection.flipped
-
-
-def wrapped_words(words: str, sheet: Sheet) -> list[str]:
-    """Lines of a caption below a picture on a screen."""
-    return textwrap.wrap(words, int(0.94 * 72 * sheet.width / (0.9 * LETTER * sheet.small)))
-
-
-def write_below(figure: Figure, words: str, sheet: Sheet) -> None:
-    """The caption in the lower left corner."""
-    lines = "\n".join(wrapped_words(words, sheet))
-    figure.text(
-        0.03, 0.6 * sheet.em / figure.get_size_inches()[1], lines, fontsize=sheet.small, color=INK,
-        va="bottom", linespacing=1.35, parse_math=False,
-    )  # fmt: skip
