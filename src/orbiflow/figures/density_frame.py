@@ -30,7 +30,7 @@ class Room(NamedTuple):
     under: bool = False
 
 
-SCREEN = Room(6.67, 9.29, 11.52, 5.26, 3.33, 1.52)
+SCREEN = Room(6.67, 10.4, 11.52, 5.26, 3.33, 1.52)
 """With a title above, and a legend of five lines below."""
 
 NARROW = 70 / 25.4

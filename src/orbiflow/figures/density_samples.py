@@ -125,9 +125,9 @@ def draw_panel(axes: Axes, points: Array, count: int, shrink: float) -> None:
     draw_dots(axes, points, 0.5, limit=count, fill=DOT, rim="none", shrink=shrink)
 
 
-def head(name: str, points: Array | None, count: int) -> str:
-    """What a panel shows."""
+def head(name: str, points: Array | None, count: int, known: int = 0) -> str:
+    """What a panel shows, of so many `known` points, which may not all be in it."""
     if points is None:
         return "density"
-    few = "" if len(points) <= count else f"{count} of "
-    return f"{few}{len(points)} {name}"
+    shown, known = min(count, len(points)), max(known, len(points))
+    return f"{shown} of {known} {name}" if shown < known else f"{known} {name}"

@@ -177,7 +177,7 @@ def draw_dots(
     shrink = max(shrink / crowd**0.7, 0.04)
     axes.scatter(
         *points.T, s=shrink * max(2.0, 9.0 - len(points) / 500), c=fill, edgecolors=rim,
-        linewidths=0.35 * shrink**0.5, alpha=alpha, zorder=3,
+        linewidths=0.35 * shrink**0.5, alpha=alpha, zorder=5,
         rasterized=rasterized,
     )  # fmt: skip
 

@@ -116,8 +116,10 @@ def chosen_scale(density: SymmetricDensity, measure: str, scale: str) -> Chosen:
     values = density_on_grid(density, t, t, measure, pixel=0.5 / _COARSE).ravel()
     areas = density.space.log_area(midpoints(density.space, _COARSE)).exp().numpy()
     dark = dark_share(values, areas)
-    reason = f"on {100 * dark:.0f} % of the area the density is below a tenth of its peak"
-    return Chosen(dark > DARKEST, f"{_SAID[dark > DARKEST]}, as {reason}")
+    log = dark > DARKEST
+    share, side = (100 * dark, "below") if log else (100 * (1 - dark), "above")
+    reason = f"the density is {side} a tenth of its peak on {share:.0f} % of the area"
+    return Chosen(log, f"{_SAID[log]}, as {reason}")
 
 
 _SAID = {False: "colours are linear", True: "colours are logarithmic"}

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from orbiflow.figures.azimuthal import Azimuthal
-from orbiflow.figures.density_axes import INK, LETTER
+from orbiflow.figures.density_axes import INK, LETTER, degrees
 from orbiflow.figures.projections import Projection
 from orbiflow.figures.sheet import Sheet
 from orbiflow.figures.world_maps import Mollweide, WorldMap
@@ -61,7 +61,7 @@ def dress_map(
     for each in (*map(parallel, lats), *map(meridian, lons)):
         for piece in projection.pieces(each):
             axes.plot(*piece.T, **style)
-    _coasts(axes, projection, sheet, side, coastlines, "#55554f" if light else COAST)
+    _coasts(axes, projection, sheet, side, coastlines, light)
     texts = _Texts(axes, projection, sheet, side, light)
     if isinstance(projection, WorldMap):
         texts.round_the_world(lats, lons)
@@ -96,25 +96,13 @@ def meridian(lon: float) -> Array:
     return np.stack([lat, np.full_like(lat, lon)], axis=-1)
 
 
-def degrees(value: float, signs: str) -> str:
-    """An angle with the letters of its positive and negative sense, or plain where there are none.
-
-    >>> degrees(-30.0, "NS"), degrees(180.0, "EW"), degrees(330.0, "")
-    ('30° S', '180°', '330°')
-    """
-    if not signs:
-        return f"{value:g}°".replace("-", "\N{MINUS SIGN}")
-    letter = "" if value in (0, 180, -180) else f" {signs[value < 0]}"
-    return f"{abs(value):g}°{letter}"
-
-
 def _coasts(
     axes: Axes,
     projection: Projection,
     sheet: Sheet,
     side: float,
     coastlines: Sequence[Array],
-    colour: str,
+    light: bool,
 ) -> None:
     from matplotlib.collections import LineCollection
     from shapely import LineString
@@ -127,7 +115,11 @@ def _coasts(
     fine = [np.array(LineString(p).simplify(_FINE * unit).coords) for p in pieces]
     axes.add_collection(
         LineCollection(
-            fine, colors=colour, linewidths=sheet.pen(0.9, 0.3), zorder=4, capstyle="round"
+            fine,
+            colors="#85857f" if light else COAST,
+            linewidths=sheet.pen(0.7 if light else 0.9, 0.25),
+            zorder=4,
+            capstyle="round",
         ),
         autolim=False,
     )

@@ -82,7 +82,8 @@ def map_samples_picture(
         light = places is not None
         dress_map(axes, projection, sheet, side, coastlines=coasts, light=light)
         pad = sheet.text * (2.2 if disc else 0.6)
-        axes.set_title(head(name, places, count), fontsize=sheet.text, pad=pad)
+        known = len(drawn if name == "samples" or data is None else data)
+        axes.set_title(head(name, places, count, known), fontsize=sheet.text, pad=pad)
     if not sheet.printed:
         write_below(figure, words, sheet)
     first = "Density" if data is None else "Data"

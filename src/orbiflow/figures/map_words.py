@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 from orbiflow.density.spaces.space import Space
 from orbiflow.figures.azimuthal import Azimuthal
-from orbiflow.figures.map_axes import degrees, graticule
+from orbiflow.figures.density_axes import degrees
+from orbiflow.figures.map_axes import graticule
 from orbiflow.figures.projections import Projection
 
 
@@ -44,10 +45,10 @@ def caption(
     steps = {f"{line[1] - line[0]:g}°" for line in (lats, lons) if len(line) > 1}
     steps = sorted(steps, key=lambda text: float(text[:-1]))
     if len(steps) == 1:
-        parts.append(f"Lines every {steps[0]}" + (", white coastlines" if coasts else ""))
+        parts.append(f"Lines every {steps[0]}" + (", and coastlines" if coasts else ""))
     else:
         lines = f"Parallels every {lats[1] - lats[0]:g}°, meridians every {lons[1] - lons[0]:g}°"
-        parts.append(lines + (", white coastlines" if coasts else ""))
+        parts.append(lines + (", and coastlines" if coasts else ""))
     if dots is not None:
         shown, known = dots
         parts.append(f"Dots are {f'{shown} of ' if shown < known else ''}{known} points")
