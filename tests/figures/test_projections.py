@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -115,7 +116,7 @@ def test_lines_are_cut_at_the_antimeridian(projection: WorldMap, line: Any) -> N
     pieces = projection.pieces(np.array(line))
     longest = max((np.abs(np.diff(p[:, 0])).max() for p in pieces), default=0.0)
     assert longest <= math.radians(1.0) * 2 * math.sqrt(2) / math.pi * 1.6 + 0.06
-    for one, other in zip(pieces, pieces[1:], strict=False):
+    for one, other in pairwise(pieces):
         assert one[-1, 1] == pytest.approx(other[0, 1], abs=1e-9)
         assert one[-1, 0] == pytest.approx(-other[0, 0], abs=1e-9)
 

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from orbiflow.arguments import described
 from orbiflow.density.tables import read_table
 from orbiflow.errors import InputFileError
 from orbiflow.symmetry.isometry import Array
@@ -102,6 +103,7 @@ def _geojson(path: Path) -> list[Array]:
 def _geometries(path: Path, item: Any, depth: int) -> Iterator[tuple[str, Any]]:
     """Kind and coordinates of every geometry with lines."""
     kind = item.get("type") if isinstance(item, dict) else None
+    kind = kind if isinstance(kind, str) else None
     if kind == "Topology":
         raise InputFileError(
             f"{path} is TopoJSON: make GeoJSON of it, with ogr2ogr -f GeoJSON lines.geojson {path.name}"
@@ -121,7 +123,7 @@ def _geometries(path: Path, item: Any, depth: int) -> Iterator[tuple[str, Any]]:
         yield kind, item.get("coordinates")
     elif kind not in _POINTS:
         raise InputFileError(
-            f"{path} is not GeoJSON: expected a feature or a geometry, got the type {kind!a:.60}"
+            f"{path} is not GeoJSON: expected a feature or a geometry, got {described(kind)}"
         )
 
 

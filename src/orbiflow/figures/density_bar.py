@@ -14,6 +14,10 @@ if TYPE_CHECKING:
     from matplotlib.image import AxesImage
 
 
+_DIGIT = 0.66
+"""Width of a digit, in ems: wider than the mean of letters."""
+
+
 def colour_bar(
     image: AxesImage, frame: Framed, sheet: Sheet, label: str, extend: str = "neither"
 ) -> None:
@@ -56,7 +60,7 @@ def spread(at: Sequence[float], texts: Sequence[str], side: float, sheet: Sheet)
     >>> spread([0.0, 0.1, 0.9], ["0.00", "0.10", "0.90"], 1.5, Sheet.column())
     ['0.00', '', '0.90']
     """
-    letter, end, kept = LETTER * sheet.small / 72, -1.0, []
+    letter, end, kept = _DIGIT * sheet.small / 72, -1.0, []
     for place, text in zip(at, texts, strict=True):
         half = letter * (len(text) + 1) / 2
         free = place * side - half > end

@@ -117,8 +117,9 @@ def chosen_scale(density: SymmetricDensity, measure: str, scale: str) -> Chosen:
     areas = density.space.log_area(midpoints(density.space, _COARSE)).exp().numpy()
     dark = dark_share(values, areas)
     log = dark > DARKEST
-    share, side = (100 * dark, "below") if log else (100 * (1 - dark), "above")
-    reason = f"the density is {side} a tenth of its peak on {share:.0f} % of the area"
+    # never more than what is true: 99.6 % are not all
+    share, side = (int(100 * dark), "below") if log else (math.ceil(100 * (1 - dark)), "above")
+    reason = f"the density is {side} a tenth of its peak on {share} % of the area"
     return Chosen(log, f"{_SAID[log]}, as {reason}")
 
 

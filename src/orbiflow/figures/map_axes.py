@@ -156,7 +156,8 @@ class _Texts:
             self._outside(text, end, (-gap, 0.0), ha="right", va="center")
         inside = isinstance(projection, Mollweide)
         middle = projection.center[1]
-        turns = sorted(((lon - middle + 180) % 360 - 180) for lon in lons if lon % 60 == 0)
+        step = self._step(projection)
+        turns = sorted(((lon - middle + 180) % 360 - 180) for lon in lons if lon % step == 0)
         turns = [*turns, 180.0] if turns[0] == -180 else turns
         for turn in turns:
             if inside and abs(turn) == 180:
@@ -168,6 +169,14 @@ class _Texts:
                 self._inside(text, place)
             else:
                 self._outside(text, place, (0.0, -gap), ha="center", va="top")
+
+    def _step(self, projection: Projection) -> float:
+        """Degrees between longitudes whose texts do not touch along the lower side."""
+        lat = 0.0 if isinstance(projection, Mollweide) else -90.0
+        ends = np.array([[lat, projection.center[1]], [lat, projection.center[1] + 60.0]])
+        room = self.size * float(np.ptp(projection.forward(ends)[:, 0]))
+        letters = 7.5 * LETTER * self.sheet.small
+        return next((s for s in (60.0, 90.0, 120.0) if room * s / 60 > letters), 180.0)
 
     def round_the_rim(self, lats: list[float], lons: list[float]) -> None:
         """Where lines meet the rim, else on them; what would touch another is left out."""

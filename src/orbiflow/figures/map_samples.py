@@ -9,7 +9,7 @@ from torch import Tensor
 from orbiflow.density.models.symmetric import SymmetricDensity
 from orbiflow.figures.azimuthal import Azimuthal
 from orbiflow.figures.density_axes import space_title
-from orbiflow.figures.density_frame import NARROW, Room, two_panels
+from orbiflow.figures.density_frame import Room, two_panels
 from orbiflow.figures.density_legend import write_below
 from orbiflow.figures.density_map import (
     MapOptions,
@@ -29,6 +29,9 @@ from orbiflow.figures.density_square import MAX_DOTS, dot_shrink
 from orbiflow.figures.map_axes import aspect, dress_map, set_limits
 from orbiflow.figures.map_words import caption
 from orbiflow.figures.sheet import Picture, Sheet
+
+_BESIDE = 120 / 25.4
+"""Inches of a printed figure below which discs are above each other, for room round their rims."""
 
 
 def map_samples_picture(
@@ -65,7 +68,7 @@ def map_samples_picture(
     notes = ["dots are points"] if coloured is None else [colours_note(coloured.why)]
     words = caption(space, projection, notes, coasts=bool(coasts))
     disc = isinstance(projection, Azimuthal)
-    stacked = not disc or (sheet.printed and sheet.width < NARROW)
+    stacked = not disc or (sheet.printed and sheet.width < _BESIDE)
     room = Room(3.6, 1.8, 3.6, 3.8, 7.4, 0) if disc else Room(3.6, 2.4, 1.8, 2.2, 4.4, 0.0)
     if disc and stacked:
         room = room._replace(gap=5.6)
