@@ -26,6 +26,8 @@ def set_limits(axes: Axes, projection: Projection) -> None:
     """The whole map, undistorted, without a frame."""
     ring = projection.outline()
     axes.set_axis_off()
+    axes.set_xticks([])
+    axes.set_yticks([])
     axes.set_xlim(*(ring[:, 0].min(), ring[:, 0].max()))
     axes.set_ylim(*(ring[:, 1].min(), ring[:, 1].max()))
     axes.set_aspect("equal")
