@@ -54,7 +54,7 @@ def test_fit_score_sample_plot(space: str, tmp_path: Path, orbiflow) -> None:
 
 @pytest.fixture
 def small_pictures(monkeypatch) -> None:
-    for name, size in (("square._GRID", 40), ("page._CELLS", 20)):
+    for name, size in (("square._GRID", 40), ("page._CELLS", 20), ("map._PIXELS", 2000)):
         monkeypatch.setattr(f"orbiflow.figures.density_{name}", size)
     monkeypatch.setattr("orbiflow.figures.field._SAMPLES", 40)
 
@@ -66,7 +66,8 @@ def test_plots(tmp_path: Path, orbiflow) -> None:
     drawn = orbiflow("density", "plot", "--model", model, "--data", data, "--out", out)
     assert drawn.status == 0, drawn.err
     names = {path.name for path in out.iterdir()}
-    assert names == {"density.png", "flow.png", "samples.png", "surface.html"}
+    pictures = {"density.png", "latlon.png", "square.png", "samples.png"}
+    assert names - {"flow.png"} == pictures | {"surface.html"}
     assert (out / "surface.html").read_text().lstrip().lower().startswith("<!doctype html>")
 
 
@@ -78,18 +79,20 @@ def test_plots_for_papers(tmp_path: Path, orbiflow) -> None:
     drawn = orbiflow(*plot, "--width", "double", "--out", out)
     assert drawn.status == 0, drawn.err
     pages = pypdfium2.PdfDocument(out)
-    assert [round(page.get_width()) for page in pages] == [510, 510, 510]
+    assert {round(page.get_width()) for page in pages} == {510}
+    assert len(pages) in (4, 5)  # with the flow, where it has a part in the density
     assert "caption: Density on the sphere. The edges with one arrow head" in drawn.out
+    assert "caption: Density on the sphere. The sphere in" in drawn.out
     assert f"written {out}, a page a figure" in drawn.out
     folder = tmp_path / "figures"
     drawn = orbiflow(*plot, "--format", "svg", "--width", "9cm", "--out", folder)
     assert drawn.status == 0, drawn.err
-    figures = {"density.svg", "flow.svg", "samples.svg"}
-    assert {path.name for path in folder.iterdir()} == figures | {"surface.html"}
-    assert 'width="255.1' in (folder / "flow.svg").read_text()
+    figures = {"density.svg", "latlon.svg", "square.svg", "samples.svg", "surface.html"}
+    assert {path.name for path in folder.iterdir()} - {"flow.svg"} == figures
+    assert 'width="255.1' in (folder / "latlon.svg").read_text()
     before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
     for options, message in (
-        (("--width", "2mm"), "--width a figure is 80 to 1000 mm wide"),
+        (("--width", "2mm"), "--width a figure is 40 to 1000 mm wide"),
         (("--width", "90"), "--width '90' has no unit"),
         (("--out", out, "--format", "png"), "--out ends in .pdf but --format is png"),
         (("--out", tmp_path / "plot.png"), "several pictures; give a folder, or a .pdf"),
@@ -241,8 +244,8 @@ def test_nothing_of_an_earlier_model_stays(tmp_path: Path, orbiflow) -> None:
     plot = ("density", "plot", "--model", model, "--out", model)
     assert orbiflow(*fit).status == 0
     assert orbiflow(*plot, "--data", data).status == 0
-    names = {"density.png", "flow.png", "samples.png", "surface.html"}
-    assert {path.name for path in model.iterdir()} == names | {"density.safetensors", "report.json"}
+    names = {"density.png", "samples.png", "surface.html", "density.safetensors", "report.json"}
+    assert {path.name for path in model.iterdir()} - {"flow.png"} == names
     # without data there is no picture of samples beside them
     assert orbiflow(*plot).status == 0
     assert not (model / "samples.png").exists()
@@ -273,3 +276,30 @@ def test_a_plot_leaves_other_files_alone(tmp_path: Path, orbiflow) -> None:
     assert wrong.status == 2
     assert (out / "surface.html").read_text() == "of an earlier model"
     assert (out / "notes.txt").read_text() == "mine"
+
+
+@pytest.mark.usefixtures("small_pictures")
+def test_maps_as_asked_for(tmp_path: Path, orbiflow) -> None:
+    data, model, out = table(tmp_path), tmp_path / "model", tmp_path / "maps"
+    orbiflow("density", "fit", data, "--space", "sphere", "--out", model, *FIT)
+    coast = tmp_path / "coast.geojson"
+    coast.write_text('{"type": "LineString", "coordinates": [[170, 10], [-170, 20]]}')
+    plot = ("density", "plot", "--model", model, "--out", out)
+    asked = ("--coastlines", coast, "--center", "150", "--samples", "20", "--format", "svg")
+    drawn = orbiflow(*plot, *asked)
+    assert drawn.status == 0, drawn.err
+    assert "about 150° E. Lines every 30°, and coastlines." in drawn.out
+    assert (out / "samples.svg").exists()
+    before = (out / "density.svg").read_bytes()
+    for options, message in (
+        (("--center", "40,140,3"), "--center needs 40,140"),
+        (("--center", "north"), "--center needs 40,140"),
+        (("--center", "40,140", "--projection", "mollweide"), "centred on a meridian"),
+        (("--radius", "100"), "--radius must be above 0 and at most 90"),
+        (("--samples", "0"), "--samples must be from 1"),
+        (("--coastlines", tmp_path), "it is not a file"),
+    ):
+        wrong = orbiflow(*plot, *options)
+        assert wrong.status != 0
+        assert message in wrong.err
+    assert (out / "density.svg").read_bytes() == before

@@ -14,7 +14,8 @@ from orbiflow.density import DensityEstimator, SymmetricDensity, Torus, density_
 from orbiflow.density.spaces.round import Sphere
 from orbiflow.errors import OrbiflowError, OutputError
 from orbiflow.export import PlotSettings, plot_density
-from orbiflow.export.density_plots import MODEL, PICTURES, refuse_others
+from orbiflow.export.density_figures import MODEL
+from orbiflow.export.density_plots import PICTURES, refuse_others
 from orbiflow.fields import FourierField
 from orbiflow.flows import Flow
 
@@ -25,9 +26,10 @@ DATA = np.random.default_rng(0).uniform(-3, 3, (40, 2))
 def _coarse(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("orbiflow.figures.density_square._GRID", 12)
     monkeypatch.setattr("orbiflow.figures.density_page._CELLS", 8)
+    monkeypatch.setattr("orbiflow.figures.density_map._PIXELS", 900)
     monkeypatch.setattr("orbiflow.figures.density_values._COARSE", 12)
     monkeypatch.setattr("orbiflow.figures.field._SAMPLES", 20)
-    monkeypatch.setattr("orbiflow.export.density_plots.SAMPLES", 50)
+    monkeypatch.setattr("orbiflow.export.density_figures.SAMPLES", 50)
 
 
 def example(space: Any = None) -> SymmetricDensity:
@@ -103,7 +105,8 @@ def test_a_fitted_estimator_is_drawn_and_another_refused(tmp_path: Path) -> None
     with pytest.raises(OrbiflowError, match=r"call fit\(data\) first"):
         plot_density(estimator, tmp_path / "a.pdf")
     plot_density(estimator.fit(DATA), tmp_path / "a.pdf")
-    assert len(pypdfium2.PdfDocument(tmp_path / "a.pdf")) == 2
+    # the flow has no part in it
+    assert len(pypdfium2.PdfDocument(tmp_path / "a.pdf")) == 1
 
 
 @pytest.mark.parametrize(
@@ -113,6 +116,8 @@ def test_a_fitted_estimator_is_drawn_and_another_refused(tmp_path: Path) -> None
         ({"width": "wide"}, "width must be single, double"),
         ({"measure": "flat"}, "measure must be one of"),
         ({"scale": "square"}, "scale must be one of"),
+        ({"projection": "globe"}, "projection must be one of"),
+        ({"samples": 0}, "samples must be from 1 to"),
     ],
 )
 def test_settings_are_checked(settings: dict[str, Any], message: str) -> None:
@@ -128,7 +133,9 @@ def test_what_does_not_fit_the_density_is_refused_before_anything_is_written(
         (Torus(2), PlotSettings(coastlines=lines), "coastlines belong to the sphere"),
         (Torus(9), PlotSettings(), "has 9 angles"),
         (Torus(2), PlotSettings(names=["one"]), "2 names of columns"),
-        (Sphere(), PlotSettings(center=[0.0, 0.0]), "not on the sphere"),
+        (Sphere(), PlotSettings(center=[0.0, 0.0, 0.0]), "a latitude and a longitude"),
+        (Torus(2), PlotSettings(projection="lambert"), "projection belongs to maps"),
+        (Torus(2), PlotSettings(radius=20), "radius belongs to maps"),
     ):
         density = example() if space.dim == 2 and space.is_torus else None
         density = density or SymmetricDensity(space, example().flow)

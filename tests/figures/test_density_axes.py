@@ -8,10 +8,11 @@ from orbiflow.density.spaces.flat import KleinBottle, Torus
 from orbiflow.density.spaces.round import ProjectivePlane, Sphere
 from orbiflow.figures.density_axes import angle_axis, angle_text, view_of
 from orbiflow.figures.density_scale import (
+    DARKEST,
     Shade,
     bar_label,
     bar_ticks,
-    is_outshone,
+    dark_share,
     measure_label,
     minor_places,
     number,
@@ -64,9 +65,9 @@ def test_logarithms_span_five_decades_at_most_and_one_at_least():
 def test_logarithms_are_taken_where_a_peak_outshines_the_area():
     values = np.full(1000, 0.04)
     values[:40] = 1.0
-    assert is_outshone(values)
-    assert not is_outshone(values, np.where(values == 1.0, 10.0, 1.0))
-    assert not is_outshone(np.linspace(0, 1, 1000))
+    assert dark_share(values) == 0.96 > DARKEST
+    assert dark_share(values, np.where(values == 1.0, 10.0, 1.0)) == pytest.approx(960 / 1360)
+    assert dark_share(np.linspace(0, 1, 1000)) == 0.1
 
 
 def test_colour_bars_are_in_short_numbers():

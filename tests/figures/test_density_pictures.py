@@ -24,10 +24,11 @@ from orbiflow.figures.density_axes import angle_axis, axis_label, view_of
 from orbiflow.figures.density_corner import corner_png
 from orbiflow.figures.density_flow import flow_png
 from orbiflow.figures.density_page import density_page
+from orbiflow.figures.density_samples import samples_png
 from orbiflow.figures.density_scale import (
     shading,
 )
-from orbiflow.figures.density_square import density_png, samples_png
+from orbiflow.figures.density_square import density_png
 from orbiflow.figures.density_values import density_at, density_on_grid, is_sharp, takes_logarithms
 from orbiflow.figures.immersions import boy_surface, edge_pairs, mesh
 from orbiflow.flows import Flow

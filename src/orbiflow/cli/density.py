@@ -12,14 +12,12 @@ from orbiflow.cli.density_options import (
     Columns,
     Data,
     DropMissing,
-    Format,
     Measure,
     Missing,
     MissingOption,
     Model,
     NoHeader,
     Repeats,
-    Scale,
     Space,
     Unit,
     Weights,
@@ -27,11 +25,11 @@ from orbiflow.cli.density_options import (
 )
 from orbiflow.cli.density_partial import conditional, marginal
 from orbiflow.cli.density_patches import patches
+from orbiflow.cli.density_plot import plot
 from orbiflow.cli.density_region import region_of
 from orbiflow.cli.work import do
 from orbiflow.jobs import (
     DensityFitRequest,
-    DensityPlotRequest,
     DensitySampleRequest,
     DensityScoreRequest,
 )
@@ -177,87 +175,7 @@ def sample(
     do(DensitySampleRequest(model=model, out=out, count=n, seed=seed))
 
 
-@density.command()
-def plot(
-    model: Model,
-    out: Annotated[
-        Path,
-        typer.Option(
-            "--out",
-            "-o",
-            help="Folder for the pictures, made if need be; or a .pdf, a page a figure.",
-        ),
-    ] = Path("plots"),
-    data: Annotated[
-        Path | None,
-        typer.Option(
-            help="Table to draw beside samples in samples.png, and as the dots of --dots.",
-            show_default=False,
-        ),
-    ] = None,
-    columns: Columns = None,
-    coastlines: Annotated[
-        Path | None,
-        typer.Option(
-            help="Table of lat,lon drawn as lines on the sphere; lat beyond 90 ends a line.",
-            show_default=False,
-        ),
-    ] = None,
-    file_format: Annotated[
-        Format | None,
-        typer.Option(
-            "--format", help="Of the figures: png, or pdf or svg for print.", show_default=False
-        ),
-    ] = None,
-    width: Annotated[
-        str | None,
-        typer.Option(
-            help="For print, with texts of 7 to 8 points: single (85mm), double (180mm) or a length.",
-            show_default=False,
-        ),
-    ] = None,
-    measure: Annotated[Measure, typer.Option(help="What the density is per.")] = Measure.NATURAL,
-    scale: Annotated[
-        Scale,
-        typer.Option(help="Of colours. Auto: log if a peak outshines nearly all of the area."),
-    ] = Scale.AUTO,
-    center: Annotated[
-        str | None,
-        typer.Option(
-            help="Angles in the middle of a torus' pictures, such as 180,180; default 0 each, so "
-            "that angles run from -180 to 180 degrees.",
-            show_default=False,
-        ),
-    ] = None,
-    dots: Annotated[
-        bool,
-        typer.Option(
-            "--dots", help="Draw data, or else samples, over density.png and the surface."
-        ),
-    ] = False,
-    seed: Annotated[int, typer.Option(help="Of the samples.")] = 0,
-) -> None:
-    """Draw a density: density, flow, samples as PNG, PDF or SVG, and surface.html, to turn in 3-D.
-
-    Of a torus of more or fewer than two angles: samples.png alone, all pairs of angles.
-    """
-    request = DensityPlotRequest(
-        model=model,
-        out=out,
-        data=data,
-        columns=named_columns(columns),
-        coastlines=coastlines,
-        format=file_format.value if file_format else None,
-        width=width,
-        measure=measure.value,
-        scale=scale.value,
-        center=center,
-        dots=dots,
-        seed=seed,
-    )
-    do(request)
-
-
+density.command()(plot)
 density.command()(marginal)
 density.command()(conditional)
 density.command()(compare)

@@ -58,6 +58,19 @@ class Scale(StrEnum):
     LOG = "log"
 
 
+class Projection(StrEnum):
+    """Of maps."""
+
+    AUTO = "auto"
+    EQUAL_EARTH = "equal-earth"
+    MOLLWEIDE = "mollweide"
+    LATLON = "latlon"
+    LAMBERT = "lambert"
+    STEREOGRAPHIC = "stereographic"
+    SCHMIDT = "schmidt"
+    WULFF = "wulff"
+
+
 class Format(StrEnum):
     """Of figures."""
 

@@ -13,7 +13,8 @@ from orbiflow.export.art import (
     write_artwork,
 )
 from orbiflow.export.curves import Curve
-from orbiflow.export.density_plots import PlotSettings, Plotted, plot_density
+from orbiflow.export.density_plot_settings import PlotSettings
+from orbiflow.export.density_plots import Plotted, plot_density
 from orbiflow.export.dxf_writer import write_dxf
 from orbiflow.export.exporting import Exported, export, scenes, write_scene
 from orbiflow.export.folder import write_tile_folder

@@ -16,9 +16,12 @@ if TYPE_CHECKING:
     from orbiflow.figures.classes import classes_png
     from orbiflow.figures.density_corner import corner_picture
     from orbiflow.figures.density_flow import flow_picture
+    from orbiflow.figures.density_map import map_picture
     from orbiflow.figures.density_page import density_page
-    from orbiflow.figures.density_square import density_picture, samples_picture
+    from orbiflow.figures.density_samples import samples_picture
+    from orbiflow.figures.density_square import density_picture
     from orbiflow.figures.field import field_picture, field_png
+    from orbiflow.figures.map_samples import map_samples_picture
     from orbiflow.figures.sheet import Picture, Sheet, pdf_pages
     from orbiflow.figures.tilings import (
         overlay_picture,
@@ -34,8 +37,11 @@ _FILES = {
     "density_corner": ("corner_picture",),
     "density_flow": ("flow_picture",),
     "density_page": ("density_page",),
-    "density_square": ("density_picture", "samples_picture"),
+    "density_map": ("map_picture",),
+    "density_samples": ("samples_picture",),
+    "density_square": ("density_picture",),
     "field": ("field_picture", "field_png"),
+    "map_samples": ("map_samples_picture",),
     "sheet": ("Picture", "Sheet", "pdf_pages"),
     "tilings": ("overlay_picture", "overlay_png", "tiling_picture", "tiling_png"),
     "window": ("default_window",),
@@ -57,6 +63,8 @@ __all__ = [
     "field_picture",
     "field_png",
     "flow_picture",
+    "map_picture",
+    "map_samples_picture",
     "overlay_picture",
     "overlay_png",
     "palette",

@@ -189,6 +189,18 @@ def angle_text(turns: float, unit: str) -> str:
     return f"\N{MINUS SIGN}{text}" if turns < 0 else text
 
 
+def degrees(value: float, signs: str) -> str:
+    """An angle with the letters of its positive and negative sense, or plain where there are none.
+
+    >>> degrees(-30.0, "NS"), degrees(180.0, "EW"), degrees(330.0, "")
+    ('30° S', '180°', '330°')
+    """
+    if not signs:
+        return f"{value:g}°".replace("-", "\N{MINUS SIGN}")
+    letter = "" if value in (0, 180, -180) else f" {signs[int(value < 0)]}"
+    return f"{abs(value):g}°{letter}"
+
+
 def dress(
     axes: Axes, view: View, sheet: Sheet, *, places: bool = True, upward: bool = True
 ) -> None:
@@ -282,9 +294,12 @@ def cones(group: CrystallographicGroup) -> list[tuple[tuple[float, float], int]]
 
 def _place(axes: Axes, space: Space, corner: tuple[float, float], sheet: Sheet) -> None:
     """Where in the data's columns a cone point lies."""
-    digits = 2 if len(space.columns) == 3 else 0
-    row = space.from_chart(torch.tensor([corner], dtype=torch.float64))[0].round(digits) + 0.0
-    text = ", ".join(f"{n} {v:.{digits}f}" for n, v in zip(space.columns, row, strict=True))
+    row = space.from_chart(torch.tensor([corner], dtype=torch.float64))[0]
+    if len(space.columns) == 2:
+        text = ", ".join(map(degrees, row.round() + 0.0, ("NS", "EW")))
+    else:
+        row = row.round(2) + 0.0
+        text = ", ".join(f"{n} {v:.2f}" for n, v in zip(space.columns, row, strict=True))
     axes.annotate(
         text.replace("-", "\N{MINUS SIGN}"), corner, xytext=(0, sheet.text * (2 * corner[1] - 1)),
         textcoords="offset points", ha="right" if corner[0] else "left",

@@ -64,6 +64,7 @@ def corner_picture(
     names: Sequence[str] | None = None,
     center: Sequence[float] | None = None,
     sheet: Sheet | None = None,
+    most: int = MAX_DOTS,
 ) -> Picture:
     """Every pair of angles: data below the diagonal, samples above, both along it.
 
@@ -71,8 +72,8 @@ def corner_picture(
 
     Args:
         density: on a torus of 1 to `MOST_COLUMNS` angles.
-        data, drawn: chart points (N, d), (M, d); at most `MAX_DOTS` of each are drawn as dots, all
-            are counted on the diagonal. Without data the samples are below the diagonal, too.
+        data, drawn: chart points (N, d), (M, d); at most `most` of each are drawn as dots, all are
+            counted on the diagonal. Without data the samples are below the diagonal, too.
         names, center: of the axes; see `orbiflow.figures.density_axes.view_of`.
         sheet: default a screen of 1600 pixels.
 
@@ -95,8 +96,8 @@ def corner_picture(
             points, colour = (below, _DATA) if row > column else (above, _DRAWN)
             fill = _DRAWN if data is None else colour
             draw_dots(
-                axes, points[:, [column, row]], 0.4, fill=fill, rim="none", shrink=grid.shrink,
-                rasterized=dim > 3,
+                axes, points[:, [column, row]], 0.4, limit=most, fill=fill, rim="none",
+                shrink=grid.shrink, rasterized=dim > 3,
             )  # fmt: skip
         _label(axes, view, row, column, grid)
         if dim == 1:
@@ -104,9 +105,9 @@ def corner_picture(
             line = density_at(density, view.to_chart(t[:, None]), "square")
             axes.plot(t.numpy(), line, color=INK, linewidth=sheet.pen(1.6, 0.6))
     counts = None if data is None else len(below), len(above)
-    _heads(grid, dim, *counts)
+    _heads(grid, dim, *counts, most)
     title = f"{'Angles' if dim > 1 else 'Angle'} on the {space_title(space)}"
-    return Picture(grid.figure, sheet, title, _caption(view, *counts))
+    return Picture(grid.figure, sheet, title, _caption(view, *counts, most))
 
 
 class _Grid(NamedTuple):
@@ -170,11 +171,11 @@ def _counts(axes: Axes, sheet: Sheet, drawn: Array, data: Array | None) -> None:
     axes.hist(drawn, bins=bins, density=True, histtype="step", color=_DRAWN, linewidth=thin)
 
 
-def _heads(grid: _Grid, dim: int, data: int | None, drawn: int) -> None:
+def _heads(grid: _Grid, dim: int, data: int | None, drawn: int, most: int) -> None:
     """How many points there are, in their colours; in print the caption counts."""
 
     def shown(count: int, what: str) -> str:
-        few = f"{MAX_DOTS} of " if count > MAX_DOTS and dim > 1 else ""
+        few = f"{most} of " if count > most and dim > 1 else ""
         return what if grid.sheet.printed else f"{few}{count} {what}"
 
     diagonal = "" if grid.sheet.printed else " the diagonal"
@@ -192,11 +193,11 @@ def _heads(grid: _Grid, dim: int, data: int | None, drawn: int) -> None:
         grid.figure.text(x, y, text, fontsize=size, color=colour)
 
 
-def _caption(view: View, data: int | None, drawn: int) -> str:
+def _caption(view: View, data: int | None, drawn: int, most: int) -> str:
     counts = [(data, "data")] if data is not None else []
     counts.append((drawn, "samples"))
     text = " and ".join(f"{count} {what}" for count, what in counts)
-    few = f", at most {MAX_DOTS} of each as dots" if view.space.dim > 1 else ""
+    few = f", at most {most} of each as dots" if view.space.dim > 1 else ""
     return f"{text}{few}. Angles in {unit_of(view.space)}."
 
 

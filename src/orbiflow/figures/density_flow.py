@@ -16,7 +16,8 @@ from orbiflow.density.models.neural import NeuralFlow
 from orbiflow.density.models.symmetric import SymmetricDensity
 from orbiflow.errors import OrbiflowError
 from orbiflow.figures.density_axes import INK, check_plane, space_title, view_of
-from orbiflow.figures.density_frame import Room, colour_bar, framed
+from orbiflow.figures.density_bar import colour_bar
+from orbiflow.figures.density_frame import Room, framed
 from orbiflow.figures.density_square import COLOURS
 from orbiflow.figures.field import draw_flow, draw_magnitude
 from orbiflow.figures.sheet import Picture, Sheet

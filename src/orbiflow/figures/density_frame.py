@@ -1,4 +1,4 @@
-"""The square of a flat picture of a density and the room around it, in units of the texts' size."""
+"""The axes of a flat picture of a density and the room around them, in units of the texts' size."""
 
 from __future__ import annotations
 
@@ -6,17 +6,20 @@ import textwrap
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
-from orbiflow.figures.density_axes import ANGLE_AXES, INK, LETTER, View
+from orbiflow.figures.density_axes import ANGLE_AXES, LETTER, View
 from orbiflow.figures.sheet import Sheet
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from matplotlib.image import AxesImage
 
 
 class Room(NamedTuple):
-    """In ems; `right` holds the colour bar, `gap` from the square and `bar` wide."""
+    """In ems, round the axes of a picture.
+
+    - `gap`, `bar`: from the axes to the colour bar, and how wide that is.
+    - `under`: whether the bar is below the axes and within `below`, or beside them and within `right`.
+    """
 
     left: float
     below: float
@@ -24,19 +27,24 @@ class Room(NamedTuple):
     above: float
     gap: float
     bar: float
+    under: bool = False
 
 
-SCREEN = Room(6.67, 9.29, 11.52, 5.26, 3.33, 1.52)
+SCREEN = Room(6.67, 10.4, 11.52, 5.26, 3.33, 1.52)
 """With a title above, and a legend of five lines below."""
+
+NARROW = 70 / 25.4
+"""Inches of a printed figure below which there is no room beside the axes."""
 
 
 class Framed(NamedTuple):
-    """A figure, the axes of its square of `side` inches, and those of its colour bar."""
+    """A figure, its axes, `side` inches wide, those of its colour bar, and whether that is below."""
 
     figure: Figure
     axes: Axes
     bar: Axes
     side: float
+    under: bool = False
 
 
 def framed(
@@ -46,47 +54,59 @@ def framed(
     ticks: Sequence[str] = ("0.00",),
     *,
     room: Room | None = None,
+    aspect: float = 1.0,
 ) -> Framed:
-    """A square with a colour bar beside it.
+    """Axes with a colour bar beside them, or, where the sheet is narrow, below.
 
     Args:
         sheet: whose width all of it has.
         view: of the square, whose ticks and labels need room; None where there are none.
         label, ticks: of the bar; in print a long label takes more lines.
         room: in place of what sheet and view ask for.
+        aspect: of the axes, width over height.
     """
     room = room or (_printed(sheet, view, label, ticks) if sheet.printed else SCREEN)
     side = sheet.width - sheet.em * (room.left + room.right)
-    height = side + sheet.em * (room.below + room.above)
+    inner = side / aspect
+    height = inner + sheet.em * (room.below + room.above)
     figure = sheet.figure(height)
 
-    def axes(left: float, width: float) -> Axes:
-        box = (
-            left / sheet.width, sheet.em * room.below / height, width / sheet.width, side / height
-        )  # fmt: skip
-        return figure.add_axes(box)
-
-    left = sheet.em * room.left
-    bar = axes(left + side + sheet.em * room.gap, sheet.em * room.bar)
-    return Framed(figure, axes(left, side), bar, side)
-
-
-def side_by_side(sheet: Sheet, view: View) -> tuple[Figure, tuple[Axes, Axes], float]:
-    """A figure with two squares, and their side in inches: ticks have texts below, and at the left."""
-    angles = view.space.name in ANGLE_AXES
-    left, right, gap, below = (5.4, 1.6, 3.0, 4.2) if angles else (1.0, 1.0, 1.6, 1.0)
-    side = (sheet.width - sheet.em * (left + gap + right)) / 2
-    height = side + sheet.em * (below + 2.4)
-    figure = sheet.figure(height)
-    first, second = (
-        figure.add_axes(
-            (
-                (sheet.em * left + k * (side + sheet.em * gap)) / sheet.width,
-                sheet.em * below / height, side / sheet.width, side / height,
-            )
+    def axes(left: float, below: float, width: float, high: float) -> Axes:
+        return figure.add_axes(
+            (left / sheet.width, below / height, width / sheet.width, high / height)
         )
-        for k in (0, 1)
-    )  # fmt: skip
+
+    left, below = sheet.em * room.left, sheet.em * room.below
+    gap, thick = sheet.em * room.gap, sheet.em * room.bar
+    if room.under:
+        bar = axes(left, below - gap - thick, side, thick)
+    else:
+        bar = axes(left + side + gap, below, thick, inner)
+    return Framed(figure, axes(left, below, side, inner), bar, side, room.under)
+
+
+def two_panels(
+    sheet: Sheet, room: Room, aspect: float = 1.0, *, stacked: bool = False
+) -> tuple[Figure, tuple[Axes, Axes], float]:
+    """A figure with two equal axes, `room.gap` apart, side by side or the first above the second.
+
+    Returns:
+        The figure, its axes, and their width in inches.
+    """
+    left, gap, right = (sheet.em * room[k] for k in (0, 4, 2))
+    side = sheet.width - left - right
+    side = side if stacked else (side - gap) / 2
+    inner = side / aspect
+    below = sheet.em * room.below
+    height = below + sheet.em * room.above + (2 * inner + gap if stacked else inner)
+    figure = sheet.figure(height)
+    corners = [(left, below + inner + gap), (left, below)]
+    if not stacked:
+        corners = [(left + k * (side + gap), below) for k in (0, 1)]
+    first, second = (
+        figure.add_axes((x / sheet.width, y / height, side / sheet.width, inner / height))
+        for x, y in corners
+    )
     return figure, (first, second), side
 
 
@@ -98,14 +118,29 @@ def _printed(sheet: Sheet, view: View | None, label: str, ticks: Sequence[str]) 
         left, below, above = 5.4, 3.8, 0.8
     else:
         left, below, above = 1.0, 2.8, 2.8
-    gap, bar = 1.4, 1.1
-    right = gap + bar + 1.4 + max(map(len, ticks), default=0) * LETTER * sheet.small / sheet.text
+    if sheet.width < NARROW:
+        return bar_under(sheet, Room(left, below, 1.4, above, below, 1.0), label)
+    return bar_beside(sheet, Room(left, below, 0.0, above, 1.4, 1.1), label, ticks)
+
+
+def bar_under(sheet: Sheet, room: Room, label: str) -> Room:
+    """Room for a bar below what takes `room.gap` under the axes, and for its ticks and label."""
+    side = sheet.width - sheet.em * (room.left + room.right)
+    lines = len(bar_label_lines(sheet, label, side))
+    return room._replace(below=room.gap + room.bar + 2.2 + 1.3 * lines, under=True)
+
+
+def bar_beside(sheet: Sheet, room: Room, label: str, ticks: Sequence[str]) -> Room:
+    """Room for a bar at the right of the axes, and for its ticks and label."""
+    widest = max(map(len, ticks), default=0) * LETTER * sheet.small / sheet.text
+    right = room.gap + room.bar + 1.4 + widest
+    made = room
     for lines in range(1, 6):  # each takes room from the square, and so from the lines
-        room = Room(left, below, right + 0.4 + 1.25 * lines, above, gap, bar)
-        side = sheet.width - sheet.em * (room.left + room.right)
+        made = room._replace(right=right + 0.4 + 1.25 * lines)
+        side = sheet.width - sheet.em * (made.left + made.right)
         if len(bar_label_lines(sheet, label, side)) <= lines:
             break
-    return room
+    return made
 
 
 def bar_label_lines(sheet: Sheet, label: str, side: float) -> list[str]:
@@ -113,16 +148,3 @@ def bar_label_lines(sheet: Sheet, label: str, side: float) -> list[str]:
     most = max(12, int(side / (LETTER * sheet.em)))
     lines = -(-len(label) // most)
     return textwrap.wrap(label, min(most, len(label) // max(lines, 1) + 6)) or [""]
-
-
-def colour_bar(
-    image: AxesImage, frame: Framed, sheet: Sheet, label: str, extend: str = "neither"
-) -> None:
-    """The bar of an image's colours."""
-    bar = frame.figure.colorbar(image, cax=frame.bar, extend=extend)
-    if sheet.printed:
-        label = "\n".join(bar_label_lines(sheet, label, frame.side))
-    bar.set_label(label, fontsize=sheet.text, color=INK)
-    bar.ax.tick_params(labelsize=sheet.small, width=sheet.pen(0.8), length=0.3 * sheet.text)
-    bar.ax.yaxis.get_offset_text().set_fontsize(sheet.small)
-    bar.outline.set_visible(False)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from orbiflow.density.spaces.space import Space
-from orbiflow.figures.density_axes import EDGE_COLOURS, INK, cones
+from orbiflow.figures.density_axes import EDGE_COLOURS, INK, LETTER, cones
 from orbiflow.figures.marks import CENTER_COLOURS, center_sign
 from orbiflow.figures.sheet import Sheet
 
@@ -42,11 +43,13 @@ def legend(
     if dots:
         style = {"markerfacecolor": "#ffffff", "markeredgecolor": INK, "linestyle": "none"}
         entries.append(Line2D([], [], marker="o", label="points", **style))
-    notes = [*([CROWDED] if dots and space.is_round else []), *notes]
-    entries += [Line2D([], [], linestyle="none", label=note) for note in notes]
+    words = _sentences(_all_notes(space, dots, notes))
+    write_below(figure, words, sheet)
+    lines = len(wrapped_words(words, sheet))
+    up = (0.6 + 1.25 * lines) * sheet.em / figure.get_size_inches()[1]
     figure.legend(
-        handles=entries, loc="lower left", bbox_to_anchor=(0.05, 0.005), ncols=2, frameon=False,
-        fontsize=sheet.small,
+        handles=entries, loc="lower left", bbox_to_anchor=(0.02, up), ncols=2, frameon=False,
+        fontsize=sheet.small, borderaxespad=0.3,
     )  # fmt: skip
 
 
@@ -63,9 +66,15 @@ def caption(space: Space, *, dots: bool, notes: Sequence[str] = ()) -> str:
         for order in _orders(space)
     ]
     parts += ["Dots are points"] if dots else []
-    notes = [*([CROWDED] if dots and space.is_round else []), *notes]
-    parts += [note[0].upper() + note[1:] for note in notes]
-    return "".join(f"{part}. " for part in parts).strip()
+    return _sentences([*parts, *_all_notes(space, dots, notes)])
+
+
+def _all_notes(space: Space, dots: bool, notes: Sequence[str]) -> list[str]:
+    return [*([CROWDED] if dots and space.is_round else []), *notes]
+
+
+def _sentences(parts: Sequence[str]) -> str:
+    return " ".join(f"{part[0].upper()}{part[1:]}." for part in parts)
 
 
 SIGNS = {2: "Lenses", 4: "Squares"}
@@ -73,3 +82,17 @@ SIGNS = {2: "Lenses", 4: "Squares"}
 
 def _orders(space: Space) -> list[int]:
     return sorted({order for _, order in cones(space.group)}, reverse=True)
+
+
+def wrapped_words(words: str, sheet: Sheet) -> list[str]:
+    """Lines of a caption below a picture on a screen."""
+    return textwrap.wrap(words, int(0.94 * 72 * sheet.width / (0.9 * LETTER * sheet.small)))
+
+
+def write_below(figure: Figure, words: str, sheet: Sheet) -> None:
+    """The caption in the lower left corner."""
+    lines = "\n".join(wrapped_words(words, sheet))
+    figure.text(
+        0.03, 0.6 * sheet.em / figure.get_size_inches()[1], lines, fontsize=sheet.small, color=INK,
+        va="bottom", linespacing=1.35, parse_math=False,
+    )  # fmt: skip

@@ -11,13 +11,13 @@ from orbiflow.density.spaces.space import Space
 from orbiflow.symmetry.isometry import Array
 
 SCALES = ("auto", "linear", "log")
-"""Of colours; "auto" is logarithmic if `is_outshone`."""
+"""Of colours; "auto" is logarithmic where more than `DARKEST` of the area would be dark."""
 
 DECADES = 5
 """Of a logarithmic scale, at most, below the largest value."""
 
-FAINT = 0.05
-"""If 95 % of the area is below this share of the peak, `auto` takes logarithms."""
+DARKEST = 0.8
+"""If the density is below a tenth of its peak on more of the area, `auto` takes logarithms."""
 
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
@@ -70,9 +70,10 @@ def shading(values: Array, weights: Array | None = None, *, log: bool = False) -
     return Shade(0.0, high if cut else peak, peak, cut=cut)
 
 
-def is_outshone(values: Array, weights: Array | None = None) -> bool:
-    """Whether a peak outshines nearly all of the area, so that a linear scale shows nothing else."""
-    return _quantile(values, weights, 0.95) < FAINT * float(values.max())
+def dark_share(values: Array, weights: Array | None = None) -> float:
+    """On which share of the area a density is below a tenth of its peak: dark on a linear scale."""
+    dark = values.ravel() < 0.1 * float(values.max())
+    return float(np.average(dark, weights=None if weights is None else weights.ravel()))
 
 
 def _quantile(values: Array, weights: Array | None, share: float) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, TypedDict, Unpack
+from typing import TYPE_CHECKING, Any, NamedTuple, TypedDict, Unpack
 
 import numpy as np
 import torch
@@ -11,11 +11,12 @@ from torch import Tensor
 
 from orbiflow.density.models.blend import BlendedDensity
 from orbiflow.density.models.symmetric import SymmetricDensity, midpoints
-from orbiflow.figures.density_axes import INK, check_plane, dress, space_title, view_of
-from orbiflow.figures.density_frame import Framed, colour_bar, framed, side_by_side
+from orbiflow.figures.density_axes import INK, View, check_plane, dress, space_title, view_of
+from orbiflow.figures.density_bar import shade_bar
+from orbiflow.figures.density_frame import framed
 from orbiflow.figures.density_legend import caption, legend
-from orbiflow.figures.density_scale import Shade, bar_label, bar_ticks, minor_places, shading
-from orbiflow.figures.density_values import density_on_grid, is_sharp, takes_logarithms
+from orbiflow.figures.density_scale import Shade, bar_label, bar_ticks, shading
+from orbiflow.figures.density_values import chosen_scale, density_on_grid, is_sharp
 from orbiflow.figures.sheet import Picture, Sheet
 from orbiflow.symmetry.isometry import Array
 
@@ -68,6 +69,7 @@ def density_picture(
     names: Sequence[str] | None = None,
     center: Sequence[float] | None = None,
     sheet: Sheet | None = None,
+    most: int = MAX_DOTS,
 ) -> Picture:
     """A density on the canonical square, with the edges marked that are the same edge.
 
@@ -77,8 +79,8 @@ def density_picture(
 
     Args:
         density: on a two-dimensional space.
-        samples: data or samples to draw as dots, chart points (N, 2); of more than `MAX_DOTS`, a
-            random choice that is always the same. They hide what they lie on.
+        samples: data or samples to draw as dots, chart points (N, 2); of more than `most`, a random
+            choice that is always the same. They hide what they lie on.
         measure: with respect to which the density is drawn (`orbiflow.density.spaces.space.MEASURES`).
         scale: of the colours, one of `orbiflow.figures.density_scale.SCALES`.
         names, center: of the axes; see `orbiflow.figures.density_axes.view_of`.
@@ -89,89 +91,62 @@ def density_picture(
             another shape, or names or a centre that do not fit.
     """
     sheet = sheet or Sheet.screen()
-    space, count = density.space, _FINE_GRID if isinstance(density, BlendedDensity) else _GRID
+    space = density.space
     check_plane(space)
     view = view_of(space, names, center)
-    middles = (torch.arange(count, dtype=torch.float64) + 0.5) / count
-    values = density_on_grid(density, middles + view.low[0], middles + view.low[1], measure)
-    areas = space.log_area(midpoints(space, count)).exp().numpy().reshape(count, count)
-    shade = shading(values, areas, log=takes_logarithms(density, measure, scale))
+    drawn = square_colours(density, view, measure, scale)
+    shade, count = drawn.shade, len(drawn.places)
     label = bar_label(shade, space, measure)
     frame = framed(sheet, view, label, [tick.text for tick in bar_ticks(shade)])
-    image = frame.axes.imshow(
-        shade.places(values).T, extent=(0, 1, 0, 1), origin="lower", cmap=COLOURS,
-        interpolation="bicubic", vmin=0, vmax=1,
-    )  # fmt: skip
+    image = drawn.on(frame.axes)
     if samples is not None:
-        draw_dots(frame.axes, view.places(samples), 0.55, shrink=_dot_shrink(sheet, frame.side))
-    _shade_bar(image, frame, sheet, shade, label)
+        draw_dots(
+            frame.axes, view.places(samples), 0.55, limit=most, shrink=dot_shrink(sheet, frame.side)
+        )
+    shade_bar(image, frame, sheet, shade, label)
     dress(frame.axes, view, sheet)
     title = f"Density on the {space_title(space)}"
     signs: dict[str, Any] = {"dots": samples is not None}
-    signs["notes"] = [average_note(count)] if is_sharp(density, 1 / count) else []
+    signs["notes"] = [drawn.why]
+    if is_sharp(density, 1 / count):
+        signs["notes"].append(average_note(count))
     if not sheet.printed:
         frame.axes.set_title(title, fontsize=1.15 * sheet.text, pad=14)
         legend(frame.figure, space, sheet, **signs)
     return Picture(frame.figure, sheet, title, caption(space, **signs))
 
 
-def samples_png(
-    density: SymmetricDensity,
-    data: Tensor,
-    drawn: Tensor,
-    *,
-    width_px: int = 1600,
-    **options: Unpack[AxesOptions],
-) -> bytes:
-    """PNG of `samples_picture`, which has the `options`, for a screen.
+class Coloured(NamedTuple):
+    """A density on the window of a square: places of its pixels (N, N) on the colour bar, first x.
+
+    - `why`: the scale is linear or logarithmic.
+    """
+
+    places: Array
+    shade: Shade
+    why: str
+
+    def on(self, axes: Axes) -> AxesImage:
+        """The picture of it."""
+        return axes.imshow(
+            self.places.T, extent=(0, 1, 0, 1), origin="lower", cmap=COLOURS,
+            interpolation="bicubic", vmin=0, vmax=1,
+        )  # fmt: skip
+
+
+def square_colours(density: SymmetricDensity, view: View, measure: str, scale: str) -> Coloured:
+    """The colours of a density's picture on the square.
 
     Raises:
-        OrbiflowError: as `samples_picture`, and for a size that cannot be made.
+        OrbiflowError: for an unknown measure or scale.
     """
-    sheet = Sheet.screen(width_px)
-    return samples_picture(density, data, drawn, sheet=sheet, **options).file()
-
-
-def samples_picture(
-    density: SymmetricDensity,
-    data: Tensor,
-    drawn: Tensor,
-    *,
-    names: Sequence[str] | None = None,
-    center: Sequence[float] | None = None,
-    sheet: Sheet | None = None,
-) -> Picture:
-    """Data and samples side by side on the canonical square.
-
-    Args:
-        density: on a two-dimensional space.
-        data, drawn: chart points (N, 2), (M, 2), such as `space.to_chart(table)` and
-            `density.sample((M,))`; at most `MAX_DOTS` of each are drawn, the same number where
-            there are enough.
-        names, center: of the axes; see `orbiflow.figures.density_axes.view_of`.
-        sheet: default a screen of 1600 pixels.
-
-    Raises:
-        OrbiflowError: for a space of another dimension, points of another shape, or names or a
-            centre that do not fit.
-    """
-    sheet, space = sheet or Sheet.screen(), density.space
-    check_plane(space)
-    view = view_of(space, names, center)
-    both = [view.places(points) for points in (data, drawn)]
-    count = min(len(points) for points in both) or MAX_DOTS
-    figure, panels, side = side_by_side(sheet, view)
-    shrink = _dot_shrink(sheet, side)
-    heads = ("data", "samples")
-    for axes, name, points in zip(panels, heads, both, strict=True):
-        axes.set_facecolor("#f4f4f1")
-        draw_dots(axes, points, 0.5, limit=count, fill="#3b528b", rim="none", shrink=shrink)
-        dress(axes, view, sheet, places=False, upward=axes is panels[0])
-        shown = min(len(points), count, MAX_DOTS)
-        few = "" if shown == len(points) else f"{shown} of "
-        axes.set_title(f"{few}{len(points)} {name}", fontsize=sheet.text, pad=0.7 * sheet.text)
-    title = f"Data and samples on the {space_title(space)}"
-    return Picture(figure, sheet, title, caption(space, dots=True))
+    space, count = density.space, _FINE_GRID if isinstance(density, BlendedDensity) else _GRID
+    middles = (torch.arange(count, dtype=torch.float64) + 0.5) / count
+    values = density_on_grid(density, middles + view.low[0], middles + view.low[1], measure)
+    areas = space.log_area(midpoints(space, count)).exp().numpy().reshape(count, count)
+    chosen = chosen_scale(density, measure, scale)
+    shade = shading(values, areas, log=chosen.log)
+    return Coloured(shade.places(values), shade, chosen.why)
 
 
 def average_note(count: int) -> str:
@@ -190,16 +165,19 @@ def draw_dots(
     shrink: float = 1.0,
     rasterized: bool = False,
 ) -> None:
-    """Points (N, 2) of the window as dots, at most `limit` and `MAX_DOTS` of them.
+    """Points (N, 2) of the window as dots, at most `limit` of them.
 
     Args:
         shrink: what to multiply the dots' area by.
-        rasterized: whether they are pixels in a PDF or SVG, too: for more than such files should hold.
+        rasterized: whether they are pixels in a PDF or SVG, too; more than `MAX_DOTS` always are.
     """
-    points = thinned(points, min(limit, MAX_DOTS))
+    points = thinned(points, limit)
+    crowd = max(1.0, len(points) / MAX_DOTS)
+    rasterized = rasterized or crowd > 1
+    shrink = max(shrink / crowd**0.7, 0.04)
     axes.scatter(
         *points.T, s=shrink * max(2.0, 9.0 - len(points) / 500), c=fill, edgecolors=rim,
-        linewidths=0.35 * shrink**0.5, alpha=alpha, zorder=3,
+        linewidths=0.35 * shrink**0.5, alpha=alpha, zorder=5,
         rasterized=rasterized,
     )  # fmt: skip
 
@@ -211,14 +189,6 @@ def thinned(points: Array, limit: int = MAX_DOTS) -> Array:
     return points[np.random.default_rng(0).choice(len(points), limit, replace=False)]
 
 
-def _dot_shrink(sheet: Sheet, side: float) -> float:
+def dot_shrink(sheet: Sheet, side: float) -> float:
     """Of dots in a square of so many inches: those on a screen have one of 5.6."""
     return max(0.2, (side / 5.6) ** 2) if sheet.printed else 1.0
-
-
-def _shade_bar(image: AxesImage, frame: Framed, sheet: Sheet, shade: Shade, label: str) -> None:
-    extend = {(True, False): "max", (False, True): "min"}.get((shade.cut, shade.faint), "neither")
-    colour_bar(image, frame, sheet, label, extend)
-    ticks = bar_ticks(shade)
-    frame.bar.set_yticks([tick.at for tick in ticks], [tick.text for tick in ticks])
-    frame.bar.set_yticks(minor_places(shade), minor=True)

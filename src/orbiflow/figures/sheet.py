@@ -20,7 +20,7 @@ FORMATS: tuple[FigureFormat, ...] = get_args(FigureFormat)
 COLUMNS = {"single": 85.0, "double": 180.0}
 """Widths in mm of a journal's one and two columns, between those of the large publishers."""
 
-NARROWEST, WIDEST = 80.0, 1000.0
+NARROWEST, WIDEST = 40.0, 1000.0
 """Of a figure in print, in mm: texts of a given size need room."""
 
 TEXT = 8.0
@@ -71,7 +71,7 @@ class Sheet:
             format: of the file; a PNG has 600 dots per inch.
 
         Raises:
-            OrbiflowError: for another word, a width below 80 or above 1000 mm, or another format.
+            OrbiflowError: for another word, a width below 40 or above 1000 mm, or another format.
         """
         if format not in FORMATS:
             raise OrbiflowError(f"format must be one of {', '.join(FORMATS)}, got {format!r}")

@@ -20,7 +20,7 @@ from orbiflow.density.tables import (
 )
 from orbiflow.density.tables.table import listing
 from orbiflow.errors import InputFileError, OrbiflowError
-from orbiflow.export.density_plots import MODEL
+from orbiflow.export.density_figures import MODEL
 from orbiflow.jobs.events import Note
 from orbiflow.jobs.run import Sink
 

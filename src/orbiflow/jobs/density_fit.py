@@ -16,7 +16,8 @@ from orbiflow.density import DensityEstimator, density_to_bytes
 from orbiflow.density.comparing import RowSketch
 from orbiflow.density.fitting.report import FitReport
 from orbiflow.density.tables import Table
-from orbiflow.export.density_plots import MODEL, PICTURES, REPORT, TABLE
+from orbiflow.export.density_figures import MODEL
+from orbiflow.export.density_plots import PICTURES, REPORT, TABLE
 from orbiflow.files import write_atomic
 from orbiflow.folders import ResultFolder
 from orbiflow.jobs.density_data import read_weighed, unit_of

@@ -21,7 +21,8 @@ from orbiflow.density import (
 from orbiflow.density.partial import axes_named, given_named
 from orbiflow.density.tables import to_csv
 from orbiflow.errors import OrbiflowError
-from orbiflow.export.density_plots import MODEL, REPORT, TABLE
+from orbiflow.export.density_figures import MODEL
+from orbiflow.export.density_plots import REPORT, TABLE
 from orbiflow.figures import corner_picture, density_picture
 from orbiflow.files import write_atomic
 from orbiflow.folders import ResultFolder

@@ -10,9 +10,11 @@ import numpy as np
 
 from orbiflow.cancel import Cancel
 from orbiflow.density.spaces.space import Space
-from orbiflow.density.tables import read_table
-from orbiflow.export.density_plots import PlotSettings, is_one_file, known_names, plot_density
+from orbiflow.export.density_figures import known_names
+from orbiflow.export.density_plot_settings import PlotSettings
+from orbiflow.export.density_plots import is_one_file, plot_density
 from orbiflow.export.lengths import column_width
+from orbiflow.figures.coastlines import read_coastlines
 from orbiflow.jobs.asked import given, read_as
 from orbiflow.jobs.density_data import model_at, read_data, same_columns
 from orbiflow.jobs.density_requests import DensityPlotRequest
@@ -20,13 +22,12 @@ from orbiflow.jobs.events import Finished, Note, Progress, Written
 from orbiflow.jobs.place import check_place
 from orbiflow.jobs.records import RecordError
 from orbiflow.jobs.run import Sink
-from orbiflow.symmetry.isometry import Array
 from orbiflow.threads import one_thread
 
 
 @one_thread()
 def density_plot(request: DensityPlotRequest, tell: Sink, cancel: Cancel) -> Finished:
-    """Draw the square, the flow, samples and the surface; beyond two angles, all pairs of angles.
+    """Draw maps or the square, the flow, samples and the surface; beyond two angles, all pairs.
 
     All pictures are drawn before the first is written; those of an earlier model go.
 
@@ -52,15 +53,17 @@ def density_plot(request: DensityPlotRequest, tell: Sink, cancel: Cancel) -> Fin
         cancel.check()
         tell(Progress(share, what))
 
-    paths, captions = plot_density(density, request.out, settings, data=points, told=told)
-    for path in paths:
+    plotted = plot_density(density, request.out, settings, data=points, told=told)
+    for path in plotted.files:
         tell(Written(path))
     printed = single or settings.sheet.printed
-    for caption in captions if printed else ():
+    for caption in plotted.captions if printed else ():
         tell(Note(f"caption: {caption}"))
+    for note in plotted.notes:
+        tell(Note(note))
     tell(Note(_said(request.out, single, density.space)))
     folder = request.out.parent if single else request.out
-    return Finished("done", {"folder": str(folder), "files": [path.name for path in paths]})
+    return Finished("done", {"folder": str(folder), "files": [path.name for path in plotted.files]})
 
 
 def _said(out: Path, single: bool, space: Space) -> str:
@@ -84,39 +87,39 @@ def _settings(request: DensityPlotRequest, space: Space, columns: list[str] | No
     """Mistakes by the names of the fields."""
     if request.coastlines is not None and space.name != "sphere":
         raise RecordError(f"{{coastlines}} belongs to the sphere, not the {space.name}")
-    asked: dict[str, Any] = given(request, ("format", "measure", "scale", "dots", "seed"))
+    if not space.is_round:
+        for name in ("projection", "radius"):
+            if getattr(request, name) not in ("auto", None):
+                raise RecordError(f"{{{name}}} belongs to maps, not to the {space.name}")
+    wanted = ("format", "measure", "scale", "projection", "radius", "samples", "dots", "seed")
+    asked: dict[str, Any] = given(request, wanted)
     if request.width is not None:
         asked["width"] = read_as("width", column_width, request.width)
         asked.setdefault("format", "pdf")
-    lines = None if request.coastlines is None else _lines(request.coastlines)
+    lines = request.coastlines
     return PlotSettings(
         names=known_names(space, columns),
         center=_center(space, request.center),
-        coastlines=lines,
+        coastlines=None if lines is None else read_coastlines(lines),
         **asked,
     )
 
 
 def _center(space: Space, text: str | None) -> list[float] | None:
-    """`center` as angles in the space's unit; "pi" stands for half a turn in radians."""
+    """`center`: angles in the space's unit, where "pi" is half a turn in radians; or of a map."""
     if text is None:
         return None
-    if not space.is_torus:
-        raise RecordError(f"{{center}} belongs to the torus, not the {space.name}")
-    signs = {"pi": math.pi, "-pi": -math.pi}
+    if not (space.is_torus or space.is_round):
+        raise RecordError(f"{{center}} belongs to the torus and to maps, not to the {space.name}")
+    signs = {} if space.is_round else {"pi": math.pi, "-pi": -math.pi}
+    example = "40,140 (latitude, longitude) or 140" if space.is_round else "angles such as 0,0"
     try:
         values = [signs.get(part.strip()) or float(part) for part in text.split(",")]
     except ValueError as error:
-        raise RecordError(f"{{center}} needs angles such as 0,0, got {text!r}") from error
-    if len(values) != space.dim or not np.isfinite(values).all():
+        raise RecordError(f"{{center}} needs {example}, got {text!r}") from error
+    finite = bool(np.isfinite(values).all())
+    if space.is_round and not (len(values) in (1, 2) and finite):
+        raise RecordError(f"{{center}} needs {example}, got {text!r}")
+    if space.is_torus and not (len(values) == space.dim and finite):
         raise RecordError(f"{{center}} needs {space.dim} angles, one a column, got {text!r}")
     return values
-
-
-def _lines(path: Path) -> list[Array]:
-    """Lines of latitude and longitude, parted by rows whose latitude is beyond 90."""
-    values = read_table(path, columns=None, width=2).values
-    breaks = np.flatnonzero(abs(values[:, 0]) > 90)
-    parts = np.split(values, breaks)
-    found = [part[abs(part[:, 0]) <= 90] for part in parts]
-    return [part for part in found if len(part) > 1]

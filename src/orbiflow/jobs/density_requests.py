@@ -10,11 +10,15 @@ from orbiflow.jobs.records import RecordError
 from orbiflow.jobs.request import Request
 
 MOST_SAMPLES = 100_000_000
+MOST_DOTS = 100_000
 
 SpaceName = Literal["torus", "sphere", "klein-bottle", "projective-plane"]
 Unit = Literal["radians", "degrees", "turns"]
 Measure = Literal["natural", "square", "uniform"]
 Missing = Literal["refuse", "drop", "marginalise"]
+Projection = Literal[
+    "auto", "equal-earth", "mollweide", "latlon", "lambert", "stereographic", "schmidt", "wulff"
+]
 PARTS = (
     "flow",
     "kernels",
@@ -125,7 +129,11 @@ class DensityPlotRequest(Request):
 
     - `out`: a folder, or a .pdf that gets a page a figure.
     - `format`, `width`: of the figures; a width, "single", "double" or such as "85mm", is for print.
-    - `center`: angles in the middle of a torus' pictures, such as "180,180".
+    - `center`: angles in the middle of a torus' pictures, such as "180,180"; latitude and longitude, or
+      a longitude, in the middle of a map.
+    - `projection`, `radius`: of a map; the radius in degrees.
+    - `coastlines`: GeoJSON or a table of latitude and longitude, for the sphere.
+    - `samples`: how many beside data or density, None for 3,000 beside data alone.
     """
 
     KIND = "density-plot"
@@ -140,11 +148,18 @@ class DensityPlotRequest(Request):
     measure: Measure = "natural"
     scale: Literal["auto", "linear", "log"] = "auto"
     center: str | None = None
+    projection: Projection = "auto"
+    radius: float | None = None
     dots: bool = False
+    samples: int | None = None
     seed: int = 0
 
     def check(self) -> None:
         columns_named(self.columns)
+        if self.samples is not None and not 1 <= self.samples <= MOST_DOTS:
+            raise RecordError(f"{{samples}} must be from 1 to {MOST_DOTS}, got {self.samples}")
+        if self.radius is not None and not 0 < self.radius <= 90:
+            raise RecordError(f"{{radius}} must be above 0 and at most 90, got {self.radius:g}")
 
 
 @dataclass(frozen=True)

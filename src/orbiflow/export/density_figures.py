@@ -1,0 +1,233 @@
+"""What the pictures of a density show, and which there are for each space."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import ArrayLike
+from torch import Tensor
+
+from orbiflow.arguments import path as as_path
+from orbiflow.density.estimator import DensityEstimator
+from orbiflow.density.models.blend import BlendedDensity
+from orbiflow.density.models.symmetric import SymmetricDensity
+from orbiflow.density.spaces.space import Space
+from orbiflow.density.storage import read_density
+from orbiflow.errors import OrbiflowError
+from orbiflow.export.density_plot_settings import PlotSettings
+from orbiflow.figures.coastlines import read_coastlines, simplified
+from orbiflow.figures.density_axes import space_title, view_of
+from orbiflow.figures.density_corner import MOST_COLUMNS, corner_picture
+from orbiflow.figures.density_flow import flow_picture
+from orbiflow.figures.density_map import map_picture
+from orbiflow.figures.density_page import density_page
+from orbiflow.figures.density_samples import samples_picture
+from orbiflow.figures.density_square import MAX_DOTS, density_picture
+from orbiflow.figures.map_choice import chosen_map
+from orbiflow.figures.map_samples import map_samples_picture
+from orbiflow.figures.projections import Projection
+from orbiflow.figures.sheet import Picture, Sheet
+from orbiflow.figures.world_maps import PlateCarree
+
+MODEL = "density.safetensors"
+SAMPLES = 3000
+PAGE_POINTS = 40_000
+"""Of coastlines on the surface that turns."""
+
+
+@dataclass(frozen=True, eq=False)
+class DensityPlots:
+    """What the pictures of a density show: chart points beside it."""
+
+    density: SymmetricDensity
+    settings: PlotSettings
+    samples: Tensor
+    data: Tensor | None
+    map: Projection | None = None
+
+    @classmethod
+    def of(
+        cls,
+        density: SymmetricDensity | DensityEstimator | str | Path,
+        settings: PlotSettings,
+        data: ArrayLike | None = None,
+    ) -> DensityPlots:
+        """Mistakes before work.
+
+        Raises:
+            OrbiflowError: as `plot_density`.
+        """
+        own, columns = _density(density)
+        space = own.space
+        if settings.names is None:
+            settings = replace(settings, names=known_names(space, columns))
+        settings = replace(settings, coastlines=_coastlines(space, settings.coastlines))
+        if space.dim > MOST_COLUMNS:
+            raise OrbiflowError(
+                f"this {space.name} has {space.dim} angles, pictures are of {MOST_COLUMNS} at most: "
+                "draw columns of `orbiflow density sample` beside those of the data"
+            )
+        _check_window(space, settings)
+        points = None if data is None else space.to_chart(data)
+        source = torch.Generator().manual_seed(settings.seed)
+        drawn = own.sample((settings.samples or SAMPLES,), source)
+        chosen = None
+        if space.is_round:
+            chosen = chosen_map(
+                space, drawn if points is None else points, projection=settings.projection,
+                center=settings.center, radius=settings.radius, names=columns,
+            )  # fmt: skip
+        return cls(own, settings, drawn, points, chosen)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What is not drawn, and why."""
+        if not self.has_surface or self._flows:
+            return ()
+        return ("the flow has no part in this density, so that there is no picture of it",)
+
+    @property
+    def has_surface(self) -> bool:
+        """Whether there is one to turn, and a square: of two dimensions alone."""
+        return self.density.space.dim == 2
+
+    def pictures(
+        self, sheet: Sheet, told: Callable[[float, str], None] = lambda *_: None
+    ) -> dict[str, Picture]:
+        """By the names of their files, without the ending."""
+        makers = self._makers(sheet)
+        made: dict[str, Picture] = {}
+        for k, (name, make) in enumerate(makers.items()):
+            told(k / (len(makers) + 1), f"drawing {name}.{sheet.format}")
+            made[name] = make()
+        return made
+
+    def page(self) -> str:
+        """The surface, to turn in a browser."""
+        settings, space = self.settings, self.density.space
+        return density_page(
+            self.density,
+            measure=settings.measure,
+            scale=settings.scale,
+            names=settings.names,
+            samples=self._shown,
+            dots=settings.dots,
+            coastlines=simplified(list(map(np.asarray, self._coasts)), PAGE_POINTS) or None,
+            title=f"Density on the {space_title(space)}",
+        )
+
+    @property
+    def _shown(self) -> Tensor:
+        return self.samples if self.data is None else self.data
+
+    def _makers(self, sheet: Sheet) -> Mapping[str, Callable[[], Picture]]:
+        density, settings, data = self.density, self.settings, self.data
+        axes: dict[str, Any] = {
+            "names": settings.names,
+            "center": settings.center,
+            "sheet": sheet,
+        }
+        most = settings.samples or MAX_DOTS
+        if not self.has_surface:
+            return {
+                "samples": lambda: corner_picture(density, data, self.samples, most=most, **axes)
+            }
+        makers: dict[str, Callable[[], Picture]] = {}
+        dots = self._shown if settings.dots else None
+        colours = {"measure": settings.measure, "scale": settings.scale}
+        flat: dict[str, Any] = {**colours, **axes, "center": None if self.map else settings.center}
+        if self.map is None:
+            makers["density"] = lambda: density_picture(density, dots, most=most, **flat)
+        else:
+            maps: dict[str, Any] = {**colours, "sheet": sheet, "coastlines": self._coasts}
+            makers |= self._maps(dots, {**maps, "most": most})
+            makers["square"] = lambda: density_picture(density, dots, most=most, **flat)
+        if self._flows:
+            makers["flow"] = lambda: flow_picture(density, center=flat["center"], sheet=sheet)
+        if data is None and settings.samples is None:
+            return makers
+        if self.map is None:
+            makers["samples"] = lambda: samples_picture(
+                density, data, self.samples, most=most, **flat
+            )
+        else:
+            chosen = self.map
+            makers["samples"] = lambda: map_samples_picture(
+                density, data, self.samples, projection=chosen, most=most, **maps
+            )
+        return makers
+
+    def _maps(
+        self, dots: Tensor | None, options: dict[str, Any]
+    ) -> dict[str, Callable[[], Picture]]:
+        density, chosen = self.density, self.map
+        assert chosen is not None
+        makers = {"density": lambda: map_picture(density, dots, projection=chosen, **options)}
+        if density.space.name == "sphere" and not isinstance(chosen, PlateCarree):
+            plain = PlateCarree((0.0, chosen.center[1]))
+            makers["latlon"] = lambda: map_picture(density, dots, projection=plain, **options)
+        return makers
+
+    @property
+    def _flows(self) -> bool:
+        """Whether a flow has a part in the density."""
+        density = self.density
+        return not (isinstance(density, BlendedDensity) and float(density.shares[0]) == 0)
+
+    @property
+    def _coasts(self) -> Sequence[Any]:
+        lines = self.settings.coastlines
+        assert not isinstance(lines, str | Path)  # they were read
+        return lines or ()
+
+
+def known_names(space: Space, columns: Sequence[str] | None) -> Sequence[str] | None:
+    """Columns of a table as names of the axes, if they are angles."""
+    angles = space.unit is not None
+    return columns if angles and columns and len(columns) == len(space.columns) else None
+
+
+def _check_window(space: Space, settings: PlotSettings) -> None:
+    """
+    Raises:
+        OrbiflowError: for options of maps on other spaces, and for names or a centre that do not fit.
+    """
+    view_of(space, settings.names, None if space.is_round else settings.center)
+    if not space.is_round and (settings.projection != "auto" or settings.radius is not None):
+        name = "radius" if settings.projection == "auto" else "projection"
+        raise OrbiflowError(
+            f"{name} belongs to maps of the sphere and the projective plane, not to the {space.name}"
+        )
+
+
+def _coastlines(
+    space: Space, lines: Sequence[ArrayLike] | str | Path | None
+) -> Sequence[ArrayLike] | None:
+    if lines is None:
+        return None
+    if space.name != "sphere":
+        raise OrbiflowError(f"coastlines belong to the sphere, not the {space.name}")
+    if isinstance(lines, str | Path):
+        return read_coastlines(as_path(lines, "coastlines"))
+    return lines
+
+
+def _density(
+    given: SymmetricDensity | DensityEstimator | str | Path,
+) -> tuple[SymmetricDensity, Sequence[str] | None]:
+    """It, and the columns that it was fitted to, where they are known."""
+    if isinstance(given, SymmetricDensity):
+        return given, None
+    if isinstance(given, DensityEstimator):
+        density = getattr(given, "density_", None)
+        if density is None:
+            raise OrbiflowError("this DensityEstimator is not fitted; call fit(data) first")
+        return density, None
+    path = as_path(given, "the density")
+    density, extra = read_density(path / MODEL if path.is_dir() else path)
+    return density, extra.get("columns")
