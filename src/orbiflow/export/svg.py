@@ -15,7 +15,7 @@ from orbiflow.figures.palette import DEFAULT_PALETTE, Palette, palette
 from orbiflow.figures.window import default_window
 from orbiflow.symmetry.isometry import Array
 from orbiflow.tilings import Colouring, Tile, colouring, patch
-from orbiflow.tilings.patch import Window
+from orbiflow.tilings.window import Window
 
 _HEADER = """<?xml version="1.0" encoding="UTF-8"?>
 <svg xmlns="http://www.w3.org/2000/svg" version="1.1" width="{width}mm" height="{height}mm" \

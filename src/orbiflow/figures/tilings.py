@@ -16,7 +16,7 @@ from orbiflow.figures.sheet import Picture, Sheet
 from orbiflow.figures.vector import vector_picture
 from orbiflow.figures.window import default_window
 from orbiflow.tilings import Colouring, Tile, colouring, copies_meeting
-from orbiflow.tilings.patch import Window, checked_window
+from orbiflow.tilings.window import Window, checked_window
 
 COMMON, MISSING, ADDED = "#c9d3dc", "#d95f02", "#2b6cb0"
 """Fills of the overlay: in both, in the target only, in the tile only."""

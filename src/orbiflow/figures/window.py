@@ -6,7 +6,7 @@ import math
 
 from orbiflow.tilings import Tile
 from orbiflow.tilings.images import expected_area
-from orbiflow.tilings.patch import Window
+from orbiflow.tilings.window import Window
 
 ASPECT = 1.5
 """Width over height of the default window."""
