@@ -48,6 +48,8 @@ class Aspects:
     def of(cls, group: CrystallographicGroup, stabilisers: Sequence[Stabiliser]) -> Aspects:
         """Of prototiles with these stabilisers."""
         count, order = len(stabilisers), group.order
+        if all(own.order == 1 for own in stabilisers):
+            return cls._of_all(count, order)
         table = np.zeros((count, order), dtype=np.int64)
         steps = np.zeros((count, order, 2), dtype=np.int64)
         turns = np.zeros((count, order), dtype=np.int64)
@@ -62,6 +64,14 @@ class Aspects:
             prototiles += [k] * len(kept)
             cosets += kept.tolist()
         return cls(np.array(prototiles), np.array(cosets), table, steps, turns)
+
+    @classmethod
+    def _of_all(cls, count: int, order: int) -> Aspects:
+        """Of prototiles without symmetry: every pair."""
+        none = np.zeros((count, order), dtype=np.int64)
+        table = np.arange(count * order).reshape(count, order)
+        prototiles, cosets = np.divmod(table.ravel(), order)
+        return cls(prototiles, cosets, table, np.zeros((count, order, 2), dtype=np.int64), none)
 
     def find(
         self, group: CrystallographicGroup, element: Isometry, prototile: int

@@ -208,18 +208,10 @@ def copies_meeting(tile: Tiles, window: Sequence[float]) -> Copies:
 
 def copies_near(tiling: Tiling, window: Window, *, whole: bool) -> Copies:
     """The tiles whose bounding box lies in the window, or meets it, in no order that matters."""
-    lattice = tiling.group.lattice
-    lows, highs = aspect_boxes(tiling)
-    numbers: list[Integers] = []
-    cells: list[Integers] = []
-    for number, (bottom, top) in enumerate(zip(lows, highs, strict=True)):
-        least, most = np.array(window[:2]) - top, np.array(window[2:]) - bottom
-        if whole:
-            least, most = np.array(window[:2]) - bottom, np.array(window[2:]) - top
-        found = _cells_within(lattice, least, most)
-        cells.append(found)
-        numbers.append(np.full(len(found), number))
-    return Copies(tiling, np.concatenate(numbers), np.concatenate(cells))
+    low, high = aspect_boxes(tiling)
+    least, most = window[:2] - (low if whole else high), window[2:] - (high if whole else low)
+    aspects, cells = _cells_within(tiling.group.lattice, least, most)
+    return Copies(tiling, aspects, cells)
 
 
 def aspect_boxes(tiling: Tiling) -> tuple[Array, Array]:
@@ -233,28 +225,44 @@ def aspect_boxes(tiling: Tiling) -> tuple[Array, Array]:
     return low, high
 
 
-def _cells_within(lattice: Array, least: Array, most: Array) -> Integers:
-    """(M, 2) all integer n with least <= lattice @ n <= most."""
-    corners = np.array([[x, y] for x in (least[0], most[0]) for y in (least[1], most[1])])
-    second = corners @ np.linalg.inv(lattice)[1]
-    if (least > most).any():
-        return np.zeros((0, 2), dtype=np.int64)
-    rows = np.arange(np.floor(second.min()), np.ceil(second.max()) + 1)
-    low, high = np.full(len(rows), -np.inf), np.full(len(rows), np.inf)
-    for step, across, start, end in zip(lattice[:, 0], lattice[:, 1], least, most, strict=True):
-        if abs(step) < 1e-12 * np.abs(lattice).max():
+def _cells_within(lattice: Array, least: Array, most: Array) -> tuple[Integers, Integers]:
+    """All integer n with least <= lattice @ n <= most, for A boxes at once.
+
+    Args:
+        least, most: (A, 2).
+
+    Returns:
+        (M,) the number of the box, and (M, 2) n.
+    """
+    inverse = np.linalg.inv(lattice)[1]
+    # the range of the second coordinate over a box; its rows; and the range of the first in a row
+    middle, half = (least + most) @ inverse / 2, (most - least) @ abs(inverse) / 2
+    half[(least > most).any(axis=1)] = -1.0
+    box, second = _ranges(middle - half, middle + half)
+    low, high = np.full(len(box), -np.inf), np.full(len(box), np.inf)
+    for axis, (step, across) in enumerate(lattice.tolist()):
+        if abs(step) < 1e-12 * abs(inverse).max() * abs(np.linalg.det(lattice)):
             continue
-        ends = np.stack([start - across * rows, end - across * rows]) / step
-        low, high = np.maximum(low, ends.min(axis=0)), np.minimum(high, ends.max(axis=0))
-    # one more at either end than rounding may have left out; then exactly
-    first = np.ceil(low) - 1
-    counts = np.maximum(np.floor(high) + 2 - first, 0).astype(np.int64)
-    own = np.repeat(np.arange(len(rows)), counts)
-    along = np.arange(len(own)) - np.repeat(np.cumsum(counts) - counts, counts)
-    cells = np.stack([first[own] + along, rows[own]], axis=1)
+        one, other = ((ends[box, axis] - across * second) / step for ends in (least, most))
+        low, high = np.maximum(low, np.minimum(one, other)), np.minimum(high, np.maximum(one, other))
+    row, first = _ranges(low, high)
+    cells = np.stack([first, second[row]], axis=1)
+    box = box[row]
     shifts = cells @ lattice.T
-    kept = ((shifts >= least) & (shifts <= most)).all(axis=1)
-    return cells[kept].astype(np.int64)
+    kept = ((shifts >= least[box]) & (shifts <= most[box])).all(axis=1)
+    return box[kept], cells[kept].astype(np.int64)
+
+
+def _ranges(low: Array, high: Array) -> tuple[Integers, Array]:
+    """All whole numbers in some intervals, one more at either end than rounding may leave out.
+
+    Returns:
+        (M,) the number of the interval, and (M,) the whole number.
+    """
+    first = np.ceil(low - 1e-9)
+    counts = np.maximum(np.floor(high + 1e-9) + 1 - first, 0).astype(np.int64)
+    own = np.repeat(np.arange(len(counts)), counts)
+    return own, first[own] + np.arange(len(own)) - (np.cumsum(counts) - counts)[own]
 
 
 def _by_rows(copies: Copies) -> Copies:

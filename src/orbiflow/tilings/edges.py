@@ -114,7 +114,7 @@ def edges(tile: Tiles) -> Edges:
 
 def _require_match(tiling: Tiling, matches: Sequence[SegmentMatch]) -> None:
     missing = sum(int((match.distance > TOLERANCE).sum()) for match in matches)
-    if missing or any(own.orders.count(None) for own in tiling.stabilisers):
+    if missing or any(order is None for own in tiling.stabilisers for order in own.orders):
         count = sum(len(match.distance) for match in matches)
         what = f"{missing} of the tile's {count} sides are no side of a neighbour"
         if not missing:

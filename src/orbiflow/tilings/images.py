@@ -128,14 +128,15 @@ def surroundings(tiling: Tiling, prototile: int, margin: float) -> Surroundings:
         mine = np.flatnonzero(near.prototiles == k)
         rows = first[mine, None] + np.arange(len(ring))
         points[rows] = near.select(mine).images(ring)
-    mirrored = np.linalg.det(tiling.group.linear_parts)[near.cosets] < 0
+    linear = tiling.group.linear_parts
+    signs = linear[:, 0, 0] * linear[:, 1, 1] - linear[:, 0, 1] * linear[:, 1, 0]
     return Surroundings(
         prototile,
         _flushed((own.ring - own.center) / scale),
         near,
         _flushed((points - own.center) / scale),
         counts,
-        mirrored,
+        (signs < 0)[near.cosets],
     )
 
 

@@ -80,7 +80,7 @@ class Tiling:
         """The tiles of a lattice cell."""
         return Aspects.of(self.group, self.stabilisers)
 
-    @property
+    @cached_property
     def tile_area(self) -> float:
         """|det B| over the tiles of a cell: the area of a tile, the mean one of several prototiles."""
         return self.group.cell_volume / len(self.aspects)
