@@ -101,12 +101,13 @@ def earlier(commit: str, folder: str) -> Path:
     packed = subprocess.run(
         ["git", "-C", str(ROOT), "archive", commit, "src/orbiflow"], capture_output=True, check=True
     ).stdout
-    tarfile.open(fileobj=io.BytesIO(packed)).extractall(folder, filter="data")
+    with tarfile.open(fileobj=io.BytesIO(packed)) as archive:
+        archive.extractall(folder, filter="data")
     return Path(folder) / "src"
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--old", metavar="COMMIT", help="an earlier commit to compare with")
     parser.add_argument("--pairs", type=int, default=5)
     parser.add_argument("--quick", action="store_true", help="two pairs")
@@ -116,7 +117,8 @@ def main() -> None:
         sides = [Side(ROOT / "src", sizes)]
         if given.old:
             sides.append(Side(earlier(given.old, folder), sizes))
-        print(f"{'sides an edge':>14}{'ms a tile':>12}" + f"{'before':>12}{'ratio':>10}" * bool(given.old))
+        heading = f"{'before':>12}{'ratio':>10}" if given.old else ""
+        print(f"{'sides an edge':>14}{'ms a tile':>12}{heading}")
         for size in sizes:
             for side in sides:
                 side.round(size)  # caches are full now

@@ -4,7 +4,7 @@ from orbiflow.tilings.certificate import Certificate, certify
 from orbiflow.tilings.classes import CLASSES, IsohedralClass, PaperOperator, isohedral_class
 from orbiflow.tilings.colouring import Colouring, colouring
 from orbiflow.tilings.copies import Copies, copies_inside, copies_meeting
-from orbiflow.tilings.dirichlet_tile import dirichlet_tile
+from orbiflow.tilings.dirichlet_tiles import dirichlet_tile, dirichlet_tiling
 from orbiflow.tilings.edge_classes import EdgeClass, EdgeImage, edge_classes
 from orbiflow.tilings.edge_identification import EdgeIdentification
 from orbiflow.tilings.edge_to_edge import edge_to_edge
@@ -42,6 +42,7 @@ __all__ = [
     "copies_inside",
     "copies_meeting",
     "dirichlet_tile",
+    "dirichlet_tiling",
     "edge_classes",
     "edge_to_edge",
     "edges",

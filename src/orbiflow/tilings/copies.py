@@ -244,7 +244,10 @@ def _cells_within(lattice: Array, least: Array, most: Array) -> tuple[Integers, 
         if abs(step) < 1e-12 * abs(inverse).max() * abs(np.linalg.det(lattice)):
             continue
         one, other = ((ends[box, axis] - across * second) / step for ends in (least, most))
-        low, high = np.maximum(low, np.minimum(one, other)), np.minimum(high, np.maximum(one, other))
+        low, high = (
+            np.maximum(low, np.minimum(one, other)),
+            np.minimum(high, np.maximum(one, other)),
+        )
     row, first = _ranges(low, high)
     cells = np.stack([first, second[row]], axis=1)
     box = box[row]

@@ -43,7 +43,8 @@ class EdgeIdentification(NamedTuple):
         if self.isometry.determinant > 0:
             return "translation" if np.abs(linear - np.eye(2)).max() < 1e-6 else "rotation"
         twice = linear @ shift + shift  # the translation that a transflection applied twice is
-        return "mirror" if np.abs(twice).max() <= 1e-6 * np.abs(shift).max() else "glide"
+        still = np.abs(twice).max() <= 1e-6 * np.abs(shift).max() + 1e-12
+        return "mirror" if self.folded or still else "glide"
 
     @property
     def brief(self) -> str:

@@ -156,18 +156,32 @@ def _turned(tiling: Tiling, k: int, begins: Integers, first: Integers) -> Intege
 
 
 def _mutual(own: Edges) -> Edges:
-    """With edges paired off where a stabiliser leaves a choice, by inverse isometries."""
+    """With partners chosen where a stabiliser leaves a choice: an edge itself, or each other."""
     across, partners = list(own.across), list(own.partners)
     done: NDArray[np.bool_] = np.zeros(len(own), dtype=bool)
     for edge in range(len(own)):
         if done[edge]:
             continue
+        there = across[edge].prototile
+        images = own.turned[there][:, partners[edge]]
+        signs = [s.determinant for s in own.tiling.stabilisers[there].elements]
+        choice = np.flatnonzero(images == edge)
+        # a mirror rather than a half-turn: it says that the edge is straight
+        choice = choice[
+            np.argsort(np.array(signs)[choice] * across[edge].determinant, kind="stable")
+        ]
+        if not len(choice):
+            choice = np.flatnonzero(~done[images])
         done[edge] = True
-        element, partner = across[edge], partners[edge]
-        if partner == edge or done[partner]:
-            continue
-        back = element.inverse()
-        across[partner] = Placed(back.linear, back.translation, own.owners[edge])
-        partners[partner] = edge
-        done[partner] = True
+        if not len(choice):
+            continue  # it has more images in its own tile than its partner has
+        by = own.tiling.stabilisers[there].elements[choice[0]].inverse()
+        element, partner = across[edge] @ by, int(images[choice[0]])
+        across[edge] = Placed(element.linear, element.translation, there)
+        partners[edge] = partner
+        if partner != edge:
+            back = element.inverse()
+            across[partner] = Placed(back.linear, back.translation, own.owners[edge])
+            partners[partner] = edge
+            done[partner] = True
     return Edges(own.tiling, own.owners, own.starts, tuple(across), tuple(partners), own.turned)
