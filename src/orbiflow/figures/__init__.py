@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from orbiflow.figures.density_square import density_picture, samples_picture
     from orbiflow.figures.field import field_picture, field_png
     from orbiflow.figures.sheet import Picture, Sheet, pdf_pages
+    from orbiflow.figures.tiling_sheet import tilings_png
     from orbiflow.figures.tilings import (
         overlay_picture,
         overlay_png,
@@ -37,6 +38,7 @@ _FILES = {
     "density_square": ("density_picture", "samples_picture"),
     "field": ("field_picture", "field_png"),
     "sheet": ("Picture", "Sheet", "pdf_pages"),
+    "tiling_sheet": ("tilings_png",),
     "tilings": ("overlay_picture", "overlay_png", "tiling_picture", "tiling_png"),
     "window": ("default_window",),
 }
@@ -64,6 +66,7 @@ __all__ = [
     "samples_picture",
     "tiling_picture",
     "tiling_png",
+    "tilings_png",
 ]
 
 

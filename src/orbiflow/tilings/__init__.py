@@ -15,7 +15,7 @@ from orbiflow.tilings.placed import Placed
 from orbiflow.tilings.prototile import Prototile
 from orbiflow.tilings.skeleton import Skeleton, skeleton
 from orbiflow.tilings.stabiliser import Stabiliser
-from orbiflow.tilings.tile import Tile
+from orbiflow.tilings.tile import Tile, Tiles, as_tiling
 from orbiflow.tilings.tiling import Tiling
 
 __all__ = [
@@ -35,7 +35,9 @@ __all__ = [
     "Skeleton",
     "Stabiliser",
     "Tile",
+    "Tiles",
     "Tiling",
+    "as_tiling",
     "aspects",
     "certify",
     "colouring",
