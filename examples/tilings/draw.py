@@ -117,9 +117,9 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("tilings.png"))
     given = parser.parse_args()
     pairs = {
-        "p1: two prototiles": cut("IH1", 0, 3, 21),
-        "p2: two prototiles": cut("IH4", 1, 4, 1),
-        "pgg: two prototiles": cut("IH6", 0, 3, 8),
+        "p1: two prototiles": cut("IH1", 0, 3, 45),
+        "p2: two prototiles": cut("IH4", 1, 4, 41),
+        "pgg: two prototiles": cut("IH6", 0, 3, 46),
     }
     shown = {**of_the_square(), **mirror_tiles(), **pairs, **archimedean(), **dirichlet_cells()}
     for name, tiling in shown.items():
