@@ -20,7 +20,7 @@ from orbiflow.escher import DescentSettings, TileResult, escherize
 from orbiflow.figures.canvas import blank_figure, fill_rings, plane_axes, png_bytes
 from orbiflow.files import write_atomic
 from orbiflow.silhouette import Target
-from orbiflow.tilings.patch import Window
+from orbiflow.tilings.window import Window
 
 BEST = {
     "bat_60": ("bat", "IH6"),

@@ -51,7 +51,7 @@ def edge_error(of: TileSpace, index: int, ring: Complex, linear: Array, offset: 
     worst = 0.0
     for pair in of.kind.identified_edges:
         first, second = (closed[ends[k] : ends[k + 1] + 1] for k in (pair.first, pair.second))
-        image = of.kind.edge_isometry(pair)(first)
+        image = pair.isometry(first)
         image = image[::-1] if pair.reversed or pair.folded else image
         worst = max(worst, np.abs((image - second) @ linear.T).max())
     return worst

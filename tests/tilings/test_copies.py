@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from exported import tile_of, tiles
 from orbiflow.errors import OrbiflowError
 from orbiflow.tilings import CLASSES, Tile, colouring, copies_inside, copies_meeting, edges, patch
-from orbiflow.tilings.patch import coset_and_cell
+from orbiflow.tilings.aspects import coset_and_cell
 
 
 def window_of(tile: Tile, shift: tuple[float, float], size: tuple[float, float]) -> tuple:
@@ -29,7 +29,7 @@ def test_those_that_meet_a_window_are_its_patch(tile, shift, size) -> None:
     window = window_of(tile, shift, size)
     found = copies_meeting(tile, window)
     ours = set(zip(found.cosets.tolist(), map(tuple, found.cells.tolist()), strict=True))
-    assert ours == {coset_and_cell(tile, g) for g in patch(tile, window)}
+    assert ours == {coset_and_cell(tile.group, g) for g in patch(tile, window)}
     assert len(ours) == len(found)
 
 
@@ -68,7 +68,7 @@ def test_neighbours_and_colours(name: str) -> None:
         g = copies.isometry(k)
         assert table[k] == colours.colour(g)
         for edge, element in enumerate(own.across):
-            coset, cell = coset_and_cell(tile, g @ element)
+            coset, cell = coset_and_cell(tile.group, g @ element)
             assert beyond[k, edge] == known.get((coset, *cell), -1)
             if beyond[k, edge] >= 0:
                 assert table[k] != table[beyond[k, edge]]

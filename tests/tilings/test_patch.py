@@ -55,8 +55,8 @@ def test_windows_that_are_none(window: tuple[float, ...]) -> None:
         patch(tile, window)
 
 
-@pytest.mark.parametrize("window", [(-500, -500, 500, 500), (0, 0, 1e9, 1), (0, 0, 1e4, 1e-9)])
+@pytest.mark.parametrize("window", [(-500, -500, 500, 500), (0, 0, 1e9, 1)])
 def test_too_many_tiles(window: tuple[float, ...]) -> None:
     tile = Tile(isohedral_class("IH1").template(), isohedral_class("IH1").group())
-    with pytest.raises(OrbiflowError, match="choose a smaller window"):
+    with pytest.raises(OrbiflowError, match="a smaller window"):
         patch(tile, window)

@@ -123,7 +123,7 @@ def _flowed_edges(model: TileModel, pieces: int, force: bool) -> list[Array]:
     ends = np.cumsum([span.stop - span.start for span in spans.values()])
     edges: dict[int, Array] = {}
     for pair, own in zip(spans, np.split(flowed, ends[:-1]), strict=True):
-        image = kind.edge_isometry(pair)(own)
+        image = pair.isometry(own)
         if pair.folded:
             edges[pair.first] = np.concatenate([own, image[-2::-1]])
         else:

@@ -78,7 +78,7 @@ def _links(own: OwnFrame) -> list[list[tuple[int, Isometry]]]:
     links: list[list[tuple[int, Isometry]]] = [[] for _ in range(count)]
     bounds = [*own.starts, count]
     for pair in own.kind.identified_edges:
-        element = own.kind.edge_isometry(pair)
+        element = pair.isometry
         back = element.inverse()
         first = np.arange(bounds[pair.first], bounds[pair.first + 1] + 1) % count
         second = np.arange(bounds[pair.second], bounds[pair.second + 1] + 1) % count

@@ -24,8 +24,7 @@ from orbiflow.likeness.overlap import boundary_iou, prepared_region
 from orbiflow.silhouette.target import Target
 from orbiflow.symmetry import rotation_matrix
 from orbiflow.symmetry.isometry import Array
-from orbiflow.tilings import IsohedralClass, isohedral_class
-from orbiflow.tilings.class_table import EdgePair
+from orbiflow.tilings import EdgeIdentification, IsohedralClass, isohedral_class
 
 APART = 0.025
 """Starts differ by this share of the outline in where some corner sits, or they are twins."""
@@ -155,7 +154,7 @@ def mirror_closed(kind: IsohedralClass) -> bool:
     Then the mirror image of a tile of the class is a tile of the class under another placement.
     """
     size = len(kind.template())
-    own = {(frozenset((p.first, p.second)), _turn_order(kind, p)) for p in kind.identified_edges}
+    own = {(frozenset((p.first, p.second)), _turn_order(p)) for p in kind.identified_edges}
     for k in range(size):
         image = {(frozenset(((k - e) % size) for e in edges), turn) for edges, turn in own}
         if image == own:
@@ -163,8 +162,8 @@ def mirror_closed(kind: IsohedralClass) -> bool:
     return False
 
 
-def _turn_order(kind: IsohedralClass, pair: EdgePair) -> int:
-    linear = kind.edge_isometry(pair).linear
+def _turn_order(pair: EdgeIdentification) -> int:
+    linear = pair.isometry.linear
     if np.linalg.det(linear) < 0:
         return -1
     return round(np.degrees(abs(np.arctan2(linear[1, 0], linear[0, 0]))))

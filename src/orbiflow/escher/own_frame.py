@@ -71,7 +71,7 @@ class OwnFrame:
         size = np.sqrt(self.kind.group().cell_volume / self.kind.group().order)
         for pair in self.kind.identified_edges:
             first, second = self.edge(pair.first), self.edge(pair.second)
-            image = self.kind.edge_isometry(pair)(first)
+            image = pair.isometry(first)
             image = image[::-1] if pair.reversed else image
             if len(image) != len(second) or np.abs(image - second).max() > TOLERANCE * size:
                 raise OrbiflowError(
@@ -140,7 +140,7 @@ def _offset(kind: IsohedralClass, placed: Array, starts: tuple[int, ...], linear
     rows, values = [], []
     inverse = np.linalg.inv(linear)
     for pair in kind.identified_edges:
-        element = kind.edge_isometry(pair)
+        element = pair.isometry
         turned = linear @ element.linear @ inverse
         begin = placed[starts[pair.first]]
         end = starts[pair.second] if not pair.reversed else _next(starts, pair.second)

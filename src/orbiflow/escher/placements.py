@@ -130,7 +130,7 @@ def _gains(
     gains = np.zeros((len(lengths), len(starts)))
     glides = np.zeros_like(gains, dtype=complex)
     for pair in kind.identified_edges:
-        linear = kind.edge_isometry(pair).linear
+        linear = pair.isometry.linear
         factor = complex(linear[0, 0], linear[1, 0])
         length = lengths[:, pair.first][:, None]
         a = (first[:, pair.first][:, None] + starts) % n

@@ -114,7 +114,7 @@ class TileSpace:
         steps = np.roll(goal, -1, axis=1) - goal
         lengths, first = self.placements.lengths, self.corners
         for pair in glides:
-            linear = self.kind.edge_isometry(pair).linear
+            linear = pair.isometry.linear
             own = lengths[:, [pair.first]]
             j = np.arange(int(own.max()))
             a, b = ((first[:, [edge]] + j) % self.size for edge in (pair.first, pair.second))
@@ -229,7 +229,7 @@ def _layout(kind: IsohedralClass) -> _Layout:
             if images:
                 corners.append((first, _Element.of(images[0])))
                 break
-    edges = tuple(_Element.of(kind.edge_isometry(pair)) for pair in kind.identified_edges)
+    edges = tuple(_Element.of(pair.isometry) for pair in kind.identified_edges)
     return _Layout(edges, tuple(corners))
 
 

@@ -138,7 +138,7 @@ def placed_tiles(copies: Copies, layout: Layout, whole: Array) -> tuple[PlacedTi
     """What the JSON file says of each copy."""
     own = layout.outline.edges
     beyond = np.zeros((len(copies), 0), int) if own is None else copies.neighbours(own.across)
-    linear = copies.tile.group.linear_parts
+    linear = copies.group.linear_parts
     return tuple(
         PlacedTile(
             int(coset),

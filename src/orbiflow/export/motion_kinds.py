@@ -16,7 +16,7 @@ from orbiflow.export.motion import ALWAYS, Motion, Places
 from orbiflow.figures.window import ASPECT, default_window
 from orbiflow.symmetry.isometry import Array
 from orbiflow.tilings import Copies, Tile, colouring, copies_meeting
-from orbiflow.tilings.patch import Window
+from orbiflow.tilings.window import Window
 
 Kind = Literal["morph", "bend", "grow"]
 KINDS: tuple[Kind, ...] = ("morph", "bend", "grow")

@@ -11,7 +11,7 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.export.curve_fit import fitted
 from orbiflow.export.curves import Curve
 from orbiflow.symmetry.isometry import Array
-from orbiflow.tilings import EdgeIdentification, Edges, Tile, edges
+from orbiflow.tilings import EdgeImage, Edges, Tile, edge_classes, edges
 
 _SHARES = (0.6, 0.15, 0.04)  # of the tolerance; the finer ones where a curve would cross another
 
@@ -40,9 +40,10 @@ class Outline:
 def outline(tile: Tile, tolerance: float) -> Outline:
     """Smooth curves along the tile's polygon that tile the plane as exactly as it does.
 
-    Each pair of identified edges is fitted once and the partner is its image; an edge with a 2-fold
-    centre is fitted up to the centre. Where curves would touch each other within the tolerance they
-    are fitted more closely, at worst along the polygon itself.
+    One of each class of identified edges is fitted and the others are its images; an edge that is its
+    own image, by a half-turn or a mirror across it, is fitted up to the middle. Where curves would
+    touch each other within the tolerance they are fitted more closely, at worst along the polygon
+    itself.
 
     Args:
         tolerance: from the polygon, in the tile's units.
@@ -63,25 +64,27 @@ def outline(tile: Tile, tolerance: float) -> Outline:
 
 def _curves(own: Edges, tolerance: float) -> tuple[Curve, ...]:
     found: dict[int, Curve] = {}
-    for pair in own.identifications:
-        points = own.points(pair.first)
-        if pair.folded:
-            found[pair.first] = _folded(points, pair, tolerance)
-            continue
-        curve = fitted(points, tolerance)
-        found[pair.first] = curve
-        image = curve.moved(pair.isometry.linear, pair.isometry.translation)
-        found[pair.second] = image.reversed() if pair.reversed else image
-    return tuple(found[k] for k in range(len(own.starts)))
+    for kind in edge_classes(own):
+        points = own.points(kind.edge)
+        if kind.straight:
+            curve = Curve.polyline(points)
+        elif kind.folds:
+            curve = _folded(points, kind.folds[0], tolerance)
+        else:
+            curve = fitted(points, tolerance)
+        found[kind.edge] = curve
+        for image in kind.images:
+            moved = curve.moved(image.isometry.linear, image.isometry.translation)
+            found[image.edge] = moved.reversed() if image.reversed else moved
+    return tuple(found[k] for k in range(len(own)))
 
 
-def _folded(points: Array, pair: EdgeIdentification, tolerance: float) -> Curve:
-    if not pair.reversed:  # on a mirror: straight
-        return Curve.polyline(points)
+def _folded(points: Array, fold: EdgeImage, tolerance: float) -> Curve:
+    """An edge that is its own image, turned or mirrored: half of it, and the half's image."""
     middle, odd = divmod(len(points) - 1, 2)
     half = points[: middle + 1]
     if odd:  # the centre lies on a side
         half = np.concatenate([half, points[middle : middle + 2].mean(axis=0)[None]])
     curve = fitted(half, tolerance)
-    image = curve.moved(pair.isometry.linear, pair.isometry.translation).reversed()
+    image = curve.moved(fold.isometry.linear, fold.isometry.translation).reversed()
     return Curve.joined([curve, image])

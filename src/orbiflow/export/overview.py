@@ -17,7 +17,7 @@ from orbiflow.figures.raster import Raster, font
 from orbiflow.figures.tilings import overlay_raster, tiling_raster
 from orbiflow.silhouette.target import Target
 from orbiflow.tilings import Colouring
-from orbiflow.tilings.patch import Window
+from orbiflow.tilings.window import Window
 
 INK, FAINT, WARNING = "#1a1a1a", "#5b6570", "#b0413e"
 

@@ -34,7 +34,7 @@ def skeleton_scene(layout: Layout) -> Scene:
     own = layout.outline.edges
     assert own is not None
     lines = skeleton(own, copies)
-    linear, translations = copies.tile.group.linear_parts, copies.translations
+    linear, translations = copies.group.linear_parts, copies.translations
     arcs: list[Curve] = []
     ends: list[tuple[int, int]] = []
     free = -1

@@ -14,8 +14,8 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.figures.palette import DEFAULT_PALETTE, Palette, palette
 from orbiflow.figures.window import default_window
 from orbiflow.symmetry.isometry import Array
-from orbiflow.tilings import Colouring, Tile, colouring, patch
-from orbiflow.tilings.patch import Window
+from orbiflow.tilings import Colouring, Tile, Tiles, as_tiling, colouring, patch
+from orbiflow.tilings.window import Window
 
 _HEADER = """<?xml version="1.0" encoding="UTF-8"?>
 <svg xmlns="http://www.w3.org/2000/svg" version="1.1" width="{width}mm" height="{height}mm" \
@@ -57,7 +57,7 @@ def tile_svg(
 
 
 def tiling_svg(
-    tile: Tile,
+    tile: Tiles,
     window: Window | None = None,
     *,
     width_mm: float = 300.0,
@@ -73,6 +73,7 @@ def tiling_svg(
     stroke, so that no paper shines through between neighbours.
 
     Args:
+        tile: a tile or a tiling.
         window: (xmin, ymin, xmax, ymax) in the tile's units, default `default_window`.
         colours: default `colouring(tile)`.
         outline_mm: width of the outline; 0 means a hairline in the tile's own colour.
@@ -83,11 +84,13 @@ def tiling_svg(
         OrbiflowError: for an unknown palette, or a window that is empty or holds too many tiles.
     """
     chosen = palette(palette_name)
-    colours = colours or colouring(tile)
+    tiling = as_tiling(tile)
+    colours = colours or colouring(tiling)
     page = _Page(window or default_window(tile), width_mm, y_down)
     groups: list[list[Array]] = [[] for _ in range(colours.count)]
-    for element in patch(tile, page.window):
-        groups[colours.colour(element)].append(element(tile.polygon))
+    for element in patch(tiling, page.window):
+        polygon = tiling.prototiles[element.prototile].polygon
+        groups[colours.colour(element)].append(element(polygon))
     parts = ['  <defs>\n    <clipPath id="window">' + page.rectangle() + "</clipPath>\n  </defs>\n"]
     parts.append(f'  <g id="paper" fill="{chosen.paper}">{page.rectangle()}</g>\n')
     parts.append('  <g id="tiling" clip-path="url(#window)">\n')
@@ -146,12 +149,14 @@ def _stroke(colour: str, width: float) -> str:
     return f' stroke="{colour}" stroke-width="{_number(width)}" stroke-linejoin="round"'
 
 
-def _name(tile: Tile) -> str:
-    return " ".join(part for part in (tile.isohedral_class, tile.group.name) if part) or "tile"
+def _name(tile: Tiles) -> str:
+    kind = tile.isohedral_class if isinstance(tile, Tile) else ""
+    return " ".join(part for part in (kind, tile.group.name) if part) or "tile"
 
 
-def _description(tile: Tile) -> str:
+def _description(tile: Tiles) -> str:
+    what = "An isohedral tiling" if len(as_tiling(tile).prototiles) == 1 else "A tiling"
     return (
-        f"An isohedral tiling of the plane ({_name(tile)}), made with orbiflow. "
+        f"{what} of the plane ({_name(tile)}), made with orbiflow. "
         "Each path is one tile; groups collect the tiles of one colour."
     )

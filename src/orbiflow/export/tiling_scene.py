@@ -33,7 +33,7 @@ def tiling_scene(layout: Layout) -> Scene:
     # about the symbol's own middle: a transform's rounding then moves no point by much
     middle = layout.tile.center
     symbol = layout.outline.closed.moved(np.eye(2), -middle)
-    turned = np.einsum("aij,j->ai", copies.tile.group.linear_parts, middle)
+    turned = np.einsum("aij,j->ai", copies.group.linear_parts, middle)
     offsets = copies.translations + turned[copies.cosets]
     chosen = palette(settings.palette)
     if settings.filled:
@@ -43,7 +43,7 @@ def tiling_scene(layout: Layout) -> Scene:
     layers = []
     for colour in range(int(colours.max(initial=0)) + 1):
         own = colours == colour
-        uses = Uses(SYMBOL, copies.tile.group.linear_parts, copies.cosets[own], offsets[own])
+        uses = Uses(SYMBOL, copies.group.linear_parts, copies.cosets[own], offsets[own])
         name = f"colour {colour + 1}" if settings.filled else "tiles"
         style = Style(
             chosen.fill(colour) if settings.filled else None,

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from orbiflow.figures.field import field_picture, field_png
     from orbiflow.figures.map_samples import map_samples_picture
     from orbiflow.figures.sheet import Picture, Sheet, pdf_pages
+    from orbiflow.figures.tiling_sheet import tilings_png
     from orbiflow.figures.tilings import (
         overlay_picture,
         overlay_png,
@@ -43,6 +44,7 @@ _FILES = {
     "field": ("field_picture", "field_png"),
     "map_samples": ("map_samples_picture",),
     "sheet": ("Picture", "Sheet", "pdf_pages"),
+    "tiling_sheet": ("tilings_png",),
     "tilings": ("overlay_picture", "overlay_png", "tiling_picture", "tiling_png"),
     "window": ("default_window",),
 }
@@ -72,6 +74,7 @@ __all__ = [
     "samples_picture",
     "tiling_picture",
     "tiling_png",
+    "tilings_png",
 ]
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry.isometry import Array
-from orbiflow.tilings.patch import Window
+from orbiflow.tilings.window import Window
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

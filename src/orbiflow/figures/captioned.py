@@ -8,7 +8,7 @@ import numpy as np
 
 from orbiflow.figures.raster import Raster
 from orbiflow.symmetry.isometry import Array
-from orbiflow.tilings.patch import Window
+from orbiflow.tilings.window import Window
 
 STRIP = 0.075
 """Height of the strip, as a share of the width."""

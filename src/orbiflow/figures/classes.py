@@ -19,8 +19,8 @@ from orbiflow.figures.marks import (
     outline_cell,
 )
 from orbiflow.symmetry.isometry import Array
-from orbiflow.tilings import CLASSES, EdgePair, IsohedralClass, Tile, aspects, patch
-from orbiflow.tilings.patch import Window
+from orbiflow.tilings import CLASSES, EdgeIdentification, IsohedralClass, Tile, aspects, patch
+from orbiflow.tilings.window import Window
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -87,7 +87,7 @@ def draw_template(axes: Axes, kind: IsohedralClass) -> None:
         for edge in {pair.first, pair.second}:
             ends = vertices[[edge, (edge + 1) % len(vertices)]]
             axes.plot(*ends.T, color=colour, linewidth=2.2, solid_capstyle="round")
-        element = kind.edge_isometry(pair)
+        element = pair.isometry
         arrow = _arrow(kind, pair)
         for ring in (arrow, element(arrow)):
             axes.fill(*ring.T, facecolor=colour, edgecolor=colour, linewidth=0.5, zorder=3)
@@ -98,7 +98,7 @@ def draw_template(axes: Axes, kind: IsohedralClass) -> None:
     axes.plot(*vertices.T, "o", color="#1a1a1a", markersize=3, zorder=5)
 
 
-def _arrow(kind: IsohedralClass, pair: EdgePair) -> Array:
+def _arrow(kind: IsohedralClass, pair: EdgeIdentification) -> Array:
     """Arrowhead on the first edge: in its middle, or for a 2-fold centre halfway to its end."""
     vertices = kind.template()
     start, end = vertices[pair.first], vertices[(pair.first + 1) % len(vertices)]

@@ -15,7 +15,7 @@ from orbiflow.symmetry import CrystallographicGroup
 from orbiflow.symmetry.elements import symmetry_elements
 from orbiflow.symmetry.isometry import Array
 from orbiflow.symmetry.lattices import reduced_basis
-from orbiflow.tilings.patch import Window
+from orbiflow.tilings.window import Window
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

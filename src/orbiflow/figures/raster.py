@@ -18,7 +18,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from orbiflow.figures.canvas import check_size
 from orbiflow.symmetry.isometry import Array
-from orbiflow.tilings.patch import Window
+from orbiflow.tilings.window import Window
 
 FINER = 3
 """Times by which each side of a pixel is drawn finer."""

@@ -7,7 +7,7 @@ import shapely
 from numpy.typing import ArrayLike
 from shapely.geometry.base import BaseGeometry
 
-from orbiflow.arguments import instance, numbers
+from orbiflow.arguments import numbers
 from orbiflow.errors import OrbiflowError
 from orbiflow.figures.captioned import caption, captioned, strip_middle
 from orbiflow.figures.palette import DEFAULT_PALETTE, Palette, palette
@@ -15,8 +15,8 @@ from orbiflow.figures.raster import Raster
 from orbiflow.figures.sheet import Picture, Sheet
 from orbiflow.figures.vector import vector_picture
 from orbiflow.figures.window import default_window
-from orbiflow.tilings import Colouring, Tile, colouring, copies_meeting
-from orbiflow.tilings.patch import Window, checked_window
+from orbiflow.tilings import Colouring, Tile, Tiles, as_tiling, colouring, copies_meeting
+from orbiflow.tilings.window import Window, checked_window
 
 COMMON, MISSING, ADDED = "#c9d3dc", "#d95f02", "#2b6cb0"
 """Fills of the overlay: in both, in the target only, in the tile only."""
@@ -27,7 +27,7 @@ DOTS = 200 / 72
 
 
 def tiling_png(
-    tile: Tile,
+    tile: Tiles,
     window: Window | None = None,
     *,
     width_px: int = 1600,
@@ -39,6 +39,7 @@ def tiling_png(
     """PNG of the tiles that meet `window`, edge to edge.
 
     Args:
+        tile: a tile or a tiling.
         window: (xmin, ymin, xmax, ymax) in the tile's units, default `default_window`.
         width_px: the height follows from the window.
         colours: default `colouring(tile)`.
@@ -49,7 +50,6 @@ def tiling_png(
         OrbiflowError: for an unknown palette, a size that cannot be made, or a window that is
             empty or holds too many tiles.
     """
-    instance(tile, Tile, "the tile", "Tile(polygon, group) makes one")
     return tiling_raster(
         tile,
         window,
@@ -62,7 +62,7 @@ def tiling_png(
 
 
 def tiling_raster(
-    tile: Tile,
+    tile: Tiles,
     window: Window | None = None,
     *,
     width_px: int,
@@ -70,16 +70,21 @@ def tiling_raster(
     colours: Colouring | None = None,
     outline_px: float = 2.0,
     y_down: bool = False,
+    strip_px: int = 0,
 ) -> Raster:
-    """The picture of `tiling_png`, to be drawn on or to be made an image; outline in pixels."""
-    chosen = palette(palette_name)
-    colours = colours or colouring(tile)
-    window = checked_window(window or default_window(tile))
-    raster = Raster(window, width_px, y_down=y_down, paper=chosen.paper)
-    copies = copies_meeting(tile, window)
-    rings, own = copies.images(tile.polygon), colours.colours(copies)
+    """The picture of `tiling_png`, to be drawn on or to be made an image; outline in pixels.
+
+    Args:
+        strip_px: height of a strip below it, for words.
+    """
+    chosen, tiling = palette(palette_name), as_tiling(tile)
+    colours = colours or colouring(tiling)
+    window = checked_window(window or default_window(tiling))
+    raster = Raster(window, width_px, y_down=y_down, paper=chosen.paper, strip_px=strip_px)
+    copies = copies_meeting(tiling, window)
+    rings, own = copies.rings(), colours.colours(copies)
     for number in range(colours.count):
-        raster.fill(list(rings[own == number]), chosen.fill(number))
+        raster.fill([rings[k] for k in np.flatnonzero(own == number)], chosen.fill(number))
     if outline_px > 0:
         for ring in rings:
             raster.line(ring, chosen.outline, outline_px, closed=True)
@@ -87,7 +92,7 @@ def tiling_raster(
 
 
 def tiling_picture(
-    tile: Tile,
+    tile: Tiles,
     window: Window | None = None,
     *,
     palette_name: str | Palette = DEFAULT_PALETTE,
@@ -104,13 +109,14 @@ def tiling_picture(
     Raises:
         OrbiflowError: as `tiling_png`.
     """
-    instance(tile, Tile, "the tile", "Tile(polygon, group) makes one")
     raster = tiling_raster(
         tile, window, width_px=1600, palette_name=palette_name, colours=colours, y_down=y_down,
         outline_px=3.0,
     )  # fmt: skip
-    name = f"a tile of class {tile.isohedral_class}" if tile.isohedral_class else "a tile"
-    title = f"Tiling by copies of {name}"
+    kind = tile.isohedral_class if isinstance(tile, Tile) else ""
+    several = f"{len(as_tiling(tile).prototiles)} tiles"
+    name = "a tile" if len(as_tiling(tile).prototiles) == 1 else several
+    title = f"Tiling by copies of {name}" + (f" of class {kind}" if kind else "")
     return vector_picture(raster, sheet or Sheet.column(), title=title, caption="")
 
 

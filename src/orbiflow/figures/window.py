@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import math
 
-from orbiflow.tilings import Tile
-from orbiflow.tilings.images import expected_area
-from orbiflow.tilings.patch import Window
+from orbiflow.tilings import Tiles, as_tiling
+from orbiflow.tilings.window import Window
 
 ASPECT = 1.5
 """Width over height of the default window."""
 
 
-def default_window(tile: Tile) -> Window:
-    """A landscape window around the tile, about four to five tiles across."""
-    width, height = tile.polygon.max(axis=0) - tile.polygon.min(axis=0)
+def default_window(tile: Tiles) -> Window:
+    """A landscape window around the tile or prototiles, about four to five tiles across."""
+    tiling = as_tiling(tile)
+    width, height = tiling.box[1] - tiling.box[0]
     # by area, but so that a long tile with its limbs among its neighbours shows whole
-    across = max(5.5 * math.sqrt(expected_area(tile)), 1.8 * width, 1.4 * ASPECT * height)
-    x, y = tile.center
+    across = max(5.5 * math.sqrt(tiling.tile_area), 1.8 * width, 1.4 * ASPECT * height)
+    x, y = tiling.center
     half, high = across / 2, across / 2 / ASPECT
     return float(x - half), float(y - high), float(x + half), float(y + high)

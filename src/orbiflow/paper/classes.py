@@ -27,7 +27,7 @@ def identification_error(kind: IsohedralClass) -> float:
     errors = []
     for pair in kind.identified_edges:
         first, second = (vertices[[e, (e + 1) % len(vertices)]] for e in (pair.first, pair.second))
-        image = kind.edge_isometry(pair)(first)
+        image = pair.isometry(first)
         errors.append(np.abs((image[::-1] if pair.reversed else image) - second).max())
     return float(max(errors))
 
@@ -38,7 +38,7 @@ def constrained_angles(kind: IsohedralClass) -> dict[int, int]:
     found = {}
     for pair in kind.identified_edges:
         if pair.kind == "rotation" and not pair.folded:
-            g = kind.edge_isometry(pair)
+            g = pair.isometry
             vertex = pair.second if (pair.second - pair.first) % count == 1 else pair.first
             turn = np.degrees(np.arctan2(g.linear[1, 0], g.linear[0, 0]))
             found[vertex] = round(abs(float(turn)))

@@ -11,7 +11,7 @@ from orbiflow.figures.palette import PALETTES, Palette
 from orbiflow.paper.panels import around
 from orbiflow.symmetry.isometry import Array
 from orbiflow.tilings import Tile, colouring, copies_meeting
-from orbiflow.tilings.patch import Window
+from orbiflow.tilings.window import Window
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from orbiflow.figures.canvas import plane_axes
-from orbiflow.tilings.patch import Window
+from orbiflow.tilings.window import Window
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -10,13 +10,20 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 import shapely
 
-from orbiflow.arguments import instance, number
+from orbiflow.arguments import number
 from orbiflow.errors import CertificationError, OrbiflowError
 from orbiflow.symmetry.isometry import Array
-from orbiflow.tilings.edge_matching import curve_distance, match_segments
-from orbiflow.tilings.images import Surroundings, expected_area, surroundings
-from orbiflow.tilings.neighbours import neighbours_among
-from orbiflow.tilings.tile import Tile
+from orbiflow.tilings.edge_matching import (
+    SegmentMatch,
+    boundaries_cancel,
+    curve_distance,
+    match_segments,
+)
+from orbiflow.tilings.images import Surroundings, surroundings
+from orbiflow.tilings.neighbours import touching
+from orbiflow.tilings.prototile import Prototile
+from orbiflow.tilings.tile import Tiles, as_tiling
+from orbiflow.tilings.tiling import Tiling
 
 EdgeMatching: TypeAlias = Literal["segments", "curves", "none"]
 
@@ -30,21 +37,24 @@ _MARGIN = 0.05  # width of the ring around the tile that must be covered; any po
 class Certificate:
     """What `certify` found. Lengths are in square roots of the expected area, areas relative to it.
 
-    Figures that could not be computed are NaN.
+    Figures that could not be computed are NaN. Of several prototiles each figure is the worst one,
+    and areas are means over the tiles.
 
     Args:
         simple: whether the polygon does not cross or touch itself.
         signed_area: of the polygon, in its own units; negative if clockwise.
-        expected_area: |det B| / order of the group, in the same units.
+        expected_area: |det B| over the number of tiles in a lattice cell, in the same units: over the
+            order of the group for a tile without a symmetry of its own.
         area_error: | |signed_area| - expected_area | / expected_area.
         edge_mismatch: largest distance of a boundary segment from the reversed segment of an
-            image, or unless `edge_matching` is "segments" of a vertex from the images' boundaries.
+            image, or unless `edge_matching` is "segments" of a vertex from the images' boundaries;
+            or of a tile with a symmetry from its image, if that is larger.
         edge_matching: "segments": one to one; "curves": the same curves with other vertices;
             "none": neither within tolerance.
         overlap: largest area in common with one image.
         total_overlap: sum of the areas in common with all images.
         uncovered: area around the tile that no image covers.
-        neighbours: number of images that share a piece of the boundary.
+        neighbours: number of images that share a piece of the boundary; the most of any prototile.
         tolerance: bound on area_error, edge_mismatch, total_overlap and uncovered.
         reasons: what failed, in words; empty if and only if the tile is valid.
     """
@@ -89,125 +99,141 @@ class Certificate:
             )
 
 
-def certify(tile: Tile, *, tolerance: float = 1e-9) -> Certificate:
-    """Check that the images of `tile` under its group tile the plane.
+def certify(tile: Tiles, *, tolerance: float = 1e-9) -> Certificate:
+    """Check that the tiles of a tiling cover the plane once (design points 9 and 16).
 
-    Proof. Orient all images counter-clockwise and let n(x) be the number of images that contain x;
-    n is invariant under the group and constant off the boundaries. Suppose that segment i of T is
-    the reverse of segment s(i) of an image g_i(T), and that s is a permutation. As an invariant
-    chain, the sum of all boundaries then equals minus itself (replace every g(e_i) by
-    -g g_i(e_s(i))), so it vanishes: n does not jump across any segment and is constant. Its mean
-    over a lattice cell is order * area / |det B|. If that is one, n = 1: with T simple, its images
-    cover the plane once. This uses no class table, only the polygon and the group.
+    Proof. The tiles are the images g(T_k), one for each coset of the stabiliser S_k. Orient all of
+    them alike and let n(x) be the number of tiles that contain x; n is invariant under the group and
+    constant off the boundaries. Suppose that each boundary segment is the reverse of an image of its
+    partner, and that partners are evenly distributed (`boundaries_cancel`). As an invariant chain, the
+    sum of all boundaries then equals minus itself, so it vanishes: n does not jump across any segment
+    and is constant. Its mean over a lattice cell is sum_k area(T_k) |G| / |S_k| over |det B|. If that
+    is one, n = 1: with the T_k simple, the tiles cover the plane once. This uses no class table, only
+    polygons and group.
 
     When partner edges are the same curves with different vertices (bricks laid in half bond, say),
-    no such permutation exists. Then the boundary must lie within tolerance of the images'
-    boundaries as a curve, and the proof rests on the areas alone: no image overlaps T, and a ring
-    around T is covered, so the covered set is open and closed. Both areas are also computed, as an
-    independent check, when the segments match.
+    no such pairing exists. Then boundaries must lie within tolerance of the other tiles' boundaries
+    as curves, and the proof rests on the areas alone: no tile overlaps a prototile, and a ring around
+    each prototile is covered, so the covered set is open and closed. Both areas are also computed, as
+    an independent check, when the segments match.
 
     Args:
-        tile: any scale and position; coordinates a factor 1e6 larger than the tile leave no room
-            for the default tolerance in double precision.
+        tile: a tile or a tiling, of any scale and position; coordinates a factor 1e6 larger than the
+            tile leave no room for the default tolerance in double precision.
         tolerance: relative, see `Certificate`.
 
-    Raises nothing for a bad tile: the certificate says what is wrong. `OrbiflowError` for what is no
-    `Tile`, and for a tolerance that is not a positive number.
+    Raises nothing for a bad tile: the certificate says what is wrong. `OrbiflowError` for what is
+    neither a `Tile` nor a `Tiling`, and for a tolerance that is not a positive number.
+
+    >>> from orbiflow.symmetry import wallpaper_group
+    >>> eighth = Tiling(wallpaper_group("p4m"), [[[0, 0], [0.5, 0], [0.5, 0.5]]])
+    >>> certify(eighth).valid, certify(eighth).neighbours
+    (True, 3)
     """
-    instance(tile, Tile, "the tile", "Tile(polygon, group) makes one")
+    tiling = as_tiling(tile)
     tolerance = number(tolerance, "tolerance", 0, above=True)
-    size = expected_area(tile)
-    area = tile.signed_area
-    figures = _Figures(area, size, tolerance)
+    figures = _Figures(tiling, tolerance)
+    numbers = range(len(tiling.prototiles))
     try:
-        around = surroundings(tile, _MARGIN)
+        around = [surroundings(tiling, k, _MARGIN) for k in numbers]
     except OrbiflowError as error:
         return figures.refuse(str(error))
-    crossing = _self_crossing(tile, around.ring)
-    if crossing:
-        return figures.refuse(crossing, *_edge_mismatch(around, tolerance))
-    overlap, total, uncovered = _areas(around)
-    mismatch, matching = _edge_mismatch(around, tolerance)
-    count = len(neighbours_among(around, max(1e-7, tolerance)).edge)
-    return figures.certificate(mismatch, matching, overlap, total, uncovered, count)
+    mismatch, matching = _edge_mismatch(tiling, around, tolerance)
+    for k in numbers:
+        crossing = _self_crossing(tiling, k, around[k].ring)
+        if crossing:
+            return figures.refuse(crossing, mismatch, matching)
+    areas = np.array([_areas(a) for a in around])
+    count = max(int(touching(a, max(1e-7, tolerance))[1].sum()) for a in around)
+    return figures.certificate(mismatch, matching, areas, count)
 
 
-@dataclass(frozen=True)
 class _Figures:
-    """The figures that are there whatever the tile, and how a certificate is made of them."""
+    """The figures that are there whatever the tiles, and how a certificate is made of them."""
 
-    area: float
-    size: float
-    tolerance: float
-
-    @property
-    def area_error(self) -> float:
-        return abs(abs(self.area) - self.size) / self.size
+    def __init__(self, tiling: Tiling, tolerance: float) -> None:
+        own = tiling.prototiles
+        shares = np.bincount(tiling.aspects.prototiles, minlength=len(own))
+        areas = np.array([p.signed_area for p in own])
+        self.area = float(shares @ areas / shares.sum())
+        self.size = tiling.tile_area
+        self.error = abs(abs(self.area) - self.size) / self.size
+        self.tolerance = tolerance
+        self.several = len(own) > 1
+        self.symmetry = max(s.order for s in tiling.stabilisers)
 
     def refuse(
         self, reason: str, mismatch: float = math.nan, matching: EdgeMatching = "none"
     ) -> Certificate:
         nan = math.nan
         return Certificate(
-            False, self.area, self.size, self.area_error, mismatch, matching,
+            False, self.area, self.size, self.error, mismatch, matching,
             nan, nan, nan, 0, self.tolerance, (reason,),
         )  # fmt: skip
 
     def certificate(
-        self,
-        mismatch: float,
-        matching: EdgeMatching,
-        overlap: float,
-        total: float,
-        uncovered: float,
-        count: int,
+        self, mismatch: float, matching: EdgeMatching, areas: Array, count: int
     ) -> Certificate:
+        """Args: areas: (K, 3) overlap, total overlap and uncovered area of each prototile."""
+        overlap, total, uncovered = (float(x) for x in areas.max(axis=0))
         reasons = []
-        if not self.area_error <= self.tolerance:
-            reasons.append(
-                f"its area {abs(self.area):.9g} is not the group's {self.size:.9g} "
-                f"(relative error {self.area_error:.1e})"
-            )
+        if not self.error <= self.tolerance:
+            reasons.append(self._area_reason())
         if not mismatch <= self.tolerance:
             reasons.append(f"its edges miss their partners by {mismatch:.1e} of its size")
         if not total <= self.tolerance:
-            reasons.append(f"it overlaps its neighbours by {total:.1e} of its area")
+            who = f"prototile {areas[:, 1].argmax()}" if self.several else "it"
+            reasons.append(f"{who} overlaps its neighbours by {total:.1e} of its area")
         if not uncovered <= self.tolerance:
-            reasons.append(f"its images leave {uncovered:.1e} of its area uncovered around it")
+            who = f" prototile {areas[:, 2].argmax()}" if self.several else " it"
+            reasons.append(f"its images leave {uncovered:.1e} of its area uncovered around{who}")
         return Certificate(
-            True, self.area, self.size, self.area_error, mismatch, matching,
+            True, self.area, self.size, self.error, mismatch, matching,
             overlap, total, uncovered, count, self.tolerance, tuple(reasons),
         )  # fmt: skip
 
+    def _area_reason(self) -> str:
+        whose = "the mean area of its tiles" if self.several else "its area"
+        own = f", the tile being its own image {self.symmetry}-fold" if self.symmetry > 1 else ""
+        return (
+            f"{whose} {abs(self.area):.9g} is not the group's {self.size:.9g}"
+            f"{'' if self.several else own} (relative error {self.error:.1e})"
+        )
 
-def _self_crossing(tile: Tile, ring: Array) -> str:
-    """Why the ring is not a simple polygon, and where in the tile's coordinates; "" if it is."""
+
+def _self_crossing(tiling: Tiling, prototile: int, ring: Array) -> str:
+    """Why a ring is not a simple polygon, and where in the tile's coordinates; "" if it is."""
     polygon = shapely.Polygon(ring)
     if shapely.is_valid(polygon) and polygon.area > 0:
         return ""
+    what = f"prototile {prototile}" if len(tiling.prototiles) > 1 else "the polygon"
     reason = str(shapely.is_valid_reason(polygon))
     found = re.fullmatch(r"(.*)\[(\S+) (\S+)\]", reason)
     if not found:
-        return f"the polygon is not simple: {reason}"
-    x, y = (
-        np.array([float(found[2]), float(found[3])]) * math.sqrt(expected_area(tile)) + tile.center
-    )
-    return f"the polygon is not simple: {found[1].lower()} near ({x:.6g}, {y:.6g})"
+        return f"{what} is not simple: {reason}"
+    own: Prototile = tiling.prototiles[prototile]
+    x, y = np.array([float(found[2]), float(found[3])]) * math.sqrt(tiling.tile_area) + own.center
+    return f"{what} is not simple: {found[1].lower()} near ({x:.6g}, {y:.6g})"
 
 
-def _edge_mismatch(around: Surroundings, tolerance: float) -> tuple[float, EdgeMatching]:
-    match = match_segments(around, tolerance)
-    mismatch = float(match.distance.max())
-    if mismatch <= tolerance and match.one_to_one:
-        return mismatch, "segments"
-    curves = curve_distance(around)
-    return curves, "curves" if curves <= tolerance else "none"
+def _edge_mismatch(
+    tiling: Tiling, around: list[Surroundings], tolerance: float
+) -> tuple[float, EdgeMatching]:
+    asymmetry = max(own.error for own in tiling.stabilisers) / math.sqrt(tiling.tile_area)
+    matches: list[SegmentMatch] = [match_segments(a, tolerance) for a in around]
+    mismatch = max(float(match.distance.max()) for match in matches)
+    if mismatch <= tolerance and boundaries_cancel(tiling, around, matches):
+        matching: EdgeMatching = "segments"
+    else:
+        mismatch = max(curve_distance(a) for a in around)
+        matching = "curves" if mismatch <= tolerance else "none"
+    return max(mismatch, asymmetry), matching if asymmetry <= tolerance else "none"
 
 
 def _areas(around: Surroundings) -> tuple[float, float, float]:
-    """Largest and total overlap with the images, and uncovered area in a ring around the tile."""
+    """Largest and total overlap with the other tiles, and uncovered area in a ring around."""
     polygon = shapely.Polygon(around.ring)
-    images = np.asarray(shapely.polygons(around.images))
+    images = np.asarray(shapely.polygons(around.rings))
     region = shapely.buffer(polygon, _MARGIN, quad_segs=2)
     shapely.prepare(region)
     images = images[shapely.intersects(region, images)]

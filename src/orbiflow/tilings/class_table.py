@@ -15,7 +15,6 @@ from typing import Literal, NamedTuple, TypeAlias
 
 Coefficients: TypeAlias = Mapping[int, float]
 TemplateKind: TypeAlias = Literal["hexagon", "floret", "cairo"]
-EdgeKind: TypeAlias = Literal["translation", "rotation", "glide"]
 
 
 class LatticeVector(NamedTuple):
@@ -43,47 +42,18 @@ class TransflectionRow(NamedTuple):
 OperatorRow: TypeAlias = RotationRow | TransflectionRow
 
 
-class EdgePair(NamedTuple):
-    """Edge `first` is mapped onto edge `second` by an element of the group.
-
-    `first == second` means a 2-fold centre at the edge's midpoint: the edge is `folded`.
-    """
-
-    first: int
-    second: int
-    kind: EdgeKind
-
-    @property
-    def folded(self) -> bool:
-        """Whether the edge is its own partner, turned over about its midpoint."""
-        return self.first == self.second
-
-    @property
-    def reversed(self) -> bool:
-        """Whether the start of `first` goes to the end of `second`: unless it is a glide."""
-        return self.kind != "glide"
-
-    @property
-    def brief(self) -> str:
-        """In brief: = translation, ~ glide, > rotation, o an edge turned over about its middle.
-
-        >>> EdgePair(0, 3, "translation").brief, EdgePair(2, 2, "rotation").brief
-        ('0=3', '2o')
-        """
-        if self.folded:
-            return f"{self.first}o"
-        sign = {"translation": "=", "glide": "~", "rotation": ">"}[self.kind]
-        return f"{self.first}{sign}{self.second}"
-
-
 class ClassRow(NamedTuple):
-    """A row of the table; operators in the order in which the paper nests them, outermost first."""
+    """A row of the table.
+
+    Operators are in the order in which the paper nests them, outermost first. Edges are pairs that are
+    identified, equal where an edge is its own partner; by which isometry, the group says.
+    """
 
     group: str
     template: TemplateKind
     lattice: tuple[LatticeVector, LatticeVector]
     operators: tuple[OperatorRow, ...]
-    edges: tuple[EdgePair, ...]
+    edges: tuple[tuple[int, int], ...]
 
 
 _HEXAGON_CELL = LatticeVector({0: 3}), LatticeVector({1: 1, 2: 1})
@@ -95,9 +65,9 @@ CLASS_TABLE: dict[str, ClassRow] = {
         lattice=(LatticeVector({0: 1, 1: 1}), LatticeVector({1: 1, 2: 1})),
         operators=(),
         edges=(
-            EdgePair(0, 3, "translation"),
-            EdgePair(1, 4, "translation"),
-            EdgePair(2, 5, "translation"),
+            (0, 3),
+            (1, 4),
+            (2, 5),
         ),
     ),
     "IH2": ClassRow(
@@ -109,9 +79,9 @@ CLASS_TABLE: dict[str, ClassRow] = {
             TransflectionRow({0: 5 / 2, 2: 1 / 2}, {1: 1, 2: 1}, {1: 1 / 2, 2: 1 / 2}),
         ),
         edges=(
-            EdgePair(0, 5, "glide"),
-            EdgePair(1, 4, "translation"),
-            EdgePair(2, 3, "glide"),
+            (0, 5),
+            (1, 4),
+            (2, 3),
         ),
     ),
     "IH3": ClassRow(
@@ -123,9 +93,9 @@ CLASS_TABLE: dict[str, ClassRow] = {
             TransflectionRow({1: 3 / 4, 2: 3 / 4}, {0: 1}, {0: 3 / 2}),
         ),
         edges=(
-            EdgePair(0, 2, "glide"),
-            EdgePair(1, 4, "translation"),
-            EdgePair(3, 5, "glide"),
+            (0, 2),
+            (1, 4),
+            (3, 5),
         ),
     ),
     "IH4": ClassRow(
@@ -139,11 +109,11 @@ CLASS_TABLE: dict[str, ClassRow] = {
             RotationRow({0: 3 / 2, 1: 1, 2: -1 / 2}, 2),
         ),
         edges=(
-            EdgePair(0, 0, "rotation"),
-            EdgePair(1, 4, "translation"),
-            EdgePair(2, 2, "rotation"),
-            EdgePair(3, 3, "rotation"),
-            EdgePair(5, 5, "rotation"),
+            (0, 0),
+            (1, 4),
+            (2, 2),
+            (3, 3),
+            (5, 5),
         ),
     ),
     "IH5": ClassRow(
@@ -157,10 +127,10 @@ CLASS_TABLE: dict[str, ClassRow] = {
             TransflectionRow({0: 7 / 2, 1: 1 / 2}, {1: 1, 2: 1}, {1: 1 / 2, 2: 1 / 2}),
         ),
         edges=(
-            EdgePair(0, 5, "glide"),
-            EdgePair(1, 4, "translation"),
-            EdgePair(2, 2, "rotation"),
-            EdgePair(3, 3, "rotation"),
+            (0, 5),
+            (1, 4),
+            (2, 2),
+            (3, 3),
         ),
     ),
     "IH6": ClassRow(
@@ -174,10 +144,10 @@ CLASS_TABLE: dict[str, ClassRow] = {
             TransflectionRow({1: 5 / 4, 2: 5 / 4}, {0: 1}, {0: 3 / 2}),
         ),
         edges=(
-            EdgePair(0, 2, "glide"),
-            EdgePair(1, 4, "glide"),
-            EdgePair(3, 3, "rotation"),
-            EdgePair(5, 5, "rotation"),
+            (0, 2),
+            (1, 4),
+            (3, 3),
+            (5, 5),
         ),
     ),
     "IH7": ClassRow(
@@ -186,9 +156,9 @@ CLASS_TABLE: dict[str, ClassRow] = {
         lattice=(LatticeVector({0: 3}), LatticeVector({1: 3})),
         operators=(RotationRow({0: 2, 1: 1}, 3),),
         edges=(
-            EdgePair(0, 5, "rotation"),
-            EdgePair(1, 2, "rotation"),
-            EdgePair(3, 4, "rotation"),
+            (0, 5),
+            (1, 2),
+            (3, 4),
         ),
     ),
     "IH21": ClassRow(
@@ -197,9 +167,9 @@ CLASS_TABLE: dict[str, ClassRow] = {
         lattice=(LatticeVector({3: 1, 4: 1}), LatticeVector({3: 1, 4: 1}, degrees=60)),
         operators=(RotationRow({2: 1}, 3), RotationRow({0: 1}, 6)),
         edges=(
-            EdgePair(0, 4, "rotation"),
-            EdgePair(1, 2, "rotation"),
-            EdgePair(3, 3, "rotation"),
+            (0, 4),
+            (1, 2),
+            (3, 3),
         ),
     ),
     "IH28": ClassRow(
@@ -208,9 +178,9 @@ CLASS_TABLE: dict[str, ClassRow] = {
         lattice=(LatticeVector({2: 2}), LatticeVector({3: 1, 4: 1})),
         operators=(RotationRow({2: 1}, 4), RotationRow({0: 1}, 4)),
         edges=(
-            EdgePair(0, 4, "rotation"),
-            EdgePair(1, 2, "rotation"),
-            EdgePair(3, 3, "rotation"),
+            (0, 4),
+            (1, 2),
+            (3, 3),
         ),
     ),
 }

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 import torch
 
-from orbiflow.arguments import described, instance, numbers, whole
+from orbiflow.arguments import described, numbers
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import (
     CrystallographicGroup,
@@ -27,10 +27,10 @@ from orbiflow.tilings.class_table import (
     CLASS_TABLE,
     ClassRow,
     Coefficients,
-    EdgePair,
     OperatorRow,
     RotationRow,
 )
+from orbiflow.tilings.edge_identification import EdgeIdentification
 from orbiflow.tilings.lattice_freedom import commutant, stretch_matrix
 from orbiflow.tilings.templates import template_vertices
 
@@ -66,10 +66,13 @@ class IsohedralClass:
         """The wallpaper group, such as "pgg"."""
         return self.row.group
 
-    @property
-    def identified_edges(self) -> tuple[EdgePair, ...]:
-        """Which edge of the template (edge k from p_k to p_{k+1}) is mapped onto which."""
-        return self.row.edges
+    @cached_property
+    def identified_edges(self) -> tuple[EdgeIdentification, ...]:
+        """Which edge of the template (edge k from p_k to p_{k+1}) is mapped onto which, and by what."""
+        return tuple(
+            EdgeIdentification(first, second, self._edge_isometry(first, second))
+            for first, second in self.row.edges
+        )
 
     @property
     def shape_dim(self) -> int:
@@ -120,20 +123,16 @@ class IsohedralClass:
         """The paper's symmetrization operators, outermost first: V = O_1(O_2(...(F)))."""
         return tuple(self._operator(row) for row in self.row.operators)
 
-    def edge_isometry(self, pair: EdgePair) -> Isometry:
-        """The element of the group that maps edge `pair.first` onto edge `pair.second`."""
+    def _edge_isometry(self, first: int, second: int) -> Isometry:
+        """The element that takes an edge onto another, and the tile to its other side."""
         vertices = self._default
-        instance(pair, EdgePair, "an edge pair", "see identified_edges")
-        for edge in (pair.first, pair.second):
-            whole(edge, "an edge of the template", 0, len(vertices) - 1)
-        start, end = vertices[pair.first], vertices[(pair.first + 1) % len(vertices)]
-        goal, goal_end = vertices[pair.second], vertices[(pair.second + 1) % len(vertices)]
-        if pair.reversed:
-            goal, goal_end = goal_end, goal
-        for element in self._group.elements_near(goal, 1e-6, source=start):
-            if np.allclose(element(end), goal_end, atol=1e-6):
-                return element
-        raise OrbiflowError(f"{pair} does not name identified edges of {self.name}")
+        start, end = vertices[first], vertices[(first + 1) % len(vertices)]
+        ends = vertices[second], vertices[(second + 1) % len(vertices)]
+        for sign, goal, goal_end in ((-1, *ends), (1, *ends[::-1])):
+            for element in self._group.elements_near(goal, 1e-6, source=start):
+                if element.determinant == sign and np.allclose(element(end), goal_end, atol=1e-6):
+                    return element
+        raise RuntimeError(f"{self.name}: no element takes edge {first} onto edge {second}")
 
     @cached_property
     def _default(self) -> Array:

@@ -9,13 +9,14 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from orbiflow.arguments import instance
 from orbiflow.symmetry import Isometry
+from orbiflow.tilings.aspects import Cell
 from orbiflow.tilings.copies import Copies
 from orbiflow.tilings.graph_colouring import Graph, colour_graph
 from orbiflow.tilings.neighbours import neighbours
-from orbiflow.tilings.patch import Cell, coset_and_cell
-from orbiflow.tilings.tile import Tile
+from orbiflow.tilings.placed import prototile_of
+from orbiflow.tilings.tile import Tiles, as_tiling
+from orbiflow.tilings.tiling import Tiling
 
 Sublattice: TypeAlias = tuple[int, int, int]
 """(a, b, c): spanned by a B_1 and b B_1 + c B_2, with 0 <= b < a; its index is a c."""
@@ -25,42 +26,43 @@ _MAX_INDEX = 9
 
 @dataclass(frozen=True, eq=False)
 class Colouring:
-    """A colour for each tile g(T), the same for tiles that differ by a vector of a sublattice.
+    """A colour for each tile, the same for tiles that differ by a vector of a sublattice.
 
     Args:
-        tile: the tile at the identity.
+        tiling: whose tiles they are.
         count: number of colours.
         sublattice: in Hermite normal form, over the basis of the group's lattice.
-        table: (order, a, c) colour by coset and by cell modulo the sublattice.
+        table: (A, a, c) colour by aspect and by cell modulo the sublattice.
     """
 
-    tile: Tile
+    tiling: Tiling
     count: int
     sublattice: Sublattice
     table: NDArray[np.int64]
 
     def colour(self, element: Isometry) -> int:
-        """Colour, 0 ... count - 1, of the tile element(T).
+        """Colour, 0 ... count - 1, of the tile that `element` makes of its prototile.
 
         Raises:
             OrbiflowError: for an isometry that is not in the tile's group.
         """
-        coset, cell = coset_and_cell(self.tile, element)
+        own = self.tiling
+        aspect, cell, _ = own.aspects.find(own.group, element, prototile_of(element))
         first, second = reduce_cell(cell, self.sublattice)
-        return int(self.table[coset, first, second])
+        return int(self.table[aspect, first, second])
 
     def colours(self, copies: Copies) -> NDArray[np.int64]:
         """(M,) colour of each copy, all at once.
 
         Args:
-            copies: of a tile with the same group as `tile`.
+            copies: of `tiling`, or of one with the same group and aspects.
         """
         a, b, c = self.sublattice
         wraps, second = np.divmod(copies.cells[:, 1], c)
-        return self.table[copies.cosets, (copies.cells[:, 0] - wraps * b) % a, second]
+        return self.table[copies.aspects, (copies.cells[:, 0] - wraps * b) % a, second]
 
 
-def colouring(tile: Tile) -> Colouring:
+def colouring(tile: Tiles) -> Colouring:
     """A proper colouring with the fewest colours that a small sublattice allows; deterministic.
 
     Exact search on the quotient of the tiling by each sublattice of index up to 9, for 1, 2, 3 ...
@@ -68,25 +70,28 @@ def colouring(tile: Tile) -> Colouring:
     can. Colour 0 is the most frequent, and so on down. Never fails: extremely skew lattices, whose
     tiles meet their own translates modulo all those sublattices, get a larger one.
 
+    Args:
+        tile: a tile or a tiling.
+
     Raises:
         OrbiflowError: if polygon and group are of very different size.
 
+    >>> from orbiflow.tilings import Tile
     >>> from orbiflow.tilings.classes import isohedral_class
     >>> hexagons = isohedral_class("IH1")
     >>> colouring(Tile(hexagons.template(), hexagons.group())).count
     3
     """
-    instance(tile, Tile, "the tile", "Tile(polygon, group) makes one")
-    links = _links(tile)
-    graphs = _loop_free_quotients(links)
+    tiling = as_tiling(tile)
+    graphs = _loop_free_quotients(_links(tiling))
     most = max(len(near) for _, graph in graphs for near in graph) + 1
     for count in range(1, most + 1):
         for sublattice, graph in graphs:
             colours = colour_graph(graph, count)
             if colours is not None:
-                shape = (tile.group.order, sublattice[0], sublattice[2])
+                shape = (len(tiling.aspects), sublattice[0], sublattice[2])
                 table = _most_frequent_first(np.array(colours)).reshape(shape)
-                return Colouring(tile, count, sublattice, table)
+                return Colouring(tiling, count, sublattice, table)
     raise RuntimeError("unreachable: maximal degree + 1 colours always suffice")
 
 
@@ -100,10 +105,16 @@ def reduce_cell(cell: Cell, sublattice: Sublattice) -> Cell:
 _Links: TypeAlias = list[list[tuple[int, Cell]]]
 
 
-def _links(tile: Tile) -> _Links:
-    """Per coset i: (coset, offset) of the neighbours of the tile of coset i in cell (0, 0)."""
-    shared = neighbours(tile).edge
-    return [[coset_and_cell(tile, g @ element) for element in shared] for g in tile.group.cosets]
+def _links(tiling: Tiling) -> _Links:
+    """Per aspect: (aspect, offset) of the neighbours of its tile in cell (0, 0)."""
+    table, group = tiling.aspects, tiling.group
+    shared = [neighbours(tiling, k).edge for k in range(len(tiling.prototiles))]
+    links: _Links = []
+    for k, coset in zip(table.prototiles, table.cosets, strict=True):
+        g = group.cosets[coset]
+        found = [table.find(group, g @ near, near.prototile) for near in shared[k]]
+        links.append([(aspect, cell) for aspect, cell, _ in found])
+    return links
 
 
 def _loop_free_quotients(links: _Links) -> list[tuple[Sublattice, Graph]]:

@@ -1,4 +1,4 @@
-"""The neighbours of a tile: images that share a piece of its boundary, or only points of it."""
+"""The neighbours of a tile: those that share a piece of its boundary, or only points of it."""
 
 from __future__ import annotations
 
@@ -9,66 +9,68 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from orbiflow.arguments import instance, number
+from orbiflow.arguments import number, whole
 from orbiflow.geometry import subdivided
-from orbiflow.symmetry import Isometry
 from orbiflow.symmetry.isometry import Array
 from orbiflow.tilings.edge_matching import segment_tree
 from orbiflow.tilings.images import Surroundings, surroundings
-from orbiflow.tilings.tile import Tile
+from orbiflow.tilings.placed import Placed
+from orbiflow.tilings.tile import Tiles, as_tiling
 
 _SAMPLES = 200  # points on the boundary at least, so that coarse polygons are seen as curves
 
 
 class Neighbours(NamedTuple):
-    """Group elements g != 1 whose image g(T) touches T, nearest first.
+    """The other tiles that touch a prototile, each as one group element, nearest first.
 
     Args:
         edge: those that share a piece of boundary of positive length.
         point: those that only touch at points.
     """
 
-    edge: tuple[Isometry, ...]
-    point: tuple[Isometry, ...]
+    edge: tuple[Placed, ...]
+    point: tuple[Placed, ...]
 
 
-def neighbours(tile: Tile, *, tolerance: float = 1e-7) -> Neighbours:
-    """The images of `tile` that touch it.
+def neighbours(tile: Tiles, prototile: int = 0, *, tolerance: float = 1e-7) -> Neighbours:
+    """The tiles that touch a prototile.
 
     Args:
-        tile: need not be certified.
+        tile: a tile or a tiling, certified or not.
+        prototile: whose neighbours; each of them says of which prototile it is a copy.
         tolerance: what counts as touching, in square roots of the tile's area.
 
     Raises:
         OrbiflowError: if polygon and group are of very different size.
 
+    >>> from orbiflow.tilings import Tile
     >>> from orbiflow.tilings.classes import isohedral_class
     >>> floret = isohedral_class("IH21")
     >>> found = neighbours(Tile(floret.template(), floret.group()))
     >>> len(found.edge), len(found.point)
     (5, 3)
     """
-    instance(tile, Tile, "the tile", "Tile(polygon, group) makes one")
+    tiling = as_tiling(tile)
     tolerance = number(tolerance, "tolerance", 0)
-    return neighbours_among(surroundings(tile, tolerance), tolerance)
+    prototile = whole(prototile, "the prototile", 0, len(tiling.prototiles) - 1)
+    around = surroundings(tiling, prototile, tolerance)
+    near, shares = touching(around, tolerance)
+    return Neighbours(near.select(shares).elements(), near.select(~shares).elements())
 
 
-def neighbours_among(around: Surroundings, tolerance: float) -> Neighbours:
-    """As `neighbours`, for images that are already at hand."""
-    if not len(around.images):
-        return Neighbours((), ())
+def touching(around: Surroundings, tolerance: float) -> tuple[Surroundings, NDArray[np.bool_]]:
+    """Those of the tiles around that touch the prototile, and which of them share boundary."""
+    if not len(around):
+        return around, np.zeros(0, dtype=bool)
     outline = shapely.linearrings(around.ring)
     shapely.prepare(outline)
-    touching = shapely.dwithin(outline, shapely.linearrings(around.images), tolerance)
-    near = around.select(np.asarray(touching))
-    if not len(near.images):
-        return Neighbours((), ())
-    tree, owner = segment_tree(near)
-    points = shapely.points(_boundary_samples(near.ring))
-    _, hits = tree.query(points, predicate="dwithin", distance=tolerance)
-    shares: NDArray[np.bool_] = np.zeros(len(near.images), dtype=bool)
-    shares[owner[hits]] = True
-    return Neighbours(near.select(shares).elements, near.select(~shares).elements)
+    near = around.select(np.asarray(shapely.dwithin(outline, around.rings, tolerance)))
+    shares: NDArray[np.bool_] = np.zeros(len(near), dtype=bool)
+    if len(near):
+        points = shapely.points(_boundary_samples(near.ring))
+        _, hits = segment_tree(near).query(points, predicate="dwithin", distance=tolerance)
+        shares[near.owner[hits]] = True
+    return near, shares
 
 
 def _boundary_samples(ring: Array) -> Array:

@@ -1,27 +1,30 @@
-"""A prototile: a polygon and the group whose images of it are to tile the plane."""
+"""A tile: one polygon and the group whose images of it are to tile the plane."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import TypeAlias
 
 import numpy as np
 
-from orbiflow.arguments import instance, numbers, whole
+from orbiflow.arguments import described, instance
 from orbiflow.errors import OrbiflowError
-from orbiflow.geometry import signed_area
 from orbiflow.symmetry import CrystallographicGroup
 from orbiflow.symmetry.isometry import Array
+from orbiflow.tilings.prototile import Prototile
+from orbiflow.tilings.tiling import Tiling
 
 
 @dataclass(frozen=True, eq=False)
 class Tile:
     """A closed polygon with a crystallographic group acting in the same coordinates.
 
-    Being a `Tile` proves nothing: `certify` does.
+    A `Tiling` by one prototile, `tiling`, with what is known of where it comes from. Being a `Tile`
+    proves nothing: `certify` does.
 
     Args:
         polygon: (N, 2) vertices in order, without repeating the first, either orientation.
-        group: one tile per group element.
+        group: whose images of the polygon are the tiles.
         isohedral_class: such as "IH4", or "" when unknown.
         corners: indices into `polygon` of the tiling vertices of the class, in order.
 
@@ -33,43 +36,51 @@ class Tile:
     group: CrystallographicGroup
     isohedral_class: str = ""
     corners: tuple[int, ...] = field(default=())
+    tiling: Tiling = field(init=False)
 
     def __post_init__(self) -> None:
-        polygon = numbers(self.polygon, "the tile's polygon", ("N", 2))
-        if len(polygon) < 3:
-            raise OrbiflowError(f"the tile's polygon needs 3 vertices at least, got {len(polygon)}")
-        how = "isohedral_class(name).group() and wallpaper_group(name) make one"
-        instance(self.group, CrystallographicGroup, "the tile's group", how)
+        prototile = Prototile(self.polygon, self.corners)
+        object.__setattr__(self, "tiling", Tiling(self.group, (prototile,)))
         instance(self.isohedral_class, str, "the tile's isohedral class", 'give its name, "IH4"')
-        corners = tuple(
-            whole(k, "a tile's corner, an index of its vertices,", 0, len(polygon) - 1)
-            for k in self.corners
-        )
-        if self.group.dim != 2:
-            raise OrbiflowError(
-                f"a tile needs a group of the plane, got dimension {self.group.dim}"
-            )
-        polygon.setflags(write=False)
-        object.__setattr__(self, "polygon", polygon)
-        object.__setattr__(self, "corners", corners)
+        object.__setattr__(self, "polygon", prototile.polygon)
+        object.__setattr__(self, "corners", prototile.corners)
 
     @property
     def signed_area(self) -> float:
         """Area, positive for counter-clockwise order (with y up)."""
-        return float(signed_area(self.polygon))
+        return self.tiling.prototiles[0].signed_area
 
     @property
     def center(self) -> Array:
         """(2,) centre of the bounding box."""
-        return (self.polygon.min(axis=0) + self.polygon.max(axis=0)) / 2
+        return self.tiling.prototiles[0].center
 
     @property
     def radius(self) -> float:
         """Largest distance of a vertex from `center`."""
-        return float(np.linalg.norm(self.polygon - self.center, axis=1).max())
+        return self.tiling.prototiles[0].radius
 
     def transformed(self, linear: Array, offset: Array) -> Tile:
         """The tile and its group under the affine map p -> linear p + offset (a similarity)."""
         moved = self.polygon @ np.asarray(linear).T + np.asarray(offset)
         group = self.group.conjugate(linear, offset)
         return Tile(moved, group, self.isohedral_class, self.corners)
+
+
+Tiles: TypeAlias = Tile | Tiling
+"""What the functions of this room take."""
+
+
+def as_tiling(tiles: Tiles) -> Tiling:
+    """The tiling that is meant.
+
+    Raises:
+        OrbiflowError: for what is neither a `Tile` nor a `Tiling`.
+    """
+    if isinstance(tiles, Tiling):
+        return tiles
+    if isinstance(tiles, Tile):
+        return tiles.tiling
+    raise OrbiflowError(
+        f"the tile must be a Tile or a Tiling, got {described(tiles)}; Tile(polygon, group) makes one"
+    )

@@ -24,7 +24,8 @@ class ArtPage:
     """A picture's tiles.
 
     - `width`, `height`: in pixels.
-    - `copies`: of the tile in its own units: all that the picture shows, and some beyond.
+    - `tile`: in its own units.
+    - `copies`: of it: all that the picture shows, and some beyond.
     - `linear`, `offset`: from there to pixels, y down.
     - `colours`: (M,) number of each copy's colour.
     - `count`: how many colours there are.
@@ -34,6 +35,7 @@ class ArtPage:
 
     width: int
     height: int
+    tile: Tile
     copies: Copies
     linear: Array
     offset: Array
@@ -41,10 +43,6 @@ class ArtPage:
     count: int
     tile_size: float
     notes: tuple[str, ...] = ()
-
-    @property
-    def tile(self) -> Tile:
-        return self.copies.tile
 
     @property
     def scale(self) -> float:
@@ -151,6 +149,7 @@ def _page(
     return ArtPage(
         width,
         height,
+        tile,
         copies,
         linear,
         offset,

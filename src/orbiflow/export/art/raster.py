@@ -67,7 +67,7 @@ class _Lookup:
         self.size = np.array([width, len(tall)], dtype=np.float64)
         self.width = page.width * samples
         # from samples to texels: linear @ sample + offset, one a copy
-        to_page = copies.tile.group.linear_parts[copies.cosets]
+        to_page = copies.group.linear_parts[copies.cosets]
         forward = page.linear @ to_page * samples
         shift = (copies.translations @ page.linear.T + page.offset) * samples
         inverse = np.linalg.inv(forward)
