@@ -9,16 +9,6 @@ import pytest
 import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
-
-from orbiflow.density.spaces import make_space
-from orbiflow.fields import FourierField
-from orbiflow.symmetry import (
-    WALLPAPER_GROUPS,
-    CrystallographicGroup,
-    rotation,
-    translation,
-    wallpaper_group,
-)
 from tests.strategies import (
     equivariance_error,
     groups,
@@ -28,6 +18,16 @@ from tests.strategies import (
     seeds,
     space_group,
     wallpaper_groups,
+)
+
+from orbiflow.density.spaces import make_space
+from orbiflow.fields import FourierField
+from orbiflow.symmetry import (
+    WALLPAPER_GROUPS,
+    CrystallographicGroup,
+    rotation,
+    translation,
+    wallpaper_group,
 )
 
 
