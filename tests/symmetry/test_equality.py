@@ -9,16 +9,6 @@ import pytest
 import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.strategies import (
-    equivariance_error,
-    groups,
-    random_field,
-    random_orthogonal,
-    random_tensor,
-    seeds,
-    space_group,
-    wallpaper_groups,
-)
 
 from orbiflow.density.spaces import make_space
 from orbiflow.fields import FourierField
@@ -28,6 +18,16 @@ from orbiflow.symmetry import (
     rotation,
     translation,
     wallpaper_group,
+)
+from strategies import (
+    equivariance_error,
+    groups,
+    random_field,
+    random_orthogonal,
+    random_tensor,
+    seeds,
+    space_group,
+    wallpaper_groups,
 )
 
 
