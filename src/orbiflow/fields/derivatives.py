@@ -100,7 +100,7 @@ def _by_autograd(function: VectorField, points: Tensor, owner: object) -> tuple[
 
 def _functionally(function: VectorField, points: Tensor) -> tuple[Tensor, Tensor]:
     """The same under `torch.func`, where no tensor may be told to require a gradient."""
-    values, pull = torch.func.vjp(function, points)
+    values, pull, *_ = torch.func.vjp(function, points)
     units = torch.eye(points.shape[-1], dtype=points.dtype, device=points.device)
     rows = [pull(unit.expand(points.shape))[0] for unit in units]
     return values, torch.stack(rows, dim=-2)

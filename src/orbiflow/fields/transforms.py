@@ -34,6 +34,14 @@ def plain_gradients(
     May itself be differentiated, in any mode, and batched; None for inputs that need no gradient.
     """
     needed = ctx.needs_input_grad[: len(inputs)]
+    if not transformed():
+        # views: were one input to depend on another, a gradient with respect to that one would also
+        # follow that path, which the outer pass follows as well
+        inputs = tuple(t.view_as(t) for t in inputs)
+        chosen = [t for n, t in zip(needed, inputs, strict=True) if n]
+        values = function(*inputs)
+        gradients = iter(torch.autograd.grad(values, chosen, cotangents, create_graph=True))
+        return [next(gradients) if n else None for n in needed]
 
     def of_wanted(*wanted: Tensor) -> Any:
         given = iter(wanted)
@@ -49,7 +57,9 @@ def refuse_old_batches(*gradients: Tensor) -> None:
     Raises:
         OrbiflowError: for gradients batched by torch's older means, which know no autograd functions.
     """
-    if any(torch._C._functorch.is_legacy_batchedtensor(gradient) for gradient in gradients):
+    # a module that torch's own type stubs leave out
+    is_batched: Any = torch._C._functorch.is_legacy_batchedtensor  # pyright: ignore
+    if any(is_batched(gradient) for gradient in gradients):
         raise OrbiflowError(
             "a field cannot be differentiated with vectorize=True or is_grads_batched=True: "
             "torch.func.vmap(torch.func.jacrev(field))(points) gives its Jacobians"
