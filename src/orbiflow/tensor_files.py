@@ -19,8 +19,10 @@ KEY = "orbiflow"
 """Under which the header stands among the file's metadata."""
 
 
-def tensor_bytes(header: Mapping[str, Any], tensors: Mapping[str, Tensor]) -> bytes:
-    """The content of a file that `read_tensors` reads again.
+def tensor_bytes(
+    header: Mapping[str, Any], tensors: Mapping[str, Tensor], what: str = "tensors"
+) -> bytes:
+    """The content of a file that `read_tensors` reads again; `what` it holds is for messages.
 
     Raises:
         OrbiflowError: for a header that is not JSON, or more than a file may hold.
@@ -28,7 +30,7 @@ def tensor_bytes(header: Mapping[str, Any], tensors: Mapping[str, Tensor]) -> by
     try:
         text = json.dumps(header, allow_nan=False)
     except (TypeError, ValueError) as error:
-        raise OrbiflowError(f"what is saved beside tensors must be JSON: {error}") from error
+        raise OrbiflowError(f"what is saved beside {what} must be JSON: {error}") from error
     alone = {name: t.detach().cpu().contiguous().clone() for name, t in tensors.items()}
     data = save(alone, metadata={KEY: text})
     if int.from_bytes(data[:8], "little") > MAX_HEADER or len(data) > MAX_BYTES:

@@ -63,7 +63,7 @@ def save_flow(flow: Flow, path: str | Path) -> Path:
         "duration": flow.duration,
         "warn": flow.warns,
     }
-    return write_atomic(path, tensor_bytes(header, tensors))
+    return write_atomic(path, tensor_bytes(header, tensors, "a flow"))
 
 
 def load_flow(path: str | Path, *, modules: Makers | None = None) -> Flow:
