@@ -15,8 +15,15 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from orbiflow.density import DensityEstimator, read_density
-    from orbiflow.escher import BendingSettings, DescentSettings, escherize, load_saved
-    from orbiflow.export import load
+    from orbiflow.escher import (
+        BendingSettings,
+        DescentSettings,
+        certified_tiles,
+        escherize,
+        fit_tile,
+        load_saved,
+    )
+    from orbiflow.export import draw_art, load
     from orbiflow.fields import FourierField, symmetrize
     from orbiflow.flows import Flow
     from orbiflow.silhouette import Target
@@ -27,8 +34,15 @@ __version__ = "0.1.0"
 
 _ROOMS = {
     "density": ("DensityEstimator", "read_density"),
-    "escher": ("BendingSettings", "DescentSettings", "escherize", "load_saved"),
-    "export": ("load",),
+    "escher": (
+        "BendingSettings",
+        "DescentSettings",
+        "certified_tiles",
+        "escherize",
+        "fit_tile",
+        "load_saved",
+    ),
+    "export": ("draw_art", "load"),
     "fields": ("FourierField", "symmetrize"),
     "flows": ("Flow",),
     "silhouette": ("Target",),
@@ -47,8 +61,11 @@ __all__ = [
     "Target",
     "Tile",
     "assert_equivariant",
+    "certified_tiles",
     "certify",
+    "draw_art",
     "escherize",
+    "fit_tile",
     "isohedral_class",
     "load",
     "load_saved",

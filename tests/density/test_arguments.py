@@ -139,7 +139,7 @@ WRONG: dict[str, tuple[Callable[[], Any], str]] = {
     "from_chart, round": (lambda: sphere.from_chart(torch.rand(3, 1)), r"got \(3, 1\)"),
     "project": (lambda: sphere.project(torch.rand(3, 5)), r"got \(3, 5\)"),
     "to bytes": (lambda: density_to_bytes("density"), "the density is a str"),  # type: ignore[arg-type]
-    "read": (lambda: read_density(3), "expected the path of a file"),  # type: ignore[arg-type]
+    "read": (lambda: read_density(3), "the file must be a path, got 3"),  # type: ignore[arg-type]
     "estimator": (lambda: DensityEstimator(3).fit(POINTS), "unknown space 3"),  # type: ignore[arg-type]
     "estimator's data": (lambda: DensityEstimator().fit(["a"]), "shape"),
 }

@@ -19,7 +19,7 @@ from orbiflow.escher.result import ClassFailure, TileResult
 from orbiflow.escher.search import Event, escherize, escherize_class
 from orbiflow.likeness.mutual import mutual_iou
 from orbiflow.silhouette.target import Target
-from orbiflow.tilings import CLASSES
+from orbiflow.tilings import CLASSES, isohedral_class
 from outlines import animal
 
 BOOT = [[0, 0], [3, 0], [3.4, 1.2], [2.2, 1.5], [2.0, 2.8], [0.8, 2.5], [-0.3, 1.2]]
@@ -204,6 +204,17 @@ def test_one_class_alone_is_cancelled_by_an_exception() -> None:
     endless = replace(QUICK, iterations=10**6, affine_iterations=1, turns=1)
     with pytest.raises(Cancelled):
         escherize_class(TARGET, "IH2", endless, watch=lambda _: cancel.cancel(), cancel=cancel)
+
+
+def test_one_class_may_be_given_by_its_name() -> None:
+    for given in ("IH4", 4, isohedral_class("ih4")):
+        results, failures = escherize(TARGET, given, QUICK)
+        assert [r.name for r in results] == ["IH4"]
+        assert not failures
+    with pytest.raises(OrbiflowError, match="unknown isohedral class 'IH8'"):
+        escherize(TARGET, "IH8", QUICK)
+    with pytest.raises(OrbiflowError, match='classes must be a name such as "IH4", or a list'):
+        escherize(TARGET, 1.5, QUICK)  # pyright: ignore[reportArgumentType]
 
 
 def test_arguments_are_checked() -> None:

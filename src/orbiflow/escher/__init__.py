@@ -5,6 +5,7 @@ from orbiflow.escher.carried import Bending, CarriedTile
 from orbiflow.escher.descent_settings import DescentSettings
 from orbiflow.escher.fit import Fit
 from orbiflow.escher.fit_descent import fit_descent
+from orbiflow.escher.fit_tile import certified_tiles, fit_tile
 from orbiflow.escher.methods import BothSettings
 from orbiflow.escher.model import TileModel
 from orbiflow.escher.occupancy import (
@@ -31,10 +32,12 @@ __all__ = [
     "SavedModel",
     "TileModel",
     "TileResult",
+    "certified_tiles",
     "escherize",
     "escherize_class",
     "fit_descent",
     "fit_occupancy",
+    "fit_tile",
     "load_model",
     "load_saved",
     "occupancy_loss",

@@ -46,6 +46,9 @@ CANDIDATES = 3
 INTERRUPTED = "interrupted"
 """The reason given for a class that was left undone."""
 
+ClassName = str | int | IsohedralClass
+"""What `isohedral_class` takes."""
+
 Watcher = Callable[["Event"], None]
 Outcome = TileResult | ClassFailure
 
@@ -102,7 +105,7 @@ class Task:
 
 def escherize(
     target: Target,
-    classes: Iterable[str] = tuple(CLASSES),
+    classes: ClassName | Iterable[ClassName] = tuple(CLASSES),
     settings: Settings | None = None,
     *,
     emphasis: Emphasis | None = None,
@@ -117,7 +120,7 @@ def escherize(
 
     Args:
         target: the silhouette.
-        classes: names; each is done once, in its own process.
+        classes: name of one, such as "IH4", or several; each is done once, in its own process.
         settings: of the search for likeness (`BendingSettings`, the default), for overlap
             (`DescentSettings`), for both (`BothSettings`), or of the paper's method
             (`OccupancySettings`).
@@ -142,7 +145,7 @@ def escherize(
     Raises:
         OrbiflowError: for an unknown class, a setting out of range, or workers that die.
     """
-    names = list(dict.fromkeys(isohedral_class(name).name for name in classes))
+    names = _names(classes)
     if not names:
         raise OrbiflowError(f"no isohedral class was given; the nine are {', '.join(CLASSES)}")
     for what, number in (("workers", workers), ("per_class", per_class)):
@@ -166,6 +169,16 @@ def escherize(
     teller.interrupted(names)
     results, failures = teller.sorted(names)
     return front_list(results) if isinstance(settings, BothSettings) else results, failures
+
+
+def _names(classes: ClassName | Iterable[ClassName]) -> list[str]:
+    if isinstance(classes, str | int | IsohedralClass):
+        classes = [classes]
+    if not isinstance(classes, Iterable):
+        raise OrbiflowError(
+            f'classes must be a name such as "IH4", or a list of them, got {described(classes)}'
+        )
+    return list(dict.fromkeys(isohedral_class(name).name for name in classes))
 
 
 def escherize_class(

@@ -13,10 +13,12 @@ from orbiflow.fields.symmetrize import (
     symmetrize,
     transflection_operator,
 )
+from orbiflow.fields.torus_network import NeuralTorusField
 
 __all__ = [
     "FourierField",
     "InvariantField",
+    "NeuralTorusField",
     "PeriodicFeatures",
     "SplineField",
     "Symmetrized",

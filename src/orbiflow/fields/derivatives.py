@@ -20,6 +20,7 @@ from orbiflow.fields.protocol import (
     VectorField,
     is_time_dependent,
 )
+from orbiflow.fields.transforms import transformed
 
 
 def jacobian(field: VectorField, points: Tensor) -> Tensor:
@@ -74,6 +75,8 @@ def _with_trace(function: VectorField, points: Tensor, owner: object) -> tuple[T
 
 def _by_autograd(function: VectorField, points: Tensor, owner: object) -> tuple[Tensor, Tensor]:
     """V and its Jacobian, differentiable if V is: in the points or in anything the field holds."""
+    if transformed():
+        return _functionally(function, points)
     keep = torch.is_grad_enabled() and _is_differentiable(function, points, owner)
     # inference mode would forbid derivatives even here
     with torch.inference_mode(False), torch.enable_grad():
@@ -93,6 +96,14 @@ def _by_autograd(function: VectorField, points: Tensor, owner: object) -> tuple[
             for i in range(points.shape[-1])
         ]
     return values if keep else values.detach(), torch.stack(rows, dim=-2)
+
+
+def _functionally(function: VectorField, points: Tensor) -> tuple[Tensor, Tensor]:
+    """The same under `torch.func`, where no tensor may be told to require a gradient."""
+    values, pull, *_ = torch.func.vjp(function, points)
+    units = torch.eye(points.shape[-1], dtype=points.dtype, device=points.device)
+    rows = [pull(unit.expand(points.shape))[0] for unit in units]
+    return values, torch.stack(rows, dim=-2)
 
 
 def _is_differentiable(function: VectorField, points: Tensor, owner: object) -> bool:

@@ -15,6 +15,7 @@ from orbiflow.fields.invariants import InvariantBasis, invariant_basis
 from orbiflow.fields.lipschitz import coefficient_bound
 from orbiflow.fields.series import differentiate, evaluate, weight_cotangent
 from orbiflow.symmetry import CrystallographicGroup
+from orbiflow.symmetry.as_written import cached_as_written
 
 
 class FourierField(InvariantField):
@@ -174,7 +175,7 @@ def _orders(basis: InvariantBasis) -> tuple[int, ...]:
     return tuple(np.abs(basis.frequencies).max(axis=0).tolist())
 
 
-@lru_cache(maxsize=64)  # the segments of a flow share them
+@cached_as_written(maxsize=64)  # the segments of a flow share them
 @torch.inference_mode(False)  # what the first caller may not train, no other could
 def _constants(
     group: CrystallographicGroup,

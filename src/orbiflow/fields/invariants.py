@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import CrystallographicGroup
+from orbiflow.symmetry.as_written import cached_as_written
 from orbiflow.symmetry.isometry import Array
 
 MAX_COEFFICIENTS = 2_000_000
@@ -128,7 +128,7 @@ def _orthonormal_columns(projector: Array) -> Array:
     return basis
 
 
-@lru_cache(maxsize=64)  # groups hash by identity; a flow of many segments shares one basis
+@cached_as_written(maxsize=64)  # a flow of many segments shares one basis
 def invariant_basis(group: CrystallographicGroup, max_frequency: int) -> InvariantBasis:
     """Build the basis orbit by orbit: the range of the mean over coset representatives.
 

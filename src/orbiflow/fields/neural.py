@@ -41,6 +41,7 @@ class PeriodicFeatures(nn.Module):
             k = np.concatenate([m * np.eye(d) for m in range(1, max_frequency + 1)])
         with torch.inference_mode(False):  # or no derivative could be taken through it, ever
             waves = torch.tensor(k @ group.inverse_lattice)
+        self.group, self.max_frequency = group, max_frequency
         self.register_buffer("frequencies", waves, persistent=False)
 
     @property

@@ -88,6 +88,7 @@ class _Marked:
 
     def __init__(self, function: Callable[[Tensor, Tensor], Tensor]) -> None:
         self._function = function
+        self.__name__ = getattr(function, "__name__", "")
 
     def __call__(self, points: Tensor, time: Tensor, /) -> Tensor:
         return self._function(points, time)

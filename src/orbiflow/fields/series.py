@@ -17,6 +17,8 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from orbiflow.fields.transforms import plain_gradients, refuse_old_batches, transformed
+
 BLOCK_BYTES = 2**21
 """Size of the working arrays for one block of points; measured best between 1 and 3 MiB."""
 
@@ -171,14 +173,9 @@ class _Series(torch.autograd.Function):
     def backward(ctx: Any, *grads: Tensor) -> tuple[Tensor | None, ...]:
         (grad,) = grads
         weights, u = ctx.saved_tensors
-        if torch.is_grad_enabled():  # second derivatives were asked for: let autograd have them
-            # views: were u to depend on weights, a gradient with respect to weights itself would
-            # also follow that path, which the outer pass follows as well
-            inputs = weights.view_as(weights), u.view_as(u)
-            wanted = [t for t, need in zip(inputs, ctx.needs_input_grad, strict=True) if need]
-            plain = evaluate_plainly(*inputs)
-            found = iter(torch.autograd.grad(plain, wanted, grad, create_graph=True))
-            return tuple(next(found) if need else None for need in ctx.needs_input_grad)
+        if torch.is_grad_enabled() or transformed():  # to be differentiated again, or in batches
+            return tuple(plain_gradients(evaluate_plainly, (weights, u), ctx, grad))
+        refuse_old_batches(grad)
         want_weights, want_points = ctx.needs_input_grad
         grad_weights = torch.zeros_like(weights)
         grad_points = torch.empty_like(u) if want_points else None
@@ -200,7 +197,10 @@ def evaluate_plainly(weights: Tensor, u: Tensor) -> Tensor:
         angle = u[:, i, None, :] * _frequencies(order, u)[:, None]
         table = torch.cat([torch.ones_like(u[:, i, None, :]), angle.cos(), angle.sin()], dim=1)
         if i == u.shape[1] - 1:
-            sums = _partial_sums(weights, table)
+            flat = weights.flatten(1, -2)
+            # of a single stack a plain product: `vmap` would copy the weights for a batched one
+            sums = (flat[0] @ table[0])[None] if len(flat) == 1 else flat @ table
+            sums = sums.unflatten(1, weights.shape[1:-1])
         else:
             sums = (sums * _align(table, i)).sum(dim=-2)
     return sums
@@ -215,8 +215,10 @@ def evaluate(weights: Tensor, u: Tensor) -> Tensor:
 
     Returns:
         (S, C, N). First derivatives with respect to both arguments are in closed form; derivatives
-        of higher order fall back to ordinary autograd.
+        of higher order, and those that `torch.func` takes, fall back to ordinary operations.
     """
+    if transformed():
+        return evaluate_plainly(weights, u)
     if torch.is_grad_enabled() and (weights.requires_grad or u.requires_grad):
         return _Series.apply(weights, u)  # type: ignore[no-any-return]
     return _forward(weights, u)
@@ -235,6 +237,8 @@ def weight_cotangent(shape: tuple[int, ...], u: Tensor, grad: Tensor) -> Tensor:
         As the weights.
     """
     weights = u.new_zeros(shape)
+    if transformed():
+        return torch.func.vjp(lambda w: evaluate_plainly(w, u), weights)[1](grad)[0]
     total = torch.zeros_like(weights)
     for block, room in _in_blocks(weights, u.shape[2]):
         part, _ = _backward_block(weights, u[..., block], grad[..., block], False, room)

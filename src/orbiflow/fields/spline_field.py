@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from functools import lru_cache
 
 import numpy as np
 import torch
@@ -15,6 +14,7 @@ from orbiflow.fields.invariant_field import InvariantField, sobolev_weights
 from orbiflow.fields.invariants import InvariantBasis, invariant_basis
 from orbiflow.fields.splines import padded, spline_sum, spline_sum_with_divergence, symbol
 from orbiflow.symmetry import CrystallographicGroup
+from orbiflow.symmetry.as_written import cached_as_written
 
 PER_WAVE = 3
 """Grid points along the shortest wave, at least: a cubic spline follows it to about 2 per cent."""
@@ -153,7 +153,7 @@ def grid_sides(group: CrystallographicGroup, basis: InvariantBasis) -> tuple[int
     return tuple(round(m) for m in sides)
 
 
-@lru_cache(maxsize=64)  # the segments of a flow share them
+@cached_as_written(maxsize=64)  # the segments of a flow share them
 @torch.inference_mode(False)  # what the first caller may not train, no other could
 def _constants(
     group: CrystallographicGroup,

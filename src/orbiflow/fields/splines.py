@@ -9,12 +9,14 @@ backward pass itself are left to autograd.
 from __future__ import annotations
 
 import math
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
 import torch
 from torch import Tensor
+
+from orbiflow.fields.transforms import plain_gradients, refuse_old_batches, transformed
 
 TAPS = 4
 """Coefficients of a cubic spline that a point meets along an axis."""
@@ -133,8 +135,12 @@ class _SplineSum(torch.autograd.Function):
     @staticmethod
     def backward(ctx: Any, *gradients: Any) -> Any:
         table, u, flat, fraction, *near = ctx.saved_tensors
-        if torch.is_grad_enabled():  # second derivatives were asked for: let autograd have them
-            return *_differentiable_gradients(ctx, table, u, gradients), None
+        if torch.is_grad_enabled() or transformed():  # to be differentiated again, or in batches
+            # the divergence is a constant where no rates are given
+            count = 1 if ctx.rates is None else 2
+            plain = partial(_plain_sum, rates=ctx.rates, count=count)
+            return *plain_gradients(plain, (table, u), ctx, gradients[:count]), None
+        refuse_old_batches(*gradients)
         weights = cubic_weights(fraction, 3)
         on_table = on_u = None
         if ctx.needs_input_grad[1]:
@@ -142,21 +148,6 @@ class _SplineSum(torch.autograd.Function):
         if ctx.needs_input_grad[0]:
             on_table = _on_table(table.shape, flat, weights, gradients, ctx.rates)
         return on_table, on_u, None
-
-
-def _differentiable_gradients(
-    ctx: Any, table: Tensor, u: Tensor, gradients: tuple[Tensor, Tensor]
-) -> list[Tensor | None]:
-    # views: were u to depend on the table, a gradient with respect to the table itself would also
-    # follow that path, which the outer pass follows as well
-    inputs = table.view_as(table), u.view_as(u)
-    wanted = [t for t, need in zip(inputs, ctx.needs_input_grad, strict=False) if need]
-    flat, fraction = _cells(tuple(table.shape[1:]), inputs[1])
-    # the divergence is a constant where no rates are given
-    count = 1 if ctx.rates is None else 2
-    plain = _sums(_near(inputs[0], flat), fraction, ctx.rates)[:count]
-    found = iter(torch.autograd.grad(plain, wanted, gradients[:count], create_graph=True))
-    return [next(found) if need else None for need in ctx.needs_input_grad[:2]]
 
 
 def _on_points(
@@ -221,14 +212,29 @@ def spline_sum(table: Tensor, u: Tensor) -> Tensor:
     Args:
         table: coefficients, `padded`.
 
-    Differentiable in both: the first derivatives in closed form, higher ones by ordinary autograd.
-    A cubic spline's third derivatives are constant in each cell.
+    Differentiable in both: the first derivatives in closed form, higher ones, and those that
+    `torch.func` takes, by ordinary operations. A cubic spline's third derivatives are constant in each
+    cell.
     """
-    return _SplineSum.apply(table, u, None)[0]  # type: ignore[index]
+    return _sum(table, u, None)[0]
 
 
 def spline_sum_with_divergence(
     table: Tensor, u: Tensor, rates: tuple[float, ...]
 ) -> tuple[Tensor, Tensor]:
     """As `spline_sum` for a vector field (C = d), and sum_i rates_i d value_i / du_i (N,)."""
+    return _sum(table, u, rates)
+
+
+def _sum(table: Tensor, u: Tensor, rates: tuple[float, ...] | None) -> tuple[Tensor, Tensor]:
+    if transformed():
+        return _plain_sum(table, u, rates)  # type: ignore[return-value]
     return _SplineSum.apply(table, u, rates)  # type: ignore[return-value]
+
+
+def _plain_sum(
+    table: Tensor, u: Tensor, rates: tuple[float, ...] | None, count: int = 2
+) -> tuple[Tensor, ...]:
+    """The first `count` of values and divergence, by ordinary differentiable operations."""
+    flat, fraction = _cells(tuple(table.shape[1:]), u)
+    return _sums(_near(table, flat), fraction, rates)[:count]

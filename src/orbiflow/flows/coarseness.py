@@ -13,6 +13,7 @@ from torch import Tensor
 
 from orbiflow.errors import CoarseStepsWarning
 from orbiflow.fields.derivatives import lipschitz_bound
+from orbiflow.fields.transforms import transformed
 
 if TYPE_CHECKING:
     from orbiflow.flows.flow import Flow
@@ -44,9 +45,9 @@ class Watch:
         Warns:
             CoarseStepsWarning: with the error found and how many steps to take.
         """
-        if self.warned or points.numel() == 0 or not self._is_due(flow):
-            return
-        # a check may not break what it checks, be it traced or transformed
+        if self.warned or transformed() or points.numel() == 0 or not self._is_due(flow):
+            return  # where torch transforms a flow there are no numbers to look at
+        # a check may not break what it checks, be it traced
         with contextlib.suppress(RuntimeError):
             message = _complaint(flow, points, inverse)
             if message:

@@ -115,6 +115,11 @@ class Flow(nn.Module):
         """Length of time of each segment."""
         return self._duration
 
+    @property
+    def warns(self) -> bool:
+        """Whether it looks if its steps are fine enough."""
+        return self._watch is not None
+
     def fields(self) -> list[Any]:
         """The vector fields, one a segment, as they were given."""
         return [s.field if isinstance(s, _Plain) else s for s in self.segments]

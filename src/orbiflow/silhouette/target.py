@@ -1,24 +1,28 @@
 """The silhouette that a tile is to look like, in the user's coordinates and in normal form."""
 
+import os
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Self
+from typing import IO, Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from orbiflow.arguments import described
+from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.geometry import centroid, orient, signed_area
 from orbiflow.silhouette.frame import Frame
 from orbiflow.silhouette.outlines import clean_ring
-from orbiflow.silhouette.readers import read_outline
+from orbiflow.silhouette.readers import Held, Reading, read_mask_array, read_outline
+from orbiflow.silhouette.readers.raster import MAX_BYTES
 
 
 @dataclass(frozen=True, eq=False)
 class Target:
     """A silhouette: one simple closed curve.
 
-    Make one with `Target.read` or `Target.from_polygon`, which check the outline.
+    Make one with `Target.read`, `from_bytes`, `from_mask` or `from_polygon`, which check the outline.
 
     - `outline`: (N, 2), without a repeated last vertex, in the input's own units. In an image the
       unit is the pixel and (0, 0) the image's top left corner, so that pixel (row 0, column 0)
@@ -51,22 +55,78 @@ class Target:
 
     @classmethod
     def read(
-        cls, path: str | Path, *, threshold: float | None = None, invert: bool | None = None
+        cls,
+        path: str | Path | IO[bytes],
+        *,
+        threshold: float | None = None,
+        invert: bool | None = None,
     ) -> Self:
         """Read a silhouette from an image (PNG, JPEG, WebP), an SVG, a `.json` or a `.dat` file.
 
-        For images, `threshold` (0 to 1) is the level that parts the shape from its background and
+        A binary stream, such as an open file or `io.BytesIO`, is read from where it stands. For
+        images, `threshold` (0 to 1) is the level that parts the shape from its background and
         `invert` says that the shape is the light (or the transparent) part; both are found out from
         the image where they are not given, and `notes` say what was found.
 
         Raises `InputFileError` for a file without a usable silhouette, with what to do about it.
         """
-        reading = read_outline(path, threshold=threshold, invert=invert)
+        where = path if isinstance(path, str | os.PathLike) else _held(path)
+        return cls._of(read_outline(where, threshold=threshold, invert=invert), str(where))
+
+    @classmethod
+    def from_bytes(
+        cls,
+        data: bytes | bytearray | memoryview,
+        name: str = "bytes",
+        *,
+        threshold: float | None = None,
+        invert: bool | None = None,
+    ) -> Self:
+        """As `read`, of the content of such a file; `name` stands in messages and for its ending.
+
+        >>> Target.from_bytes(b"[[0, 0], [2, 0], [2, 2], [0, 2]]").kind
+        'json'
+        """
+        if not isinstance(data, bytes | bytearray | memoryview):
+            raise OrbiflowError(
+                f"data must be bytes, got {described(data)}; Target.read takes paths"
+            )
+        held = Held(bytes(data), str(name))
+        return cls._of(read_outline(held, threshold=threshold, invert=invert), held.name)
+
+    @classmethod
+    def from_mask(
+        cls,
+        mask: ArrayLike,
+        *,
+        threshold: float | None = None,
+        invert: bool | None = None,
+        source: str = "mask",
+    ) -> Self:
+        """The largest shape in an array (H, W), a row of pixels at a time, the first on top.
+
+        Booleans, and integers that are 0 and 1 alone, are true in the shape (`invert`: outside of it).
+        Other integers and floats are gray levels, of 0 to 255, 65535 or 1, and are read as those of
+        images are: `threshold` and `invert` are found out where they are not given.
+
+        Raises `OrbiflowError` for another array, and `InputFileError` for one without a shape.
+
+        >>> import numpy as np
+        >>> mask = np.zeros((60, 80), bool)
+        >>> mask[10:50, 20:70] = True
+        >>> round(Target.from_mask(mask).area)
+        2000
+        """
+        reading = read_mask_array(mask, source, threshold=threshold, invert=invert)
+        return cls._of(reading, source)
+
+    @classmethod
+    def _of(cls, reading: Reading, source: str) -> Self:
         return cls(
             reading.outline,
             reading.y_down,
             reading.notes,
-            str(path),
+            source,
             reading.kind,
             reading.size,
             reading.corner,
@@ -120,6 +180,22 @@ class Target:
             "y_down": self.y_down,
             "notes": list(self.notes),
         }
+
+
+def _held(stream: Any) -> Held:
+    """What a binary stream holds, up to what is read of any file."""
+    how = "a path or a binary stream; Target.from_bytes takes bytes, Target.from_mask arrays"
+    if not callable(getattr(stream, "read", None)):
+        raise OrbiflowError(f"the silhouette's file must be {how}, got {described(stream)}")
+    name = getattr(stream, "name", None)
+    name = name if isinstance(name, str) else "stream"
+    try:
+        data = stream.read(MAX_BYTES + 1)
+    except (OSError, ValueError) as error:
+        raise InputFileError(f"{name}: cannot be read ({error})") from error
+    if not isinstance(data, bytes):
+        raise OrbiflowError(f'{name} is a stream of text; open it in binary mode, "rb"')
+    return Held(data, name)
 
 
 def _read_only(array: NDArray[np.float64]) -> NDArray[np.float64]:

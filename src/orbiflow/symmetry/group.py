@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import math
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -18,6 +19,7 @@ from orbiflow.symmetry.isometry import (
     cast_like,
     check_dimension,
     identity,
+    translation,
 )
 
 
@@ -41,7 +43,9 @@ def checked_lattice(lattice: ArrayLike) -> Array:
 class CrystallographicGroup:
     """A discrete group of isometries whose translations contain a full lattice.
 
-    Build one with `generate`; the constructor trusts its arguments.
+    Build one with `generate`; the constructor trusts its arguments. Two are equal if they are the same
+    set of isometries, within 1e-9 as in `contains`, whatever their bases, coset representatives and
+    names.
 
     Args:
         lattice: (d, d), basis vectors as columns.
@@ -112,6 +116,41 @@ class CrystallographicGroup:
     def translations(self) -> Array:
         """(|G|, d) translations of the coset representatives."""
         return np.stack([g.translation for g in self.cosets])
+
+    def __eq__(self, other: object) -> bool:
+        """Whether both are the same set of isometries: each contains the other's generators."""
+        if not isinstance(other, CrystallographicGroup):
+            return NotImplemented
+        if other is self:
+            return True
+        share, its_share = self.cell_volume / self.order, other.cell_volume / other.order
+        if self._invariants != other._invariants or not math.isclose(
+            share, its_share, rel_tol=1e-6
+        ):
+            return False
+        pairs = (self, other), (other, self)
+        return all(mine.contains(g) for mine, its in pairs for g in its._own_generators())
+
+    def __hash__(self) -> int:
+        return hash(self._invariants)
+
+    @cached_property
+    def _invariants(self) -> tuple[int, tuple[tuple[int, int, int], ...]]:
+        """Dimension, and how many elements of the point group have each trace and determinant.
+
+        Whole numbers only: equality has a tolerance, so that whatever moves with the group, rounded or
+        not, would give some equal groups two hashes.
+        """
+        integral = np.round(self.inverse_lattice @ self.linear_parts @ self.lattice)
+        unique = np.unique(integral, axis=0)
+        kinds = np.stack([np.trace(unique, axis1=1, axis2=2), np.linalg.det(unique)], axis=1)
+        values, counts = np.unique(np.round(kinds).astype(int), axis=0, return_counts=True)
+        rows = zip(values.tolist(), counts.tolist(), strict=True)
+        return self.dim, tuple((trace, det, count) for (trace, det), count in rows)
+
+    def _own_generators(self) -> Iterator[Isometry]:
+        yield from (translation(vector) for vector in self.lattice.T)
+        yield from self.cosets
 
     def contains(self, isometry: Isometry, tolerance: float = TOLERANCE) -> bool:
         """Whether `isometry` is an element of the group, within `tolerance` of the cell's size."""

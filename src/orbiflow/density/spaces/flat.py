@@ -34,7 +34,7 @@ def whole_turn(unit: str) -> float:
     return TURN[unit]
 
 
-@lru_cache(maxsize=16)  # fields are cached by group identity
+@lru_cache(maxsize=16)
 def _integer_lattice(dim: int) -> CrystallographicGroup:
     if dim == 2:
         return identification_group("torus")

@@ -40,6 +40,8 @@ class Space(ABC):
     - `columns`: names of the data's columns.
     - `unit`: of angles, None where the natural measure is in steradians.
     - `is_round`: whether the natural measure is the area of the unit sphere.
+
+    Spaces of the same class, settings and group are equal.
     """
 
     name: str
@@ -152,6 +154,19 @@ class Space(ABC):
     def uniform(self, count: int, generator: torch.Generator) -> Tensor:
         """`count` chart points, uniform in natural measure."""
         return torch.rand(count, self.dim, dtype=torch.float64, generator=generator)
+
+    def __eq__(self, other: object) -> bool:
+        """Whether both are made by the same class and settings, on the same group."""
+        if not isinstance(other, Space):
+            return NotImplemented
+        return (
+            type(other) is type(self)
+            and other.settings() == self.settings()
+            and other.group == self.group
+        )
+
+    def __hash__(self) -> int:
+        return hash((type(self), self.dim))
 
     @cached_property
     def _near(self) -> tuple[Array, Array]:

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
 import torch
-from safetensors import SafetensorError
-from safetensors.torch import load, save
 from torch import Tensor
 
 from orbiflow.density.models.bases import Base, UniformBase, VonMisesBase
@@ -29,12 +26,13 @@ from orbiflow.density.storage.groups import check_group, group_header, is_same_g
 from orbiflow.density.storage.neural import neural_from_header, neural_header, neural_tensors
 from orbiflow.density.storage.series import series_from_header, series_parts
 from orbiflow.errors import InputFileError, OrbiflowError
+from orbiflow.tensor_files import read_tensors, tensor_bytes
 
 FORMAT, FORMAT_2, FORMAT_1 = "orbiflow-density/3", "orbiflow-density/2", "orbiflow-density/1"
 """Written, and read as well: the first had one smoothness for all segments, and no group; the second
 no chains beside a flow. What needs no chains is still written as the second."""
 
-MAX_BYTES, MAX_HEADER, MAX_KERNELS = 256 * 2**20, 2**20, 1_000_000
+MAX_KERNELS = 1_000_000
 
 
 def density_to_bytes(density: SymmetricDensity, **extra: Any) -> bytes:
@@ -71,17 +69,7 @@ def density_to_bytes(density: SymmetricDensity, **extra: Any) -> bytes:
     }
     if chains is not None:
         header["chains"] = chains_header(chains)
-    try:
-        text = json.dumps(header, allow_nan=False)
-    except (TypeError, ValueError) as error:
-        raise OrbiflowError(f"what is saved beside a density must be JSON: {error}") from error
-    data = save({name: t.contiguous() for name, t in tensors.items()}, metadata={"orbiflow": text})
-    if int.from_bytes(data[:8], "little") > MAX_HEADER or len(data) > MAX_BYTES:
-        raise OrbiflowError(
-            f"the file would have {len(data) / 2**20:.1f} MB, {len(text) / 2**20:.1f} MB of them "
-            f"header; at most {MAX_BYTES / 2**20:g} and {MAX_HEADER / 2**20:g} are read again"
-        )
-    return data
+    return tensor_bytes(header, tensors, "a density")
 
 
 def _checked_space(space: Space) -> Space:
@@ -156,34 +144,13 @@ def read_density(path: str | Path) -> tuple[SymmetricDensity, dict[str, Any]]:
     Raises:
         InputFileError: if the file is missing, too large, damaged or of another kind.
     """
+    header, tensors = read_tensors(path, "a density")
     try:
-        path = Path(path)
-    except TypeError as error:
-        raise InputFileError(f"expected the path of a file, got {path!r}") from error
-    try:
-        size = path.stat().st_size
-        if size > MAX_BYTES:
-            raise InputFileError(f"{path}: {size / 2**20:.0f} MB, a density has at most 256 MB")
-        data = path.read_bytes()
-    except OSError as error:
-        raise InputFileError(f"cannot read {path}: {error.strerror or error}") from error
-    try:
-        length = int.from_bytes(data[:8], "little")
-        if not 2 <= length <= min(len(data) - 8, MAX_HEADER):
-            raise ValueError("no header")
-        header = json.loads(json.loads(data[8 : 8 + length])["__metadata__"]["orbiflow"])
         if header["format"] not in (FORMAT, FORMAT_2, FORMAT_1):
             raise ValueError(f"format {header['format']!r}")
         with torch.inference_mode(False):  # what is made in it could never be differentiated
-            return _restored(header, load(data)), header["extra"]
-    except (
-        SafetensorError,
-        OrbiflowError,
-        ValueError,
-        KeyError,
-        TypeError,
-        RecursionError,
-    ) as error:
+            return _restored(header, tensors), header["extra"]
+    except (OrbiflowError, ValueError, KeyError, TypeError, RecursionError) as error:
         raise InputFileError(
             f"{path}: not a density saved by orbiflow, or damaged ({error})"
         ) from error

@@ -1,4 +1,4 @@
-"""A group as JSON, and whether two are the same: saved parameters are coordinates in its basis."""
+"""Whether two groups are written alike: saved parameters are coordinates in a group's basis."""
 
 from __future__ import annotations
 
@@ -8,18 +8,12 @@ import numpy as np
 
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import CrystallographicGroup
+from orbiflow.symmetry.header import group_header
+
+__all__ = ["check_group", "group_header", "is_same_group"]
 
 TOLERANCE = 1e-9
 """Of matrices and translations that are read as equal."""
-
-
-def group_header(group: CrystallographicGroup) -> dict[str, Any]:
-    """Lattice (columns are basis vectors) and coset representatives, ready for JSON."""
-    return {
-        "lattice": group.lattice.tolist(),
-        "linear": group.linear_parts.tolist(),
-        "translations": group.translations.tolist(),
-    }
 
 
 def is_same_group(one: CrystallographicGroup, other: CrystallographicGroup) -> bool:

@@ -7,12 +7,14 @@ import numpy as np
 
 from orbiflow.arguments import path as as_path
 from orbiflow.errors import InputFileError, OrbiflowError
+from orbiflow.silhouette.readers.arrays import read_mask_array
 from orbiflow.silhouette.readers.polygon_files import read_dat, read_json
 from orbiflow.silhouette.readers.raster import read_image
 from orbiflow.silhouette.readers.reading import Reading, check_file, read_head
+from orbiflow.silhouette.readers.source import Held, Source
 from orbiflow.silhouette.readers.svg import read_svg
 
-__all__ = ["Reading", "read_outline"]
+__all__ = ["Held", "Reading", "read_mask_array", "read_outline"]
 
 _HEAD_BYTES = 65536
 _IMAGE_MAGIC = (
@@ -36,15 +38,15 @@ _READABLE = "a PNG, JPEG or WebP image, an SVG drawing, a .json polygon or a .da
 
 
 def read_outline(
-    path: str | Path, *, threshold: float | None = None, invert: bool | None = None
+    path: str | Path | Held, *, threshold: float | None = None, invert: bool | None = None
 ) -> Reading:
-    """Read the outline of the silhouette in the file at `path`.
+    """Read the outline of the silhouette in the file at `path`, or in bytes that are `Held`.
 
     `threshold` and `invert` are for images (see `read_image`). Raises `InputFileError` for a file
     that is missing, of no kind that is read, damaged, too large, or without a usable shape, and
     `OrbiflowError` for a setting that cannot be used.
     """
-    path = as_path(path, "the silhouette's file")
+    path = path if isinstance(path, Held) else as_path(path, "the silhouette's file")
     check_file(path)
     kind = _kind(path, read_head(path, _HEAD_BYTES))
     if kind == "image":
@@ -59,7 +61,7 @@ def read_outline(
         return {"svg": read_svg, "json": read_json, "dat": read_dat}[kind](path)
 
 
-def _kind(path: Path, head: bytes) -> str:
+def _kind(path: Source, head: bytes) -> str:
     if head.startswith(_IMAGE_MAGIC) or (head[:4] == b"RIFF" and head[8:12] == b"WEBP"):
         return "image"
     text = _text(head)
@@ -85,7 +87,7 @@ def _text(head: bytes) -> str | None:
     return text.lstrip("\ufeff").lstrip()
 
 
-def _what(path: Path, head: bytes, text: str | None) -> str:
+def _what(path: Source, head: bytes, text: str | None) -> str:
     for magic, what in _CONVERTIBLE.items():
         if head.startswith(magic):
             return what

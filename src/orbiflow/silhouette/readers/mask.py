@@ -1,7 +1,6 @@
 """Masks: pictures whose light, or opaque, part is what is meant."""
 
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +14,7 @@ from orbiflow.silhouette.readers.raster import (
     open_image,
     upright,
 )
+from orbiflow.silhouette.readers.source import Source
 
 _PAINT = "paint what must survive white and the rest black"
 
@@ -34,7 +34,7 @@ class MaskReading:
     notes: tuple[str, ...]
 
 
-def read_mask(path: Path) -> MaskReading:
+def read_mask(path: Source) -> MaskReading:
     """Read a mask from a PNG, JPEG or WebP image, turned as its EXIF orientation asks.
 
     The level is the opacity where some of the mask is more transparent than the rest, else the
@@ -44,7 +44,7 @@ def read_mask(path: Path) -> MaskReading:
     return open_image(path, _decode)
 
 
-def _decode(path: Path, image: Image.Image) -> MaskReading:
+def _decode(path: Source, image: Image.Image) -> MaskReading:
     turned, notes = upright(image)
     band, band_notes = _channel(path, turned)
     levels, reduced = averaged(band)
@@ -59,7 +59,7 @@ def _decode(path: Path, image: Image.Image) -> MaskReading:
     return MaskReading(levels, turned.size, reduced, (*notes, *band_notes))
 
 
-def _channel(path: Path, image: Image.Image) -> tuple[Image.Image, list[str]]:
+def _channel(path: Source, image: Image.Image) -> tuple[Image.Image, list[str]]:
     """The channel that emphasises: mode "L" (0 to 255) or "F" (0 to 1)."""
     if image.mode.startswith(("I", "F")):
         return deep_channel(path, image), []

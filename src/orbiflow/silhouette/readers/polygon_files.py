@@ -1,19 +1,19 @@
 """Polygons written out as numbers: the `.dat` files of Nagata and Imahori, JSON and GeoJSON."""
 
 import json
-from pathlib import Path
 
 import numpy as np
 
 from orbiflow.errors import InputFileError
 from orbiflow.silhouette.outlines import MAX_VERTICES, clean_ring
 from orbiflow.silhouette.readers.reading import Reading, read_bytes
+from orbiflow.silhouette.readers.source import Source
 
 MAX_BYTES = 16 * 2**20
 POLYGON_KEYS = ("polygon", "tile", "outline")
 
 
-def read_dat(path: Path) -> Reading:
+def read_dat(path: Source) -> Reading:
     """Read a goal polygon of Nagata and Imahori: a line `n`, then n lines `x y`, with y down.
 
     Blank lines are passed over; lines after those n are left unread, with a note. Source of the
@@ -45,7 +45,7 @@ def read_dat(path: Path) -> Reading:
     return Reading(outline, True, "dat", None, tuple(notes))
 
 
-def _vertex_count(path: Path, lines: list[tuple[int, str]]) -> int:
+def _vertex_count(path: Source, lines: list[tuple[int, str]]) -> int:
     if not lines:
         raise InputFileError(f"{path}: the file holds only blank lines; export it again")
     number, first = lines[0]
@@ -63,7 +63,7 @@ def _vertex_count(path: Path, lines: list[tuple[int, str]]) -> int:
     return n
 
 
-def _vertex(path: Path, number: int, line: str) -> tuple[float, float]:
+def _vertex(path: Source, number: int, line: str) -> tuple[float, float]:
     try:
         x, y = (float(word) for word in line.split())
     except ValueError as exc:
@@ -77,7 +77,7 @@ def _vertex(path: Path, number: int, line: str) -> tuple[float, float]:
     return x, y
 
 
-def read_json(path: Path) -> Reading:
+def read_json(path: Source) -> Reading:
     """Read a polygon from JSON, with y up unless the file says otherwise.
 
     Taken are: a list of [x, y] pairs; an object with such a list under "polygon", "tile" or
@@ -103,7 +103,7 @@ def read_json(path: Path) -> Reading:
     return Reading(outline, y_down, "json", None, (*notes, *dropped))
 
 
-def _find_polygon(path: Path, content: object) -> tuple[list, bool, list[str]]:
+def _find_polygon(path: Source, content: object) -> tuple[list, bool, list[str]]:
     """The list of vertices in `content`, whether y points down, and notes."""
     if isinstance(content, list):
         return content, False, []
@@ -128,7 +128,7 @@ def _find_polygon(path: Path, content: object) -> tuple[list, bool, list[str]]:
     return points, y_down, notes
 
 
-def _geojson_ring(path: Path, content: dict) -> tuple[list, list[str]]:
+def _geojson_ring(path: Source, content: dict) -> tuple[list, list[str]]:
     geometry = content.get("geometry") if content["type"] == "Feature" else content
     if not isinstance(geometry, dict) or geometry.get("type") != "Polygon":
         kind = geometry.get("type") if isinstance(geometry, dict) else content["type"]
@@ -148,7 +148,7 @@ def _geojson_ring(path: Path, content: dict) -> tuple[list, list[str]]:
     return rings[0], notes
 
 
-def _check_pairs(path: Path, points: list) -> None:
+def _check_pairs(path: Source, points: list) -> None:
     if len(points) > MAX_VERTICES:
         raise InputFileError(
             f"{path}: {len(points)} vertices, at most {MAX_VERTICES} are read; simplify the outline"

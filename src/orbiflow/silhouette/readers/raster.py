@@ -5,8 +5,7 @@ import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from numbers import Real
-from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +14,7 @@ from skimage.filters import threshold_otsu
 
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.silhouette.readers.reading import Reading, check_file
+from orbiflow.silhouette.readers.source import Source, opened
 from orbiflow.silhouette.readers.tracing import Level, trace
 
 MAX_BYTES = 64 * 2**20
@@ -27,22 +27,28 @@ _FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "GIF", "TIFF")
 _DAMAGED = (OSError, SyntaxError, ValueError, EOFError, KeyError, IndexError, TypeError)
 _DAMAGED += (OverflowError, MemoryError, ArithmeticError, Image.DecompressionBombError)
 
+_PARTS = {"alpha": ("opaque", "transparent"), "mask": ("marked", "unmarked")}
+"""Channels that say by themselves where the shape is: their high part and their low part."""
+
 _Decoded = TypeVar("_Decoded")
 
 
 @dataclass(frozen=True)
-class _Picture:
-    """One channel, 0 to 1, shape (H, W); each of its pixels is `reduced` pixels of the image wide."""
+class Picture:
+    """One channel, 0 to 1, shape (H, W); each of its pixels is `reduced` pixels of the image wide.
+
+    - `name`: "luminance"; or "alpha" or "mask", whose high part is the shape.
+    """
 
     channel: NDArray[np.float64]
-    name: str  # "alpha" or "luminance"
+    name: str
     size: tuple[int, int]
     reduced: int
     notes: tuple[str, ...]
 
 
 def read_image(
-    path: Path, *, threshold: float | None = None, invert: bool | None = None
+    path: Source, *, threshold: float | None = None, invert: bool | None = None
 ) -> Reading:
     """Read the outline of the shape in a PNG, JPEG or WebP image, in pixels with y down.
 
@@ -55,15 +61,20 @@ def read_image(
     Raises `InputFileError` for a file over 64 MB, an image over 40 megapixels, one that cannot be
     decoded, and one without a shape of its own; `OrbiflowError` for a threshold out of range.
     """
-    if threshold is not None and not (isinstance(threshold, Real) and 0 < threshold < 1):
-        raise OrbiflowError(f"threshold must lie between 0 and 1, got {threshold}")
+    checked_threshold(threshold)
     picture = open_image(path, _decode)
-    level, notes = _choose_shape(path, picture, threshold, invert)
+    level, notes = choose_shape(path, picture, threshold, invert)
     outline, traced = trace(path, level, scale=picture.reduced, size=picture.size)
     return Reading(outline, True, "image", picture.size, (*picture.notes, *notes, *traced))
 
 
-def open_image(path: Path, decode: Callable[[Path, Image.Image], _Decoded]) -> _Decoded:
+def checked_threshold(threshold: float | None) -> None:
+    """Raise OrbiflowError for a threshold out of range."""
+    if threshold is not None and not (isinstance(threshold, Real) and 0 < threshold < 1):
+        raise OrbiflowError(f"threshold must lie between 0 and 1, got {threshold}")
+
+
+def open_image(path: Source, decode: Callable[[Any, Image.Image], _Decoded]) -> _Decoded:
     """What `decode` makes of the image at `path`, which is opened within bounds.
 
     Raises `InputFileError` for a file over 64 MB, an image over 40 megapixels (before a pixel of it
@@ -79,8 +90,8 @@ def open_image(path: Path, decode: Callable[[Path, Image.Image], _Decoded]) -> _
         with warnings.catch_warnings():
             # Pillow warns of damaged metadata and of sizes that are refused here anyway.
             warnings.simplefilter("ignore")
-            with Image.open(path, formats=_FORMATS) as image:
-                _check_size(path, image.size)
+            with Image.open(opened(path), formats=_FORMATS) as image:
+                check_size(path, image.size)
                 return decode(path, image)
     except InputFileError:
         raise
@@ -99,7 +110,8 @@ def open_image(path: Path, decode: Callable[[Path, Image.Image], _Decoded]) -> _
         ) from exc
 
 
-def _check_size(path: Path, size: tuple[int, int]) -> None:
+def check_size(path: Source, size: tuple[int, int]) -> None:
+    """Raise InputFileError for a picture of `size` (width, height) that is too large or too small."""
     width, height = size
     if width * height > MAX_PIXELS:
         raise InputFileError(
@@ -109,7 +121,7 @@ def _check_size(path: Path, size: tuple[int, int]) -> None:
         raise InputFileError(f"{path}: {width} x {height} pixels cannot hold a silhouette")
 
 
-def _too_large(path: Path, size: str) -> str:
+def _too_large(path: Source, size: str) -> str:
     return f"{path}: {size}, at most {MAX_PIXELS // 10**6} megapixels are read; downscale the image"
 
 
@@ -134,16 +146,16 @@ def averaged(band: Image.Image) -> tuple[NDArray[np.float64], int]:
     return np.asarray(band.reduce(reduced), dtype=np.float64) / full_scale, reduced
 
 
-def _decode(path: Path, image: Image.Image) -> _Picture:
+def _decode(path: Source, image: Image.Image) -> Picture:
     turned, notes = upright(image)
     band, name, band_notes = _channel(path, turned)
     channel, reduced = averaged(band)
     if reduced > 1:
         notes.append(f"averaged {reduced} x {reduced} pixels into one before tracing")
-    return _Picture(channel, name, turned.size, reduced, (*notes, *band_notes))
+    return Picture(channel, name, turned.size, reduced, (*notes, *band_notes))
 
 
-def _channel(path: Path, image: Image.Image) -> tuple[Image.Image, str, list[str]]:
+def _channel(path: Source, image: Image.Image) -> tuple[Image.Image, str, list[str]]:
     """The channel that shows the shape: mode "L" (0 to 255) or "F" (0 to 1)."""
     if image.mode.startswith(("I", "F")):
         return deep_channel(path, image), "luminance", []
@@ -164,7 +176,7 @@ def _channel(path: Path, image: Image.Image) -> tuple[Image.Image, str, list[str
     return Image.alpha_composite(white, rgba).convert("L"), "luminance", [note]
 
 
-def deep_channel(path: Path, image: Image.Image) -> Image.Image:
+def deep_channel(path: Source, image: Image.Image) -> Image.Image:
     """A channel of more than 8 bits as mode "F", 0 to 1."""
     values = np.asarray(image, dtype=np.float32)
     if not np.isfinite(values).all():
@@ -178,8 +190,8 @@ def deep_channel(path: Path, image: Image.Image) -> Image.Image:
     return Image.fromarray(values / np.float32(full_scale))
 
 
-def _choose_shape(
-    path: Path, picture: _Picture, threshold: float | None, invert: bool | None
+def choose_shape(
+    path: Source, picture: Picture, threshold: float | None, invert: bool | None
 ) -> tuple[Level, list[str]]:
     """The level turned so that the shape is high, and notes of how it was told apart."""
     channel = picture.channel
@@ -199,10 +211,10 @@ def _choose_shape(
         )
     high = np.median(channel[above])
     low = np.median(channel[~above])
-    if picture.name == "alpha":
+    if picture.name in _PARTS:
         take_high = not invert
-        part = "opaque" if take_high else "transparent"
-        notes = [f"shape taken: the {part} part (alpha threshold {cut:.2f}{given})"]
+        part = _PARTS[picture.name][not take_high]
+        notes = [f"shape taken: the {part} part ({picture.name} threshold {cut:.2f}{given})"]
     else:
         take_high, notes = _polarity(above, invert, f"threshold {cut:.2f}{given}")
     if take_high:
@@ -210,9 +222,9 @@ def _choose_shape(
     return Level(1 - channel, 1 - cut, 1 - float(low)), notes
 
 
-def _cut(path: Path, picture: _Picture) -> float:
+def _cut(path: Source, picture: Picture) -> float:
     """Level midway between the usual levels of the two classes that Otsu's method finds."""
-    if picture.name == "alpha":
+    if picture.name in _PARTS:
         return 0.5
     channel = picture.channel
     above = channel > threshold_otsu(channel)

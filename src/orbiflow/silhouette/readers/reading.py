@@ -2,12 +2,12 @@
 
 import stat
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from orbiflow.errors import InputFileError
+from orbiflow.silhouette.readers.source import Held, Source
 
 
 @dataclass(frozen=True)
@@ -30,8 +30,12 @@ class Reading:
     corner: tuple[float, float] = (0.0, 0.0)
 
 
-def check_file(path: Path) -> int:
+def check_file(path: Source) -> int:
     """Size of the regular file at `path` in bytes; `InputFileError` where there is none to read."""
+    if isinstance(path, Held):
+        if not path.data:
+            raise InputFileError(f"{path}: there are no bytes in it; give the content of a file")
+        return len(path.data)
     try:
         status = path.stat()
     except FileNotFoundError as exc:
@@ -47,15 +51,9 @@ def check_file(path: Path) -> int:
     return status.st_size
 
 
-def read_bytes(path: Path, limit: int) -> bytes:
+def read_bytes(path: Source, limit: int) -> bytes:
     """Content of the file at `path`; refused when it is larger than `limit` bytes."""
-    try:
-        with path.open("rb") as file:
-            data = file.read(limit + 1)
-    except OSError as exc:
-        raise InputFileError(
-            f"{path}: cannot be read ({exc.strerror}); check its permissions"
-        ) from exc
+    data = read_head(path, limit + 1)
     if len(data) > limit:
         raise InputFileError(
             f"{path}: larger than {limit / 2**20:.0f} MB, the most that is read of this kind of "
@@ -64,8 +62,10 @@ def read_bytes(path: Path, limit: int) -> bytes:
     return data
 
 
-def read_head(path: Path, n: int) -> bytes:
+def read_head(path: Source, n: int) -> bytes:
     """First `n` bytes of the file at `path`, or all of a shorter one."""
+    if isinstance(path, Held):
+        return path.data[:n]
     try:
         with path.open("rb") as file:
             return file.read(n)

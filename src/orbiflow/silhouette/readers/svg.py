@@ -1,7 +1,5 @@
 """SVG drawings: the outline of the largest closed shape, in the drawing's own user units."""
 
-from pathlib import Path
-
 import numpy as np
 import shapely
 from numpy.typing import NDArray
@@ -19,6 +17,7 @@ from orbiflow.silhouette.outlines import (
 )
 from orbiflow.silhouette.readers.fill_rule import TooTangled, fill
 from orbiflow.silhouette.readers.reading import Reading, read_bytes
+from orbiflow.silhouette.readers.source import Source
 from orbiflow.silhouette.readers.svg_paths import MAX_POINTS, SubPath, TooManyPoints
 from orbiflow.silhouette.readers.svg_shapes import Drawing
 from orbiflow.silhouette.readers.svg_xml import parse_xml
@@ -33,7 +32,7 @@ GRID_FLOOR = 1e-12  # of the largest coordinate
 COLLINEAR = 1e-6  # of the size of the drawing: vertices nearer their chord than this are dropped
 
 
-def read_svg(path: Path) -> Reading:
+def read_svg(path: Source) -> Reading:
     """Read the outline of the silhouette in an SVG drawing, in user units with y down.
 
     User units are those of the viewBox (of the root element), whatever width and height say. All
@@ -136,7 +135,7 @@ def _covers(region: BaseGeometry, page: BaseGeometry) -> bool:
     return is_box and region.envelope.intersection(page).area >= 0.999 * page.area
 
 
-def _overlay(path: Path, regions: list[BaseGeometry]) -> BaseGeometry:
+def _overlay(path: Source, regions: list[BaseGeometry]) -> BaseGeometry:
     # Snapped to a grid: neighbours that all but share an edge would leave cracks between them.
     bounds = shapely.total_bounds(regions)
     size = max(bounds[2] - bounds[0], bounds[3] - bounds[1])

@@ -3,7 +3,6 @@
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from xml.etree.ElementTree import Element
 
 import numpy as np
@@ -11,6 +10,7 @@ import svgelements
 from numpy.typing import NDArray
 
 from orbiflow.errors import InputFileError
+from orbiflow.silhouette.readers.source import Source
 from orbiflow.silhouette.readers.svg_paths import SubPath, sub_paths
 from orbiflow.silhouette.readers.svg_xml import MAX_DEPTH, StyleSheet
 
@@ -78,7 +78,7 @@ class _Place:
 class Drawing:
     """An SVG drawing: walk it with `collect`, then read off `shapes` and what else was met."""
 
-    path: Path
+    path: Source
     root: Element
     shapes: list[DrawnShape] = field(default_factory=list)
     others: dict[str, int] = field(default_factory=dict)

@@ -1,11 +1,11 @@
 """The XML of an SVG file, read within bounds and without entities, and its simple CSS."""
 
 import re
-from pathlib import Path
 from xml.etree.ElementTree import Element, TreeBuilder
 from xml.parsers import expat
 
 from orbiflow.errors import InputFileError
+from orbiflow.silhouette.readers.source import Source
 
 MAX_ELEMENTS = 20_000
 MAX_DEPTH = 100
@@ -14,7 +14,7 @@ MAX_STYLE = 200_000  # characters
 _SELECTOR = re.compile(r"\*|[\w-]*(?:[.#][\w-]+)?")
 
 
-def parse_xml(path: Path, data: bytes) -> Element:
+def parse_xml(path: Source, data: bytes) -> Element:
     """Root element of the SVG document `data`, all names without their namespaces.
 
     Raises `InputFileError` when it is not well formed, declares entities (which can blow up to any
@@ -47,7 +47,7 @@ def parse_xml(path: Path, data: bytes) -> Element:
 
 
 class _BoundedTree:
-    def __init__(self, path: Path, parser: expat.XMLParserType) -> None:
+    def __init__(self, path: Source, parser: expat.XMLParserType) -> None:
         self.path, self.parser, self.builder = path, parser, TreeBuilder()
         self.count = self.depth = 0
 
@@ -84,7 +84,7 @@ class StyleSheet:
     Enough for what drawing programs write; rules with other selectors are passed over.
     """
 
-    def __init__(self, path: Path, root: Element) -> None:
+    def __init__(self, path: Source, root: Element) -> None:
         self.rules: dict[str, dict[str, str]] = {}
         text = "\n".join(style.text or "" for style in root.iter("style"))
         if len(text) > MAX_STYLE:

@@ -1,7 +1,6 @@
 """From a picture's level to the outline of its largest shape, to a fraction of a pixel."""
 
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +11,7 @@ from skimage.measure import find_contours
 from orbiflow.errors import InputFileError
 from orbiflow.geometry import polygons_in
 from orbiflow.silhouette.outlines import outer_ring, percent, simplified
+from orbiflow.silhouette.readers.source import Source
 
 MIN_AREA = 30.0  # square pixels
 MAX_OUTLINE_VERTICES = 4000
@@ -32,7 +32,7 @@ class Level:
 
 
 def trace(
-    path: Path, level: Level, *, scale: int, size: tuple[int, int]
+    path: Source, level: Level, *, scale: int, size: tuple[int, int]
 ) -> tuple[NDArray[np.float64], list[str]]:
     """Outline (N, 2) of the largest shape in image pixels, with notes.
 

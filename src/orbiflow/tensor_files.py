@@ -1,0 +1,71 @@
+"""Files of named tensors with a JSON header beside them: safetensors, never pickle."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from safetensors import SafetensorError
+from safetensors.torch import load, save
+from torch import Tensor
+
+from orbiflow.arguments import path as as_path
+from orbiflow.errors import InputFileError, OrbiflowError
+
+MAX_BYTES, MAX_HEADER = 256 * 2**20, 2**20
+KEY = "orbiflow"
+"""Under which the header stands among the file's metadata."""
+
+
+def tensor_bytes(
+    header: Mapping[str, Any], tensors: Mapping[str, Tensor], what: str = "tensors"
+) -> bytes:
+    """The content of a file that `read_tensors` reads again; `what` it holds is for messages.
+
+    Raises:
+        OrbiflowError: for a header that is not JSON, or more than a file may hold.
+    """
+    try:
+        text = json.dumps(header, allow_nan=False)
+    except (TypeError, ValueError) as error:
+        raise OrbiflowError(f"what is saved beside {what} must be JSON: {error}") from error
+    alone = {name: t.detach().cpu().contiguous().clone() for name, t in tensors.items()}
+    data = save(alone, metadata={KEY: text})
+    if int.from_bytes(data[:8], "little") > MAX_HEADER or len(data) > MAX_BYTES:
+        raise OrbiflowError(
+            f"the file would have {len(data) / 2**20:.1f} MB, {len(text) / 2**20:.1f} MB of them "
+            f"header; at most {MAX_BYTES / 2**20:g} and {MAX_HEADER / 2**20:g} are read again"
+        )
+    return data
+
+
+def read_tensors(path: str | Path, what: str) -> tuple[dict[str, Any], dict[str, Tensor]]:
+    """Header and tensors of a file; `what` it is to hold, such as "a flow", is for messages.
+
+    Raises:
+        InputFileError: if the file is missing, too large, damaged or of another kind.
+    """
+    path = as_path(path, "the file")
+    try:
+        size = path.stat().st_size
+        if size > MAX_BYTES:
+            raise InputFileError(
+                f"{path}: {size / 2**20:.0f} MB, {what} has at most {MAX_BYTES / 2**20:g} MB"
+            )
+        data = path.read_bytes()
+    except OSError as error:
+        raise InputFileError(f"cannot read {path}: {error.strerror or error}") from error
+    try:
+        length = int.from_bytes(data[:8], "little")
+        if not 2 <= length <= min(len(data) - 8, MAX_HEADER):
+            raise ValueError("no header")
+        header = json.loads(json.loads(data[8 : 8 + length])["__metadata__"][KEY])
+        if not isinstance(header, dict):
+            raise ValueError("its header is no table")
+        return header, load(data)
+    except (SafetensorError, ValueError, KeyError, TypeError, RecursionError) as error:
+        raise InputFileError(
+            f"{path}: not {what} saved by orbiflow, or damaged ({error})"
+        ) from error
