@@ -28,7 +28,18 @@ APART = 4
 ROWS = 4_000
 """Of each set, at most."""
 
-WINDOWS = {4: "2", 5: "3", 6: "4", 8: "22", 9: "23", 10: "33", 11: "34", 12: "44", 13: "223", 14: "233"}
+WINDOWS = {
+    4: "2",
+    5: "3",
+    6: "4",
+    8: "22",
+    9: "23",
+    10: "33",
+    11: "34",
+    12: "44",
+    13: "223",
+    14: "233",
+}
 """Side-chain angles of the residues of a window, by the number of all its angles."""
 
 
@@ -105,8 +116,10 @@ def main() -> None:
         arrays[f"structure_{dim}"] = np.array(
             [structures[rows[k][0].chain[0]] for k in order], dtype=np.int16
         )
-        print(f"T{dim}: {len(order)} of {len(rows)} windows, {len(set(arrays[f'structure_{dim}']))}"
-              " structures")
+        print(
+            f"T{dim}: {len(order)} of {len(rows)} windows, {len(set(arrays[f'structure_{dim}']))}"
+            " structures"
+        )
     np.savez_compressed(HERE, **arrays)
 
 
