@@ -25,7 +25,7 @@ def _file(name: str, what: str) -> Path:
 
 
 class Residue(NamedTuple):
-    """One-letter name, phi, psi in radians (not a number where there is none), the number of its chain."""
+    """One-letter name, phi and psi in radians (nan where there is none), the number of its chain."""
 
     name: str
     phi: float

@@ -1,10 +1,11 @@
 """The integral of a fitted density, from its values: no constant of the library is taken on trust.
 
-A density is a sum, so its parts are integrated one by one, each by the rule that suits it. Broad parts
-(flow, floor, chains, broad kernels) are summed over a grid of the whole space. Kernels narrower than the
-grid's cells are integrated each on a grid of its own width, as many as `LOOKED_AT` of them. On tori of
-more than three angles no grid is fine enough: each kernel is a product, integrated angle by angle, and
-chains are integrated by importance sampling from a kernel estimate of ours, which says its standard error.
+A density is a sum, so its parts are integrated one by one, each by the rule that suits it. Broad
+parts (flow, floor, chains, broad kernels) are summed over a grid of the whole space. Kernels
+narrower than a few cells are integrated each on a grid of its own width, as many as `LOOKED_AT` of
+them. On tori of many angles no grid is fine enough: a narrow kernel is a product, integrated angle
+by angle, and the others and the chains are integrated by importance sampling, from a kernel
+estimate with a floor.
 """
 
 from __future__ import annotations
@@ -46,7 +47,7 @@ class Integral(NamedTuple):
 
 @torch.no_grad()
 def integral(density: BlendedDensity, train: Data) -> Integral:
-    """Of a density fitted to rows `train`: angles in radians, or anything on spaces of two dimensions."""
+    """Of a density fitted to rows `train`; in radians, where there are more angles than two."""
     kernels = density.kernels
     narrow = (kernels.concentrations > BROAD).any(dim=1)
     share = float(density.shares[1])

@@ -1,4 +1,4 @@
-"""What a test log-likelihood can be: by atoms where rows repeat, by the data's entropy where they do not."""
+"""What a test log-likelihood can be: without limit where rows repeat, else as the entropy allows."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def embedded(data: Data, round_: bool) -> Data:
 
 
 def narrow_log_density(train: Data, test: Data, kappa: float, *, round_: bool) -> Data:
-    """Log of a kernel estimate of concentration `kappa`, so great that kernels are normal and see few rows.
+    """Log of a kernel estimate of a concentration so great that kernels are normal and see few rows.
 
     Distances are differences of coordinates: cosines would lose what is nearer than 1e-8.
     """

@@ -3,13 +3,13 @@
     python benchmarks/density_many.py [--splits K] [--grouped] [--alone] [--flow] [--workers W]
         [--quick] [DATA ...]
 
-sidechains-D: phi, psi and side-chain angles of one, two or three neighbouring residues (Top8000, in the
-repository: data/sidechains.npz). backbone-D: phi, psi of D / 2 residues in sequence (Top500). known-D: a
-hidden Markov chain of rotamers, whose density is known. rna-7: the RNA benchmark. Random 90/10 splits, or
-with --grouped those that keep a protein's or molecule's rows on one side; test NLL in nats per radian^D,
-beside a von Mises kernel estimate of one width and a floor, tuned. --alone: kernels, mixtures and chains
-alone as well, --flow: a neural flow on chains. Differences, regret, bar and seconds are those of
-density_default.py.
+sidechains-D: phi, psi and side-chain angles of one, two or three neighbouring residues (Top8000, in
+the repository: data/sidechains.npz). backbone-D: phi, psi of D / 2 residues in sequence (Top500).
+known-D: a hidden Markov chain of rotamers, whose density is known. rna-7: the RNA benchmark. Random
+90/10 splits, or with --grouped those that keep the rows of a protein or molecule on one side; test
+NLL in nats per radian^D, beside a von Mises kernel estimate of one width and a floor, tuned.
+--alone: kernels, mixtures and chains alone as well, --flow: a neural flow on chains. Differences,
+regret, bar and seconds are those of density_default.py.
 """
 
 from __future__ import annotations

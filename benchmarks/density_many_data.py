@@ -29,7 +29,7 @@ class Grouped(NamedTuple):
 def sidechains(dim: int) -> Grouped:
     """Torsion angles of neighbouring residues with their side chains, from the repository.
 
-    4, 5 and 6 are phi, psi, chi1 to chi2, chi3, chi4 of one residue; 7 has phi, psi and three chi of one
+    4, 5 and 6 are phi, psi and two, three, four chi of one residue; 7 has phi, psi and three chi of one
     and phi, psi of the next; from 8 on there are two residues, from 13 three, at most four apart.
     """
     with np.load(BUNDLED, allow_pickle=False) as arrays:

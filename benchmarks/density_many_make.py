@@ -11,7 +11,7 @@ from __future__ import annotations
 import csv
 import re
 import sys
-from itertools import chain
+from itertools import chain, pairwise
 from pathlib import Path
 from typing import NamedTuple
 
@@ -92,7 +92,7 @@ def with_backbone(chains: dict[tuple[str, str], dict[int, Residue]]) -> list[lis
     found = []
     for own in chains.values():
         numbers = sorted(own)
-        for first, second in zip(numbers, numbers[1:], strict=False):
+        for first, second in pairwise(numbers):
             if len(own[first].angles) == 5 and second - first <= APART:
                 after = own[second]
                 found.append([own[first], after._replace(angles=after.angles[:2])])

@@ -1,14 +1,14 @@
 """The likelihood of kinetic diffusions on tori, as it is evaluated, where the answer is known.
 
-TDM (Zhu et al., ICLR 2025) adds a velocity xi to each angle g: dg = xi dt, dxi = -xi dt + sqrt(2) dW. Its
-published code (github.com/yuchen-zhu-zyc/TDM, losses.py and sde.py) scores a test row by following the
-probability flow from t0 to T in fixed steps,
+TDM (Zhu et al., ICLR 2025) adds a velocity xi to each angle g: dg = xi dt, dxi = -xi dt + sqrt(2)
+dW. Its published code (github.com/yuchen-zhu-zyc/TDM, losses.py and sde.py) scores a test row by
+following the probability flow from t0 to T in fixed steps,
 
     xi <- exp(-dt) xi - (1 - exp(-dt)) score,    g <- g + dt xi,
 
-adding up the divergence -1 - d score / d xi at the start of each, and log p = sum + log N(xi_T) - log N(xi_0)
-- log 2 pi for each angle. Here the rows are wrapped normal: the score is known, so are the log density
-and the integral of what is estimated.
+adding up the divergence -1 - d score / d xi at the start of each; the log density is that sum + log
+N(xi_T) - log N(xi_0) - log 2 pi for each angle. Here the rows are wrapped normal: the score is
+known and so is the log density; what is estimated can be integrated.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ def log_wrapped(angle: Data, deviation: float) -> Data:
 def score(time: float, angle: Data, velocity: Data, deviation: float) -> tuple[Data, Data]:
     """d log p_t / d xi, exact, and its derivative by xi.
 
-    p_t is a sum of normals over the angle's turns: of variance s^2 + 2 (t - 1 + e^-t) in the angle, 1 in
-    the velocity and covariance 1 - e^-t.
+    p_t is a sum of normals over the angle's turns: of variance s^2 + 2 (t - 1 + e^-t) in the angle, 1
+    in the velocity and covariance 1 - e^-t.
     """
     left = 1 - math.exp(-time)
     variance = deviation**2 + 2 * (time - left)

@@ -2,12 +2,13 @@
 
     python benchmarks/density_record.py [--splits K] [--workers W] [--quick] [PART ...]
 
-table: ours on each data set, random 90/10 splits and grouped ones (equal locations; protein chains; RNA
-structures), with the integral of every density by quadrature (density_integral.py), and the published
-figures. narrow: test NLL of a tuned kernel estimate with ever narrower kernels added, on both kinds of
-split. entropy: what an estimate by nearest neighbours says of the data's entropy, and of that of as many
-draws from our density, whose entropy is known. scheme: the published evaluation of kinetic diffusions on a
-density that is known (density_momentum.py). Needs the tables of docs/benchmarks.md, scheme nothing.
+table: ours on each data set, random 90/10 splits and grouped ones (equal locations; protein chains;
+RNA structures), with the integral of every density by quadrature (density_integral.py), and the
+published figures. narrow: test NLL of a tuned kernel estimate with ever narrower kernels added, on
+both kinds of split. entropy: what an estimate by nearest neighbours says of the data's entropy, and
+of that of as many draws from our density, whose entropy is known. scheme: the published evaluation
+of kinetic diffusions on a density that is known (density_momentum.py). Needs the tables of
+docs/benchmarks.md, scheme nothing.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ from density_data import EARTH, TORI, Data, backbone_and_chains, earth, rna, rna
 from density_default_data import Drawn
 from density_integral import Integral, integral
 from density_limits import neighbour_entropy, with_narrow
-from density_momentum import mass, excess
+from density_momentum import excess, mass
 from numpy.typing import NDArray
 
 from orbiflow.density import BlendedDensity, DensityEstimator
@@ -134,12 +135,7 @@ def narrow(_count: int, _pool: ProcessPoolExecutor, names: tuple[str, ...]) -> N
         drawn, group, _ = load(name)
         for what in ("random", "grouped"):
             rest, test = halves(drawn, 0, group if what == "grouped" else None)
-            # rows held out as the test rows are: groups on one side
-            own = None
-            if what == "grouped":
-                _, own = np.unique(rest if name in EARTH else _groups(drawn, group, rest), axis=0,
-                                   return_inverse=True)  # fmt: skip
-                own = own.ravel()
+            own = _groups(drawn, group, rest) if what == "grouped" else None
             train, held = halves(Drawn(rest, drawn.space), 1, own)
             base, found = with_narrow(train, held, test, kappas, round_=drawn.space == "sphere")
             cells = "".join(f"{nll:9.3f} ({share:4.1%})" for nll, share in found)
@@ -149,7 +145,7 @@ def narrow(_count: int, _pool: ProcessPoolExecutor, names: tuple[str, ...]) -> N
 def _groups(drawn: Drawn, group: NDArray[np.integer], rows: Data) -> NDArray[np.integer]:
     """The group of each of some rows, by their values: those that are equal share one."""
     own = {bytes(place): number for place, number in zip(drawn.data, group, strict=True)}
-    return np.array([own[bytes(place)] for place in rows])[:, None]
+    return np.array([own[bytes(place)] for place in rows])
 
 
 def _width(kappa: float) -> str:
@@ -173,10 +169,8 @@ def entropy(_count: int, _pool: ProcessPoolExecutor, names: tuple[str, ...]) -> 
         draws = estimator.sample(len(drawn.data), random_state=1)
         truth = -estimator.score(draws)
         own, others = neighbour_entropy(drawn.data), neighbour_entropy(draws)
-        print(
-            f"{name:9}{len(drawn.data):8}{own:9.3f}{others:10.3f}{truth:8.3f}{own - others + truth:17.3f}",
-            flush=True,
-        )
+        cells = f"{own:9.3f}{others:10.3f}{truth:8.3f}{own - others + truth:17.3f}"
+        print(f"{name:9}{len(drawn.data):8}{cells}", flush=True)
 
 
 def scheme(_count: int, _pool: ProcessPoolExecutor, _names: tuple[str, ...]) -> None:
