@@ -154,11 +154,11 @@ def _width(kappa: float) -> str:
 
 
 def entropy(_count: int, _pool: ProcessPoolExecutor, names: tuple[str, ...]) -> None:
-    """Print estimates of the entropy of data on tori."""
+    """Print estimates of the entropy of data on tori, by nearest, second and fourth neighbours."""
+    print("entropy by neighbours, of the rows and of as many draws from our density, which has the")
     print(
-        "entropy by nearest neighbours, of the rows and of as many draws from our density, which has"
+        f"{'data':9}{'rows':>8}{'true':>9}{'neighbour':>11}{'of rows':>9}{'draws':>9}{'corrected':>11}"
     )
-    print(f"{'data':9}{'rows':>8}{'of rows':>9}{'of draws':>10}{'truly':>8}{'rows, corrected':>17}")
     for name in names:
         drawn, _, _ = load(name)
         if drawn.space != "torus":
@@ -168,9 +168,10 @@ def entropy(_count: int, _pool: ProcessPoolExecutor, names: tuple[str, ...]) -> 
         estimator = DensityEstimator("torus", seed=0, parts=parts).fit(drawn.data)
         draws = estimator.sample(len(drawn.data), random_state=1)
         truth = -estimator.score(draws)
-        own, others = neighbour_entropy(drawn.data), neighbour_entropy(draws)
-        cells = f"{own:9.3f}{others:10.3f}{truth:8.3f}{own - others + truth:17.3f}"
-        print(f"{name:9}{len(drawn.data):8}{cells}", flush=True)
+        for neighbour in (1, 2, 4):
+            own, other = (neighbour_entropy(part, neighbour) for part in (drawn.data, draws))
+            cells = f"{truth:9.3f}{neighbour:11}{own:9.3f}{other:9.3f}{own - other + truth:11.3f}"
+            print(f"{name:9}{len(drawn.data):8}{cells}", flush=True)
 
 
 def scheme(_count: int, _pool: ProcessPoolExecutor, _names: tuple[str, ...]) -> None:
