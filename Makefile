@@ -28,6 +28,8 @@ bench: $(VENV)/.installed-dev
 	$(BIN)/python benchmarks/density_nll.py --quick || test $$? -eq 2 # its data are not here
 	$(BIN)/python benchmarks/density_rna.py --quick || test $$? -eq 2
 	$(BIN)/python benchmarks/density_unoriented.py --quick
+	$(BIN)/python benchmarks/density_many.py --quick
+	$(BIN)/python benchmarks/density_record.py --quick || test $$? -eq 2
 
 docs: $(VENV)/.installed-docs
 	$(BIN)/python -m sphinx -b html -W --keep-going -q docs out/site

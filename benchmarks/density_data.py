@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import re
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from common import DATA, needed
@@ -22,42 +24,73 @@ def _file(name: str, what: str) -> Path:
     return needed(DATA / "density" / name, what)
 
 
-def backbone(kind: str) -> Data:
-    """phi, psi (N, 2) in radians of the Top500 proteins: a residue class of the benchmark.
+class Residue(NamedTuple):
+    """One-letter name, phi and psi in radians (nan where there is none), the number of its chain."""
 
-    The file's angles are rounded to `ROUNDED`. Uniform noise of that width is added, always the same:
-    else a kernel narrow enough scores any number of nats on rounded points that come back in the test
-    part (dequantisation, as is usual for pixels: Theis, van den Oord, Bethge, 2016).
-    """
-    rows: list[tuple[str, float, float, str]] = []
-    chain: list[tuple[str, str, str]] = []
+    name: str
+    phi: float
+    psi: float
+    chain: int
 
-    def close() -> None:
-        for (name, phi, psi), (after, *_) in zip(
-            chain, [*chain[1:], ("", "", "")][: len(chain)], strict=True
-        ):
-            if re.match(r"-?\d", phi) and re.match(r"-?\d", psi):
-                rows.append((name, float(phi), float(psi), after))
-        chain.clear()
 
-    for line in (
-        _file("torus/pyro_top500/top500.txt", "the Top500 backbones").read_text().splitlines()
-    ):
+def residues() -> list[Residue]:
+    """Of the Top500 proteins, in sequence."""
+    found, number = [], 0
+    path = _file("torus/pyro_top500/top500.txt", "the Top500 backbones")
+    for line in path.read_text().splitlines():
         if line.startswith("#"):
-            close()
+            number += 1
             continue
-        name, _, phi, psi = line.split()[:4] if len(line.split()) >= 4 else (*line.split(), "-")[:4]
-        chain.append((name, phi, psi))
-    close()
+        cells = line.split()
+        phi, psi = cells[2:4] if len(cells) >= 4 else ("-", "-")
+        found.append(Residue(cells[0], _angle(phi), _angle(psi), number))
+    return found
+
+
+def _angle(cell: str) -> float:
+    return float(cell) if re.match(r"-?\d", cell) else math.nan
+
+
+def backbone(kind: str) -> Data:
+    """phi, psi (N, 2) in radians of the Top500 proteins: a residue class of the benchmark."""
+    return backbone_and_chains(kind)[0]
+
+
+def backbone_and_chains(kind: str) -> tuple[Data, NDArray[np.int64]]:
+    """phi, psi (N, 2) in radians, and the number (N,) of the protein's chain."""
     wanted = {
         "glycine": lambda name, _: name == "G",
         "proline": lambda name, _: name == "P",
         "prepro": lambda name, after: name not in "GP" and after == "P",
         "general": lambda name, after: name not in "GP" and after != "P",
     }[kind]
-    angles = np.array([(phi, psi) for name, phi, psi, after in rows if wanted(name, after)])
+    every = residues()
+    rows = [
+        own
+        for own, after in zip(every, [*every[1:], Residue("", 0, 0, -1)], strict=True)
+        if math.isfinite(own.phi + own.psi)
+        and wanted(own.name, after.name if after.chain == own.chain else "")
+    ]
+    angles = np.array([(row.phi, row.psi) for row in rows])
+    return dequantised(angles), np.array([row.chain for row in rows])
+
+
+def dequantised(angles: Data) -> Data:
+    """Angles that are rounded to `ROUNDED`, with uniform noise of that width, always the same.
+
+    Else a kernel narrow enough scores any number of nats on rounded points that come back in the test
+    part (as is usual for pixels: Theis, van den Oord, Bethge, 2016).
+    """
     noise = np.random.default_rng(0).uniform(-0.5, 0.5, angles.shape)
     return np.remainder(angles + ROUNDED * noise + np.pi, 2 * np.pi) - np.pi
+
+
+def backbone_chains() -> list[Data]:
+    """phi, psi (L, 2) in radians of each chain of the Top500 proteins, with gaps of not a number."""
+    chains: dict[int, list[tuple[float, float]]] = {}
+    for row in residues():
+        chains.setdefault(row.chain, []).append((row.phi, row.psi))
+    return [np.array(rows) for rows in chains.values()]
 
 
 def earth(kind: str) -> Data:
@@ -72,6 +105,12 @@ def earth(kind: str) -> Data:
 def rna() -> Data:
     """Seven torsion angles (N, 7) in degrees."""
     return np.loadtxt(_file("torus/rna.tsv", "the torsion angles of RNA"), usecols=range(2, 9))
+
+
+def rna_structures() -> NDArray[np.str_]:
+    """The structure (N,) that each row of `rna` is of."""
+    path = _file("torus/rna.tsv", "the torsion angles of RNA")
+    return np.loadtxt(path, usecols=0, dtype=str)
 
 
 def poles() -> Data:

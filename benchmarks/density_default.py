@@ -14,100 +14,16 @@ processor time.
 from __future__ import annotations
 
 import argparse
-import math
-import time
-from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
-from typing import Any, NamedTuple
 
-import density_data
-import numpy as np
-import torch
-from density_default_data import SETS, Drawn, load
-from density_kde import KernelDensity
-from density_unoriented_kde import tuned
-
-from orbiflow.density import DensityEstimator, to_latlon
-
-Data = density_data.Data
-
-PARTS: dict[str, dict[str, Any]] = {
-    "default": {},
-    "flow": {"parts": "flow"},
-    "kernels": {"parts": "kernels"},
-    "mixture": {"parts": "mixture"},
-    "chains": {"parts": "chains"},
-}
-
-
-class Outcome(NamedTuple):
-    """Of one split: log densities (N,) of the test rows by each model, and seconds of each fit."""
-
-    scores: dict[str, Data]
-    seconds: dict[str, float]
-
-
-def kernel_estimate(train: Data, space: str) -> Callable[[Data], Data]:
-    """Of one width, tuned on a ninth of the rows."""
-    held, rest = train[: max(3, len(train) // 9)], train[max(3, len(train) // 9) :]
-    if space in ("torus", "sphere"):
-        found = KernelDensity.tuned(rest, held, round_=space == "sphere")
-        return KernelDensity(
-            train, found.kappa, round_=space == "sphere", floor=found.floor
-        ).score_samples
-    return tuned(rest, held, axes=space == "projective-plane").score_samples
+from density_compare import HEAD, PARTS, Outcome, compare, line
+from density_default_data import SETS, load
 
 
 def run(job: tuple[str, int, bool]) -> Outcome:
     """One split."""
-    torch.set_num_threads(1)
     name, seed, alone = job
-    drawn = load(name)
-    order = np.random.default_rng(seed).permutation(len(drawn.data))
-    cut = len(order) // 10 if drawn.trained is None else len(order) - drawn.trained
-    test, train = drawn.data[order[:cut]], drawn.data[order[cut:]]
-    scores, seconds = {}, {}
-    begin = time.process_time()
-    latlon = drawn.space in ("sphere", "projective-plane") and train.shape[1] == 3
-    forms = [to_latlon(part) if latlon else part for part in (train, test)]
-    scores["kernel"] = kernel_estimate(forms[0], drawn.space)(forms[1])
-    seconds["kernel"] = time.process_time() - begin
-    for part, options in PARTS.items():
-        chains = drawn.space == "torus" and train.shape[1] > 1
-        if part != "default" and (not alone or (part == "chains" and not chains)):
-            continue
-        begin = time.process_time()
-        estimator = DensityEstimator(drawn.space, seed=seed, **options).fit(train)
-        seconds[part] = time.process_time() - begin
-        scores[part] = estimator.score_samples(test)
-    if drawn.log_density is not None:
-        scores["truth"] = drawn.log_density(test)
-    return Outcome(scores, seconds)
-
-
-def line(name: str, drawn: Drawn, outcomes: list[Outcome]) -> str:
-    """A row of the table."""
-    scores = {
-        key: np.concatenate([outcome.scores[key] for outcome in outcomes])
-        for key in outcomes[0].scores
-    }
-    own = scores["default"]
-    others = {key: value for key, value in scores.items() if key not in ("default", "truth")}
-    best = max(others, key=lambda key: float(others[key].mean()))
-    worse = others[best] - own
-    error = float(worse.std() / math.sqrt(len(worse)))
-    mean = float(worse.mean())
-    columns = "".join(
-        f"{-scores[key].mean():10.3f}" if key in scores else f"{'':10}"
-        for key in ("kernel", "flow", "kernels", "mixture", "chains", "default")
-    )
-    regret = f"{(scores['truth'] - own).mean():8.3f}" if "truth" in scores else " " * 8
-    seconds = np.mean([outcome.seconds["default"] for outcome in outcomes])
-    verdict = "met" if mean <= max(0.01, 2 * error) else "MISSED"
-    return (
-        f"{name:14}{drawn.space[:10]:11}{drawn.trained or len(drawn.data):7}{columns}"
-        f"{mean:9.3f} +- {error:.3f}  {best:8}{regret}{seconds:8.1f}  {verdict}"
-    )
+    return compare(load(name), seed, list(PARTS) if alone else ["default"])
 
 
 def main() -> None:
@@ -124,10 +40,7 @@ def main() -> None:
     names, count = options.data or list(SETS), options.splits
     if options.quick:
         names, count = ["tiny", "axes"], 1
-    print(
-        "data          space            n    kernel      flow   kernels   mixture    chains   default"
-        "   difference      to      regret seconds"
-    )
+    print(HEAD)
     with ProcessPoolExecutor(options.workers) as pool:
         jobs = [(name, seed, options.alone) for name in names for seed in range(count)]
         found = pool.map(run, jobs)

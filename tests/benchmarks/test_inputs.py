@@ -78,9 +78,14 @@ def test_the_page_names_every_benchmark() -> None:
     page = (ROOT / "docs" / "benchmarks.md").read_text()
     helpers = {
         "common",
+        "density_compare",
         "density_data",
         "density_default_data",
+        "density_integral",
         "density_kde",
+        "density_limits",
+        "density_many_data",
+        "density_momentum",
         "density_unoriented_data",
     }
     helpers |= {"density_unoriented_kde", "likeness_methods"}

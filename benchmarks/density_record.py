@@ -1,0 +1,221 @@
+"""Published test log-likelihoods beside ours, and what each can be worth (docs/published.md).
+
+    python benchmarks/density_record.py [--splits K] [--workers W] [--quick] [PART ...]
+
+table: ours on each data set, random 90/10 splits and grouped ones (equal locations; protein chains;
+RNA structures), with the integral of every density by quadrature (density_integral.py), and the
+published figures. narrow: test NLL of a tuned kernel estimate with ever narrower kernels added, on
+both kinds of split. entropy: what an estimate by nearest neighbours says of the data's entropy, and
+of that of as many draws from our density, whose entropy is known. scheme: the published evaluation
+of kinetic diffusions on a density that is known (density_momentum.py). Needs the tables of
+docs/benchmarks.md, scheme nothing.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from typing import NamedTuple
+
+import numpy as np
+import torch
+from common import published
+from density_compare import halves
+from density_data import EARTH, TORI, Data, backbone_and_chains, earth, rna, rna_structures
+from density_default_data import Drawn
+from density_integral import Integral, integral
+from density_limits import neighbour_entropy, with_narrow
+from density_momentum import excess, mass
+from numpy.typing import NDArray
+
+from orbiflow.density import BlendedDensity, DensityEstimator
+
+SETS = (*EARTH, *TORI, "rna")
+PUBLISHED_NAME = {"quakes": "earthquake"}
+METHODS = ("moser", "rsgm", "rdm", "rfm", "gfm", "tdm", "wkbc")
+
+
+class Grouped(NamedTuple):
+    """Rows, their space, and the group (N,) of each; whether groups are equal rows."""
+
+    drawn: Drawn
+    group: NDArray[np.integer]
+    equal: bool
+
+
+def load(name: str) -> Grouped:
+    """A data set of the record."""
+    if name in EARTH:
+        rows = earth(name)
+        _, group = np.unique(rows, axis=0, return_inverse=True)
+        return Grouped(Drawn(rows, "sphere"), group.ravel(), True)
+    if name == "rna":
+        _, group = np.unique(rna_structures(), return_inverse=True)
+        return Grouped(Drawn(np.radians(rna()), "torus"), group, False)
+    rows, chain = backbone_and_chains(name)
+    _, group = np.unique(chain, return_inverse=True)
+    return Grouped(Drawn(rows, "torus"), group, False)
+
+
+class Row(NamedTuple):
+    """Of one split: test NLL, share of test rows that repeat a training row, the density's integral."""
+
+    nll: float
+    repeated: float
+    integral: Integral
+
+
+def fitted(name: str, seed: int, grouped: bool) -> tuple[DensityEstimator, Data, Data]:
+    """The default, and the training and test rows."""
+    drawn, group, equal = load(name)
+    train, test = halves(drawn, seed, group if grouped else None)
+    repeats = "rounding" if grouped and equal else "places"
+    return DensityEstimator(drawn.space, seed=seed, repeats=repeats).fit(train), train, test
+
+
+def row(job: tuple[str, int, bool]) -> Row:
+    """One split."""
+    torch.set_num_threads(1)
+    estimator, train, test = fitted(*job)
+    known = set(map(bytes, train))
+    density = estimator.density_
+    assert isinstance(density, BlendedDensity)
+    return Row(
+        -estimator.score(test),
+        float(np.mean([bytes(place) in known for place in test])),
+        integral(density, train),
+    )
+
+
+def table(count: int, pool: ProcessPoolExecutor, names: tuple[str, ...]) -> None:
+    """Print ours beside the published figures."""
+    figures = published("density_nll")
+    print(f"{count} splits: ours, mean and spread; test rows that repeat a training row; integrals")
+    print(
+        f"{'data':9}{'random':>17}{'repeat':>8}{'grouped':>17}"
+        + "".join(f"{m:>8}" for m in METHODS)
+    )
+    jobs = [
+        (name, seed, grouped)
+        for name in names
+        for grouped in (False, True)
+        for seed in range(count)
+    ]
+    found = pool.map(row, jobs)
+    for name in names:
+        random, grouped = ([next(found) for _ in range(count)] for _ in range(2))
+        others = [figures.get(m, {}).get(PUBLISHED_NAME.get(name, name), math.nan) for m in METHODS]
+        print(
+            f"{name:9}{_spread(random)}{np.mean([r.repeated for r in random]):8.1%}{_spread(grouped)}"
+            + "".join(f"{value:8.2f}" if math.isfinite(value) else f"{'':8}" for value in others)
+        )
+        for what, rows in (("random", random), ("grouped", grouped)):
+            whole = "  ".join(
+                f"{r.integral.value:.5f}"
+                + (f" +- {r.integral.error:.5f}" if r.integral.error else "")
+                + f" (narrow kernels within {r.integral.worst_kernel:.0e})"
+                for r in rows
+            )
+            print(f"{'':9}integral, {what}: {whole}", flush=True)
+
+
+def _spread(rows: list[Row]) -> str:
+    values = [r.nll for r in rows]
+    return f"{np.mean(values):9.3f} +- {np.std(values):.3f}"
+
+
+def narrow(_count: int, _pool: ProcessPoolExecutor, names: tuple[str, ...]) -> None:
+    """Print test NLL by the width of added kernels."""
+    kappas = 10.0 ** np.arange(5, 14, 2)
+    print("test NLL of a kernel estimate, and with kernels of these deviations added (their share)")
+    print(f"{'data':9}{'split':9}{'tuned':>8}" + "".join(f"{_width(k):>16}" for k in kappas))
+    for name in names:
+        drawn, group, _ = load(name)
+        for what in ("random", "grouped"):
+            rest, test = halves(drawn, 0, group if what == "grouped" else None)
+            own = _groups(drawn, group, rest) if what == "grouped" else None
+            train, held = halves(Drawn(rest, drawn.space), 1, own)
+            base, found = with_narrow(train, held, test, kappas, round_=drawn.space == "sphere")
+            cells = "".join(f"{nll:9.3f} ({share:4.1%})" for nll, share in found)
+            print(f"{name:9}{what:9}{base:8.3f}{cells}", flush=True)
+
+
+def _groups(drawn: Drawn, group: NDArray[np.integer], rows: Data) -> NDArray[np.integer]:
+    """The group of each of some rows, by their values: those that are equal share one."""
+    own = {bytes(place): number for place, number in zip(drawn.data, group, strict=True)}
+    return np.array([own[bytes(place)] for place in rows])
+
+
+def _width(kappa: float) -> str:
+    degrees = math.degrees(kappa**-0.5)
+    return f"{degrees:.1g} deg" if degrees > 1e-3 else f"{degrees:.0e} deg"
+
+
+def entropy(_count: int, _pool: ProcessPoolExecutor, names: tuple[str, ...]) -> None:
+    """Print estimates of the entropy of data on tori, by nearest, second and fourth neighbours."""
+    print("entropy by neighbours, of the rows and of as many draws from our density, which has the")
+    print(
+        f"{'data':9}{'rows':>8}{'true':>9}{'neighbour':>11}{'of rows':>9}{'draws':>9}{'corrected':>11}"
+    )
+    for name in names:
+        drawn, _, _ = load(name)
+        if drawn.space != "torus":
+            continue
+        torch.set_num_threads(1)
+        parts = "mixture,chains"  # smooth: draws from kernels lie beside each other
+        estimator = DensityEstimator("torus", seed=0, parts=parts).fit(drawn.data)
+        draws = estimator.sample(len(drawn.data), random_state=1)
+        truth = -estimator.score(draws)
+        for neighbour in (1, 2, 4):
+            own, other = (neighbour_entropy(part, neighbour) for part in (drawn.data, draws))
+            cells = f"{truth:9.3f}{neighbour:11}{own:9.3f}{other:9.3f}{own - other + truth:11.3f}"
+            print(f"{name:9}{len(drawn.data):8}{cells}", flush=True)
+
+
+def scheme(_count: int, _pool: ProcessPoolExecutor, _names: tuple[str, ...]) -> None:
+    """Print how far the published evaluation is off, by the width of the density and its steps."""
+    degrees = (1, 2, 4, 8, 16, 40)
+    print("estimated less true NLL of one angle, wrapped normal, exact score; mass of the estimate")
+    print(f"{'T':>4}{'t0':>8}{'steps':>7}" + "".join(f"{d:>11} deg" for d in degrees))
+    for end, start in ((15.0, 1e-2), (2.0, 1e-4)):
+        for steps in (100, 300, 1000):
+            time = {"end": end, "start": start}
+            cells = []
+            for d in degrees:
+                width = math.radians(d)
+                off = excess(width, steps, rows=4_000, **time)
+                cells.append(f"{off:+8.3f} {mass(width, steps, **time):6.3f}")
+            print(f"{end:4g}{start:8g}{steps:7}" + "".join(f"{c:>15}" for c in cells), flush=True)
+
+
+PARTS: dict[str, Callable[[int, ProcessPoolExecutor, tuple[str, ...]], None]] = {
+    "scheme": scheme,
+    "narrow": narrow,
+    "entropy": entropy,
+    "table": table,
+}
+
+
+def main() -> None:
+    """Print the parts."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("parts", nargs="*", metavar="PART", help=f"{', '.join(PARTS)} (all)")
+    parser.add_argument("--data", nargs="+", choices=SETS, default=list(SETS))
+    parser.add_argument("--splits", type=int, default=2)
+    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--quick", action="store_true", help="proline, one split")
+    options = parser.parse_args()
+    if unknown := set(options.parts) - set(PARTS):
+        parser.error(f"no such part: {', '.join(sorted(unknown))}")
+    names = ("proline",) if options.quick else tuple(options.data)
+    parts = options.parts or (["narrow", "table"] if options.quick else list(PARTS))
+    with ProcessPoolExecutor(options.workers) as pool:
+        for part in parts:
+            PARTS[part](1 if options.quick else options.splits, pool, names)
+            print()
+
+
+if __name__ == "__main__":
+    main()
