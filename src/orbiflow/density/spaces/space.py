@@ -117,8 +117,7 @@ class Space(ABC):
         Raises:
             OrbiflowError: for a measure that is not one of `MEASURES`.
         """
-        if not isinstance(measure, str) or measure not in MEASURES:
-            raise OrbiflowError(f"measure must be one of {', '.join(MEASURES)}, got {measure!r}")
+        check_measure(measure)
         if measure == "square":
             return torch.zeros_like(points[..., 0])
         shift = math.log(self.volume) if measure == "uniform" else 0.0
@@ -176,6 +175,15 @@ class Space(ABC):
     def __repr__(self) -> str:
         options = ", ".join(f"{k}={v!r}" for k, v in self.settings().items())
         return f"{type(self).__name__}({options})"
+
+
+def check_measure(measure: str) -> None:
+    """
+    Raises:
+        OrbiflowError: for a measure that is not one of `MEASURES`.
+    """
+    if not isinstance(measure, str) or measure not in MEASURES:
+        raise OrbiflowError(f"measure must be one of {', '.join(MEASURES)}, got {measure!r}")
 
 
 def rectangle(space: Space) -> Tensor:
