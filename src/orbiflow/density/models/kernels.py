@@ -11,7 +11,7 @@ from torch import Tensor
 
 from orbiflow.density.arguments import float_tensor
 from orbiflow.density.models.bases import Base
-from orbiflow.density.models.near_sums import near_log_sum
+from orbiflow.density.models.near_sums import TOLERANCE, near_log_sum
 from orbiflow.density.models.terms import Terms
 from orbiflow.density.spaces.round import RoundSpace
 from orbiflow.density.spaces.space import Space, rectangle
@@ -72,17 +72,33 @@ class AdaptiveKernels(Base):
         values = self.log_density(points)
         return values + self.space.log_area(points) if self.space.is_round else values
 
-    def log_density(self, points: Tensor, beside: float = -math.inf) -> Tensor:
+    def log_density(
+        self, points: Tensor, beside: float = -math.inf, tolerance: float = TOLERANCE
+    ) -> Tensor:
         """As `log_prob`, but on round spaces with respect to the round area: (...,) at points (..., d).
 
         Args:
-            beside: logarithm of a constant density that will be added. What is left out or interpolated
-                is off by `orbiflow.density.models.near_sums.TOLERANCE` of the sum of both at most.
+            beside: logarithm of a constant density that will be added.
+            tolerance: of the sum of both, what far kernels that are left out may add, and smooth ones
+                that are interpolated may be off, at most each.
         """
         flat = points.reshape(-1, self.space.dim).double()
         features = self.space.features(flat)[0].mT
-        values = near_log_sum(self._terms, features.contiguous(), beside)
+        values = near_log_sum(self._terms, features.contiguous(), beside, tolerance)
         return values.reshape(points.shape[:-1]).to(points.dtype)
+
+    def parted(self, wide: Tensor) -> tuple[AdaptiveKernels | None, AdaptiveKernels | None, float]:
+        """Those of a mask (N,) and the others, each with weights of sum 1, and the former's weight."""
+        weight = float(self.weights[wide].sum())
+        found = [
+            AdaptiveKernels(
+                self.space, self.centers[w], self.concentrations[w], self.weights[w] / share
+            )
+            if share > 0
+            else None
+            for w, share in ((wide, weight), (~wide, float(self.weights[~wide].sum())))
+        ]
+        return found[0], found[1], weight
 
     def sample(self, count: int, generator: torch.Generator) -> Tensor:
         seed = int(torch.randint(2**31, (), generator=generator))

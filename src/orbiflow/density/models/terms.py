@@ -1,8 +1,8 @@
 """Sums of kernels as tables: terms that fall off with the distance on products of unit spheres.
 
-Features (m, N) are points on F factors: circles in the plane, one for each angle, or one sphere in space.
-Component i belongs to factor i modulo F. Terms and points lie last, so that sums over components run
-along the memory.
+Features (m, N) are points on F factors: circles in the plane, one for each angle, or one sphere in
+space. Component i belongs to factor i modulo F. Terms and points lie last, so that sums over components
+run along the memory.
 """
 
 from __future__ import annotations
@@ -68,6 +68,26 @@ class Terms(NamedTuple):
             for part in parts
         ]
         return (sums[0] if len(sums) == 1 else torch.cat(sums)).log() + top
+
+    def log_sum_and_slope(
+        self, features: Tensor, middle: Tensor, spread: float
+    ) -> tuple[Tensor, Tensor]:
+        """As `log_sum`, and its gradient (m, N) in the features; not differentiable."""
+        rows, bias = self._about(middle[:, None])
+        bias = bias - self.peaks.max()
+        offset = features - middle[:, None]
+        seen = torch.cat([offset, lengths2(offset, self.factors)])
+        values, slopes = [], []
+        for part in seen.split(max(1, BLOCK_ENTRIES // self.count), dim=1):
+            table = torch.addmm(bias, part.mT, rows)
+            top = table.amax(dim=1, keepdim=True) if spread > WIDE else table.new_zeros(1, 1)
+            table.sub_(top).clamp_min_(-WIDE - 80).exp_()
+            total = table.sum(dim=1)
+            values.append(total.log() + top[:, 0])
+            slopes.append(rows @ table.mT / total)
+        linear, square = torch.cat(slopes, dim=1).split([len(middle), self.factors])
+        repeated = square.repeat(len(middle) // self.factors, 1)
+        return torch.cat(values) + self.peaks.max(), linear + 2 * repeated * offset
 
     def _about(self, middle: Tensor) -> tuple[Tensor, Tensor]:
         """Rows (m + F, K) and bias (K,): exponents are linear in offsets and their squares."""

@@ -22,6 +22,9 @@ TURNS = 9
 BETWEEN = 1.5
 """Logarithm of how much larger a term may be between those points."""
 
+ROUNDING = math.log(1e-15)
+"""Of the largest value, what the arithmetic of interpolation loses elsewhere in the tile."""
+
 POLE = 0.75
 """Largest coordinate, beyond the reals too: the chart has poles at plus and minus i."""
 
@@ -67,7 +70,8 @@ class Chart:
         self.factors, self._tile = tile.factors, tile
         pole = tile.middle.reshape(-1, self.factors)
         self._frame = _frame(pole / pole.norm(dim=0))
-        u = torch.cat([local[1:] / (1 + local[:1]) for local in self._turned(features)])
+        self._local = self._turned(features)
+        u = torch.cat([local[1:] / (1 + local[:1]) for local in self._local])
         low, high = u.amin(dim=1), u.amax(dim=1)
         self.middle, self.half = (low + high) / 2, ((high - low) / 2).clamp_min(1e-9)
         self._t = (u - self.middle[:, None]) / self.half[:, None]
@@ -101,21 +105,41 @@ class Chart:
                 best += largest - terms.peaks + self._nearest2(terms, factor) / 2
             worst = best if worst is None else torch.maximum(worst, best)
         assert worst is not None
-        return worst + terms.peaks
+        return torch.maximum(worst + terms.peaks, largest + ROUNDING)
 
-    def sum(self, terms: Terms, top: float) -> Tensor:
-        """The sum (N,) of terms at the tile's points, over exp(top)."""
+    def sum(self, terms: Terms, top: float, *, slope: bool) -> tuple[Tensor, Tensor | None]:
+        """The sum (N,) of terms at the tile's points, over exp(top), and its gradient (m, N) if asked.
+
+        The gradient is that of some continuation beyond the spheres.
+        """
         nodes = _nodes()
         sides = self.middle[:, None] + self.half[:, None] * nodes
-        table = (
-            self._product(terms, top, sides)
-            if len(terms.kappa) == 2
-            else self._dense(terms, top, sides)
-        )
-        weights = [_lagrange(t) for t in self._t]
+        flat = len(terms.kappa) == 2
+        table = self._product(terms, top, sides) if flat else self._dense(terms, top, sides)
+        weights, rates = zip(*(_lagrange(t, slope) for t in self._t), strict=True)
         if len(weights) == 1:
-            return weights[0] @ table[:, 0]
-        return ((weights[0] @ table) * weights[1]).sum(dim=1)
+            values, rated = weights[0] @ table[:, 0], [rates[0] @ table[:, 0]] if slope else []
+        else:
+            first = weights[0] @ table
+            values = (first * weights[1]).sum(dim=1)
+            rated = [
+                *([((rates[0] @ table) * weights[1]).sum(dim=1)] if slope else []),
+                *([(first * rates[1]).sum(dim=1)] if slope else []),
+            ]
+        if not slope:
+            return values, None
+        return values, self._in_features(torch.stack(rated) / self.half[:, None])
+
+    def _in_features(self, slope: Tensor) -> Tensor:
+        """A gradient (D, N) in the coordinates as one in the features, (m, N)."""
+        found = []
+        parts = slope.split(len(slope) // self.factors)
+        for frame, local, part in zip(self._frame, self._local, parts, strict=True):
+            below = 1 + local[:1]
+            across = part / below
+            along = -(across * local[1:] / below).sum(dim=0, keepdim=True)
+            found.append(frame.mT @ torch.cat([along, across]))
+        return torch.stack(found, dim=1).flatten(0, 1)
 
     def _product(self, terms: Terms, top: float, sides: Tensor) -> Tensor:
         """Values (n, n) at the nodes of terms that are products of functions of the two coordinates."""
@@ -228,7 +252,12 @@ def _transform() -> Tensor:
         return matrix * (2 / NODES)
 
 
-def _lagrange(t: Tensor) -> Tensor:
-    """(N, n): weights of the values at the nodes for the polynomial's values at t (N,)."""
-    powers = torch.cos(torch.acos(t.clamp(-1, 1))[:, None] * torch.arange(NODES, dtype=t.dtype))
-    return powers @ _transform()
+def _lagrange(t: Tensor, slope: bool) -> tuple[Tensor, Tensor | None]:
+    """(N, n): weights of the values at the nodes for the polynomial's values at t (N,), and slopes."""
+    values, rates = [torch.ones_like(t), t], [torch.zeros_like(t), torch.ones_like(t)]
+    for _ in range(NODES - 2):
+        values.append(2 * t * values[-1] - values[-2])
+        if slope:
+            rates.append(2 * values[-2] + 2 * t * rates[-1] - rates[-2])
+    found = torch.stack(values, dim=1) @ _transform()
+    return found, torch.stack(rates, dim=1) @ _transform() if slope else None

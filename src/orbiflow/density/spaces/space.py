@@ -107,6 +107,21 @@ class Space(ABC):
     def from_chart(self, points: Tensor) -> Array:
         """Chart points (N, d) to data (N, k)."""
 
+    def cover(self, data: ArrayLike) -> Tensor:
+        """Points (N, d) of the plane that data (N, k) stand for: `to_chart`, or images of it."""
+        return self.to_chart(data)
+
+    @abstractmethod
+    def data_gradient(self, data: ArrayLike, points: Tensor, gradient: Tensor) -> Array:
+        """Gradients (N, k) in the data's own coordinates, from those (N, d) in the chart at `points`.
+
+        Args:
+            points: `cover` of the data.
+
+        Per unit of each angle: radian, degree or turn. On round spaces per degree of latitude and
+        longitude, or, of unit vectors, the vector of R^3 that is tangent to the sphere, per radian.
+        """
+
     @abstractmethod
     def settings(self) -> dict[str, Any]:
         """What, with `name`, makes the same space again; ready for JSON."""
