@@ -20,8 +20,8 @@ from orbiflow.density import (
 )
 from orbiflow.density.slopes import log_density_gradient
 from orbiflow.errors import OrbiflowError
-from orbiflow.fields import SplineField
 from orbiflow.flows import Flow
+from strategies import random_field
 
 TURN = np.linalg.qr(np.random.default_rng(5).normal(size=(3, 3)))[0]
 SPACES: dict[str, Space] = {
@@ -40,9 +40,8 @@ SPACES: dict[str, Space] = {
 def density_on(space: Space, seed: int, share: float) -> SymmetricDensity:
     """A flow of one field, kernels and a floor."""
     torch.manual_seed(seed)
-    field = SplineField(space.group, 2)
-    with torch.no_grad():
-        field.parameters_.normal_(std=0.05)
+    # of waves: a spline's divergence has kinks, where numerical derivatives are off
+    flow = Flow(random_field(space.group, 2, seed % 2**31, rms=0.05), steps=4, warn=False)
     width = 1 if space.is_round else space.dim
     kernels = AdaptiveKernels(
         space,
@@ -51,9 +50,7 @@ def density_on(space: Space, seed: int, share: float) -> SymmetricDensity:
         torch.softmax(torch.randn(6, dtype=torch.float64), dim=0),
     )
     shares = torch.tensor([share, 0.7 - share, 0.3])
-    return BlendedDensity(
-        space, Flow([field], steps=4, warn=False), UniformBase(space), kernels, shares
-    )
+    return BlendedDensity(space, flow, UniformBase(space), kernels, shares)
 
 
 def data_on(space: Space, seed: int) -> np.ndarray:
@@ -86,7 +83,7 @@ def log_density(density: SymmetricDensity, data: np.ndarray) -> np.ndarray:
 
 
 @given(st.sampled_from(sorted(SPACES)), st.integers(0, 2**31), st.sampled_from([0.0, 0.4]))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=15, deadline=None)
 def test_the_gradient_is_the_numerical_one(name: str, seed: int, share: float) -> None:
     space = SPACES[name]
     density, data = density_on(space, seed, share), data_on(space, seed)

@@ -78,8 +78,8 @@ class DensityFitRequest(Request):
 class DensityScoreRequest(Request):
     """Add log densities to a table; see `orbiflow density score --help`.
 
-    - `columns`, `header`, `drop_missing`, `missing`, `weights`: as for a fit; rows left out get an empty
-      cell, weights are of the mean.
+    - `columns`, `header`, `drop_missing`, `missing`, `weights`: as for a fit; rows left out get an
+      empty cell, weights are of the mean.
     - `region`: add the mass of the smallest highest-density region that holds each row, too.
     - `gradient`: whether the gradient in the data's own coordinates is added, a column each.
     - `table`: whether log densities are read off a table, whose error is told.
