@@ -4,8 +4,8 @@
 
 Points in forty clusters of 0.01 to 0.3 radians. Fit: seconds of processor time. Then evaluations a
 second of processor time, side by side in one run: of `log_prob`; of its gradient in the points; of all
-kernels for all points; and off a `TabulatedDensity`, once made. Off: largest differences in nats, of the
-exact evaluation to that of all kernels (which knows the narrowest ones to 1e-9), and of the table to
+kernels for all points; and off a `TabulatedDensity`, once made. Off: largest differences in nats, of
+the exact one to that of all kernels (which knows the narrowest ones to 1e-9), and of the table to
 the exact one at the density's own points. --parts: of the density, such as kernels. --search:
 `GridSearchCV` over five settings of 2,000 points in five folds.
 """
