@@ -3,7 +3,14 @@
 import pytest
 import torch
 
-from orbiflow.density import SymmetricDensity, TabulatedDensity, Torus, make_space
+from orbiflow.density import (
+    AdaptiveKernels,
+    BlendedDensity,
+    SymmetricDensity,
+    TabulatedDensity,
+    Torus,
+    make_space,
+)
 from orbiflow.errors import OrbiflowError
 from orbiflow.fields import SplineField
 from orbiflow.flows import Flow
@@ -44,6 +51,25 @@ def test_the_table_is_invariant(name: str) -> None:
     for element in table.space.group.cosets:
         there = table.log_prob(element(points) + 2, measure="uniform")
         assert torch.allclose(there, table.log_prob(points, measure="uniform"), atol=1e-9)
+
+
+@pytest.mark.parametrize("name", SPACES)
+def test_kernels_narrower_than_a_cell_are_kept_apart(name: str) -> None:
+    torch.manual_seed(5)
+    plain = some_density(name)
+    space = plain.space
+    width = 1 if space.is_round else 2
+    kappa = 10 ** (1 + 6 * torch.rand(200, 1, dtype=torch.float64)).expand(200, width)
+    kernels = AdaptiveKernels(
+        space, torch.rand(200, 2, dtype=torch.float64), kappa, torch.full((200,), 1 / 200)
+    )
+    shares = torch.tensor([0.3, 0.6, 0.1])
+    density = BlendedDensity(space, plain.flow, plain.base, kernels, shares)
+    table = TabulatedDensity(density, 128)
+    assert table.error < 5e-3
+    points = density.sample((1000,), torch.Generator().manual_seed(1))
+    off = (table.log_prob(points) - density.log_prob(points)).detach().abs()
+    assert float(off.max()) < 5 * table.largest + 1e-9
 
 
 def test_a_finer_table_is_nearer() -> None:

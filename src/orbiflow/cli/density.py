@@ -145,6 +145,22 @@ def score(
             "the row.",
         ),
     ] = False,
+    gradient: Annotated[
+        bool,
+        typer.Option(
+            "--gradient",
+            help="Add the gradient of log_prob, a column for each of the data's: per unit of each "
+            "angle, per degree of lat and lon, tangent vectors of x,y,z.",
+        ),
+    ] = False,
+    table: Annotated[
+        bool,
+        typer.Option(
+            "--table",
+            help="Read log densities off a table, in two dimensions: faster where a flow or chains "
+            "have a share. Its error is said.",
+        ),
+    ] = False,
 ) -> None:
     """Add a column log_prob, in nats, to a table."""
     request = DensityScoreRequest(
@@ -158,6 +174,8 @@ def score(
         weights=weights,
         measure=measure.value,
         region=region,
+        gradient=gradient,
+        table=table,
     )
     do(request)
 

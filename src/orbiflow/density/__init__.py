@@ -26,6 +26,7 @@ from orbiflow.density.models import (
     midpoints,
 )
 from orbiflow.density.partial import conditional, log_prob_observed, marginal
+from orbiflow.density.slopes import log_density_gradient
 from orbiflow.density.spaces import (
     MEASURES,
     SPACES,
@@ -75,6 +76,7 @@ __all__ = [
     "fit_neural",
     "from_klein",
     "kl_by_quadrature",
+    "log_density_gradient",
     "log_prob_observed",
     "make_space",
     "marginal",

@@ -37,6 +37,7 @@ from orbiflow.density.partial import (
     marginal,
 )
 from orbiflow.density.random_state import RandomState, seed_of
+from orbiflow.density.slopes import log_density_gradient
 from orbiflow.density.spaces.catalogue import space_class
 from orbiflow.density.spaces.space import Space
 from orbiflow.errors import OrbiflowError
@@ -278,6 +279,14 @@ class DensityEstimator:
             if bool(points.isnan().any()):
                 return log_prob_observed(density, points, measure=measure).numpy()
             return density.log_prob(points, measure=measure).numpy()
+
+    def score_gradient(self, X: ArrayLike) -> Array:
+        """Gradients (N, k) of the log density in natural measure, in the data's own coordinates.
+
+        In nats per unit of each angle; per degree of latitude and longitude; of unit vectors the
+        tangent vector that points uphill, per radian. See `log_density_gradient`.
+        """
+        return log_density_gradient(self._fitted(), np.asarray(X))[1]
 
     def score(
         self, X: ArrayLike, y: object = None, sample_weight: ArrayLike | None = None

@@ -85,6 +85,8 @@ class DensityScoreRequest(Request):
     - `columns`, `header`, `drop_missing`, `missing`, `weights`: as for a fit; rows left out get an
       empty cell, weights are of the mean.
     - `region`: add the mass of the smallest highest-density region that holds each row, too.
+    - `gradient`: whether the gradient in the data's own coordinates is added, a column each.
+    - `table`: whether log densities are read off a table, whose error is told.
     """
 
     KIND = "density-score"
@@ -99,12 +101,20 @@ class DensityScoreRequest(Request):
     weights: str | None = None
     measure: Measure = "natural"
     region: bool = False
+    gradient: bool = False
+    table: bool = False
 
     def check(self) -> None:
         columns_named(self.columns)
         _check_missing(self.drop_missing, self.missing)
         if self.region and self.missing == "marginalise":
             raise RecordError("{region} is of whole rows: leave it out, or {missing} marginalise")
+        if self.gradient and self.table:
+            raise RecordError("{gradient} is exact and {table} is not: give one of them")
+        if (self.gradient or self.table) and self.missing == "marginalise":
+            raise RecordError(
+                "{gradient} and {table} are of whole rows: leave them out, or {missing} marginalise"
+            )
 
 
 @dataclass(frozen=True)

@@ -19,12 +19,11 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.files import write_atomic
 from orbiflow.jobs.density_data import model_at, read_data, read_weighed, same_columns
 from orbiflow.jobs.density_requests import DensitySampleRequest, DensityScoreRequest, PatchesRequest
+from orbiflow.jobs.density_scores import evaluated
 from orbiflow.jobs.events import Finished, Note, Progress, Written
 from orbiflow.jobs.run import Sink
 from orbiflow.symmetry.isometry import Array
 from orbiflow.threads import one_thread
-
-BLOCK = 65_536
 
 
 @one_thread()
@@ -57,16 +56,10 @@ def density_score(request: DensityScoreRequest, tell: Sink, cancel: Cancel) -> F
     known = ~points.isnan()
     lacking = int((~known.all(dim=1)).sum())
     log_prob = log_prob_observed if lacking else type(density).log_prob
-    parts = []
-    with torch.no_grad():
-        for start in range(0, len(points), BLOCK):
-            cancel.check()
-            block = points[start : start + BLOCK]
-            parts.append(log_prob(density, block, measure=request.measure))
-            tell(Progress(min(1.0, (start + BLOCK) / len(points)), "scoring"))
-    scores = torch.cat(parts).numpy()
+    added = evaluated(density, table, points, log_prob, request, tell, cancel)
     name = "log_prob_marginal" if lacking else "log_prob"
-    added = {name: scores}
+    scores = added.pop("log_prob")
+    added = {name: scores, **added}
     if request.region:
         tell(Progress(1.0, "drawing samples"))
         natural = scores_of(density, table.values) if request.measure != "natural" else scores

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+import math
+from typing import Any, ClassVar
 
 import torch
 from torch import Tensor
@@ -11,8 +12,8 @@ from orbiflow.density.arguments import check_kind, float_tensor, points_tensor
 from orbiflow.density.models.bases import Base, UniformBase
 from orbiflow.density.models.chains import VonMisesChains
 from orbiflow.density.models.kernels import AdaptiveKernels
-from orbiflow.density.models.symmetric import SymmetricDensity, shape_of
-from orbiflow.density.spaces.space import Space
+from orbiflow.density.models.symmetric import BLOCK, SymmetricDensity, shape_of
+from orbiflow.density.spaces.space import CHART, Space, check_measure
 from orbiflow.errors import OrbiflowError
 from orbiflow.flows import Flow
 from orbiflow.threads import one_thread
@@ -34,6 +35,8 @@ class BlendedDensity(SymmetricDensity):
     Raises:
         OrbiflowError: for shares that are no proportions.
     """
+
+    block: ClassVar[int] = 2**19  # tiles of many points cost less a point
 
     def __init__(
         self,
@@ -73,31 +76,61 @@ class BlendedDensity(SymmetricDensity):
         return others if self.chains is None else (*others, self.chains)
 
     def _log_prob(self, value: Tensor, measure: str) -> Tensor:
-        parts = [*self._flow_part(value), *(part.log_prob(value) for part in self._others)]
-        blended = self._sum(parts, self.shares[-len(parts) :])
-        return blended + self.space.log_density_factor(value, measure)
+        return self._shifted(self._parts(value, kernels=True), value, measure)
 
     @one_thread()
-    def log_prob_without_kernels(self, points: Tensor) -> Tensor:
+    def log_prob_without_kernels(self, points: Tensor, *, measure: str = CHART) -> Tensor:
         """Log of the density less the kernels' share of it, (N,) at chart points (N, d).
 
-        With respect to the square's area; of integral 1 - shares_1.
+        Of integral 1 - shares_1.
         """
         value = points_tensor(points, self.space.dim).to(self._like().dtype)
-        parts = [*self._flow_part(value), *(part.log_prob(value) for part in self._others[1:])]
-        shares = torch.cat([self.shares[:1], self.shares[2:]])
-        return self._sum(parts, shares[-len(parts) :])
+        return self._shifted(self._parts(value, kernels=False), value, measure)
 
-    def _flow_part(self, value: Tensor) -> list[Tensor]:
-        """The flow's log density, or nothing where it has no share."""
-        if float(self.shares[0]) == 0:
-            return []
-        start, log_det = self.flow.inverse_and_log_det(value)
-        return [self.base.log_prob(start) + log_det]
+    @property
+    def kernels_beside(self) -> float:
+        """Logarithm of the floor over the kernels' share, for `AdaptiveKernels.log_density`."""
+        ratio = float((self.shares[2] / self.shares[1]).log())
+        return ratio - math.log(self.space.volume) if self.space.is_round else ratio
 
-    def _sum(self, parts: list[Tensor], shares: Tensor) -> Tensor:
-        weighted = [part + s.log() for part, s in zip(parts, shares.to(parts[0]), strict=True)]
-        return torch.stack(weighted).logsumexp(dim=0)
+    def _parts(self, value: Tensor, *, kernels: bool) -> Tensor:
+        """Log density (...,) per round area on round spaces, per area of the square on flat ones."""
+        log_shares = self.shares.log().to(value)
+        floor = -math.log(self.space.volume) if self.space.is_round else 0.0
+        total = (log_shares[2] + floor).expand(value.shape[:-1])
+        if kernels:
+            own = self.kernels.log_density(value, self.kernels_beside)
+            total = torch.logaddexp(total, own + log_shares[1])
+        if self.chains is not None:
+            total = torch.logaddexp(total, self.chains.log_prob(value) + log_shares[3])
+        if float(self.shares[0]) > 0:
+            flow = self._of_flow(value)
+            if self.space.is_round:
+                flow = flow - self.space.log_area(value)
+            total = torch.logaddexp(total, flow + log_shares[0])
+        return total
+
+    def _of_flow(self, value: Tensor) -> Tensor:
+        """The flow's log density (...,) per area of the square; in blocks if it needs no gradient."""
+        if torch.is_grad_enabled():
+            start, log_det = self.flow.inverse_and_log_det(value)
+            return self.base.log_prob(start) + log_det
+        parts = []
+        for block in value.reshape(-1, self.space.dim).split(BLOCK):
+            start, log_det = self.flow.inverse_and_log_det(block)
+            parts.append(self.base.log_prob(start) + log_det)
+        return torch.cat(parts).reshape(value.shape[:-1])
+
+    def _shifted(self, values: Tensor, points: Tensor, measure: str) -> Tensor:
+        """Log densities as of `_parts` with respect to `measure`."""
+        check_measure(measure)
+        volume = math.log(self.space.volume)
+        if measure == CHART:
+            return values + self.space.log_area(points) if self.space.is_round else values
+        shift = (0.0 if self.space.is_round else -volume) + (
+            volume if measure == "uniform" else 0.0
+        )
+        return values + shift
 
     @one_thread()
     def rsample(self, sample_shape: Any = (), generator: torch.Generator | None = None) -> Tensor:

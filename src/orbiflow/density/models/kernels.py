@@ -11,14 +11,12 @@ from torch import Tensor
 
 from orbiflow.density.arguments import float_tensor
 from orbiflow.density.models.bases import Base
-from orbiflow.density.models.log_sum import log_sum_exp
+from orbiflow.density.models.near_sums import TOLERANCE, near_log_sum
+from orbiflow.density.models.terms import Terms
 from orbiflow.density.spaces.round import RoundSpace
 from orbiflow.density.spaces.space import Space, rectangle
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry.isometry import Array
-
-BLOCK_ENTRIES = 250_000
-"""Of the table of points against kernels worked on at a time: few enough for the cache."""
 
 
 class AdaptiveKernels(Base):
@@ -66,20 +64,41 @@ class AdaptiveKernels(Base):
         self.centers, self.concentrations, self.weights = (
             t.double() for t in (centers, concentrations, weights)
         )
-        self._center_features = space.features(self.centers)[0]
+        images = space.features(self.centers)
+        self._center_features = images[0]
+        self._terms = _terms(space, images, self.concentrations, self.weights)
 
     def log_prob(self, points: Tensor) -> Tensor:
+        values = self.log_density(points)
+        return values + self.space.log_area(points) if self.space.is_round else values
+
+    def log_density(
+        self, points: Tensor, beside: float = -math.inf, tolerance: float = TOLERANCE
+    ) -> Tensor:
+        """As `log_prob`, but on round spaces with respect to the round area: (...,) at points (..., d).
+
+        Args:
+            beside: logarithm of a constant density that will be added.
+            tolerance: of the sum of both, what far kernels that are left out may add, and smooth ones
+                that are interpolated may be off, at most each.
+        """
         flat = points.reshape(-1, self.space.dim).double()
-        rows, offsets = kernel_rows(self.space, self._center_features, self.concentrations)
-        rows, offsets = rows.mT.contiguous(), offsets + self.weights.log()
-        block = max(1, BLOCK_ENTRIES // len(self.centers))
-        # features of all at once: block by block they would cost more than the kernels
-        images = self.space.features(flat)
-        parts = [_log_sum(part, rows, offsets) for part in images.split(block, dim=1)]
-        values = torch.cat(parts)
-        if self.space.is_round:
-            values = values + self.space.log_area(flat)
+        features = self.space.features(flat)[0].mT
+        values = near_log_sum(self._terms, features.contiguous(), beside, tolerance)
         return values.reshape(points.shape[:-1]).to(points.dtype)
+
+    def parted(self, wide: Tensor) -> tuple[AdaptiveKernels | None, AdaptiveKernels | None, float]:
+        """Those of a mask (N,) and the others, each with weights of sum 1, and the former's weight."""
+        weight = float(self.weights[wide].sum())
+        found = [
+            AdaptiveKernels(
+                self.space, self.centers[w], self.concentrations[w], self.weights[w] / share
+            )
+            if share > 0
+            else None
+            for w, share in ((wide, weight), (~wide, float(self.weights[~wide].sum())))
+        ]
+        return found[0], found[1], weight
 
     def sample(self, count: int, generator: torch.Generator) -> Tensor:
         seed = int(torch.randint(2**31, (), generator=generator))
@@ -96,10 +115,23 @@ class AdaptiveKernels(Base):
         )
 
 
-def _log_sum(images: Tensor, rows: Tensor, offsets: Tensor) -> Tensor:
-    """(N,) of features (E, N, m): over kernels and images."""
-    sums = [log_sum_exp(torch.addmm(offsets, image, rows)) for image in images]
-    return torch.stack(sums).logsumexp(dim=0)
+def _terms(space: Space, images: Tensor, kappa: Tensor, weights: Tensor) -> Terms:
+    """Kernels about all images (E, N, m) of their centers: then points need no images."""
+    if space.is_round:
+        every = kappa.mT.repeat(1, len(images))
+        peaks = _round_peaks(kappa[:, 0])
+    else:
+        # the lattice's rectangle leaves signed permutations of the axes
+        turns = [torch.as_tensor(np.abs(g.linear)) for g in space.group.cosets]
+        every = torch.cat([turn @ kappa.mT for turn in turns], dim=1)
+        peaks = -(torch.special.i0e(kappa) * rectangle(space)).log().sum(dim=1)
+    centers = images.flatten(0, 1).mT.contiguous()
+    return Terms(centers, every, (peaks + weights.log()).repeat(len(images)))
+
+
+def _round_peaks(kappa: Tensor) -> Tensor:
+    """Logarithms of the largest values of von Mises-Fisher kernels, per round area."""
+    return (kappa / (2 * math.pi)).log() - (-torch.expm1(-2 * kappa)).log()
 
 
 def kernel_rows(space: Space, centers: Tensor, kappa: Tensor) -> tuple[Tensor, Tensor]:
@@ -109,8 +141,7 @@ def kernel_rows(space: Space, centers: Tensor, kappa: Tensor) -> tuple[Tensor, T
     """
     if space.is_round:
         k = kappa[:, 0]
-        offsets = (k / (2 * math.pi)).log() - torch.log1p(-torch.exp(-2 * k)) - k
-        return kappa * centers, offsets
+        return kappa * centers, _round_peaks(k) - k
     scaled = torch.special.i0e(kappa) * rectangle(space)
     return torch.cat([kappa, kappa], dim=1) * centers, -(scaled.log() + kappa).sum(dim=1)
 

@@ -40,6 +40,7 @@ class SymmetricDensity(Distribution):
 
     arg_constraints: ClassVar[dict[str, Any]] = {}
     has_rsample = True
+    block: ClassVar[int] = BLOCK
 
     error: float = 0.0
     """Nats, root mean square, by which a density with tabulated parts is off what it stands for; see
@@ -68,10 +69,10 @@ class SymmetricDensity(Distribution):
         """
         points = points_tensor(value, self.space.dim)
         own = points.to(self._like().dtype)
-        if torch.is_grad_enabled() or own[..., 0].numel() <= BLOCK:
+        if torch.is_grad_enabled() or own[..., 0].numel() <= self.block:
             return self._log_prob(own, measure).to(points.dtype)
         flat = own.reshape(-1, self.space.dim)
-        parts = [self._log_prob(block, measure) for block in flat.split(BLOCK)]
+        parts = [self._log_prob(block, measure) for block in flat.split(self.block)]
         return torch.cat(parts).reshape(points.shape[:-1]).to(points.dtype)
 
     def _log_prob(self, value: Tensor, measure: str) -> Tensor:

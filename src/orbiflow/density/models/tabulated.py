@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import torch
 from torch import Tensor
 
 from orbiflow.density.arguments import check_kind, check_range, points_tensor
+from orbiflow.density.models.blend import BlendedDensity
+from orbiflow.density.models.kernels import AdaptiveKernels
 from orbiflow.density.models.symmetric import SymmetricDensity, midpoints
 from orbiflow.density.spaces.space import CHART, rectangle
 from orbiflow.errors import OrbiflowError
@@ -21,10 +24,19 @@ BLOCK = 16384
 """Points looked up at a time: their sixteen coefficients stay in the cache."""
 
 
+CELLS = 4.0
+"""Deviations, in cells of the table, of the narrowest kernels that it can follow."""
+
+LOOSE = 1e-7
+"""Of the density, what is left out of the sum of narrower ones, at most."""
+
+
 class TabulatedDensity:
     """The cubic spline through a density's logarithm, relative to the uniform one, on an even grid.
 
-    Invariant under the group as the density is. No longer normalised to rounding, only to `error`.
+    Kernels narrower than `CELLS` cells are not on the table: those near a point are summed, so the
+    error is that of what is smooth. Invariant under the group as the density is. No longer normalised
+    to rounding, only to `error`.
 
     Args:
         density: in two dimensions, on a rectangular lattice.
@@ -46,7 +58,9 @@ class TabulatedDensity:
             raise OrbiflowError(f"a table needs two dimensions, this {space.name} has {space.dim}")
         check_range("resolution", resolution, 8, 4096, integer=True)
         self.space, self.resolution = space, resolution
-        self._table = padded(self._coefficients(density)[None])
+        self._narrow: AdaptiveKernels | None = None
+        smooth = self._smooth_part(density)
+        self._table = padded(self._coefficients(smooth)[None])
         generator = torch.Generator().manual_seed(seed)
         with torch.no_grad():
             drawn = density.sample((CHECKED,), generator)
@@ -55,7 +69,30 @@ class TabulatedDensity:
         self.error = float(off[0].square().mean().sqrt())
         self.largest = float(torch.cat(off).abs().max())
 
-    def _coefficients(self, density: SymmetricDensity) -> Tensor:
+    def _smooth_part(self, density: SymmetricDensity) -> Callable[[Tensor], Tensor]:
+        """Log of what is tabulated at points (N, 2), relative to the uniform density.
+
+        Sets aside what is not.
+        """
+        if not isinstance(density, BlendedDensity):
+            return lambda points: density.log_prob(points, measure="uniform")
+        wide, self._narrow, share = density.kernels.parted(_wide(density.kernels, self.resolution))
+        of_kernels, volume = float(density.shares[1]), math.log(self.space.volume)
+        # the kernels' own measure is the round area, or that of the square
+        self._shift = volume if self.space.is_round else 0.0
+        self._floor = float(density.shares[2])
+        self._log_share = math.log(of_kernels * (1 - share)) if self._narrow else -math.inf
+        if wide is None:
+            return lambda points: density.log_prob_without_kernels(points, measure="uniform")
+
+        def smooth(points: Tensor) -> Tensor:
+            rest = density.log_prob_without_kernels(points, measure="uniform")
+            own = wide.log_density(points, tolerance=LOOSE).to(rest)
+            return torch.logaddexp(rest, own + math.log(of_kernels * share) + self._shift)
+
+        return smooth
+
+    def _coefficients(self, smooth: Callable[[Tensor], Tensor]) -> Tensor:
         space, n = self.space, self.resolution
         sides = [round(n * float(p)) for p in rectangle(space)]
         # half a step off: no point falls on a cone point, where the area factor is singular
@@ -63,7 +100,7 @@ class TabulatedDensity:
         grid = torch.stack(torch.meshgrid(*axes, indexing="ij"), dim=-1).reshape(-1, 2)
         cell = (space.project(grid) * n).floor().long().clamp(0, n - 1)
         with torch.no_grad():
-            values = density.log_prob(midpoints(space, n), measure="uniform").reshape(n, n)
+            values = smooth(midpoints(space, n)).double().reshape(n, n)
         whole = values[cell[:, 0], cell[:, 1]].reshape(sides)
         along, across = (symbol(m) for m in sides)
         spectrum = torch.fft.fft2(whole) / (along[:, None] * across[None, :])
@@ -83,6 +120,10 @@ class TabulatedDensity:
         cells = flat.mT * self.resolution - 0.5
         parts = [spline_sum(self._table, block)[0] for block in cells.split(BLOCK, dim=1)]
         values = torch.cat(parts)
+        if self._narrow is not None:
+            beside = math.log(self._floor) - self._log_share - self._shift
+            own = self._narrow.log_density(flat, beside, LOOSE)
+            values = torch.logaddexp(values, own + (self._log_share + self._shift))
         if measure == "natural":  # the area factor, costlier than the table, drops out
             values = values - math.log(self.space.volume)
         elif measure != "uniform":
@@ -95,3 +136,15 @@ class TabulatedDensity:
             f"TabulatedDensity({self.space!r}, {self.resolution} points a side, "
             f"error {self.error:.1e} nats)"
         )
+
+
+def _wide(kernels: AdaptiveKernels, resolution: int) -> Tensor:
+    """Which kernels (N,) a table of this resolution can follow along both axes."""
+    space = kernels.space
+    if space.is_round:  # the chart is conformal
+        scale = (space.log_area(kernels.centers) / 2).exp()[:, None]
+        # it is far from even across a wide kernel: nothing is narrower than it would be at best
+        scale = scale.clamp_min(0.5)
+    else:
+        scale = 2 * math.pi / rectangle(space)
+    return (kernels.concentrations**-0.5 > CELLS / resolution * scale).all(dim=1)

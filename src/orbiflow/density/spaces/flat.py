@@ -77,8 +77,15 @@ class Torus(Space):
         return self.period**self.dim
 
     def to_chart(self, data: ArrayLike) -> Tensor:
+        return self.project(self.cover(data))
+
+    def cover(self, data: ArrayLike) -> Tensor:
         table = checked_table(data, (self.dim,), f"{self.dim} angles")
-        return self.project(torch.tensor(table / self.period))
+        return torch.tensor(table / self.period)
+
+    def data_gradient(self, data: ArrayLike, points: Tensor, gradient: Tensor) -> Array:
+        del data, points
+        return gradient.numpy() / self.period
 
     def from_chart(self, points: Tensor) -> Array:
         """Angles (N, dim) in [-1/2, 1/2) turns."""
@@ -136,8 +143,16 @@ class KleinBottle(Space):
         return self.period**2 / 2
 
     def to_chart(self, data: ArrayLike) -> Tensor:
+        return self.project(self.cover(data))
+
+    def cover(self, data: ArrayLike) -> Tensor:
         theta, phi = checked_table(data, (2,), "theta and phi").T / self.period
-        return self.project(torch.tensor(np.stack([phi + 0.25, 2 * theta], axis=-1)))
+        return torch.tensor(np.stack([phi + 0.25, 2 * theta], axis=-1))
+
+    def data_gradient(self, data: ArrayLike, points: Tensor, gradient: Tensor) -> Array:
+        del data, points
+        along_x, along_y = gradient.numpy().T
+        return np.stack([2 * along_y, along_x], axis=-1) / self.period
 
     def from_chart(self, points: Tensor) -> Array:
         """(N, 2): theta in [0, 1/2) turns, phi in [-1/4, 3/4) turns."""

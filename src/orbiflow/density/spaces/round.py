@@ -126,6 +126,32 @@ class RoundSpace(Space):
     def to_chart(self, data: ArrayLike) -> Tensor:
         return self.vectors_to_chart(to_vectors(data))
 
+    def data_gradient(self, data: ArrayLike, points: Tensor, gradient: Tensor) -> Array:
+        """As of any space; at cone points, where the chart says nothing, not a number."""
+        own = to_vectors(data)
+        with torch.enable_grad():
+            at = points.detach().clone().requires_grad_()
+            found = self.unit_vectors(at)
+            rows = [
+                torch.autograd.grad(found[:, k].sum(), at, retain_graph=k < 2)[0] for k in range(3)
+            ]
+        # conformal: the transpose over the squared scale is the inverse
+        jacobian = torch.stack(rows, dim=1)
+        scale = (jacobian**2).sum(dim=(1, 2)) / 2
+        slope = (torch.einsum("nkd,nd->nk", jacobian, gradient) / scale[:, None]).numpy()
+        # of an axis the chart may have the other end
+        slope *= np.sign((own * found.detach().numpy()).sum(axis=1, keepdims=True))
+        if np.shape(data)[1] == 3:
+            return slope
+        lat, lon = np.radians(np.asarray(data, dtype=np.float64).T)
+        north = np.stack(
+            [-np.sin(lat) * np.cos(lon), -np.sin(lat) * np.sin(lon), np.cos(lat)], axis=-1
+        )
+        east = np.stack([-np.sin(lon), np.cos(lon), np.zeros_like(lon)], axis=-1)
+        east *= np.cos(lat)[:, None]
+        per_degree = [(slope * direction).sum(axis=1) for direction in (north, east)]
+        return np.radians(np.stack(per_degree, axis=-1))
+
     def from_chart(self, points: Tensor) -> Array:
         vectors = self._representatives(self.vectors(points))
         return vectors if self.form == "vector" else to_latlon(vectors)

@@ -109,6 +109,21 @@ class Space(ABC):
     def from_chart(self, points: Tensor) -> Array:
         """Chart points (N, d) to data (N, k)."""
 
+    def cover(self, data: ArrayLike) -> Tensor:
+        """Points (N, d) of the plane that data (N, k) stand for: `to_chart`, or images of it."""
+        return self.to_chart(data)
+
+    @abstractmethod
+    def data_gradient(self, data: ArrayLike, points: Tensor, gradient: Tensor) -> Array:
+        """Gradients (N, k) in the data's own coordinates, from those (N, d) in the chart at `points`.
+
+        Args:
+            points: `cover` of the data.
+
+        Per unit of each angle: radian, degree or turn. On round spaces per degree of latitude and
+        longitude, or, of unit vectors, the vector of R^3 that is tangent to the sphere, per radian.
+        """
+
     @abstractmethod
     def settings(self) -> dict[str, Any]:
         """What, with `name`, makes the same space again; ready for JSON."""
@@ -119,8 +134,7 @@ class Space(ABC):
         Raises:
             OrbiflowError: for a measure that is not one of `MEASURES`.
         """
-        if not isinstance(measure, str) or measure not in MEASURES:
-            raise OrbiflowError(f"measure must be one of {', '.join(MEASURES)}, got {measure!r}")
+        check_measure(measure)
         if measure == "square":
             return torch.zeros_like(points[..., 0])
         shift = math.log(self.volume) if measure == "uniform" else 0.0
@@ -191,6 +205,15 @@ class Space(ABC):
     def __repr__(self) -> str:
         options = ", ".join(f"{k}={v!r}" for k, v in self.settings().items())
         return f"{type(self).__name__}({options})"
+
+
+def check_measure(measure: str) -> None:
+    """
+    Raises:
+        OrbiflowError: for a measure that is not one of `MEASURES`.
+    """
+    if not isinstance(measure, str) or measure not in MEASURES:
+        raise OrbiflowError(f"measure must be one of {', '.join(MEASURES)}, got {measure!r}")
 
 
 def rectangle(space: Space) -> Tensor:

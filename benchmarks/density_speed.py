@@ -1,0 +1,163 @@
+"""How fast default densities are fitted and evaluated: exactly, off a table, and kernel by kernel.
+
+    python benchmarks/density_speed.py [--rows N ...] [--points N] [--quick] [SPACE ...]
+
+Points in forty clusters of 0.01 to 0.3 radians. Fit: seconds of processor time. Then evaluations a
+second of processor time, side by side in one run: of `log_prob`; of its gradient in the points; of all
+kernels for all points; and off a `TabulatedDensity`, once made. Off: largest differences in nats, of
+the exact one to that of all kernels (which knows the narrowest ones to 1e-9), and of the table to
+the exact one at the density's own points. --parts: of the density, such as kernels. --search:
+`GridSearchCV` over five settings of 2,000 points in five folds.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from orbiflow.density import (
+    BlendedDensity,
+    DensityEstimator,
+    SymmetricDensity,
+    TabulatedDensity,
+    log_density_gradient,
+)
+from orbiflow.density.models.kernels import kernel_rows
+from orbiflow.density.models.log_sum import log_sum_exp
+from orbiflow.density.models.terms import BLOCK_ENTRIES
+
+SPACES = ("torus", "sphere", "klein-bottle", "projective-plane", "three angles")
+DENSE = 2_000
+"""Points at which all kernels are summed."""
+
+
+class Speed(NamedTuple):
+    """Of one evaluation: processor seconds, and the points."""
+
+    seconds: float
+    points: int
+
+    def __str__(self) -> str:
+        return f"{self.points / self.seconds:12,.0f}"
+
+
+def clustered(space: str, rows: int, seed: int = 0) -> NDArray[np.float64]:
+    """Data (N, k) in the units of the space."""
+    rng = np.random.default_rng(seed)
+    round_ = space in ("sphere", "projective-plane")
+    dims = 3 if round_ or space == "three angles" else 2
+    middles = rng.normal(size=(40, dims)) * (1 if round_ else 3)
+    if round_:
+        middles /= np.linalg.norm(middles, axis=1, keepdims=True)
+    spread = rng.uniform(0.01, 0.3, 40)
+    which = rng.integers(40, size=rows)
+    data = middles[which] + spread[which, None] * rng.normal(size=(rows, dims))
+    return data / np.linalg.norm(data, axis=1, keepdims=True) if round_ else data
+
+
+def timed(function: Callable[[], torch.Tensor], points: int) -> tuple[torch.Tensor, Speed]:
+    """What it returns and how long it takes."""
+    begin = time.process_time()
+    found = function()
+    return found, Speed(time.process_time() - begin, points)
+
+
+def dense(density: BlendedDensity, points: torch.Tensor) -> torch.Tensor:
+    """Log density (N,), all kernels at all points, as the formula says."""
+    space, kernels = density.space, density.kernels
+    rows, offsets = kernel_rows(space, space.features(kernels.centers)[0], kernels.concentrations)
+    rows, offsets = rows.mT.contiguous(), offsets + kernels.weights.log()
+    block = max(1, BLOCK_ENTRIES // len(offsets))
+    parts = [
+        torch.stack([log_sum_exp(torch.addmm(offsets, end, rows)) for end in ends]).logsumexp(dim=0)
+        for ends in space.features(points).split(block, dim=1)
+    ]
+    own = torch.cat(parts) + density.shares[1].log()
+    if space.is_round:
+        own = own + space.log_area(points)
+    return torch.logaddexp(own, density.log_prob_without_kernels(points))
+
+
+def line(space: str, rows: int, points: int, parts: str) -> str:
+    """A row of the table."""
+    data = clustered(space, rows)
+    begin = time.process_time()
+    name = "torus" if space == "three angles" else space
+    estimator = DensityEstimator(name, parts=parts).fit(data)
+    fit = time.process_time() - begin
+    density = estimator.density_
+    assert isinstance(density, BlendedDensity)
+    generator = torch.Generator().manual_seed(0)
+    drawn = density.sample((points,), generator)
+    some = drawn[:DENSE]
+    with torch.no_grad():
+        exact, of_exact = timed(lambda: density.log_prob(drawn), points)
+        whole, of_dense = timed(lambda: dense(density, some), len(some))
+    off = float((density.log_prob(some) - whole).detach().abs().max())
+    few = min(points, 50_000)
+    chart = density.space.from_chart(drawn[:few])
+    _, of_slope = timed(lambda: torch.tensor(log_density_gradient(density, chart)[0]), few)
+    shown = f"{'':>12}{'':>10}"
+    if density.space.dim == 2:
+        shown = tabulated(density, drawn, exact)
+    return (
+        f"{space:18}{rows:8,}{fit:9.1f}{len(density.kernels.weights):10,}{of_exact}{of_slope}"
+        f"{of_dense}{off:10.1e}{shown}"
+    )
+
+
+def tabulated(density: SymmetricDensity, drawn: torch.Tensor, exact: torch.Tensor) -> str:
+    """Columns of the table's speed and error."""
+    table = TabulatedDensity(density)
+    with torch.no_grad():
+        found, speed = timed(lambda: table.log_prob(drawn), len(drawn))
+    return f"{speed}{float((found - exact).abs().max()):10.1e}"
+
+
+def search() -> str:
+    """A search over five settings."""
+    from sklearn.model_selection import GridSearchCV
+
+    begin, wall = time.process_time(), time.perf_counter()
+    settings = ["auto", "kernels", "mixture", "kernels,mixture", "flow,kernels"]
+    found = GridSearchCV(DensityEstimator("torus"), {"parts": settings}, cv=5)
+    found.fit(clustered("torus", 2_000))
+    return (
+        f"GridSearchCV, 5 settings of 2,000 points, 26 fits on one core: "
+        f"{time.process_time() - begin:.0f} s of processor time, {time.perf_counter() - wall:.0f} s"
+    )
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("spaces", nargs="*", metavar="SPACE", help=f"{', '.join(SPACES)} (all)")
+    parser.add_argument("--rows", type=int, nargs="+", default=[1_000, 10_000])
+    parser.add_argument("--points", type=int, default=1_000_000, help="evaluated")
+    parser.add_argument("--parts", default="auto")
+    parser.add_argument("--search", action="store_true", help="a grid search, too")
+    parser.add_argument("--quick", action="store_true", help="one small fit")
+    options = parser.parse_args()
+    torch.set_num_threads(1)
+    rows = [300] if options.quick else options.rows
+    spaces = ["torus"] if options.quick else options.spaces or SPACES
+    points = 5_000 if options.quick else options.points
+    print(
+        f"{'space':18}{'rows':>8}{'fit, s':>9}{'kernels':>10}{'exact, 1/s':>12}{'slope, 1/s':>12}"
+        f"{'dense, 1/s':>12}{'off':>10}{'table, 1/s':>12}{'off':>10}"
+    )
+    for count in rows:
+        for space in spaces:
+            print(line(space, count, points, options.parts), flush=True)
+    if options.search:
+        print(search())
+
+
+if __name__ == "__main__":
+    main()

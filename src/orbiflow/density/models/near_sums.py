@@ -1,0 +1,199 @@
+"""Sums of many kernels at many points: tile by tile, without what is too far to be felt."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from orbiflow.density.models.terms import Terms
+from orbiflow.density.models.tiles import Chart, Tile
+
+TOLERANCE = 1e-12
+"""Of a sum: what is left out, and what interpolation misses, at most."""
+
+FEW_POINTS, FEW_PAIRS = 256, 200_000
+"""Tiles are not parted further with fewer points, or fewer points times terms."""
+
+WORTH_FLAT, WORTH_ROUND = 500, 2_000
+"""Points of a tile from which on smooth terms are interpolated."""
+
+WORTH_TERMS = 200
+"""And terms."""
+
+LESS, IDLE = 0.9, 3
+"""Tiles are parted so often in a row though more than that share of the terms stays."""
+
+LEAST = 1e-290
+"""Interpolated sums relative to their largest value are no less."""
+
+HOPELESS = 60.0
+"""Concentration times squared radius from which on terms are never smooth across a tile."""
+
+
+def near_log_sum(
+    terms: Terms, features: Tensor, floor: float = -math.inf, tolerance: float = TOLERANCE
+) -> Tensor:
+    """Logarithm (N,) of the sum of terms at features (m, N), within twice `tolerance` and rounding.
+
+    Points are parted into tiles. Terms whose largest values in a tile cannot be felt beside the least
+    sum there are left out; those that are smooth across the tile are summed at few places and
+    interpolated; the rest is summed point by point, once tiles are small.
+
+    Args:
+        floor: logarithm of what is added to the sum elsewhere: errors may be as large relative to
+            both. Not in the result.
+
+    Differentiable in the features: the gradient in closed form, as fast as the sum; higher
+    derivatives by autograd through the terms that can be felt.
+    """
+    if not (features.requires_grad and torch.is_grad_enabled()):
+        return _Walk(features, terms, floor, tolerance).done()
+    return _NearLogSum.apply(features, terms, floor, tolerance)  # type: ignore[return-value]
+
+
+class _NearLogSum(torch.autograd.Function):
+    @staticmethod
+    def forward(ctx: Any, features: Tensor, terms: Terms, floor: float, tolerance: float) -> Tensor:
+        walk = _Walk(features, terms, floor, tolerance, slope=True)
+        values = walk.done()
+        assert walk.slope is not None
+        ctx.save_for_backward(features, walk.slope)
+        ctx.rest = terms, floor, tolerance
+        return values
+
+    @staticmethod
+    def backward(ctx: Any, *gradients: Any) -> Any:
+        features, slope = ctx.saved_tensors
+        if not torch.is_grad_enabled():
+            return gradients[0] * slope, None, None, None
+        # second derivatives were asked for: let autograd have them
+        view = features.view_as(features)
+        plain = _Walk(view, *ctx.rest, by_autograd=True).done()
+        (found,) = torch.autograd.grad(plain, view, gradients[0], create_graph=True)
+        return found, None, None, None
+
+
+class _Part(NamedTuple):
+    """Points by their numbers (N,), their features (m, N), the terms that may be felt there.
+
+    - `idle`: how often in a row nothing was left out.
+    """
+
+    index: np.ndarray
+    features: Tensor
+    terms: Terms
+    idle: int
+
+
+class _Walk:
+    """Sums as they grow, and their gradients in the features if asked."""
+
+    def __init__(
+        self,
+        features: Tensor,
+        terms: Terms,
+        floor: float,
+        tolerance: float,
+        *,
+        slope: bool = False,
+        by_autograd: bool = False,
+    ) -> None:
+        self.features, self.terms, self.floor = features, terms, floor
+        self.tolerance, self.each = math.log(tolerance), math.log(tolerance / terms.count)
+        self.by_autograd = by_autograd
+        self.worth = math.inf if by_autograd else _worth(terms)
+        plain = features.detach()
+        self.log_sum = torch.full_like(plain[0], -math.inf)
+        self.slope = torch.zeros_like(plain) if slope else None
+        self.places: list[np.ndarray] = []
+        self.sums: list[Tensor] = []
+
+    def done(self) -> Tensor:
+        """Logarithms (N,) of the sums."""
+        stack = [_Part(np.arange(len(self.log_sum)), self.features.detach(), self.terms, 0)]
+        while stack and len(self.log_sum):
+            stack += self.step(stack.pop())
+        if not self.sums:
+            return self.log_sum
+        at = torch.as_tensor(np.concatenate(self.places))
+        return self.log_sum.index_copy(0, at, torch.cat(self.sums))
+
+    def step(self, part: _Part) -> list[_Part]:
+        """Treat a part, or return its halves."""
+        index, features, terms, idle = part
+        tile = Tile(features, terms.factors)
+        least, largest = tile.bounds(terms)
+        bottom = max(self.floor, float(least.logsumexp(dim=0)))
+        near = largest > bottom + self.each
+        if not bool(near.all()):
+            terms, least, largest = terms.only(near), least[near], largest[near]
+        terms = self._interpolated(part._replace(terms=terms), tile, least, largest, bottom)
+        if not terms.count:
+            return []
+        count = len(index)
+        idle = 0 if terms.count < LESS * part.terms.count or count > self.worth else idle + 1
+        if count > FEW_POINTS and count * terms.count > FEW_PAIRS and idle <= IDLE:
+            return [
+                _Part(index[at], features[:, torch.as_tensor(at)], terms, idle)
+                for at in _halves(features, tile)
+            ]
+        spread = float(terms.peaks.max()) - bottom
+        at = torch.as_tensor(index)
+        if self.by_autograd:
+            self.places.append(index)
+            self.sums.append(terms.log_sum(self.features[:, at], tile.middle, spread))
+        elif self.slope is None:
+            self._add(at, terms.log_sum(features, tile.middle, spread), None)
+        else:
+            self._add(at, *terms.log_sum_and_slope(features, tile.middle, spread))
+        return []
+
+    def _add(self, at: Tensor, log_sum: Tensor, slope: Tensor | None) -> None:
+        """Add to the sums at some points (N,) the logarithms of others, with their gradients (m, N)."""
+        before = self.log_sum[at]
+        after = torch.logaddexp(before, log_sum)
+        self.log_sum[at] = after
+        if self.slope is not None and slope is not None:
+            old, new = ((x - after).exp().nan_to_num_(0.0) for x in (before, log_sum))
+            self.slope[:, at] = self.slope[:, at] * old + slope * new
+
+    def _interpolated(
+        self, part: _Part, tile: Tile, least: Tensor, largest: Tensor, bottom: float
+    ) -> Terms:
+        """Adds terms that are smooth across the tile to the sums; returns the others."""
+        terms = part.terms
+        if len(part.index) < self.worth or terms.count < WORTH_TERMS or not tile.has_chart:
+            return terms
+        wide = (terms.kappa * tile.radius[:, None] ** 2).amax(dim=0) < HOPELESS
+        if int(wide.sum()) < WORTH_TERMS:
+            return terms
+        chart = Chart(part.features, tile)
+        allowed = (self.tolerance + least).clamp_min_(bottom + self.each)
+        smooth = wide & (chart.errors(terms, largest) < allowed)
+        if int(smooth.sum()) < WORTH_TERMS:
+            return terms
+        top = float(largest[smooth].max())
+        values, slope = chart.sum(terms.only(smooth), top, slope=self.slope is not None)
+        values.clamp_min_(LEAST)  # what cannot be felt beside others may come out below 0
+        if slope is not None:
+            slope = slope / values
+        self._add(torch.as_tensor(part.index), values.log() + top, slope)
+        return terms.only(~smooth)
+
+
+def _worth(terms: Terms) -> float:
+    """Points of a tile from which on interpolation may pay."""
+    if terms.factors > 1:
+        return WORTH_FLAT if terms.factors == 2 else math.inf
+    return WORTH_ROUND if len(terms.centers) > 2 else WORTH_FLAT
+
+
+def _halves(features: Tensor, tile: Tile) -> tuple[np.ndarray, np.ndarray]:
+    """Numbers of the points in both halves, across the tile's longest side."""
+    along = features[int(tile.sides.argmax())].numpy()
+    order = np.argpartition(along, len(along) // 2)
+    return order[: len(along) // 2], order[len(along) // 2 :]

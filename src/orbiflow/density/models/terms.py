@@ -1,0 +1,102 @@
+"""Sums of kernels as tables: terms that fall off with the distance on products of unit spheres.
+
+Features (m, N) are points on F factors: circles in the plane, one for each angle, or one sphere in
+space. Component i belongs to factor i modulo F. Terms and points lie last, so that sums over components
+run along the memory.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import torch
+from torch import Tensor
+
+from orbiflow.density.models.log_sum import log_sum_exp
+
+WIDE = 600.0
+"""Logarithm of the ratios that exponentials bear without help."""
+
+BLOCK_ENTRIES = 250_000
+"""Of the table of points against terms worked on at a time: few enough for the cache."""
+
+
+class Terms(NamedTuple):
+    """Terms exp(peak - sum_f kappa_f / 2 |x_f - center_f|^2) of a sum over K of them.
+
+    - `centers`: (m, K) features. `kappa`: (F, K). `peaks`: (K,), their largest logarithms.
+    """
+
+    centers: Tensor
+    kappa: Tensor
+    peaks: Tensor
+
+    @property
+    def count(self) -> int:
+        """K."""
+        return len(self.peaks)
+
+    @property
+    def factors(self) -> int:
+        """F."""
+        return len(self.kappa)
+
+    def only(self, which: Tensor) -> Terms:
+        """Those of a mask (K,)."""
+        at = which.nonzero()[:, 0]
+        return Terms(*(t.index_select(-1, at) for t in self))
+
+    def log_sum(self, features: Tensor, middle: Tensor, spread: float) -> Tensor:
+        """Logarithm (N,) of the sum at features (m, N), differentiable.
+
+        Args:
+            middle: (m,) near the features. About it little cancels: at a concentration of 1e7 the
+                cosine of the whole angle would lose half of all digits.
+            spread: logarithm of the ratio of the largest peak to the least sum.
+        """
+        rows, bias = self._about(middle[:, None])
+        top = float(self.peaks.max())
+        offset = features - middle[:, None]
+        seen = torch.cat([offset, lengths2(offset, self.factors)])
+        block = max(1, BLOCK_ENTRIES // self.count)
+        parts = seen.split(block, dim=1)
+        if spread > WIDE:
+            return torch.cat([log_sum_exp(torch.addmm(bias, part.mT, rows)) for part in parts])
+        bias = bias - top
+        sums = [
+            torch.addmm(bias, part.mT, rows).clamp_min_(-WIDE - 80).exp_().sum(dim=1)
+            for part in parts
+        ]
+        return (sums[0] if len(sums) == 1 else torch.cat(sums)).log() + top
+
+    def log_sum_and_slope(
+        self, features: Tensor, middle: Tensor, spread: float
+    ) -> tuple[Tensor, Tensor]:
+        """As `log_sum`, and its gradient (m, N) in the features; not differentiable."""
+        rows, bias = self._about(middle[:, None])
+        bias = bias - self.peaks.max()
+        offset = features - middle[:, None]
+        seen = torch.cat([offset, lengths2(offset, self.factors)])
+        values, slopes = [], []
+        for part in seen.split(max(1, BLOCK_ENTRIES // self.count), dim=1):
+            table = torch.addmm(bias, part.mT, rows)
+            top = table.amax(dim=1, keepdim=True) if spread > WIDE else table.new_zeros(1, 1)
+            table.sub_(top).clamp_min_(-WIDE - 80).exp_()
+            total = table.sum(dim=1)
+            values.append(total.log() + top[:, 0])
+            slopes.append(rows @ table.mT / total)
+        linear, square = torch.cat(slopes, dim=1).split([len(middle), self.factors])
+        repeated = square.repeat(len(middle) // self.factors, 1)
+        return torch.cat(values) + self.peaks.max(), linear + 2 * repeated * offset
+
+    def _about(self, middle: Tensor) -> tuple[Tensor, Tensor]:
+        """Rows (m + F, K) and bias (K,): exponents are linear in offsets and their squares."""
+        offset, half = self.centers - middle, self.kappa / 2
+        bias = self.peaks - (half * lengths2(offset, self.factors)).sum(dim=0)
+        repeated = self.kappa.repeat(len(middle) // self.factors, 1)
+        return torch.cat([repeated * offset, -half]), bias
+
+
+def lengths2(offset: Tensor, factors: int) -> Tensor:
+    """Squares (F, N) of the lengths of vectors (m, N) in each factor."""
+    return (offset**2).reshape(-1, factors, offset.shape[1]).sum(dim=0)
