@@ -157,8 +157,8 @@ def score(
         bool,
         typer.Option(
             "--table",
-            help="Read log densities off a table, in two dimensions: faster where a flow or chains "
-            "have a share. Its error is said.",
+            help="Read log densities off a table, in two dimensions: faster where kernels are wide "
+            "or a flow has a share. Its error is said.",
         ),
     ] = False,
 ) -> None:
