@@ -111,9 +111,9 @@ def _show_batch(event: Finished) -> None:
     """What came of many, and how to go on."""
     summary = event.summary
     shown = [f"{summary['done']} of {summary['files']} done"]
-    shown += [f"{summary['kept']} of them before"] if summary["kept"] else []
+    if summary["kept"] == summary["files"]:
+        shown = ["nothing was left to do"]
     without = summary["failed"] + summary["nothing"]
-    shown += [f"{without} without a result"] if without else []
     output.print(
         f"{', '.join(shown)}, in {summary['seconds']:.0f} s; look at {summary['page']}, or "
         f"{summary['table']}",

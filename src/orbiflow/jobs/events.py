@@ -1,10 +1,11 @@
 """What a job tells while it runs.
 
 In this order: `Started`; then `Note`, `Progress`, `Preview` (one at most, before any `TileFound`),
-`TileFound`, `ClassFailed`, `ItemDone` and `Written` as they happen; last either `Finished` or `Failed`. The
-`share` of `Progress` never falls, nor does its `class_share` within a class. Each class of a search
-has exactly one outcome after its last `Progress`: `TileFound` or `ClassFailed`. `ItemDone` comes when the
-folder of one of many has its final name; `Written` when a file has: after the work, before `Finished`.
+`TileFound`, `ClassFailed`, `ItemDone` and `Written` as they happen; last either `Finished` or `Failed`.
+The `share` of `Progress` never falls, nor does its `class_share` within a class. Each class of a search
+has exactly one outcome after its last `Progress`: `TileFound` or `ClassFailed`. `ItemDone` comes when
+the folder of one of many has its final name; `Written` when a file has: after the work, before
+`Finished`.
 
 All come in the thread that called `run`, or out of `Job.events`.
 """

@@ -110,7 +110,7 @@ class BatchFolder:
             with folder.replaced() as staged:
                 _write(staged, files)
         thumbnail = self.path / THUMBNAILS / f"{entry.name}.png"
-        if picture in files:
+        if picture is not None and picture in files:
             make_folder(thumbnail.parent)
             write_atomic(thumbnail, _small(files[picture]))
         elif files:

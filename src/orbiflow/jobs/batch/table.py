@@ -25,7 +25,10 @@ def table(entries: Iterable[Entry], kind: Kind) -> bytes:
     )
     for entry in entries:
         figures = [_cell(entry.best.get(name)) for name in names]
-        settings = json.dumps(entry.settings, separators=(",", ":"), sort_keys=True)
+        asked = {
+            name: value for name, value in entry.settings.items() if value not in (None, False)
+        }
+        settings = json.dumps(asked, separators=(",", ":"), sort_keys=True)
         seconds = "" if entry.seconds is None else f"{entry.seconds:.3f}"
         head, tail = [entry.file, entry.state], [entry.code, settings, entry.version]
         folder = "" if entry.state == "failed" else entry.name

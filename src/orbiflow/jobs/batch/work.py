@@ -133,13 +133,9 @@ def _said_before(
     gone = sorted(entry.name for file, entry in entries.items() if file not in set(files))
     if gone:
         named = ", ".join(gone[:MOST_NAMED]) + (", ..." if len(gone) > MOST_NAMED else "")
-        which = (
-            f"that --match {request.match!r} leaves out or that are"
-            if request.match
-            else "that are"
-        )
+        out = f" or that --match {request.match} leaves out" if request.match else ""
         yield (
-            f"{len(gone)} earlier results are of files {which} not in {request.folder}; they "
+            f"{len(gone)} earlier results are of files that are not in {request.folder}{out}; they "
             f"are kept and not listed: {named}"
         )
 

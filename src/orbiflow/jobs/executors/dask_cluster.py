@@ -149,7 +149,7 @@ class DaskCluster:
                 f"{self.address} --nthreads 1 --nworkers N`"
             ) from error
         try:
-            found = client.run(_version_asker())
+            found: Any = client.run(_version_asker())
         except Exception as error:
             raise OrbiflowError(
                 f"the workers of {self.address} cannot be asked: {error}"
@@ -247,7 +247,8 @@ class _Crew:
 
 def _threads(client: Client) -> int:
     try:
-        return sum(client.nthreads().values())
+        found: Any = client.nthreads()
+        return sum(found.values())
     except (OSError, RuntimeError, TimeoutError, AttributeError):  # the scheduler has gone
         return 0
 

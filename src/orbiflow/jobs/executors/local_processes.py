@@ -10,6 +10,7 @@ from types import TracebackType
 from typing import Any, Self
 
 from orbiflow.cancel import Cancel
+from orbiflow.jobs.events import Note
 from orbiflow.jobs.executors.parcel import Answer, Parcel, carry_out
 from orbiflow.jobs.run import Sink
 
@@ -46,7 +47,10 @@ class LocalProcesses:
         return "one process" if self.workers == 1 else f"{self.workers} processes"
 
     def answers(
-        self, parcels: Iterable[Parcel], tell: Sink, cancel: Cancel
+        self,
+        parcels: Iterable[Parcel],
+        tell: Sink,
+        cancel: Cancel,
     ) -> Generator[Answer, None, None]:
         """As of every `Executor`."""
         from orbiflow.processes import process_context, work  # with torch
@@ -66,6 +70,7 @@ class LocalProcesses:
         with closing(pool) as all_news:
             for news in all_news:
                 if news.died:
+                    tell(Note(f"{TRIES} processes died of {keys[news.index]}; the others go on"))
                     yield Answer.died(keys[news.index], TRIES)
                 elif news.done:
                     yield Answer.of(keys[news.index], *news.value)

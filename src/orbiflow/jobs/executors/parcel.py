@@ -6,7 +6,7 @@ import json
 import tempfile
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -124,9 +124,8 @@ def _run(
         read, written = folder / "in" / order["name"], folder / "out"
         read.parent.mkdir()
         read.write_bytes(data)
-        request = request_from_json(order["request"])
-        there: dict[str, Any] = {order["reads"]: read, order["writes"]: written}
-        request = replace(request, **there)
+        there = {order["reads"]: str(read), order["writes"]: str(written)}
+        request = request_from_json({**order["request"], **there})
         with suppress(Exception):  # told by its last event
             run(request, keep, cancel)
         files = _packed(written)
