@@ -18,6 +18,7 @@ from orbiflow import __version__
 from orbiflow.cancel import Cancel
 from orbiflow.errors import OrbiflowError
 from orbiflow.jobs.events import Note
+from orbiflow.jobs.executors.memory import keeping_memory
 from orbiflow.jobs.executors.parcel import Answer, Parcel, carry_out
 from orbiflow.jobs.run import Sink
 
@@ -255,7 +256,8 @@ def _threads(client: Client) -> int:
 
 def _serve(header: str, data: bytes) -> tuple[str, dict[str, bytes]]:
     """In a worker."""
-    return carry_out(header, data, _Released())
+    with keeping_memory():
+        return carry_out(header, data, _Released())
 
 
 class _Released(Cancel):
