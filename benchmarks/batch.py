@@ -2,10 +2,11 @@
 
     python benchmarks/batch.py [--count 200] [--effort fast] [--classes IH4,IH6] [--workers 2] [--quick]
 
-The silhouettes are those of ../shared/data and examples/silhouettes, each bent by a small smooth displacement with
-a seed, so that no two are the same. The local batch is stopped at its half and gone on with; on the
-cluster, of so many workers with one thread each, one is killed with SIGKILL at a third. All files of both
-but for their seconds must be the same, byte for byte. Last, both are asked for again: nothing is to be done.
+The silhouettes are those of ../shared/data and examples/silhouettes, each bent by a small smooth
+displacement with a seed, so that no two are the same. The local batch is stopped at its half and gone
+on with; on the cluster, of so many workers with one thread each, one is killed with SIGKILL at a third.
+All files of both but for their seconds must be the same, byte for byte. Last, both are asked for again:
+nothing is to be done.
 """
 
 from __future__ import annotations
@@ -156,7 +157,7 @@ def compare(folder: Path, count: int, each: dict[str, Any], workers: int) -> Non
     second, more = timed(local)
     print(f"{workers} local processes, gone on: {_row(second, more)}")
     with LocalCluster(
-        n_workers=workers, threads_per_worker=1, host="127.0.0.1", dashboard_address=None
+        n_workers=workers, threads_per_worker=1, host="127.0.0.1", dashboard_address="127.0.0.1:0"
     ) as cluster:
         address = cluster.scheduler_address
         remote = BatchRequest(folder / "in", folder / "dask", each=each, scheduler=address)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import secrets
 import time
 import warnings
-from collections.abc import Callable, Generator, Iterable
+from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import suppress
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
@@ -38,8 +38,9 @@ PATIENCE = 300.0
 class DaskCluster:
     """An `Executor`: the workers of the scheduler at an address.
 
-    Dask gives what a lost worker was at to another one; how many may die of one parcel is the
-    scheduler's setting `distributed.scheduler.allowed-failures` (3, and the next is the last).
+    Dask gives what a lost worker was at to another one, so many times (the scheduler's setting
+    `distributed.scheduler.allowed-failures`, 3), and then gives up all that the last one was at. These
+    parcels are tried once more at the end, one at a time: only the one to blame has no result.
 
     Args:
         address: such as "tcp://10.0.0.5:8786", or "tls://..." with Dask's own settings.
@@ -97,41 +98,50 @@ class DaskCluster:
     def answers(
         self, parcels: Iterable[Parcel], tell: Sink, cancel: Cancel
     ) -> Generator[Answer, None, None]:
-        """As of every `Executor`.
-
-        No more parcels are out than there are threads that work, and a quarter more: a worker that
-        dies casts suspicion on all that wait for it.
-        """
+        """As of every `Executor`; no more parcels are out than threads work."""
         client = self._connected()
-        out = _Out(client)
-        crew = _Crew(client, self.address, tell)
-        waiting = iter(parcels)
+        out, crew = _Out(client), _Crew(client, self.address, tell)
+        waiting, suspects = iter(parcels), list[Parcel]()
+        alone = False
         try:
             while not cancel.cancelled:
                 room = crew.room()
-                while len(out) < room and (parcel := next(waiting, None)) is not None:
-                    out.send(parcel)
+                out.fill(waiting, room)
                 if not len(out) and room:
-                    return
+                    if not suspects:
+                        return
+                    alone = True
+                    out.send(suspects.pop())
                 came = out.came()
                 for future, result in came:
-                    yield self._answer(future, result, out)
+                    parcel = out.known(future)
+                    out.fill(waiting, room)  # now: what comes next takes the caller its time
+                    answer = self._answer(parcel, future, result, alone)
+                    if answer is not None:
+                        yield answer
+                        continue
+                    tell(
+                        Note(
+                            f"workers died while they were at {parcel.key}; it is tried again alone"
+                        )
+                    )
+                    suspects.append(parcel)
                 if not came:
                     time.sleep(POLL)
         finally:
             out.recall()
 
-    def _answer(self, future: Future, result: Any, out: _Out) -> Answer:
+    def _answer(self, parcel: Parcel, future: Future, result: Any, alone: bool) -> Answer | None:
+        """Nothing of what is only suspected of killing workers."""
         from distributed import KilledWorker
 
-        key = out.known(future)
         if future.status == "finished":
             future.release()
-            return Answer.of(key, *result)
+            return Answer.of(parcel.key, *result)
         if future.status == "error":
             error = result[1]
             if isinstance(error, KilledWorker):
-                return Answer.died(key, error.allowed_failures + 1)
+                return Answer.died(parcel.key, error.allowed_failures + 1) if alone else None
             raise OrbiflowError(
                 f"a worker of {self.address} could not begin: {type(error).__name__}: {error}; is the "
                 "same orbiflow installed there?"
@@ -184,11 +194,15 @@ class _Out:
         self.client = client
         self.run = secrets.token_hex(4)
         self.sent = 0
-        self.futures: dict[str, tuple[str, Future]] = {}
+        self.futures: dict[str, tuple[Parcel, Future]] = {}
         self.coming = as_completed(loop=client.loop, with_results=True, raise_errors=False)
 
     def __len__(self) -> int:
         return len(self.futures)
+
+    def fill(self, waiting: Iterator[Parcel], room: int) -> None:
+        while len(self) < room and (parcel := next(waiting, None)) is not None:
+            self.send(parcel)
 
     def send(self, parcel: Parcel) -> None:
         key = f"orbiflow-{self.run}-{self.sent}"
@@ -198,14 +212,14 @@ class _Out:
             future = self.client.submit(
                 _serve, parcel.header(), parcel.data, key=key, pure=False, retries=0
             )
-        self.futures[key] = parcel.key, future
+        self.futures[key] = parcel, future
         self.coming.add(future)
 
     def came(self) -> list[tuple[Future, Any]]:
         return list(self.coming.next_batch(block=False))
 
-    def known(self, future: Future) -> str:
-        """The parcel's own key; it is out no more."""
+    def known(self, future: Future) -> Parcel:
+        """Which it was of; it is out no more."""
         return self.futures.pop(str(future.key))[0]
 
     def recall(self) -> None:
@@ -243,7 +257,7 @@ class _Crew:
                 f"no worker has been at {self.address} for {PATIENCE:.0f} s; the same command goes on "
                 "from here once there is one"
             )
-        return self.threads + (self.threads + 3) // 4
+        return self.threads
 
 
 def _threads(client: Client) -> int:

@@ -1,8 +1,8 @@
 """How a process keeps the memory that it frees.
 
-Dask's nannies start workers with MALLOC_TRIM_THRESHOLD_=65536: glibc then hands every freed block of that
-size back to the system. A search frees arrays of about this size all the time, and fetching the memory
-again cost it as much as its own work (2.4 s of CPU instead of 1.3 s for one class).
+Dask's nannies start workers with MALLOC_TRIM_THRESHOLD_=65536: glibc then hands every freed block of
+that size back to the system. A search frees arrays of about this size all the time, and fetching the
+memory again cost it as much as its own work (2.4 s of CPU instead of 1.3 s for one class).
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ VARIABLE = "MALLOC_TRIM_THRESHOLD_"
 
 @contextlib.contextmanager
 def keeping_memory() -> Iterator[None]:
-    """Freed memory stays with this process in the block; only where it would not, and glibc is there."""
+    """Freed memory stays with this process in the block; where it would not, and glibc is there."""
     asked = os.environ.get(VARIABLE, "")
     set_option = getattr(_libc(), "mallopt", None) if asked.isdecimal() else None
     if set_option is None or int(asked) >= ROOM:
