@@ -26,7 +26,9 @@ def table(entries: Iterable[Entry], kind: Kind) -> bytes:
     for entry in entries:
         figures = [_cell(entry.best.get(name)) for name in names]
         asked = {
-            name: value for name, value in entry.settings.items() if value not in (None, False)
+            name: value
+            for name, value in entry.settings.items()
+            if value is not None and value is not False
         }
         settings = json.dumps(asked, separators=(",", ":"), sort_keys=True)
         seconds = "" if entry.seconds is None else f"{entry.seconds:.3f}"
