@@ -119,7 +119,8 @@ def pids(address: str) -> list[int]:
     from distributed import Client
 
     with Client(address, set_as_default=False) as client:
-        return list(client.run(os.getpid).values())
+        found: Any = client.run(os.getpid)
+        return list(found.values())
 
 
 def main() -> None:
@@ -159,7 +160,7 @@ def compare(folder: Path, count: int, each: dict[str, Any], workers: int) -> Non
     with LocalCluster(
         n_workers=workers, threads_per_worker=1, host="127.0.0.1", dashboard_address="127.0.0.1:0"
     ) as cluster:
-        address = cluster.scheduler_address
+        address = str(getattr(cluster, "scheduler_address"))  # noqa: B009  (it may be a coroutine)
         remote = BatchRequest(folder / "in", folder / "dask", each=each, scheduler=address)
         victim = pids(address)[0]
 
