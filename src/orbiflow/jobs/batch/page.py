@@ -99,7 +99,7 @@ def _card(entry: Entry, kind: Kind, picture: bool) -> str:
         for column in kind.columns
         if not column.form and not isinstance(entry.best.get(column.name), bool)
     ]
-    warning = "" if entry.best.get("certified", True) else '<b class="refused">not certified</b>'
+    warning = "" if entry.best.get("certified", True) else ' <b class="refused">not certified</b>'
     figures = "".join(
         f"<div><dt>{html.escape(column.title)}</dt>"
         f"<dd>{html.escape(column.shown(entry.best.get(column.name)))}</dd></div>"
