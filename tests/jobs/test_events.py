@@ -14,6 +14,7 @@ from orbiflow.jobs import (
     Event,
     Failed,
     Finished,
+    ItemDone,
     Note,
     Preview,
     Progress,
@@ -40,6 +41,7 @@ EVENTS = st.one_of(
     st.builds(Preview, words, numbers, numbers),
     st.builds(TileFound, words, numbers, numbers, st.booleans()),
     st.builds(ClassFailed, words, words),
+    st.builds(ItemDone, words, st.sampled_from(["done", "nothing found", "failed"]), words),
     st.builds(Written, st.text(st.characters(exclude_characters="\0"), min_size=1).map(Path)),
     st.builds(
         Finished,

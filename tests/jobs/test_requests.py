@@ -16,6 +16,8 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.jobs import (
     AnimateRequest,
     ArtRequest,
+    BatchRequest,
+    DensityBatchRequest,
     DensityCompareRequest,
     DensityFitRequest,
     DensityPlotRequest,
@@ -69,6 +71,7 @@ REQUESTS = st.one_of(
         threshold=st.none() | st.floats(0, 1),
         invert=st.none() | st.booleans(),
         force=st.booleans(),
+        called=st.none() | st.text(),
     ),
     st.builds(
         EscherizeRequest,
@@ -158,6 +161,23 @@ REQUESTS = st.one_of(
         copies=st.none() | st.integers(1),
         clip=st.none() | st.booleans(),
         calibrate=st.booleans(),
+    ),
+    st.builds(
+        BatchRequest,
+        folder=paths,
+        out=paths,
+        each=st.fixed_dictionaries(
+            {"effort": st.sampled_from([None, "fast"]), "classes": st.none() | st.lists(st.text())}
+        ),
+        match=st.none() | st.just("*.svg"),
+        workers=st.none() | st.integers(1),
+        retry_failed=st.booleans(),
+    ),
+    st.builds(
+        DensityBatchRequest,
+        folder=paths,
+        each=st.fixed_dictionaries({"space": spaces, "seed": seeds}),
+        scheduler=st.none() | st.just("tcp://127.0.0.1:8786"),
     ),
     st.builds(PatchesRequest, data=paths, columns=columns, unit=units, farthest=numbers),
 )

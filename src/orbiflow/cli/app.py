@@ -11,6 +11,7 @@ from rich.markup import escape
 from orbiflow import __version__
 from orbiflow.cli.animate import animate
 from orbiflow.cli.art import art
+from orbiflow.cli.batch import batch
 from orbiflow.cli.classes import classes
 from orbiflow.cli.console import errors
 from orbiflow.cli.density import density
@@ -32,6 +33,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 app.command()(escherize)
+app.command()(batch)
 app.command()(export)
 app.command()(art)
 app.command()(animate)

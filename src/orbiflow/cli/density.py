@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from orbiflow.cli.density_batch import batch
 from orbiflow.cli.density_compare import compare
 from orbiflow.cli.density_options import (
     Columns,
@@ -199,3 +200,4 @@ density.command()(conditional)
 density.command()(compare)
 density.command("region")(region_of)
 density.command()(patches)
+density.command()(batch)

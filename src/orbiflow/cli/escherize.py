@@ -2,38 +2,31 @@
 
 from __future__ import annotations
 
-import re
-from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from orbiflow.cli.search_options import (
+    ChosenEffort,
+    ChosenMethod,
+    ChosenObjective,
+    Classes,
+    Figures,
+    Force,
+    Invert,
+    Iterations,
+    MaxFrequency,
+    Method,
+    MinNeck,
+    PerClass,
+    Seed,
+    Threshold,
+    Turns,
+    named_classes,
+)
 from orbiflow.cli.work import do
 from orbiflow.jobs import EscherizeRequest
-
-
-class Method(StrEnum):
-    """How tiles are fitted."""
-
-    DESCENT = "descent"
-    OCCUPANCY = "occupancy"
-
-
-class Objective(StrEnum):
-    """What a tile is to be good at."""
-
-    LIKENESS = "likeness"
-    OVERLAP = "overlap"
-    BOTH = "both"
-
-
-class Effort(StrEnum):
-    """How long the descent searches."""
-
-    FAST = "fast"
-    NORMAL = "normal"
-    BEST = "best"
 
 
 def escherize(
@@ -47,24 +40,9 @@ def escherize(
     out: Annotated[
         Path, typer.Option("--out", "-o", help="Folder for the results, made if need be.")
     ] = Path("out"),
-    classes: Annotated[
-        str, typer.Option(help="Isohedral classes, such as IH4,IH6, or all.")
-    ] = "all",
-    effort: Annotated[
-        Effort | None,
-        typer.Option(
-            help="Seconds, a quarter of a minute, or minutes; default normal.", show_default=False
-        ),
-    ] = None,
-    objective: Annotated[
-        Objective | None,
-        typer.Option(
-            help="Likeness: the silhouette bends until it is a tile, every limb kept. Overlap: the "
-            "tile covers the silhouette as it is. Both: a short list of the best compromises. Default "
-            "likeness.",
-            show_default=False,
-        ),
-    ] = None,
+    classes: Classes = "all",
+    effort: ChosenEffort = None,
+    objective: ChosenObjective = None,
     emphasis: Annotated[
         Path | None,
         typer.Option(
@@ -90,60 +68,20 @@ def escherize(
     pin_angle: Annotated[
         bool, typer.Option("--pin-angle", help="What is pinned keeps its angle, too.")
     ] = False,
-    per_class: Annotated[
-        int, typer.Option(help="Tiles of each class, the best and others that differ from it.")
-    ] = 1,
-    min_neck: Annotated[
-        float | None,
-        typer.Option(
-            help="Tiles with necks thinner than this rank lower; in square roots of the area, "
-            "default 0.01.",
-            show_default=False,
-        ),
-    ] = None,
-    max_frequency: Annotated[
-        int | None,
-        typer.Option(
-            help="Overlap: detail of the deformation (Omega in the paper), 0 to 60; default 10, or "
-            "15 for effort best.",
-            show_default=False,
-        ),
-    ] = None,
-    seed: Annotated[int, typer.Option(help="Same seed, same machine: same tiles.")] = 0,
-    method: Annotated[
-        Method, typer.Option(help="The descent, or the paper's occupancy loss for comparison.")
-    ] = Method.DESCENT,
-    turns: Annotated[
-        int | None,
-        typer.Option(help="Occupancy: starting rotations, default 12.", show_default=False),
-    ] = None,
-    iterations: Annotated[
-        int | None,
-        typer.Option(help="Occupancy: steps of the fit, default 200.", show_default=False),
-    ] = None,
-    figures: Annotated[
-        bool,
-        typer.Option(
-            "--figures",
-            help="Also for print: tiling.pdf, overlay.pdf; and the flow: field.png, field.pdf.",
-        ),
-    ] = False,
+    per_class: PerClass = 1,
+    min_neck: MinNeck = None,
+    max_frequency: MaxFrequency = None,
+    seed: Seed = 0,
+    method: ChosenMethod = Method.DESCENT,
+    turns: Turns = None,
+    iterations: Iterations = None,
+    figures: Figures = False,
     workers: Annotated[
         int | None, typer.Option(help="Processes; default one a core.", show_default=False)
     ] = None,
-    threshold: Annotated[
-        float | None,
-        typer.Option(help="Level between shape and background, 0 to 1; default: found out."),
-    ] = None,
-    invert: Annotated[
-        bool | None,
-        typer.Option(
-            "--invert/--no-invert", help="The shape is the light part; default: found out."
-        ),
-    ] = None,
-    force: Annotated[
-        bool, typer.Option("--force", help="Keep tiles that are not certified, marked so.")
-    ] = False,
+    threshold: Threshold = None,
+    invert: Invert = None,
+    force: Force = False,
 ) -> None:
     """Find tiles that look like a silhouette and tile the plane, and prove it.
 
@@ -151,11 +89,10 @@ def escherize(
     tile.svg, tiling.svg, tiling.png, overlay.png and model.safetensors; after a search for both,
     front.png, too.
     """
-    names = None if classes.strip().lower() == "all" else re.split(r"[,\s]+", classes)
     request = EscherizeRequest(
         image=image,
         out=out,
-        classes=None if names is None else tuple(filter(None, names)),
+        classes=named_classes(classes),
         method=method.value,
         objective=objective.value if objective else None,
         min_neck=min_neck,

@@ -10,10 +10,11 @@ from rich.progress import Progress as Bar
 from rich.table import Table
 
 from orbiflow.cli.console import errors, output
-from orbiflow.jobs import Event, Finished, Note, Preview, Progress, Started, TileFound
+from orbiflow.jobs import Event, Finished, ItemDone, Note, Preview, Progress, Started, TileFound
 
 INTERRUPTED = "interrupted"
-FORKING = ("escherize", "paper")
+BATCHES = ("batch", "density-batch")
+FORKING = ("escherize", "paper", *BATCHES)
 """Jobs that start processes."""
 
 
@@ -51,10 +52,15 @@ class Terminal:
             case TileFound():
                 self._best(event)
                 _say(f"{event.class_name}: IoU {event.iou:.4f}")
+            case ItemDone():
+                failed = "" if event.state == "done" else f"{event.state}: "
+                _say(f"{event.name}: {failed}{event.what}")
             case Finished():
                 self._end_bar()
                 if self.job == "escherize":
                     _show_tiles(event)
+                elif self.job in BATCHES:
+                    _show_batch(event)
 
     def _best(self, event: Preview | TileFound) -> None:
         if self.bar is not None:
@@ -99,6 +105,34 @@ class _Bar:
 
 def _say(text: str) -> None:
     output.print(f"  {text}", highlight=False, soft_wrap=True, markup=False)
+
+
+def _show_batch(event: Finished) -> None:
+    """What came of many, and how to go on."""
+    summary = event.summary
+    shown = [f"{summary['done']} of {summary['files']} done"]
+    if summary["kept"] == summary["files"]:
+        shown = ["nothing was left to do"]
+    without = summary["failed"] + summary["nothing"]
+    output.print(
+        f"{', '.join(shown)}, in {summary['seconds']:.0f} s; look at {summary['page']}, or "
+        f"{summary['table']}",
+        soft_wrap=True,
+        highlight=False,
+    )
+    if summary["left"]:
+        errors.print(
+            f"interrupted with {summary['left']} still to do; the same command goes on from here",
+            soft_wrap=True,
+            highlight=False,
+        )
+    elif without:
+        errors.print(
+            f"{without} without a result, for the reasons in {summary['table']}; --retry-failed does "
+            "them again",
+            soft_wrap=True,
+            highlight=False,
+        )
 
 
 def _show_tiles(event: Finished) -> None:

@@ -9,7 +9,14 @@ import typer
 from orbiflow.cancel import Cancel
 from orbiflow.cli.interrupts import stopped_by_interrupt
 from orbiflow.cli.terminal import Terminal
-from orbiflow.jobs import EscherizeRequest, Request, run
+from orbiflow.jobs import (
+    BatchRequest,
+    DensityBatchRequest,
+    EscherizeRequest,
+    Finished,
+    Request,
+    run,
+)
 
 STATUS = {"done": 0, "nothing found": 1, "cancelled": 130}
 
@@ -24,10 +31,32 @@ def do(request: Request) -> None:
     import torch  # now, and not while options are read
 
     torch.set_num_threads(1)  # many small operations; and workers may be forked
-    # only a search has something to keep
-    keeps = isinstance(request, EscherizeRequest)
-    stopping = stopped_by_interrupt() if keeps else nullcontext(Cancel())
-    with stopping as cancel, Terminal() as terminal:
-        finished = run(request, terminal, cancel)
+    finished = _run(request)
     if STATUS[finished.state]:
         raise typer.Exit(STATUS[finished.state])
+
+
+def do_many(request: BatchRequest | DensityBatchRequest) -> None:
+    """Run a batch.
+
+    Raises:
+        OrbiflowError: for anything that the user can mend.
+        typer.Exit: with status 1 if a file has no result, 130 after Ctrl-C.
+    """
+    if request.scheduler is None:
+        import torch
+
+        torch.set_num_threads(1)  # workers may be forked
+    finished = _run(request)
+    if STATUS[finished.state]:
+        raise typer.Exit(STATUS[finished.state])
+    if finished.summary["failed"] or finished.summary["nothing"]:
+        raise typer.Exit(1)
+
+
+def _run(request: Request) -> Finished:
+    # only these have something to keep
+    keeps = isinstance(request, EscherizeRequest | BatchRequest | DensityBatchRequest)
+    stopping = stopped_by_interrupt() if keeps else nullcontext(Cancel())
+    with stopping as cancel, Terminal() as terminal:
+        return run(request, terminal, cancel)

@@ -29,11 +29,11 @@ from orbiflow.escher.methods import (
 )
 from orbiflow.escher.occupancy import OccupancySettings
 from orbiflow.escher.preview import quick_bent_tile, quick_tile
-from orbiflow.escher.processes import process_context, work
 from orbiflow.escher.result import ClassFailure, TileResult, best_tiles
 from orbiflow.likeness.mutual import mutual_iou
 from orbiflow.likeness.ranking import diverse
 from orbiflow.likeness.thinnest import least_neck
+from orbiflow.processes import process_context, work
 from orbiflow.silhouette.emphasis import Emphasis
 from orbiflow.silhouette.pins import Pins
 from orbiflow.silhouette.target import Target
@@ -157,7 +157,7 @@ def escherize(
     teller = _Teller(watch)
     count = min(workers, len(names))
     # asked before torch is limited here: a limit makes no fork safe
-    context = process_context() if count > 1 else None
+    context = process_context(("orbiflow.escher.search",)) if count > 1 else None
     with contextlib.suppress(Cancelled):
         _preview(task, names, teller.tell, cancel)
         if context is None:

@@ -8,7 +8,6 @@ import json
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from orbiflow.escher.processes import work
 from orbiflow.escher.result import ClassFailure, TileResult
 from orbiflow.export.folder import FIGURE_FILES, TILE_FILES, figure_files, write_tile_folder
 from orbiflow.export.index_page import index_page
@@ -16,6 +15,7 @@ from orbiflow.export.overview import overview_png
 from orbiflow.export.result_file import folder_names
 from orbiflow.figures.front import FrontPoint, front_png
 from orbiflow.files import write_atomic
+from orbiflow.processes import work
 from orbiflow.silhouette.target import Target
 from orbiflow.tilings import Colouring, colouring
 

@@ -9,6 +9,7 @@ True
 """
 
 from orbiflow.cancel import Cancel
+from orbiflow.jobs.batch_requests import BatchRequest, DensityBatchRequest
 from orbiflow.jobs.density_compare_requests import DensityCompareRequest, DensityRegionRequest
 from orbiflow.jobs.density_requests import (
     DensityConditionalRequest,
@@ -24,6 +25,7 @@ from orbiflow.jobs.events import (
     Event,
     Failed,
     Finished,
+    ItemDone,
     Note,
     Preview,
     Progress,
@@ -48,8 +50,10 @@ from orbiflow.jobs.tile_requests import (
 __all__ = [
     "AnimateRequest",
     "ArtRequest",
+    "BatchRequest",
     "Cancel",
     "ClassFailed",
+    "DensityBatchRequest",
     "DensityCompareRequest",
     "DensityConditionalRequest",
     "DensityFitRequest",
@@ -63,6 +67,7 @@ __all__ = [
     "ExportRequest",
     "Failed",
     "Finished",
+    "ItemDone",
     "Job",
     "Note",
     "PaperRequest",

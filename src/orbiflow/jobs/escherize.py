@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import time
+from dataclasses import replace
 from typing import Any
 
 from orbiflow.cancel import Cancel
@@ -165,6 +166,8 @@ def _settings(request: EscherizeRequest) -> Settings:
 
 def _read(request: EscherizeRequest) -> tuple[Target, Emphasis | None, Pins | None]:
     target = Target.read(request.image, threshold=request.threshold, invert=request.invert)
+    if request.called is not None:
+        target = replace(target, source=request.called)
     emphasis = pins = None
     if request.emphasis is not None:
         strength = {} if request.strength is None else {"strength": request.strength}

@@ -1,10 +1,11 @@
 """What a job tells while it runs.
 
 In this order: `Started`; then `Note`, `Progress`, `Preview` (one at most, before any `TileFound`),
-`TileFound`, `ClassFailed` and `Written` as they happen; last either `Finished` or `Failed`. The
-`share` of `Progress` never falls, nor does its `class_share` within a class. Each class of a search
-has exactly one outcome after its last `Progress`: `TileFound` or `ClassFailed`. `Written` comes when
-a file has its final name: after the search, before `Finished`.
+`TileFound`, `ClassFailed`, `ItemDone` and `Written` as they happen; last either `Finished` or `Failed`.
+The `share` of `Progress` never falls, nor does its `class_share` within a class. Each class of a search
+has exactly one outcome after its last `Progress`: `TileFound` or `ClassFailed`. `ItemDone` comes when
+the folder of one of many has its final name; `Written` when a file has: after the work, before
+`Finished`.
 
 All come in the thread that called `run`, or out of `Job.events`.
 """
@@ -93,6 +94,20 @@ class ClassFailed(Event):
 
 
 @dataclass(frozen=True)
+class ItemDone(Event):
+    """One of many is done with, in a batch.
+
+    - `name`: of its folder among the results. `what`: came of it, in words.
+    """
+
+    KIND = "item-done"
+
+    name: str
+    state: Literal["done", "nothing found", "failed"]
+    what: str
+
+
+@dataclass(frozen=True)
 class Written(Event):
     """A file is there, whole."""
 
@@ -141,6 +156,7 @@ EVENTS: dict[str, type[Event]] = {
         Preview,
         TileFound,
         ClassFailed,
+        ItemDone,
         Written,
         Finished,
         Failed,

@@ -5,6 +5,7 @@ Importing this takes no time: no numerical library.
 
 from __future__ import annotations
 
+from orbiflow.jobs.batch_requests import BatchRequest, DensityBatchRequest
 from orbiflow.jobs.density_compare_requests import DensityCompareRequest, DensityRegionRequest
 from orbiflow.jobs.density_requests import (
     DensityConditionalRequest,
@@ -42,6 +43,8 @@ REQUESTS: dict[str, type[Request]] = {
         DensityRegionRequest,
         PatchesRequest,
         PaperRequest,
+        BatchRequest,
+        DensityBatchRequest,
     )
 }
 

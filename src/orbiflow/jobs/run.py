@@ -30,6 +30,8 @@ _MODULES = {
     "density-region": "density_region",
     "density-patches": "density_use",
     "paper": "paper",
+    "batch": "batch",
+    "density-batch": "batch",
 }
 
 

@@ -28,6 +28,7 @@ class EscherizeRequest(Request):
     - `figures`: draw the flow of each tile that one made, too (`field.png`).
     - `workers`: processes, None for one a core.
     - `threshold`, `invert`: how the picture is read, None to find out.
+    - `called`: what the results call the silhouette, None for its path.
     """
 
     KIND = "escherize"
@@ -53,6 +54,7 @@ class EscherizeRequest(Request):
     threshold: float | None = None
     invert: bool | None = None
     force: bool = False
+    called: str | None = None
 
     def check(self) -> None:
         at_least_one(self, "per_class")

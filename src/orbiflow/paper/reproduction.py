@@ -11,10 +11,10 @@ from typing import Any, NamedTuple
 
 from orbiflow.cancel import Cancel, Cancelled
 from orbiflow.errors import OrbiflowError
-from orbiflow.escher.processes import process_context, work
 from orbiflow.paper.canvas import Canvas, Picture
 from orbiflow.paper.exhibit import Draw, Exhibit, Findings, Shown, Work
 from orbiflow.paper.extent import Extent
+from orbiflow.processes import process_context, work
 from orbiflow.threads import one_blas_thread, one_thread
 
 Progress = Callable[[float, str], None]
@@ -106,7 +106,8 @@ def _run(
             yield index, _outcome(function, item, _deaf, cancel)
         return
     told = functools.partial(_outcome, function)
-    pool = work(told, items, workers, context=process_context(), cancel=cancel)
+    context = process_context(("orbiflow.escher.search",))
+    pool = work(told, items, workers, context=context, cancel=cancel)
     with contextlib.closing(pool), contextlib.suppress(OrbiflowError):
         for news in pool:
             yield news.index, news.value

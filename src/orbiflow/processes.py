@@ -11,10 +11,10 @@ import time
 import traceback
 import warnings
 from collections import deque
-from collections.abc import Callable, Generator, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
-from typing import Any
+from typing import Any, NamedTuple
 
 import torch
 
@@ -38,24 +38,28 @@ class News:
     - `index`: of the item that it works on.
     - `value`: what it tells, or the result.
     - `done`: whether it is the result.
+    - `died`: whether there is none, since every worker that was given the item died; `done`, too.
     """
 
     index: int
     value: Any
     done: bool
+    died: bool = False
 
 
-def process_context() -> Any:
+def process_context(preload: Sequence[str] = ("torch",)) -> Any:
     """How workers start: forked where that is safe, which saves them two seconds of imports.
 
     A fork is safe as long as this process has no other thread and torch has not been allowed any.
+    Elsewhere they are forked from a server, where there is one, which begins with importing the modules
+    of `preload`; there is one server a process, and its first call decides.
     """
     methods = multiprocessing.get_all_start_methods()
     if "fork" in methods and torch.get_num_threads() == 1 and threading.active_count() == 1:
         return multiprocessing.get_context("fork")
     context = multiprocessing.get_context("forkserver" if "forkserver" in methods else "spawn")
     if context.get_start_method() == "forkserver":
-        context.set_forkserver_preload(["orbiflow.escher.search"])
+        context.set_forkserver_preload(list(preload))
     return context
 
 
@@ -66,6 +70,7 @@ def work(
     *,
     context: Any = None,
     cancel: Cancel | None = None,
+    tries: int | None = None,
 ) -> Generator[News, None, None]:
     """Do `function(item, tell, cancel)` for each item, in processes; yield their news in this thread.
 
@@ -75,15 +80,17 @@ def work(
 
     Args:
         function: of a module, or a `functools.partial` of one; it is handed to each worker once.
-        items: taken in order by whichever worker is free.
+        items: taken in order, one at a time, by whichever worker is free.
         workers: processes at most.
         context: of `process_context`.
         cancel: looked at between news; workers are given a token that follows it.
+        tries: workers that may die of an item. Each is replaced by a new one; an item that has had
+            so many is done with, its news say `died`. None: no worker may die.
 
     Raises:
-        OrbiflowError: if a worker dies; and whatever `function` raises.
+        OrbiflowError: if a worker dies without `tries`; and whatever `function` raises.
     """
-    pool = _Pool(function, items, context or process_context(), cancel or Cancel())
+    pool = _Pool(function, items, context or process_context(), cancel or Cancel(), tries)
     try:
         pool.start(workers)
         yield from pool.news()
@@ -91,57 +98,59 @@ def work(
         pool.close()
 
 
+class _Order(NamedTuple):
+    index: int
+    item: Any
+    tried: int  # workers that have died of it
+
+
 @dataclass(eq=False)
 class _Worker:
     process: Any
-    index: int | None = None
+    order: _Order | None = None
 
 
 class _Pool:
     def __init__(
-        self, function: Function, items: Iterable[Any], context: Any, cancel: Cancel
+        self,
+        function: Function,
+        items: Iterable[Any],
+        context: Any,
+        cancel: Cancel,
+        tries: int | None,
     ) -> None:
-        self.function, self.context, self.cancel = function, context, cancel
-        self.waiting = deque(enumerate(items))
+        self.function, self.context, self.cancel, self.tries = function, context, cancel, tries
+        self.items = enumerate(items)
+        self.again: deque[_Order] = deque()
         self.workers: dict[Connection, _Worker] = {}
         self.ended: list[Any] = []
         self.stop_by: float | None = None
 
     def start(self, count: int) -> None:
-        for _ in range(min(count, len(self.waiting))):
-            ours, theirs = self.context.Pipe()
-            # a fork inherits our ends: a worker would never learn that this process has gone
-            method = self.context.get_start_method()
-            inherited = (ours, *self.workers) if method == "fork" else ()
-            process = self.context.Process(
-                target=_serve, args=(theirs, inherited, self.function), daemon=True
-            )
-            # a fork server would hand the blocked signal on to other people's processes
-            shielded = contextlib.nullcontext() if method == "forkserver" else _without_interrupts()
-            with _quiet_fork(), shielded:
-                process.start()
-            theirs.close()
-            self.workers[ours] = _Worker(process)
-        for channel in list(self.workers):
-            self._feed(channel)
+        first = [order for order in (self._next() for _ in range(count)) if order is not None]
+        channels = [self._new_worker() for _ in first]
+        for channel, order in zip(channels, first, strict=True):
+            self._feed(channel, order)
 
     def news(self) -> Iterator[News]:
         while self._go_on():
             for channel in wait(list(self.workers), POLL):
                 assert isinstance(channel, Connection)
-                worker = self.workers[channel]
+                order = self.workers[channel].order
+                assert order is not None
                 try:
                     what, value = channel.recv()
                 except (EOFError, OSError) as error:
-                    self._lost(channel, error)
+                    given_up = self._lost(channel, order, error)
+                    if given_up:
+                        yield News(order.index, None, True, died=True)
                     continue
-                assert worker.index is not None
                 if what == "raised":
                     raise value
-                news = News(worker.index, value, what == "done")
+                news = News(order.index, value, what == "done")
                 self._listen()
                 if news.done:
-                    self._feed(channel)
+                    self._feed(channel, self._next())
                 yield news
 
     def close(self) -> None:
@@ -153,6 +162,31 @@ class _Pool:
         for process in self.ended:
             process.join()
 
+    def _next(self) -> _Order | None:
+        """What is to be done next, nothing once this is the end."""
+        if self.stop_by is not None:
+            return None
+        if self.again:
+            return self.again.popleft()
+        index, item = next(self.items, (None, None))
+        return None if index is None else _Order(index, item, 0)
+
+    def _new_worker(self) -> Connection:
+        ours, theirs = self.context.Pipe()
+        # a fork inherits our ends: a worker would never learn that this process has gone
+        method = self.context.get_start_method()
+        inherited = (ours, *self.workers) if method == "fork" else ()
+        process = self.context.Process(
+            target=_serve, args=(theirs, inherited, self.function), daemon=True
+        )
+        # a fork server would hand the blocked signal on to other people's processes
+        shielded = contextlib.nullcontext() if method == "forkserver" else _without_interrupts()
+        with _quiet_fork(), shielded:
+            process.start()
+        theirs.close()
+        self.workers[ours] = _Worker(process)
+        return ours
+
     def _go_on(self) -> bool:
         self._listen()
         return bool(self.workers) and (self.stop_by is None or time.monotonic() < self.stop_by)
@@ -161,27 +195,35 @@ class _Pool:
         """Tell the workers, once, that this is the end."""
         if self.cancel.cancelled and self.stop_by is None:
             self.stop_by = time.monotonic() + GRACE
-            self.waiting.clear()
             for channel, worker in self.workers.items():
-                if worker.index is not None:
+                if worker.order is not None:
                     _send(channel, None)
 
-    def _feed(self, channel: Connection) -> None:
+    def _feed(self, channel: Connection, order: _Order | None) -> None:
         """The next item to a free worker, or its end."""
-        index, item = self.waiting.popleft() if self.waiting else (None, None)
-        self.workers[channel].index = index
-        _send(channel, None if index is None else (item,))
-        if index is None:
+        self.workers[channel].order = order
+        _send(channel, None if order is None else (order.item,))
+        if order is None:
             self._ended(channel)
 
-    def _lost(self, channel: Connection, error: Exception) -> None:
+    def _lost(self, channel: Connection, order: _Order, error: Exception) -> bool:
+        """Whether the item that a worker died of is given up; else another one is to try."""
         self._listen()  # Ctrl-C may have ended a worker that was only just starting
-        if self.stop_by is None:
+        if self.stop_by is None and self.tries is None:
             raise OrbiflowError(
                 "a worker process died: was memory short, or is the script that called this "
                 'without `if __name__ == "__main__":`? Try workers=1'
             ) from error
         self._ended(channel)
+        if self.stop_by is not None or self.tries is None:
+            return False
+        given_up = order.tried + 1 >= self.tries
+        if not given_up:
+            self.again.append(order._replace(tried=order.tried + 1))
+        following = self._next()
+        if following is not None:
+            self._feed(self._new_worker(), following)
+        return given_up
 
     def _ended(self, channel: Connection) -> None:
         self.ended.append(self.workers.pop(channel).process)

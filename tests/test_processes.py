@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from orbiflow.cancel import Cancel
 from orbiflow.errors import OrbiflowError
-from orbiflow.escher.processes import work
+from orbiflow.processes import work
 
 Tell = Callable[[Any], None]
 
@@ -71,6 +72,53 @@ def test_a_worker_that_dies_is_an_error() -> None:
     with pytest.raises(OrbiflowError, match="a worker process died"):
         list(work(dying, range(3), 2))
     assert multiprocessing.active_children() == []
+
+
+def dying_once(item: tuple[int, Path], _tell: Tell, _cancel: Cancel) -> int:
+    number, mark = item
+    if number == 1 and not mark.exists():
+        mark.touch()
+        os._exit(3)
+    return number
+
+
+def dying_of_two(item: int, _tell: Tell, _cancel: Cancel) -> int:
+    if item == 2:
+        os._exit(3)
+    return item
+
+
+@pytest.mark.parametrize("workers", [1, 2, 5])
+def test_a_worker_that_dies_is_replaced_and_its_item_tried_again(
+    workers: int, tmp_path: Path
+) -> None:
+    items = [(number, tmp_path / "mark") for number in range(4)]
+    news = list(work(dying_once, items, workers, tries=2))
+    assert sorted(n.value for n in news) == [0, 1, 2, 3]
+    assert all(n.done and not n.died for n in news)
+    assert multiprocessing.active_children() == []
+
+
+@pytest.mark.parametrize("workers", [1, 3])
+def test_an_item_that_kills_every_worker_fails_alone(workers: int) -> None:
+    news = list(work(dying_of_two, iter(range(5)), workers, tries=3))
+    assert sorted(n.value for n in news if not n.died) == [0, 1, 3, 4]
+    assert [(n.index, n.done) for n in news if n.died] == [(2, True)]
+    assert multiprocessing.active_children() == []
+
+
+def test_items_are_taken_when_they_are_needed() -> None:
+    taken = []
+
+    def items() -> Iterator[int]:
+        for number in range(9):
+            taken.append(number)
+            yield number
+
+    news = work(square, items(), 2)
+    next(news)
+    news.close()
+    assert len(taken) <= 3
 
 
 def test_cancelling_ends_all() -> None:

@@ -1,0 +1,180 @@
+"""The folder of a batch: a folder a result, the table and the page of all, the journal."""
+
+from __future__ import annotations
+
+import io
+import time
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack, suppress
+from pathlib import Path, PurePosixPath
+from types import TracebackType
+from typing import Self
+
+from filelock import FileLock, Timeout
+
+from orbiflow.errors import OutputError
+from orbiflow.files import make_folder, write_atomic
+from orbiflow.folders import LITTER, ResultFolder
+from orbiflow.jobs.batch.journal import Entry, Journal
+from orbiflow.jobs.batch.kinds import Kind
+from orbiflow.jobs.batch.page import page
+from orbiflow.jobs.batch.table import table
+
+JOURNAL, TABLE, PAGE, THUMBNAILS, LOCK = (
+    "batch.jsonl",
+    "batch.csv",
+    "index.html",
+    "thumbnails",
+    ".batch.lock",
+)
+RESERVED = (JOURNAL, TABLE, PAGE, THUMBNAILS, LOCK)
+"""Names that no result has."""
+
+THUMBNAIL = (360, 240)
+"""Pixels: half as many again as the page shows."""
+
+PAUSE, REST = 1.0, 20.0
+"""The table and the page are written again after so many seconds at the earliest, and after so many
+times the seconds that it took: most of the time is for the work, however many results there are."""
+
+
+class BatchFolder:
+    """Where a batch's results go; in a `with` block, this batch's alone.
+
+    Args:
+        path: of the folder, made if need be. An earlier batch there is gone on with.
+        kind: of the batch.
+        title: of the page.
+
+    Raises:
+        OutputError: if something else is in it, another batch is at work there, or it cannot be
+            written.
+    """
+
+    def __init__(self, path: Path, kind: Kind, title: str) -> None:
+        self.path, self.kind, self.title = path, kind, title
+        self._check()
+        make_folder(path)
+        self.journal = Journal(path / JOURNAL)
+        self.files: Sequence[str] = ()
+        self._open = ExitStack()
+        self._written, self._cost = 0.0, 0.0
+
+    def __enter__(self) -> Self:
+        lock = FileLock(self.path / LOCK, timeout=0)
+        try:
+            self._open.enter_context(lock)
+        except Timeout as error:
+            raise OutputError(
+                f"another batch is at work in {self.path}: wait for it or choose another --out"
+            ) from error
+        except OSError as error:
+            raise OutputError(
+                f"cannot write into {self.path}: {error.strerror or error}"
+            ) from error
+        self.journal = Journal(self.path / JOURNAL)  # as the last one left it
+        self._open.enter_context(self.journal)
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        """Write the table and the page, whatever has happened."""
+        with self._open:
+            if kind is None:
+                self.write_all()
+            else:
+                with suppress(OutputError):  # the first error is the one to be told
+                    self.write_all()
+
+    def has(self, name: str) -> bool:
+        """Whether a result's folder is there."""
+        return (self.path / name).is_dir()
+
+    def keep(self, entry: Entry, files: Mapping[str, bytes], picture: str | None) -> None:
+        """Put a result where it belongs, and say so in the journal, in this order.
+
+        Args:
+            entry: of the file.
+            files: of the result, by path; none leaves what was there.
+            picture: path of the one that the page is to show small.
+
+        Raises:
+            OutputError: if it cannot be written; the journal then does not have it.
+        """
+        if files:
+            folder = ResultFolder(self.path / entry.name, self.kind.earlier)
+            with folder.replaced() as staged:
+                _write(staged, files)
+        thumbnail = self.path / THUMBNAILS / f"{entry.name}.png"
+        if picture is not None and picture in files:
+            make_folder(thumbnail.parent)
+            write_atomic(thumbnail, _small(files[picture]))
+        elif files:
+            thumbnail.unlink(missing_ok=True)
+        self.journal.add(entry)
+        now = time.monotonic()
+        if now - self._written > max(PAUSE, REST * self._cost):
+            self.write_all()
+
+    def write_all(self) -> None:
+        """The table and the page of all `files` that are done with.
+
+        Raises:
+            OutputError: if they cannot be written.
+        """
+        begin = time.monotonic()
+        entries = [self.journal.entries[f] for f in self.files if f in self.journal.entries]
+        write_atomic(self.path / TABLE, table(entries, self.kind))
+        pictures = frozenset(path.stem for path in (self.path / THUMBNAILS).glob("*.png"))
+        waiting = len(self.files) - len(entries)
+        write_atomic(self.path / PAGE, page(entries, self.kind, self.title, waiting, pictures))
+        self._written = time.monotonic()
+        self._cost = self._written - begin
+
+    def _check(self) -> None:
+        """Raises an `OutputError` for a folder that is not a batch's."""
+        try:
+            if not self.path.exists() or (self.path / JOURNAL).exists():
+                return
+            found = next((p for p in sorted(self.path.iterdir()) if not _is_litter(p)), None)
+        except OSError as error:
+            raise OutputError(
+                f"cannot write into {self.path}: {error.strerror or error}; choose another --out"
+            ) from error
+        if found is not None:
+            raise OutputError(
+                f"{self.path} holds {found.name}, which is of no earlier batch: choose another --out "
+                "or move it"
+            )
+
+
+def _is_litter(path: Path) -> bool:
+    return path.name in LITTER or path.name == LOCK
+
+
+def _write(folder: Path, files: Mapping[str, bytes]) -> None:
+    for name, data in files.items():
+        path = folder / PurePosixPath(name)
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(data)
+        except OSError as error:
+            raise OutputError(
+                f"cannot write {name} into {folder}: {error.strerror or error}; free the disk or "
+                "choose another --out"
+            ) from error
+
+
+def _small(picture: bytes) -> bytes:
+    """A PNG, small in pixels and bytes."""
+    from PIL import Image, ImageOps
+
+    out = io.BytesIO()
+    with Image.open(io.BytesIO(picture)) as image:
+        small = ImageOps.fit(image.convert("RGB"), THUMBNAIL, Image.Resampling.BOX)
+        small.quantize(64, dither=Image.Dither.NONE).save(out, "PNG", optimize=True)
+    return out.getvalue()

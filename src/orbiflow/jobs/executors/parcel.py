@@ -1,0 +1,163 @@
+"""A job that travels: text and bytes on its way there, text and bytes on its way back."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+from orbiflow import __version__
+from orbiflow.cancel import Cancel
+from orbiflow.errors import OrbiflowError
+from orbiflow.jobs.events import Event, Failed, Finished, Progress, Written, event_from_json
+from orbiflow.jobs.request import Request
+from orbiflow.jobs.requests import request_from_json
+from orbiflow.jobs.run import run
+
+MOST_WRITTEN = 512 * 2**20
+"""Bytes that one job may write."""
+
+
+@dataclass(frozen=True)
+class Parcel:
+    """A request and what it reads.
+
+    - `key`: by which its answer is known.
+    - `request`: one that reads one file and writes a folder.
+    - `reads`, `writes`: names of these two fields.
+    - `name`, `data`: of the file.
+    """
+
+    key: str
+    request: Request
+    reads: str
+    writes: str
+    name: str
+    data: bytes
+
+    def header(self) -> str:
+        """All but the file's bytes."""
+        fields = {"reads": self.reads, "writes": self.writes, "name": self.name}
+        return json.dumps({"version": __version__, "request": self.request.to_json(), **fields})
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What came of a parcel.
+
+    - `key`: of the parcel.
+    - `events`: without `Progress` and `Written`; the last is `Finished` or `Failed`.
+    - `files`: what it wrote, by path relative to its folder, with slashes.
+    """
+
+    key: str
+    events: tuple[Event, ...]
+    files: Mapping[str, bytes]
+
+    @classmethod
+    def of(cls, key: str, text: str, files: Mapping[str, bytes]) -> Answer:
+        """From what `carry_out` gave.
+
+        Raises:
+            OrbiflowError: if it is something else.
+        """
+        events = tuple(event_from_json(document) for document in json.loads(text))
+        if not events or not isinstance(events[-1], Finished | Failed):
+            raise OrbiflowError("a worker gave an answer without an end")
+        for name in files:
+            path = PurePosixPath(name)
+            if path.is_absolute() or ".." in path.parts or not path.parts or "\\" in name:
+                raise OrbiflowError(f"a worker gave a file a name that cannot be used: {name!r}")
+        return cls(key, events, files)
+
+    @classmethod
+    def died(cls, key: str, times: int) -> Answer:
+        """Of a parcel that workers died of."""
+        message = (
+            f"{times} workers died while they were at it: was memory short? A simpler file may do"
+        )
+        return cls(key, (Failed(message, "died"),), {})
+
+    @property
+    def end(self) -> Finished | Failed:
+        """The last event."""
+        last = self.events[-1]
+        assert isinstance(last, Finished | Failed)
+        return last
+
+
+def carry_out(header: str, data: bytes, cancel: Cancel) -> tuple[str, dict[str, bytes]]:
+    """Run a parcel's request in this thread, in a folder that is gone afterwards.
+
+    Returns:
+        Events as text, and files, for `Answer.of`. Whatever fails is among the events.
+    """
+    from orbiflow.threads import one_thread  # with torch
+
+    order = json.loads(header)
+    with (
+        tempfile.TemporaryDirectory(prefix="orbiflow-", ignore_cleanup_errors=True) as folder,
+        one_thread(),
+    ):
+        events, files = _run(order, data, Path(folder), cancel)
+        shown = [_without(event.to_json(), folder) for event in events]
+    return json.dumps(shown, allow_nan=False), files
+
+
+def _run(
+    order: Mapping[str, Any], data: bytes, folder: Path, cancel: Cancel
+) -> tuple[list[Event], dict[str, bytes]]:
+    if order["version"] != __version__:
+        text = f"this worker has orbiflow {__version__}, not {order['version']}"
+        return [Failed(text, "mistake")], {}
+    events: list[Event] = []
+
+    def keep(event: Event) -> None:
+        if not isinstance(event, Progress | Written):
+            events.append(event)
+
+    try:
+        read, written = folder / "in" / order["name"], folder / "out"
+        read.parent.mkdir()
+        read.write_bytes(data)
+        there = {order["reads"]: str(read), order["writes"]: str(written)}
+        request = request_from_json({**order["request"], **there})
+        with suppress(Exception):  # told by its last event
+            run(request, keep, cancel)
+        files = _packed(written)
+    except OSError as error:
+        return [Failed(f"{type(error).__name__}: {error.strerror or error}", "error")], {}
+    except OrbiflowError as error:
+        return [Failed(str(error), "mistake")], {}
+    return events or [Failed("the job ended without a word", "error")], files
+
+
+def _packed(folder: Path) -> dict[str, bytes]:
+    """All files in a folder, if there is one.
+
+    Raises:
+        OrbiflowError: if they are too large to be sent.
+    """
+    paths = sorted(path for path in folder.rglob("*") if path.is_file())
+    size = sum(path.stat().st_size for path in paths)
+    if size > MOST_WRITTEN:
+        raise OrbiflowError(
+            f"its results are {size / 2**20:.0f} MB, more than the {MOST_WRITTEN / 2**20:.0f} MB that "
+            "are sent back; run it by itself"
+        )
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in paths}
+
+
+def _without(value: Any, folder: str) -> Any:
+    """Plain data, whose texts do not name a folder that will be gone."""
+    if isinstance(value, str):
+        for part in ("in", "out"):
+            value = value.replace(str(Path(folder) / part / "_")[:-1], "")
+        return value
+    if isinstance(value, dict):
+        return {name: _without(part, folder) for name, part in value.items()}
+    return [_without(part, folder) for part in value] if isinstance(value, list) else value

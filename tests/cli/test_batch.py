@@ -1,0 +1,141 @@
+"""`orbiflow batch` and `orbiflow density batch`: what a user sees."""
+
+from __future__ import annotations
+
+import inspect
+import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from typing import get_type_hints
+
+import numpy as np
+import pytest
+
+from jobs.batches import rows, write_boot
+from jobs.searches import ENDLESS
+from orbiflow.cli.batch import batch
+from orbiflow.cli.density_batch import batch as density_batch
+from orbiflow.cli.escherize import escherize
+from orbiflow.jobs import BatchRequest
+
+QUICK = [
+    "--classes",
+    "IH4",
+    "--method",
+    "occupancy",
+    "--turns",
+    "1",
+    "--iterations",
+    "2",
+    "--max-frequency",
+    "1",
+]
+
+
+def test_a_folder_twice(tmp_path: Path, orbiflow) -> None:
+    write_boot(tmp_path / "in" / "boot.json")
+    command = ("batch", tmp_path / "in", "--out", tmp_path / "out", "--workers", 1, *QUICK)
+    first = orbiflow(*command)
+    assert first.status == 0, first.err
+    assert "1 silhouettes for one process" in first.out
+    assert "boot: IH4, score" in first.out
+    assert f"look at {tmp_path / 'out' / 'index.html'}" in first.out
+    second = orbiflow(*command)
+    assert second.status == 0
+    assert "nothing was left to do" in second.out
+    assert json.loads(rows(tmp_path / "out")["boot.json"]["settings"])["seed"] == 0
+    write_boot(tmp_path / "in" / "broken.json")
+    (tmp_path / "in" / "broken.json").write_text("[")
+    third = orbiflow(*command)
+    assert third.status == 1
+    assert "broken: failed: broken.json: " in third.out
+    assert "--retry-failed does them again" in third.err
+
+
+@pytest.mark.skipif(os.name != "posix", reason="sends signals")
+def test_ctrl_c_says_how_to_go_on(tmp_path: Path) -> None:
+    for name in ("one", "two", "three"):
+        write_boot(tmp_path / "in" / f"{name}.json")
+    command = [sys.executable, "-u", "-m", "orbiflow", "batch", tmp_path / "in"]
+    command += ["--out", tmp_path / "out", "--workers", "2", *QUICK, "--iterations", str(ENDLESS)]
+    with subprocess.Popen(
+        [str(part) for part in command],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    ) as process:
+        assert process.stdout is not None
+        while "silhouettes for 2 processes" not in (line := process.stdout.readline()):
+            assert line, process.communicate()
+        os.killpg(process.pid, signal.SIGINT)
+        # returns once the last process that holds the pipes has ended
+        rest, said = process.communicate()
+    assert process.returncode == 130, rest + said
+    assert "interrupted with 3 still to do; the same command goes on from here" in said
+    assert rows(tmp_path / "out") == {}
+    assert not (tmp_path / "out" / "one").exists()
+
+
+def test_tables(tmp_path: Path, orbiflow) -> None:
+    (tmp_path / "in").mkdir()
+    draws = np.random.default_rng(0).vonmises(0, 2, size=(60, 2))
+    np.savetxt(tmp_path / "in" / "one.csv", draws, delimiter=",")
+    outcome = orbiflow(
+        *("density", "batch", tmp_path / "in", "--out", tmp_path / "out"),
+        *("--space", "torus", "--parts", "kernels", "--workers", 1),
+    )
+    assert outcome.status == 0, outcome.err
+    row = rows(tmp_path / "out")["one.csv"]
+    report = json.loads((tmp_path / "out" / "one" / "report.json").read_text())
+    assert float(row["log_likelihood"]) == report["log_likelihood"]["natural"]
+    assert row["rows"] == "60"
+    assert "one.csv" in (tmp_path / "out" / "index.html").read_text()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("nowhere",), "there is no such folder; give a folder of files"),
+        (("file.png",), "it is a file; give a folder of files"),
+        (("empty",), "no file to read; wanted are names that end in .png"),
+        (("in", "--out", "in/out"), "choose an --out somewhere else"),
+        (("in", "--workers", "0"), "--workers must be at least 1"),
+        (("in", "--workers", "2", "--scheduler", "tcp://127.0.0.1:1"), "of a --scheduler are its"),
+        (("in", "--match", "*.webp"), "none of its 1 files fits the pattern '*.webp'"),
+        (("in", "--turns", "3"), "--turns belongs to --method occupancy"),
+    ],
+)
+def test_mistakes(
+    arguments: tuple[str, ...], message: str, tmp_path: Path, orbiflow, monkeypatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "empty").mkdir()
+    (tmp_path / "file.png").touch()
+    write_boot(tmp_path / "in" / "boot.json")
+    outcome = orbiflow("batch", *arguments)
+    assert outcome.status == 2
+    assert outcome.err.startswith("error: ")
+    assert message in " ".join(outcome.err.split())
+    assert not (tmp_path / "batch").exists()
+    assert not (tmp_path / "in" / "out").exists()
+
+
+def test_options_of_a_search_are_those_of_escherize() -> None:
+    own, other = (get_type_hints(f, include_extras=True) for f in (batch, escherize))
+    of_one = {"image", "out", "workers", *BatchRequest.OWN}
+    for name in set(other) - of_one - {"return"}:
+        assert own[name].__metadata__[0] is other[name].__metadata__[0], name
+    defaults = inspect.signature(escherize).parameters
+    for name, parameter in inspect.signature(batch).parameters.items():
+        if name in defaults and name not in of_one:
+            assert parameter.default == defaults[name].default
+
+
+def test_options_of_both_batches_are_one() -> None:
+    own, other = (get_type_hints(f, include_extras=True) for f in (batch, density_batch))
+    for name in ("match", "workers", "scheduler", "retry_failed"):
+        assert own[name].__metadata__[0] is other[name].__metadata__[0]
