@@ -99,7 +99,7 @@ class Azimuthal(Projection):
 class Lambert(Azimuthal):
     """Lambert's azimuthal projection, of equal areas.
 
-    >>> Lambert((90.0, 0.0)).forward(np.array([[0.0, 90.0]])).round(6).tolist()
+    >>> Lambert((0.0, 0.0)).forward(np.array([[0.0, 90.0]])).round(6).tolist()
     [[1.414214, 0.0]]
     """
 

@@ -13,6 +13,7 @@ from orbiflow.density.models.symmetric import SymmetricDensity
 from orbiflow.errors import OrbiflowError
 from orbiflow.figures.density_axes import (
     INK,
+    LETTER,
     View,
     angle_axis,
     apart,
@@ -188,9 +189,14 @@ def _heads(grid: _Grid, dim: int, data: int | None, drawn: int, most: int) -> No
     y = (grid.below + dim * grid.side + 0.6 * grid.sheet.em) / height
     size = grid.sheet.text * (1.0 if grid.sheet.printed else 1.05)
     reach = dim * grid.side / width
-    for k, (text, colour) in enumerate(heads):
-        x = grid.left / width + reach * k * (0.53 if dim > 1 else 0.36)
+    widths = [(len(text) + 1.5) * LETTER * size / 72 / width for text, _ in heads]
+    step = max(reach * (0.53 if dim > 1 else 0.36), max(widths[:-1], default=0.0))
+    x = grid.left / width
+    if x + step * (len(heads) - 1) + widths[-1] > 1:  # a narrow figure
+        x, step = 0.4 * grid.sheet.em / width, 0.0
+    for (text, colour), own in zip(heads, widths, strict=True):
         grid.figure.text(x, y, text, fontsize=size, color=colour)
+        x += step or own
 
 
 def _caption(view: View, data: int | None, drawn: int, most: int) -> str:

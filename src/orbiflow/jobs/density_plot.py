@@ -68,10 +68,10 @@ def density_plot(request: DensityPlotRequest, tell: Sink, cancel: Cancel) -> Fin
 
 def _said(out: Path, single: bool, space: Space) -> str:
     if space.dim != 2:
-        where = out if single else f"the samples in {out}"
+        where = out if single else f"the picture in {out}"
         return (
             f"density, flow and surface are drawn in two dimensions, this {space.name} has "
-            f"{space.dim}: {where} shows its samples angle by angle"
+            f"{space.dim}: {where} shows samples, angle by angle"
         )
     if single:
         return f"written {out}, a page a figure; a folder gets the surface to turn, too"
