@@ -55,6 +55,12 @@ def test_windows_that_are_none(window: tuple[float, ...]) -> None:
         patch(tile, window)
 
 
+def test_a_long_thin_window() -> None:
+    tile = Tile(isohedral_class("IH1").template(), isohedral_class("IH1").group())
+    found = patch(tile, (0.1, 0.1, 9000.1, 0.1 + 1e-9))
+    assert len(found) == pytest.approx(9000 / 1.5, abs=2)
+
+
 @pytest.mark.parametrize("window", [(-500, -500, 500, 500), (0, 0, 1e9, 1)])
 def test_too_many_tiles(window: tuple[float, ...]) -> None:
     tile = Tile(isohedral_class("IH1").template(), isohedral_class("IH1").group())

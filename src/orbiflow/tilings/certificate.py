@@ -194,7 +194,7 @@ class _Figures:
 
     def _area_reason(self) -> str:
         whose = "the mean area of its tiles" if self.several else "its area"
-        own = f", the tile being its own image {self.symmetry}-fold" if self.symmetry > 1 else ""
+        own = f" for a tile with a symmetry of order {self.symmetry}" if self.symmetry > 1 else ""
         return (
             f"{whose} {abs(self.area):.9g} is not the group's {self.size:.9g}"
             f"{'' if self.several else own} (relative error {self.error:.1e})"

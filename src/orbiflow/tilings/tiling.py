@@ -56,6 +56,8 @@ class Tiling:
             given = list(prototiles)
         except TypeError:
             given = []
+        if given and not isinstance(given[0], Prototile | str) and np.ndim(given[0]) == 1:
+            given = []  # a polygon by itself
         own = tuple(p if isinstance(p, Prototile) else Prototile(np.asarray(p)) for p in given)
         if not own:
             raise OrbiflowError(
