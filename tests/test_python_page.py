@@ -36,7 +36,7 @@ def test_the_snippets(tmp_path: Path, monkeypatch, capsys: pytest.CaptureFixture
         assert loop.width == 240
         assert getattr(loop, "n_frames", 1) > 5
     assert {p.name for p in (tmp_path / "pictures").iterdir()} == {
-        "density.png", "flow.png", "samples.png", "surface.html",
+        "density.png", "samples.png", "surface.html",
     }  # fmt: skip
 
 
