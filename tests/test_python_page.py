@@ -24,9 +24,11 @@ def test_the_snippets(tmp_path: Path, monkeypatch, capsys: pytest.CaptureFixture
         exec(compile(snippet, "python.md", "exec"), names)
     said = capsys.readouterr().out.splitlines()
     assert said[0].endswith("True")
-    assert said[2].startswith("Density on the torus. The edges with one arrow head")
-    assert said[3].startswith("Dashed: the silhouette as it was")
-    for name in ("cut.svg", "turtles.svg", "cut.dxf"):
+    assert said[1] == "True True"
+    assert said[3].startswith("Density on the torus. The edges with one arrow head")
+    assert said[4:7] == ["True"] * 3
+    assert said[7].startswith("Dashed: the silhouette as it was")
+    for name in ("cut.svg", "turtles.svg", "cut.dxf", "boxes.png"):
         assert (tmp_path / name).stat().st_size > 1000
     for name in ("figure.pdf", "density.pdf", "density-alone.pdf"):
         assert (tmp_path / name).read_bytes().startswith(b"%PDF")
@@ -34,7 +36,7 @@ def test_the_snippets(tmp_path: Path, monkeypatch, capsys: pytest.CaptureFixture
         assert loop.width == 240
         assert getattr(loop, "n_frames", 1) > 5
     assert {p.name for p in (tmp_path / "pictures").iterdir()} == {
-        "density.png", "flow.png", "samples.png", "surface.html",
+        "density.png", "samples.png", "surface.html",
     }  # fmt: skip
 
 
