@@ -11,8 +11,8 @@ from density_kde import Data, with_floor
 from scipy.special import ive
 
 from orbiflow.density import to_vectors
-from orbiflow.density.models.kernels import BLOCK_ENTRIES
 from orbiflow.density.models.log_sum import log_sum_exp
+from orbiflow.density.models.terms import BLOCK_ENTRIES
 
 CONCENTRATIONS = np.geomspace(2.0, 2e4, 9)
 FINER = (1.78, 1.33)

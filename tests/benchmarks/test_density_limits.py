@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orbiflow.density import DensityEstimator
+from orbiflow.density import BlendedDensity, DensityEstimator
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 
@@ -121,6 +121,7 @@ def fitted(dim: int) -> tuple[DensityEstimator, np.ndarray]:
 def test_the_integral_is_seen_from_values(module, dim: int, monkeypatch) -> None:
     estimator, rows = fitted(dim)
     density = estimator.density_
+    assert isinstance(density, BlendedDensity)
     own = module("density_integral").integral(density, rows)
     assert abs(own.value - 1) < max(1e-3, 4 * own.error)
     assert own.worst_kernel < 1e-6

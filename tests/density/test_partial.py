@@ -103,7 +103,9 @@ def test_many_angles_without_tables(seed: int, data: st.DataObject) -> None:
     for axis, value in at.items():
         points[:, axis] = value
     product = found.log_prob(points[:, left]) + marginal(density, known).log_prob(points[:, known])
-    assert (product - density.log_prob(points)).abs().max() < 1e-9
+    # a part keeps a share of 1e-9 where what is known leaves it less
+    floor = (-density.log_prob(points) + marginal(density, known).log_prob(points[:, known])).exp()
+    assert ((product - density.log_prob(points)).abs() < 1e-9 * (1 + 10 * floor)).all()
     assert found.error == 0
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 import math
 import numbers
 from collections.abc import Mapping, Sequence
@@ -28,6 +27,7 @@ from orbiflow.density.fitting.rows import mean_of, weighed
 from orbiflow.density.fitting.settings import FitSettings
 from orbiflow.density.models.still import MOST_DIM
 from orbiflow.density.models.symmetric import SymmetricDensity
+from orbiflow.density.parameters import Parameters
 from orbiflow.density.partial import (
     axes_named,
     chart_of_observed,
@@ -55,7 +55,7 @@ OF_FLOWS = (*ONLY_SPLINES[:-1], "evaluations", "validation")
 AUTO = "auto"
 
 
-class DensityEstimator:
+class DensityEstimator(Parameters):
     """Exact, normalised density of angles, directions, axes or Klein-bottle coordinates.
 
     Follows scikit-learn's conventions: works in a `GridSearchCV` and a `Pipeline`.
@@ -314,48 +314,6 @@ class DensityEstimator:
         generator = torch.Generator().manual_seed(seed_of(random_state))
         return self.space_.from_chart(density.sample((int(n_samples),), generator))
 
-    def get_params(self, deep: bool = True) -> dict[str, Any]:
-        """The constructor's arguments, by name."""
-        del deep
-        return {name: getattr(self, name) for name in self._names()}
-
-    def set_params(self, **params: Any) -> DensityEstimator:
-        """Change constructor arguments.
-
-        Raises:
-            OrbiflowError: for a name that is none.
-        """
-        for name, value in params.items():
-            if name not in self._names():
-                raise OrbiflowError(f"no parameter {name!r}; there are {', '.join(self._names())}")
-            setattr(self, name, value)
-        return self
-
-    def __sklearn_tags__(self) -> Any:
-        # asked for by scikit-learn alone, which is therefore there
-        from sklearn.utils import Tags, TargetTags  # pyright: ignore[reportMissingImports]
-
-        return Tags(
-            estimator_type="density_estimator",
-            target_tags=TargetTags(required=False),
-            transformer_tags=None,
-            regressor_tags=None,
-            classifier_tags=None,
-        )
-
-    def __repr__(self) -> str:
-        defaults = inspect.signature(type(self)).parameters
-        shown = [
-            f"{name}={value!r}"
-            for name, value in self.get_params().items()
-            if value != defaults[name].default
-        ]
-        return f"DensityEstimator({', '.join(shown)})"
-
-    @classmethod
-    def _names(cls) -> list[str]:
-        return list(inspect.signature(cls).parameters)
-
     def _space_for(self, data: np.ndarray) -> Space:
         if isinstance(self.space, Space):
             return self.space
@@ -375,24 +333,18 @@ class DensityEstimator:
     def _flow_settings(self) -> FitSettings:
         """Of a flow alone, or with kernels."""
         return FitSettings(
-            kernels=self.kernels, seconds=self.seconds, seed=self.seed, **self._set(OF_FLOWS)
+            kernels=self.kernels, seconds=self.seconds, seed=self.seed, **self._changed(OF_FLOWS)
         )
 
     def _flow_beside(self, rows: int) -> FitSettings | None:
         """Of a flow beside other parts."""
-        given = self._set(OF_FLOWS)
+        given = self._changed(OF_FLOWS)
         if not given or self.space_.dim > MOST_DIM:
             return None
         return replace(flow_settings(self.space_, rows, self.seed), seconds=math.inf, **given)
 
-    def _set(self, names: tuple[str, ...]) -> dict[str, Any]:
-        """Parameters that are not at their defaults."""
-        defaults = inspect.signature(type(self)).parameters
-        given = {name: getattr(self, name) for name in names}
-        return {name: v for name, v in given.items() if v != defaults[name].default}
-
     def _refuse_settings_of_splines(self) -> None:
-        set_ = list(self._set(ONLY_SPLINES))
+        set_ = list(self._changed(ONLY_SPLINES))
         if set_:
             raise OrbiflowError(
                 f"{', '.join(set_)} would have no effect on a torus of {self.space_.dim} angles, where "

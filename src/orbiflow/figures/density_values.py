@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 
 from orbiflow.density.models.blend import BlendedDensity
-from orbiflow.density.models.kernels import AdaptiveKernels, kernel_rows
+from orbiflow.density.models.kernels import AdaptiveKernels
 from orbiflow.density.models.symmetric import SymmetricDensity, midpoints
 from orbiflow.density.spaces.space import rectangle
 from orbiflow.errors import OrbiflowError
@@ -17,14 +17,8 @@ from orbiflow.figures.density_scale import DARKEST, SCALES, dark_share
 from orbiflow.figures.immersions import off_cones
 from orbiflow.symmetry.isometry import Array
 
-_BLOCK = 200_000
-"""Pairs of points and kernels worked on at a time: few enough for the processor's cache."""
-
-_TILES = 32
-"""Along a side of the square, of points that have their kernels in common."""
-
-_REACH = 30.0
-"""Logarithm of how far below its peak a kernel is left out."""
+_TOLERANCE = 1e-5
+"""Of what is drawn, relative to it."""
 
 _COARSE = 120
 """Points along a side by which a scale is chosen."""
@@ -182,38 +176,7 @@ def _flat_sums(kernels: AdaptiveKernels, kappa: Tensor, x: Tensor, y: Tensor) ->
 
 
 def _round_sums(kernels: AdaptiveKernels, kappa: Tensor, points: Tensor) -> Tensor:
-    """The mixture of kernels (N,) at points off the cone points, per area of the square.
-
-    Most kernels are narrow: the square is cut into tiles, each of which has those alone that reach it.
-    """
-    space = kernels.space
-    centers = space.features(kernels.centers)[0]
-    rows, offsets = kernel_rows(space, centers, kappa)
-    # exponents are at most the peaks' logarithms: plain sums, in single precision for their speed
-    rows, centers = rows.mT.contiguous().float(), centers.float()
-    offsets = (offsets + kernels.weights.log()).float()
-    reach = (2 * _REACH / kappa[:, 0]).sqrt().float()
-    ends = space.features(points).float()
-    total = torch.zeros(len(points))
-    tiles = (points * _TILES).floor().long().clamp(0, _TILES - 1)
-    number = tiles[:, 0] * _TILES + tiles[:, 1]
-    counts = torch.bincount(number, minlength=_TILES**2).tolist()
-    for tile in number.argsort(stable=True).split(counts):
-        for end in ends[:, tile] if len(tile) else ():
-            # chords obey the triangle inequality: |center - middle| <= reach + |point - middle|
-            middle = torch.nn.functional.normalize(end.mean(dim=0), dim=0)
-            chord = (end - middle).norm(dim=1).max()
-            near = torch.nonzero(centers @ middle >= 1 - (reach + chord) ** 2 / 2)[:, 0]
-            total[tile] += _plain_sums(end, rows[:, near], offsets[near])
-    return total.double() * space.log_area(points).exp()
-
-
-def _plain_sums(features: Tensor, rows: Tensor, offsets: Tensor) -> Tensor:
-    """(N,) of features (N, m): the sum of exponentials, block by block."""
-    block = max(1, _BLOCK // max(1, len(offsets)))
-    # the clamp, far below anything drawn, keeps exp() from its slow path, fifty times slower
-    sums = [
-        torch.addmm(offsets, part, rows).clamp_(-80).exp_().sum(dim=1)
-        for part in features.split(block)
-    ]
-    return torch.cat(sums)
+    """The mixture of kernels (N,) at points off the cone points, per area of the square."""
+    widened = AdaptiveKernels(kernels.space, kernels.centers, kappa, kernels.weights)
+    values = widened.log_density(points, tolerance=_TOLERANCE)
+    return (values + kernels.space.log_area(points)).exp()
