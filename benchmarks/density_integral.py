@@ -1,11 +1,12 @@
 """The integral of a fitted density, from its values: no constant of the library is taken on trust.
 
-A density is a sum, so its parts are integrated one by one, each by the rule that suits it. Broad
-parts (flow, floor, chains, broad kernels) are summed over a grid of the whole space. Kernels
-narrower than a few cells are integrated each on a grid of its own width, as many as `LOOKED_AT` of
-them. On tori of many angles no grid is fine enough: a narrow kernel is a product, integrated angle
-by angle, and the others and the chains are integrated by importance sampling, from a kernel
-estimate with a floor.
+A density is a sum, so its parts are integrated one by one, each by the rule that suits it. On spaces
+of two dimensions flow, floor, chains and broad kernels are summed over a grid of the whole space, and
+kernels narrower than a few of its cells are integrated each on a grid of its own width. On tori of
+more angles no grid is fine enough. But a kernel is a product, and a chain is one in its residuals (to
+which the angles go by a triangular map that keeps volume): their integrals are those of sections
+through the center, angle by angle. Of narrow kernels, and on such tori of kernels and of components,
+`LOOKED_AT` are integrated.
 """
 
 from __future__ import annotations
@@ -15,14 +16,12 @@ from typing import NamedTuple
 
 import numpy as np
 import torch
-from density_kde import KernelDensity
 from numpy.typing import NDArray
 
 from orbiflow.density import BlendedDensity, midpoints
+from orbiflow.density.models.chains import SCALES, VonMisesChains, waves
 from orbiflow.density.models.kernels import AdaptiveKernels
 from orbiflow.density.spaces.round import RoundSpace
-
-Data = NDArray[np.float64]
 
 GRID = 256
 """Points a side of the whole space's grid."""
@@ -31,34 +30,44 @@ BROAD = 150.0
 """Concentration up to which that grid sees a kernel: a deviation of three cells at least."""
 
 LOOKED_AT, REACH, NODES = 100, 10.0, 81
-"""Narrow kernels, how many deviations of them, and points a side."""
-
-DRAWN, PROPOSED, FLOOR = 40_000, 12.0, 0.1
-"""Of importance sampling: points, the concentration of the estimate drawn from, its uniform part."""
+"""Parts that are integrated by themselves, how many deviations of them, and points a side."""
 
 
 class Integral(NamedTuple):
-    """Its value, the standard error where it was sampled, the largest error of a narrow kernel's."""
+    """Its value, and the largest relative error of a part that was integrated by itself."""
 
     value: float
-    error: float
-    worst_kernel: float
+    worst: float
 
 
 @torch.no_grad()
-def integral(density: BlendedDensity, train: Data) -> Integral:
-    """Of a density fitted to rows `train`; in radians, where there are more angles than two."""
-    kernels = density.kernels
+def integral(density: BlendedDensity) -> Integral:
+    """Of a density on a space of two dimensions, or on a torus of more angles without a flow."""
+    if density.space.dim == 2:
+        return _by_grid(density)
+    shares = density.shares.tolist()
+    if shares[0]:
+        raise ValueError("a flow of many angles is not integrated")
+    found = [(shares[1], _mean(density.kernels)), (shares[2], (1.0, 0.0))]
+    if density.chains is not None:
+        found.append((shares[3], _chains(density.chains)))
+    value = sum(share * mean for share, (mean, _) in found)
+    return Integral(value, max(worst for _, (_, worst) in found))
+
+
+def _by_grid(density: BlendedDensity) -> Integral:
+    kernels, share = density.kernels, float(density.shares[1])
     narrow = (kernels.concentrations > BROAD).any(dim=1)
-    share = float(density.shares[1])
+    points = midpoints(density.space, GRID)
+    values = density.log_prob_without_kernels(points).exp()
     fine, worst = 0.0, 0.0
+    if not bool(narrow.all()):
+        weight = share * float(kernels.weights[~narrow].sum())
+        values = values + weight * _part(kernels, ~narrow).log_prob(points).exp()
     if bool(narrow.any()):
-        mean, worst = _narrow(_part(kernels, narrow))
+        mean, worst = _mean(_part(kernels, narrow))
         fine = share * float(kernels.weights[narrow].sum()) * mean
-    broad = None if bool(narrow.all()) else _part(kernels, ~narrow)
-    weight = share * float(kernels.weights[~narrow].sum())
-    value, error = (_grid if density.space.dim == 2 else _sampled)(density, broad, weight, train)
-    return Integral(value + fine, error, worst)
+    return Integral(float(values.mean()) + fine, worst)
 
 
 def _part(kernels: AdaptiveKernels, chosen: torch.Tensor) -> AdaptiveKernels:
@@ -71,48 +80,65 @@ def _part(kernels: AdaptiveKernels, chosen: torch.Tensor) -> AdaptiveKernels:
     )
 
 
-def _broad_values(
-    density: BlendedDensity, broad: AdaptiveKernels | None, weight: float, points: torch.Tensor
-) -> torch.Tensor:
-    """Of all but the narrow kernels, with respect to the chart's area."""
-    values = density.log_prob_without_kernels(points).exp()
-    return values if broad is None else values + weight * broad.log_prob(points).exp()
-
-
-def _grid(
-    density: BlendedDensity, broad: AdaptiveKernels | None, weight: float, _train: Data
-) -> tuple[float, float]:
-    points = midpoints(density.space, GRID)
-    return float(_broad_values(density, broad, weight, points).mean()), 0.0
-
-
-def _sampled(
-    density: BlendedDensity, broad: AdaptiveKernels | None, weight: float, train: Data
-) -> tuple[float, float]:
-    rng = np.random.default_rng(0)
-    dim, count = train.shape[1], int(DRAWN * (1 - FLOOR))
-    about = train[rng.integers(len(train), size=count)]
-    drawn = np.concatenate(
-        [rng.vonmises(about, PROPOSED), rng.uniform(-np.pi, np.pi, (DRAWN - count, dim))]
-    )
-    estimate = KernelDensity(train, PROPOSED, round_=False, floor=FLOOR)
-    points = density.space.to_chart(drawn)
-    factor = density.space.log_density_factor(points, "natural")
-    values = _broad_values(density, broad, weight, points).log() + factor
-    ratio = np.exp(values.numpy() - estimate.score_samples(drawn))
-    return float(ratio.mean()), float(ratio.std() / math.sqrt(DRAWN))
-
-
-def _narrow(kernels: AdaptiveKernels) -> tuple[float, float]:
-    """Mean integral of narrow kernels, and the one farthest from 1."""
-    order = kernels.concentrations.amax(dim=1).argsort()
+def _looked_at(concentrations: torch.Tensor) -> list[int]:
+    """Some of them, from the broadest to the narrowest."""
+    order = concentrations.amax(dim=1).argsort()
     places = np.unique(np.linspace(0, len(order) - 1, min(len(order), LOOKED_AT)).round())
-    own = _round_integral if kernels.space.is_round else _product_integral
-    found = [own(kernels, order[int(k)]) for k in places]
+    return [int(order[int(place)]) for place in places]
+
+
+def _summary(found: list[float]) -> tuple[float, float]:
+    """Mean integral, and the error of the one farthest from 1."""
     return float(np.mean(found)), float(max(abs(value - 1) for value in found))
 
 
-def _single(kernels: AdaptiveKernels, at: torch.Tensor) -> AdaptiveKernels:
+def _mean(kernels: AdaptiveKernels) -> tuple[float, float]:
+    own = _round_integral if kernels.space.is_round else _product_integral
+    return _summary([own(kernels, at) for at in _looked_at(kernels.concentrations)])
+
+
+def _chains(chains: VonMisesChains) -> tuple[float, float]:
+    found = []
+    for at in _looked_at(chains.concentrations):
+        found += [_chain_integral(chains, at, scale) for scale in range(len(SCALES))]
+    return _summary(found)
+
+
+def _chain_integral(chains: VonMisesChains, at: int, scale: int) -> float:
+    """Of one component at one scale, in its residuals, relative to its weight."""
+    weight = float(chains.log_weights[at, scale])
+    if weight == -math.inf:
+        return 1.0
+    kappa = chains.concentrations[at] / SCALES[scale]
+    middle = float(
+        chains.joint(_points(chains, at, torch.zeros(1, chains.space.dim)))[0, scale, at]
+    )
+    log_value = middle - weight
+    for axis, concentration in enumerate(kappa.tolist()):
+        nodes, weights = _section(concentration)
+        residuals = torch.zeros(len(nodes), chains.space.dim, dtype=torch.float64)
+        residuals[:, axis] = torch.tensor(2 * math.pi * nodes)
+        values = chains.joint(_points(chains, at, residuals))[:, scale, at] - middle
+        log_value += math.log((weights * values.exp().numpy()).sum())
+    return math.exp(log_value)
+
+
+def _points(chains: VonMisesChains, at: int, residuals: torch.Tensor) -> torch.Tensor:
+    """Points of the cube (N, d) at residuals (N, d) in radians of a component."""
+    angle = torch.zeros(residuals.shape, dtype=torch.float64)
+    for now in chains.order[at].tolist():
+        angle[:, now] = residuals[:, now] + waves(angle) @ chains.means[at, now]
+    return angle / (2 * math.pi)
+
+
+def _section(kappa: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Gauss's rule about 0 on the part of a turn, in turns, where a von Mises density is."""
+    reach = min(0.5, REACH / math.sqrt(max(kappa, 1e-12)) / (2 * math.pi))
+    nodes, weights = np.polynomial.legendre.leggauss(NODES)
+    return reach * nodes, reach * weights
+
+
+def _single(kernels: AdaptiveKernels, at: int) -> AdaptiveKernels:
     return AdaptiveKernels(
         kernels.space,
         kernels.centers[at][None],
@@ -121,7 +147,7 @@ def _single(kernels: AdaptiveKernels, at: torch.Tensor) -> AdaptiveKernels:
     )
 
 
-def _round_integral(kernels: AdaptiveKernels, at: torch.Tensor) -> float:
+def _round_integral(kernels: AdaptiveKernels, at: int) -> float:
     """On a disc about the kernel's center, by Gauss's rule along the radius."""
     single, space = _single(kernels, at), kernels.space
     assert isinstance(space, RoundSpace)
@@ -138,16 +164,14 @@ def _round_integral(kernels: AdaptiveKernels, at: torch.Tensor) -> float:
     return float(reach / 2 * (weights * ring).sum())
 
 
-def _product_integral(kernels: AdaptiveKernels, at: torch.Tensor) -> float:
-    """Angle by angle, through the center: a product's integral is that of its sections, rescaled."""
+def _product_integral(kernels: AdaptiveKernels, at: int) -> float:
+    """Angle by angle, through the center."""
     single = _single(kernels, at)
-    nodes, weights = np.polynomial.legendre.leggauss(NODES)
     middle = float(single.log_prob(single.centers))
     log_value = middle
     for axis, kappa in enumerate(single.concentrations[0].tolist()):
-        reach = min(0.5, REACH / math.sqrt(kappa) / (2 * math.pi))
-        points = single.centers.repeat(NODES, 1)
-        points[:, axis] += torch.tensor(reach * nodes)
-        section = (single.log_prob(points) - middle).exp().numpy()
-        log_value += math.log(reach * (weights * section).sum())
+        nodes, weights = _section(kappa)
+        points = single.centers.repeat(len(nodes), 1)
+        points[:, axis] += torch.tensor(nodes)
+        log_value += math.log((weights * (single.log_prob(points) - middle).exp().numpy()).sum())
     return math.exp(log_value)

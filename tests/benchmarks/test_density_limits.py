@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orbiflow.density import BlendedDensity, DensityEstimator
+from orbiflow.density import DensityEstimator
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 
@@ -110,24 +110,22 @@ def test_the_published_evaluation_is_off_and_less_so_with_steps(module) -> None:
     assert momentum.mass(0.1, 100, draws=20, **time) > 1.2
 
 
-def fitted(dim: int) -> tuple[DensityEstimator, np.ndarray]:
+@pytest.mark.parametrize("dim", [2, 4])
+def test_the_integral_is_seen_from_values(module, dim: int, monkeypatch) -> None:
+    integral = module("density_integral").integral
     rng = np.random.default_rng(4)
     rows = rng.vonmises(rng.uniform(-3, 3, (3, dim))[rng.integers(3, size=400)], 20.0)
     rows[:40] = rows[40:80]  # so that there are narrow kernels
-    return DensityEstimator("torus", parts="kernels,mixture", seed=0).fit(rows), rows
-
-
-@pytest.mark.parametrize("dim", [2, 4])
-def test_the_integral_is_seen_from_values(module, dim: int, monkeypatch) -> None:
-    estimator, rows = fitted(dim)
-    density = estimator.density_
-    assert isinstance(density, BlendedDensity)
-    own = module("density_integral").integral(density, rows)
-    assert abs(own.value - 1) < max(1e-3, 4 * own.error)
-    assert own.worst_kernel < 1e-6
+    density = DensityEstimator("torus", parts="kernels,mixture,chains", seed=0).fit(rows).density_
+    found = integral(density)
+    assert found.value == pytest.approx(1, abs=1e-4)
+    assert found.worst < 1e-6
     # and it would be seen if a constant were wrong
-    kernels = type(density.kernels)
-    right = kernels.log_prob
-    monkeypatch.setattr(kernels, "log_prob", lambda self, x: right(self, x) + 0.1)
-    spoilt = module("density_integral").integral(density, rows)
-    assert spoilt.value - own.value > 0.05
+    for part, share, method in ((density.kernels, 1, "log_prob"), (density.chains, 3, "joint")):
+        if part is None or float(density.shares[share]) < 0.01:
+            continue
+        right = getattr(type(part), method)
+        with monkeypatch.context() as patched:
+            patched.setattr(type(part), method, lambda self, x, own=right: own(self, x) + 0.1)
+            off = 0.1 * float(density.shares[share])
+            assert integral(density).value - found.value == pytest.approx(off, rel=0.1)
