@@ -180,7 +180,7 @@ REFUSED: list[tuple[Call, Any, str]] = [
     (lambda p: distance(p, torch.tensor(SQUARE)), SQUARE, "must be a Tensor"),
     (lambda p: distance(p, p), whole, "floating-point"),
     (lambda p: distance(p, p), space, r"shape \(..., N, 2\)"),
-    (silhouette.Target.read, None, "must be a path, got None"),
+    (silhouette.Target.read, None, "must be a path or a binary stream; .*got None"),
     (TARGET.to_input, [1, 2, 3], r"expected shape \(..., 2\), got \(3,\)"),
     (TARGET.to_normal, "x", "points: expected real numbers"),
     (TARGET.frame.to_normal, torch.zeros(3), r"expected shape \(..., 2\)"),
