@@ -7,7 +7,7 @@ import math
 import numpy as np
 from density_kde import KernelDensity
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 from scipy.special import digamma, gammaln
 
 from orbiflow.density import to_vectors
@@ -33,7 +33,7 @@ def narrow_log_density(train: Data, test: Data, kappa: float, *, round_: bool) -
 
     Distances are differences of coordinates: cosines would lose what is nearer than 1e-8.
     """
-    tree = cKDTree(embedded(train, round_))
+    tree = KDTree(embedded(train, round_))
     places = embedded(test, round_)
     if round_:
         log_normal = math.log(2 * math.pi / kappa)
@@ -79,7 +79,7 @@ def neighbour_entropy(data: Data, neighbour: int = 1) -> float:
     """
     count, dim = data.shape
     turned = np.remainder(data, 2 * np.pi)
-    distance = cKDTree(turned, boxsize=2 * np.pi * (1 + 1e-12)).query(turned, k=neighbour + 1)[0]
+    distance = KDTree(turned, boxsize=2 * np.pi * (1 + 1e-12)).query(turned, k=neighbour + 1)[0]
     ball = dim / 2 * math.log(math.pi) - gammaln(dim / 2 + 1)
     mean = float(np.log(distance[:, neighbour]).mean())
     return float(digamma(count) - digamma(neighbour) + ball + dim * mean)

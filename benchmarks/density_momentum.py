@@ -42,7 +42,7 @@ def score(time: float, angle: Data, velocity: Data, deviation: float) -> tuple[D
     lifted = angle + TURNS
     off = velocity - left * lifted / variance
     logs = -(lifted**2) / (2 * variance) - off**2 / (2 * spread)
-    weights = np.exp(logs - logsumexp(logs, axis=0))
+    weights = np.exp(logs - np.asarray(logsumexp(logs, axis=0)))
     pull = -off / spread
     mean = (weights * pull).sum(axis=0)
     return mean, (weights * pull**2).sum(axis=0) - mean**2 - 1 / spread

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orbiflow.density import DensityEstimator
+from orbiflow.density import BlendedDensity, DensityEstimator
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 
@@ -117,6 +117,7 @@ def test_the_integral_is_seen_from_values(module, dim: int, monkeypatch) -> None
     rows = rng.vonmises(rng.uniform(-3, 3, (3, dim))[rng.integers(3, size=400)], 20.0)
     rows[:40] = rows[40:80]  # so that there are narrow kernels
     density = DensityEstimator("torus", parts="kernels,mixture,chains", seed=0).fit(rows).density_
+    assert isinstance(density, BlendedDensity)
     found = integral(density)
     assert found.value == pytest.approx(1, abs=1e-4)
     assert found.worst < 1e-6
