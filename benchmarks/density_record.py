@@ -125,7 +125,7 @@ def _spread(rows: list[Row]) -> str:
 
 def narrow(_count: int, _pool: ProcessPoolExecutor, names: tuple[str, ...]) -> None:
     """Print test NLL by the width of added kernels."""
-    kappas = np.power(10.0, np.arange(5, 14, 2), dtype=np.float64)
+    kappas = np.array([1e5, 1e7, 1e9, 1e11, 1e13])
     print("test NLL of a kernel estimate, and with kernels of these deviations added (their share)")
     print(f"{'data':9}{'split':9}{'tuned':>8}" + "".join(f"{_width(k):>16}" for k in kappas))
     for name in names:
@@ -181,7 +181,7 @@ def scheme(_count: int, _pool: ProcessPoolExecutor, _names: tuple[str, ...]) -> 
             cells = []
             for d in degrees:
                 width = math.radians(d)
-                off = excess(width, steps, end=end, start=start, rows=4_000)
+                off = excess(width, steps, rows=4_000, end=end, start=start)
                 cells.append(f"{off:+8.3f} {mass(width, steps, end=end, start=start):6.3f}")
             print(f"{end:4g}{start:8g}{steps:7}" + "".join(f"{c:>15}" for c in cells), flush=True)
 
