@@ -40,7 +40,7 @@ FIRST_IS_SHORT = (
 DEAF = (
     "import os, time\n"
     "from orbiflow.cancel import Cancel\n"
-    "from orbiflow.escher import methods, processes\n"
+    "from orbiflow import processes\nfrom orbiflow.escher import methods\n"
     "def fit(*_, **__):\n"
     "    os.write(1, b'deaf\\n')\n"
     "    time.sleep(1e6)\n"
