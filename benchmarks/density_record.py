@@ -92,9 +92,7 @@ def row(job: tuple[str, int, bool]) -> Row:
 def table(count: int, pool: ProcessPoolExecutor, names: tuple[str, ...]) -> None:
     """Print ours beside the published figures."""
     figures = published("density_nll")
-    print(
-        f"{count} splits: ours, mean and spread; test rows that repeat a training row; integrals, and"
-    )
+    print(f"{count} splits: ours, mean and spread; test rows that repeat a training row; integrals")
     print(
         f"{'data':9}{'random':>17}{'repeat':>8}{'grouped':>17}"
         + "".join(f"{m:>8}" for m in METHODS)
