@@ -4,7 +4,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
 
-.PHONY: demo test lint bench docs gallery clean
+.PHONY: demo test lint bench docs gallery wheel clean
 
 demo: $(VENV)/.installed
 	$(BIN)/orbiflow escherize examples/silhouettes/turtle.png --out out/demo
@@ -38,6 +38,9 @@ docs: $(VENV)/.installed-docs
 
 gallery: $(VENV)/.installed
 	$(BIN)/python docs/gallery/make.py
+
+wheel:
+	PYTHON=$(PYTHON) .ci/wheel
 
 clean:
 	rm -rf $(VENV) out
