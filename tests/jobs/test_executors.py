@@ -35,6 +35,8 @@ DEADLY = EscherizeRequest(image=Path("any.png"))
 @pytest.fixture(name="cluster", scope="module")
 def cluster_fixture() -> Iterator[Any]:
     """A Dask cluster of two worker processes, on the loopback interface alone."""
+    if not os.environ.get("ORBIFLOW_DASK"):
+        pytest.skip("a cluster was once seen to hang: ORBIFLOW_DASK=1 (make dask) tries it")
     dask = pytest.importorskip("dask", reason="the extra of Dask is not installed")
     from distributed import LocalCluster
 
