@@ -4,7 +4,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
 
-.PHONY: demo test lint bench docs gallery dask wheel clean
+.PHONY: demo test lint bench docs gallery wheel clean
 
 demo: $(VENV)/.installed
 	$(BIN)/orbiflow escherize examples/silhouettes/turtle.png --out out/demo
@@ -38,9 +38,6 @@ docs: $(VENV)/.installed-docs
 
 gallery: $(VENV)/.installed
 	$(BIN)/python docs/gallery/make.py
-
-dask: $(VENV)/.installed-dev
-	ORBIFLOW_DASK=1 timeout 600 $(BIN)/python -m pytest -q tests/jobs/test_executors.py
 
 wheel:
 	PYTHON=$(PYTHON) .ci/wheel

@@ -6,11 +6,14 @@ that is how Dask is. What orbiflow adds is a function by its name, text and byte
 
 from __future__ import annotations
 
+import asyncio
+import concurrent.futures
 import secrets
 import time
 import warnings
 from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import suppress
+from dataclasses import dataclass
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
@@ -59,15 +62,13 @@ class DaskCluster:
                 of orbiflow on every worker.
         """
         try:
-            from distributed import Client
+            import distributed  # noqa: F401
         except ImportError as error:
             raise OrbiflowError(
                 "a Dask scheduler needs dask.distributed: pip install 'orbiflow[dask]'"
             ) from error
         try:
-            self._client = Client(
-                self.address, timeout=self.timeout, set_as_default=False, name="orbiflow"
-            )
+            self._client = _connected(self.address, self.timeout)
         except Exception as error:  # of many kinds, down to an AssertionError of its event loop
             raise OrbiflowError(
                 f"no Dask scheduler answers at {self.address} within {self.timeout:g} s; start one "
@@ -92,14 +93,14 @@ class DaskCluster:
 
     @property
     def place(self) -> str:
-        count = _threads(self._connected())
+        count = _threads(self._working())
         return f"{'one worker' if count == 1 else f'{count} workers'} of {self.address}"
 
     def answers(
         self, parcels: Iterable[Parcel], tell: Sink, cancel: Cancel
     ) -> Generator[Answer, None, None]:
         """As of every `Executor`; no more parcels are out than threads work."""
-        client = self._connected()
+        client = self._working()
         out, crew = _Out(client), _Crew(client, self.address, tell)
         waiting, suspects = iter(parcels), list[Parcel]()
         alone = False
@@ -113,43 +114,41 @@ class DaskCluster:
                     alone = True
                     out.send(suspects.pop())
                 came = out.came()
-                for future, result in came:
-                    parcel = out.known(future)
+                for one in came:
                     out.fill(waiting, room)  # now: what comes next takes the caller its time
-                    answer = self._answer(parcel, future, result, alone)
+                    answer = self._answer(one, alone)
                     if answer is not None:
                         yield answer
                         continue
-                    tell(
-                        Note(
-                            f"workers died while they were at {parcel.key}; it is tried again alone"
-                        )
-                    )
-                    suspects.append(parcel)
+                    key = one.parcel.key
+                    tell(Note(f"workers died while they were at {key}; it is tried again alone"))
+                    suspects.append(one.parcel)
                 if not came:
                     time.sleep(POLL)
         finally:
             out.recall()
 
-    def _answer(self, parcel: Parcel, future: Future, result: Any, alone: bool) -> Answer | None:
+    def _answer(self, one: _Sent, alone: bool) -> Answer | None:
         """Nothing of what is only suspected of killing workers."""
         from distributed import KilledWorker
 
-        if future.status == "finished":
-            future.release()
-            return Answer.of(parcel.key, *result)
-        if future.status == "error":
-            error = result[1]
-            if isinstance(error, KilledWorker):
-                return Answer.died(parcel.key, error.allowed_failures + 1) if alone else None
+        try:
+            result = one.result.result()
+        except KilledWorker as error:
+            died = Answer.died(one.parcel.key, error.allowed_failures + 1)
+            return died if alone else None
+        except (OSError, concurrent.futures.CancelledError) as error:
+            raise OrbiflowError(
+                f"the scheduler at {self.address} has gone or dropped the work; the same command goes "
+                "on from here once it is back"
+            ) from error
+        except Exception as error:
             raise OrbiflowError(
                 f"a worker of {self.address} could not begin: {type(error).__name__}: {error}; is the "
                 "same orbiflow installed there?"
             ) from error
-        raise OrbiflowError(
-            f"the scheduler at {self.address} has gone or dropped the work; the same command goes on "
-            "from here once it is back"
-        )
+        one.future.release()
+        return Answer.of(one.parcel.key, *result)
 
     def _check_workers(self, client: Client) -> None:
         try:
@@ -173,7 +172,7 @@ class DaskCluster:
                     "version on all machines"
                 )
 
-    def _connected(self) -> Client:
+    def _working(self) -> Client:
         if self._client is None:
             raise OrbiflowError("connect first: `with DaskCluster(address) as cluster:`")
         return self._client
@@ -185,50 +184,71 @@ class DaskCluster:
             self._client = None
 
 
+@dataclass(frozen=True, eq=False)
+class _Sent:
+    """A parcel that is with the workers, and what comes back.
+
+    The future's own status says nothing of the result: of a worker that dies once its result has been
+    fetched, the status is "lost".
+    """
+
+    parcel: Parcel
+    future: Future
+    result: concurrent.futures.Future[Any]
+
+
 class _Out:
     """Parcels that are with the workers."""
 
     def __init__(self, client: Client) -> None:
-        from distributed import as_completed
-
         self.client = client
         self.run = secrets.token_hex(4)
-        self.sent = 0
-        self.futures: dict[str, tuple[Parcel, Future]] = {}
-        self.coming = as_completed(loop=client.loop, with_results=True, raise_errors=False)
+        self.count = 0
+        self.sent: list[_Sent] = []
 
     def __len__(self) -> int:
-        return len(self.futures)
+        return len(self.sent)
 
     def fill(self, waiting: Iterator[Parcel], room: int) -> None:
         while len(self) < room and (parcel := next(waiting, None)) is not None:
             self.send(parcel)
 
     def send(self, parcel: Parcel) -> None:
-        key = f"orbiflow-{self.run}-{self.sent}"
-        self.sent += 1
+        key = f"orbiflow-{self.run}-{self.count}"
+        self.count += 1
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # that a picture is large
             future = self.client.submit(
                 _serve, parcel.header(), parcel.data, key=key, pure=False, retries=0
             )
-        self.futures[key] = parcel, future
-        self.coming.add(future)
+        loop: Any = self.client.loop
+        fetched = asyncio.run_coroutine_threadsafe(_fetched(self.client, future), loop.asyncio_loop)
+        self.sent.append(_Sent(parcel, future, fetched))
 
-    def came(self) -> list[tuple[Future, Any]]:
-        return list(self.coming.next_batch(block=False))
-
-    def known(self, future: Future) -> Parcel:
-        """Which it was of; it is out no more."""
-        return self.futures.pop(str(future.key))[0]
+    def came(self) -> list[_Sent]:
+        """Those that are out no more."""
+        came = [one for one in self.sent if one.result.done()]
+        self.sent = [one for one in self.sent if one not in came]
+        return came
 
     def recall(self) -> None:
         """Workers that are at it stop at their next step."""
-        left = [future for _, future in self.futures.values()]
-        self.futures.clear()
+        left, self.sent = self.sent, []
+        for one in left:
+            one.result.cancel()
         with suppress(Exception):  # the scheduler may have gone
             if left:
-                self.client.cancel(left, force=True)
+                self.client.cancel([one.future for one in left], force=True)
+
+
+async def _fetched(client: Client, future: Future) -> Any:
+    """A result, whatever dies before it is here.
+
+    Not `distributed.as_completed`: a result that is lost while it fetches it, and whose task then
+    fails, never comes out of it.
+    """
+    gathering: Any = client.gather(future, asynchronous=True)
+    return await gathering
 
 
 class _Crew:
@@ -258,6 +278,24 @@ class _Crew:
                 "from here once there is one"
             )
         return self.threads
+
+
+def _connected(address: str, timeout: float) -> Client:
+    """A client; what fails is closed at once.
+
+    A client that could not start is closed by the garbage collector, which takes the lock of all
+    clients' loops. In the midst of another's start, which holds it, that never ends.
+    """
+    from distributed import Client
+
+    client = Client.__new__(Client)
+    try:
+        client.__init__(address, timeout=timeout, set_as_default=False, name="orbiflow")
+    except BaseException:
+        with suppress(Exception):
+            client.close(timeout=2)
+        raise
+    return client
 
 
 def _threads(client: Client) -> int:
