@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import torch
 from torch import Tensor
@@ -14,7 +14,7 @@ from orbiflow.density.fitting.assembly import assembled
 from orbiflow.density.fitting.budget import Budget
 from orbiflow.density.fitting.evidence import Candidates, PartEvidence, candidates_of, judged
 from orbiflow.density.fitting.families import ChainFamily, Family, KernelFamily, MixtureFamily
-from orbiflow.density.fitting.flow import fit_density
+from orbiflow.density.fitting.flow_trial import TriedFlow, flow_settings, try_flow
 from orbiflow.density.fitting.folds import LEAST_PLACES, Folds, folds_of
 from orbiflow.density.fitting.kernels import NARROWEST
 from orbiflow.density.fitting.missing import (
@@ -36,10 +36,9 @@ from orbiflow.density.fitting.rows import (
 )
 from orbiflow.density.fitting.settings import FitSettings
 from orbiflow.density.fitting.training import training
-from orbiflow.density.fitting.weights import gain_of, stacked, stacking_weights, supported_weights
+from orbiflow.density.fitting.weights import stacked, supported_weights
 from orbiflow.density.models.blend import BlendedDensity
 from orbiflow.density.models.still import MOST_DIM
-from orbiflow.density.models.symmetric import SymmetricDensity
 from orbiflow.density.partial import at_observed
 from orbiflow.density.spaces.flat import whole_turn
 from orbiflow.density.spaces.space import Space
@@ -53,9 +52,6 @@ REPEATS = ("places", "rounding")
 
 LEAST_FLOW_ROWS = 300
 """With fewer, a flow is not tried: none has gained anything."""
-
-FEW_ROWS, MANY_ROWS = 5_000, 20_000
-"""With fewer a flow is fitted in one stage; from the latter on it may be finer."""
 
 MEMBERS = 12
 """Chains of one size on tori of four or more angles, all folds together."""
@@ -214,15 +210,6 @@ def _narrowest(space: Space, step: float | None) -> float:
     return min(NARROWEST, 1 / angle**2)
 
 
-class _Tried(NamedTuple):
-    """A flow, its share and what came of it."""
-
-    flow: SymmetricDensity | None = None
-    share: float = 0.0
-    evidence: tuple[PartEvidence, ...] = ()
-    report: FitReport | None = None
-
-
 def _try_flow(
     space: Space,
     folds: Folds,
@@ -231,48 +218,16 @@ def _try_flow(
     settings: AutomaticSettings,
     budget: Budget,
     say: Progress,
-) -> _Tried:
-    """A flow fitted without the first tenth, and the share that this tenth gives it."""
+) -> TriedFlow:
     wanted = "flow" in settings.parts and space.dim <= MOST_DIM and not budget.is_spent
     only = settings.parts == ("flow",)
     if not wanted or (len(folds.rows) < LEAST_FLOW_ROWS and not only):
-        return _Tried()
+        return TriedFlow()
     chosen = settings.flow or flow_settings(space, len(folds.rows), settings.seed)
-    train = folds.train(0)
-    density, report = fit_density(
-        space,
-        train.points,
-        replace(chosen, seconds=min(chosen.seconds, budget.seconds_left)),
-        weights=train.weights,
-        progress=lambda done, what: say(BEFORE_FLOW + (1 - BEFORE_FLOW) * done, f"flow: {what}"),
-    )
-    held = folds.held(0)
-    with torch.no_grad():
-        own = density.log_prob(held.points)
-    first = candidates.table[:, : candidates.first]
-    others = stacked(first, weights)
-    table = torch.stack([others, own])
-    both = stacking_weights(table, held.weights)
-    gain = gain_of(stacked(table, both), others, held.weights)
-    alone = held.mean(own - first[-1])
-    # a weight chosen on these rows gains one nat among all of them by chance, and a flow that few rows
-    # speak for has streaks that are not in the data
-    kept = gain.nats * len(held) >= 1 and gain.is_sure
-    share = float(both[1]) if kept else 0.0
-    worth = gain if kept else gain_of(others, others)
-    evidence = PartEvidence("flow", share, alone, worth.nats, worth.error, len(held))
-    return _Tried(density if kept else None, share, (evidence,), report)
-
-
-def flow_settings(space: Space, rows: int, seed: int) -> FitSettings:
-    """Of a flow beside other parts: those have the clusters, it has what is smooth."""
-    if space.dim == MOST_DIM:
-        return FitSettings(detail=5, segments=3, roughness=(1e-3,), iterations=60, seed=seed)
-    if rows >= MANY_ROWS:
-        return FitSettings(roughness=(1e-3, 1e-4), seed=seed)
-    if rows >= FEW_ROWS:
-        return FitSettings(detail=6, segments=4, roughness=(1e-3, 1e-4), iterations=60, seed=seed)
-    return FitSettings(detail=6, segments=4, roughness=(1e-3,), iterations=40, seed=seed)
+    return try_flow(
+        space, folds, candidates, weights, chosen, budget,
+        lambda done, what: say(BEFORE_FLOW + (1 - BEFORE_FLOW) * done, what),
+    )  # fmt: skip
 
 
 def _shrunk(parts: list[PartEvidence], flow: float) -> list[PartEvidence]:
@@ -285,7 +240,7 @@ def _report(
     folds: Folds,
     candidates: Candidates,
     weights: Tensor,
-    tried: _Tried,
+    tried: TriedFlow,
     parts: tuple[PartEvidence, ...],
     found: Repeats,
     settings: AutomaticSettings,
