@@ -9,6 +9,8 @@ from typing import Annotated
 
 import typer
 
+from orbiflow.jobs import RecordError
+
 
 class Space(StrEnum):
     """Where the data live."""
@@ -119,3 +121,17 @@ Weights = Annotated[
 Model = Annotated[
     Path, typer.Option("--model", "-m", help="Folder that `fit` wrote.", show_default=False)
 ]
+
+
+def numbers_of(text: str | None, field: str) -> tuple[float, ...] | None:
+    """Numbers with commas between them; None stays None.
+
+    >>> numbers_of("0.5, 0.9", "mass")
+    (0.5, 0.9)
+    """
+    if text is None:
+        return None
+    try:
+        return tuple(float(part) for part in text.split(",") if part.strip())
+    except ValueError as error:
+        raise RecordError(f"{{{field}}} must be numbers such as 0.5,0.9, got {text!r}") from error

@@ -15,6 +15,7 @@ from orbiflow.cli.density_options import (
     Projection,
     Scale,
     named_columns,
+    numbers_of,
 )
 from orbiflow.cli.work import do
 from orbiflow.jobs import DensityPlotRequest
@@ -90,6 +91,13 @@ def plot(
             show_default=False,
         ),
     ] = None,
+    regions: Annotated[
+        str | None,
+        typer.Option(
+            help="Masses such as 0.5,0.9: lines about the smallest regions that hold them.",
+            show_default=False,
+        ),
+    ] = None,
     samples: Annotated[
         int | None,
         typer.Option(
@@ -124,6 +132,7 @@ def plot(
         center=center,
         projection=projection.value,
         radius=radius,
+        regions=numbers_of(regions, "regions"),
         samples=samples,
         dots=dots,
         seed=seed,

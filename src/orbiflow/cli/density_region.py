@@ -7,9 +7,9 @@ from typing import Annotated
 
 import typer
 
-from orbiflow.cli.density_options import Model
+from orbiflow.cli.density_options import Model, numbers_of
 from orbiflow.cli.work import do
-from orbiflow.jobs import DensityRegionRequest, RecordError
+from orbiflow.jobs import DensityRegionRequest
 
 
 def region_of(
@@ -44,23 +44,10 @@ def region_of(
     request = DensityRegionRequest(
         model=model,
         out=out,
-        mass=_numbers(mass, "mass"),
-        level=_numbers(level, "level"),
+        mass=numbers_of(mass, "mass"),
+        level=numbers_of(level, "level"),
         samples=samples,
         budget=budget,
         seed=seed,
     )
     do(request)
-
-
-def _numbers(text: str | None, field: str) -> tuple[float, ...] | None:
-    """
-    >>> _numbers("0.5, 0.9", "mass")
-    (0.5, 0.9)
-    """
-    if text is None:
-        return None
-    try:
-        return tuple(float(part) for part in text.split(",") if part.strip())
-    except ValueError as error:
-        raise RecordError(f"{{{field}}} must be numbers such as 0.5,0.9, got {text!r}") from error

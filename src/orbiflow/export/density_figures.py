@@ -16,6 +16,7 @@ from orbiflow.arguments import path as as_path
 from orbiflow.density.estimator import DensityEstimator
 from orbiflow.density.models.blend import BlendedDensity
 from orbiflow.density.models.symmetric import SymmetricDensity
+from orbiflow.density.regions import DensityLevels
 from orbiflow.density.spaces.space import Space
 from orbiflow.density.storage import read_density
 from orbiflow.errors import OrbiflowError
@@ -26,6 +27,7 @@ from orbiflow.figures.density_corner import MOST_COLUMNS, corner_picture
 from orbiflow.figures.density_flow import flow_picture
 from orbiflow.figures.density_map import map_picture
 from orbiflow.figures.density_page import density_page
+from orbiflow.figures.density_regions import RegionLine
 from orbiflow.figures.density_samples import samples_picture
 from orbiflow.figures.density_square import MAX_DOTS, density_picture
 from orbiflow.figures.map_choice import chosen_map
@@ -49,6 +51,7 @@ class DensityPlots:
     samples: Tensor
     data: Tensor | None
     map: Projection | None = None
+    regions: tuple[RegionLine, ...] = ()
 
     @classmethod
     def of(
@@ -82,7 +85,7 @@ class DensityPlots:
                 space, drawn if points is None else points, projection=settings.projection,
                 center=settings.center, radius=settings.radius, names=columns,
             )  # fmt: skip
-        return cls(own, settings, drawn, points, chosen)
+        return cls(own, settings, drawn, points, chosen, _regions(own, settings))
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -139,14 +142,15 @@ class DensityPlots:
             }
         makers: dict[str, Callable[[], Picture]] = {}
         dots = self._shown if settings.dots else None
-        colours = {"measure": settings.measure, "scale": settings.scale}
+        colours: dict[str, Any] = {"measure": settings.measure, "scale": settings.scale}
+        lines = {"regions": self.regions}
         flat: dict[str, Any] = {**colours, **axes, "center": None if self.map else settings.center}
         if self.map is None:
-            makers["density"] = lambda: density_picture(density, dots, most=most, **flat)
+            makers["density"] = lambda: density_picture(density, dots, most=most, **lines, **flat)
         else:
             maps: dict[str, Any] = {**colours, "sheet": sheet, "coastlines": self._coasts}
-            makers |= self._maps(dots, {**maps, "most": most})
-            makers["square"] = lambda: density_picture(density, dots, most=most, **flat)
+            makers |= self._maps(dots, {**maps, **lines, "most": most})
+            makers["square"] = lambda: density_picture(density, dots, most=most, **lines, **flat)
         if self._flows:
             makers["flow"] = lambda: flow_picture(density, center=flat["center"], sheet=sheet)
         if data is None and settings.samples is None:
@@ -190,6 +194,23 @@ def known_names(space: Space, columns: Sequence[str] | None) -> Sequence[str] | 
     """Columns of a table as names of the axes, if they are angles."""
     angles = space.unit is not None
     return columns if angles and columns and len(columns) == len(space.columns) else None
+
+
+def _regions(density: SymmetricDensity, settings: PlotSettings) -> tuple[RegionLine, ...]:
+    """
+    Raises:
+        OrbiflowError: for regions of what is not drawn in two dimensions.
+    """
+    if not settings.regions:
+        return ()
+    if density.space.dim != 2:
+        raise OrbiflowError(
+            f"regions are drawn in two dimensions, this {density.space.name} has {density.space.dim}"
+        )
+    levels = DensityLevels(density, seed=settings.seed % 2**63)
+    return tuple(
+        RegionLine(mass, levels.highest(mass).log_prob) for mass in map(float, settings.regions)
+    )
 
 
 def _check_window(space: Space, settings: PlotSettings) -> None:

@@ -8,14 +8,30 @@ from pathlib import Path
 
 from numpy.typing import ArrayLike
 
-from orbiflow.arguments import whole
+from orbiflow.arguments import number, whole
 from orbiflow.density.spaces.space import MEASURES
 from orbiflow.errors import OrbiflowError
+from orbiflow.figures.density_regions import STYLES
 from orbiflow.figures.density_scale import SCALES
 from orbiflow.figures.map_choice import PROJECTIONS
 from orbiflow.figures.sheet import FigureFormat, Sheet
 
 MOST_SAMPLES = 100_000
+LEAST_MASS = 1e-3
+"""Of a region that is drawn: what twenty thousand samples can tell from none."""
+
+
+def check_masses(masses: Sequence[float]) -> None:
+    """
+    Raises:
+        OrbiflowError: unless `masses` are different numbers between 0.001 and 0.999, four at most.
+    """
+    for mass in masses:
+        number(mass, "a region's mass", LEAST_MASS, 1 - LEAST_MASS)
+    if len(masses) > len(STYLES) or len(set(masses)) < len(masses):
+        raise OrbiflowError(
+            f"regions must be of at most {len(STYLES)} different masses, got {list(masses)}"
+        )
 
 
 @dataclass(frozen=True)
@@ -32,6 +48,7 @@ class PlotSettings:
     - `projection`, `radius`: of maps; see `orbiflow.figures.map_choice.chosen_map`.
     - `coastlines`: of the sphere: lines (N, 2) of latitude and longitude, or a file of them; see
       `orbiflow.figures.coastlines.read_coastlines`.
+    - `regions`: masses between 0 and 1: lines about the smallest regions that hold them, four at most.
     - `dots`: draw data, or else samples, over the density.
     - `samples`: how many beside the data, or, if there are none, beside the density; None for 3,000
       beside data alone. More than 3,000 are pixels in a PDF or SVG.
@@ -53,6 +70,7 @@ class PlotSettings:
     projection: str = "auto"
     radius: float | None = None
     coastlines: Sequence[ArrayLike] | str | Path | None = None
+    regions: Sequence[float] = ()
     dots: bool = False
     samples: int | None = None
     seed: int = 0
@@ -65,6 +83,7 @@ class PlotSettings:
                 raise OrbiflowError(
                     f"{name} must be one of {', '.join(known)}, got {getattr(self, name)!r}"
                 )
+        check_masses(self.regions)
         if self.samples is not None:
             whole(self.samples, "samples", 1, MOST_SAMPLES)
 

@@ -19,6 +19,12 @@ from orbiflow.figures.density_axes import chart_points, space_title
 from orbiflow.figures.density_bar import shade_bar
 from orbiflow.figures.density_frame import NARROW, Room, bar_beside, bar_under, framed
 from orbiflow.figures.density_legend import wrapped_words, write_below
+from orbiflow.figures.density_regions import (
+    RegionLine,
+    draw_regions,
+    log_natural,
+    region_note,
+)
 from orbiflow.figures.density_scale import Shade, bar_label, bar_ticks, shading
 from orbiflow.figures.density_square import COLOURS, MAX_DOTS, dot_shrink, draw_dots
 from orbiflow.figures.density_values import chosen_scale, density_on_map, is_sharp_on_map
@@ -59,6 +65,7 @@ def map_picture(
     sheet: Sheet | None = None,
     about: Tensor | None = None,
     most: int = MAX_DOTS,
+    regions: Sequence[RegionLine] = (),
     **options: Unpack[MapOptions],
 ) -> Picture:
     """A density on a map with its graticule.
@@ -73,6 +80,7 @@ def map_picture(
         sheet: default a screen of 1600 pixels.
         most: dots, of more samples a random choice that is always the same.
         about: chart points (N, 2) that the map should show, default `samples`.
+        regions: of highest density, whose edges are drawn as lines.
 
     Raises:
         OrbiflowError: for another space, and for options that do not fit it.
@@ -85,7 +93,7 @@ def map_picture(
     shade = drawn.shade
     label = bar_label(shade, space, measure)
     dots = None if samples is None else places_on(space, projection, samples)
-    notes = [drawn.why]
+    notes = [drawn.why, *([region_note(regions)] if regions else [])]
     if is_sharp_on_map(density, drawn.pixels.angle):
         size = f"{math.degrees(drawn.pixels.angle):.2g}°"
         notes.append(f"peaks narrower than {size} are averaged over it")
@@ -95,6 +103,8 @@ def map_picture(
     frame = framed(sheet, None, room=room, aspect=aspect(projection))
     set_limits(frame.axes, projection)
     image = drawn.on(frame.axes)
+    if regions:
+        drawn.draw_regions(frame.axes, regions, sheet)
     if dots is not None:
         shrink = dot_shrink(sheet, max(1.0, frame.side / aspect(projection)))
         draw_dots(frame.axes, dots, 0.55, limit=most, shrink=shrink)
@@ -134,6 +144,7 @@ class ColouredMap(NamedTuple):
 
     - `places`: (N,) of its pixels on the colour bar.
     - `why`: the scale is linear or logarithmic.
+    - `log_natural`: (N,) logarithms of the density in natural measure.
     """
 
     projection: Projection
@@ -141,6 +152,21 @@ class ColouredMap(NamedTuple):
     places: Array
     shade: Shade
     why: str
+    log_natural: Array
+
+    def draw_regions(self, axes: Axes, regions: Sequence[RegionLine], sheet: Sheet) -> None:
+        """Lines about regions, cut out along the outline as the picture is."""
+        from matplotlib.patches import Polygon
+
+        table = np.full(self.pixels.shown.shape, np.nan)
+        table[self.pixels.shown] = self.log_natural
+        ends, counts = np.reshape(self.pixels.extent, (2, 2)), table.shape[::-1]
+        x, y = (
+            low + (high - low) * (np.arange(count) + 0.5) / count
+            for (low, high), count in zip(ends, counts, strict=True)
+        )
+        ring = Polygon(self.projection.outline().tolist(), closed=True, transform=axes.transData)
+        draw_regions(axes, regions, x, y, table, sheet, ring)
 
     def on(self, axes: Axes) -> AxesImage:
         """One picture cut out along the outline: neither seams nor steps at the rim."""
@@ -171,7 +197,8 @@ def coloured_map(
     values = density_on_map(density, points, measure, pixels.angle)
     chosen = chosen_scale(density, measure, scale)
     shade = shading(values[pixels.within], pixels.areas[pixels.within], log=chosen.log)
-    return ColouredMap(projection, pixels, shade.places(values), shade, chosen.why)
+    logs = log_natural(density, values, points, measure)
+    return ColouredMap(projection, pixels, shade.places(values), shade, chosen.why, logs)
 
 
 class Pixels(NamedTuple):

@@ -15,6 +15,12 @@ from orbiflow.figures.density_axes import INK, View, check_plane, dress, space_t
 from orbiflow.figures.density_bar import shade_bar
 from orbiflow.figures.density_frame import framed
 from orbiflow.figures.density_legend import caption, legend
+from orbiflow.figures.density_regions import (
+    RegionLine,
+    draw_regions,
+    log_natural,
+    region_note,
+)
 from orbiflow.figures.density_scale import Shade, bar_label, bar_ticks, shading
 from orbiflow.figures.density_values import chosen_scale, density_on_grid, is_sharp
 from orbiflow.figures.sheet import Picture, Sheet
@@ -39,10 +45,16 @@ class AxesOptions(TypedDict, total=False):
 
 
 class DensityOptions(AxesOptions, total=False):
-    """Of `density_picture`."""
+    """Of `density_picture` and `samples_picture`."""
 
     measure: str
     scale: str
+
+
+class SquareOptions(DensityOptions, total=False):
+    """Of `density_picture`."""
+
+    regions: Sequence[RegionLine]
 
 
 def density_png(
@@ -50,7 +62,7 @@ def density_png(
     samples: Tensor | None = None,
     *,
     width_px: int = 1600,
-    **options: Unpack[DensityOptions],
+    **options: Unpack[SquareOptions],
 ) -> bytes:
     """PNG of `density_picture`, which has the `options`, for a screen; the height follows.
 
@@ -70,6 +82,7 @@ def density_picture(
     center: Sequence[float] | None = None,
     sheet: Sheet | None = None,
     most: int = MAX_DOTS,
+    regions: Sequence[RegionLine] = (),
 ) -> Picture:
     """A density on the canonical square, with the edges marked that are the same edge.
 
@@ -85,6 +98,7 @@ def density_picture(
         scale: of the colours, one of `orbiflow.figures.density_scale.SCALES`.
         names, center: of the axes; see `orbiflow.figures.density_axes.view_of`.
         sheet: default a screen of 1600 pixels.
+        regions: of highest density, whose edges are drawn as lines.
 
     Raises:
         OrbiflowError: for a space of another dimension, an unknown measure or scale, samples of
@@ -99,6 +113,9 @@ def density_picture(
     label = bar_label(shade, space, measure)
     frame = framed(sheet, view, label, [tick.text for tick in bar_ticks(shade)])
     image = drawn.on(frame.axes)
+    if regions:
+        middles = (np.arange(count) + 0.5) / count
+        draw_regions(frame.axes, regions, middles, middles, drawn.log_natural.T, sheet)
     if samples is not None:
         draw_dots(
             frame.axes, view.places(samples), 0.55, limit=most, shrink=dot_shrink(sheet, frame.side)
@@ -107,7 +124,7 @@ def density_picture(
     dress(frame.axes, view, sheet)
     title = f"Density on the {space_title(space)}"
     signs: dict[str, Any] = {"dots": samples is not None}
-    signs["notes"] = [drawn.why]
+    signs["notes"] = [drawn.why, *([region_note(regions)] if regions else [])]
     if is_sharp(density, 1 / count):
         signs["notes"].append(average_note(count))
     if not sheet.printed:
@@ -120,11 +137,13 @@ class Coloured(NamedTuple):
     """A density on the window of a square: places of its pixels (N, N) on the colour bar, first x.
 
     - `why`: the scale is linear or logarithmic.
+    - `log_natural`: (N, N) logarithms of the density in natural measure.
     """
 
     places: Array
     shade: Shade
     why: str
+    log_natural: Array
 
     def on(self, axes: Axes) -> AxesImage:
         """The picture of it."""
@@ -146,7 +165,9 @@ def square_colours(density: SymmetricDensity, view: View, measure: str, scale: s
     areas = space.log_area(midpoints(space, count)).exp().numpy().reshape(count, count)
     chosen = chosen_scale(density, measure, scale)
     shade = shading(values, areas, log=chosen.log)
-    return Coloured(shade.places(values), shade, chosen.why)
+    grid = torch.stack(torch.meshgrid(*(middles + low for low in view.low), indexing="ij"), dim=-1)
+    logs = log_natural(density, values.ravel(), grid.reshape(-1, 2), measure)
+    return Coloured(shade.places(values), shade, chosen.why, logs.reshape(count, count))
 
 
 def average_note(count: int) -> str:

@@ -91,7 +91,9 @@ def _settings(request: DensityPlotRequest, space: Space, columns: list[str] | No
         for name in ("projection", "radius"):
             if getattr(request, name) not in ("auto", None):
                 raise RecordError(f"{{{name}}} belongs to maps, not to the {space.name}")
-    wanted = ("format", "measure", "scale", "projection", "radius", "samples", "dots", "seed")
+    wanted = (
+        "format", "measure", "scale", "projection", "radius", "regions", "samples", "dots", "seed",
+    )  # fmt: skip
     asked: dict[str, Any] = given(request, wanted)
     if request.width is not None:
         asked["width"] = read_as("width", column_width, request.width)

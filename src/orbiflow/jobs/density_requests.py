@@ -143,6 +143,7 @@ class DensityPlotRequest(Request):
       a longitude, in the middle of a map.
     - `projection`, `radius`: of a map; the radius in degrees.
     - `coastlines`: GeoJSON or a table of latitude and longitude, for the sphere.
+    - `regions`: masses of the smallest regions that hold them, about which lines are drawn.
     - `samples`: how many beside data or density, None for 3,000 beside data alone.
     """
 
@@ -160,6 +161,7 @@ class DensityPlotRequest(Request):
     center: str | None = None
     projection: Projection = "auto"
     radius: float | None = None
+    regions: tuple[float, ...] | None = None
     dots: bool = False
     samples: int | None = None
     seed: int = 0
@@ -170,6 +172,8 @@ class DensityPlotRequest(Request):
             raise RecordError(f"{{samples}} must be from 1 to {MOST_DOTS}, got {self.samples}")
         if self.radius is not None and not 0 < self.radius <= 90:
             raise RecordError(f"{{radius}} must be above 0 and at most 90, got {self.radius:g}")
+        if any(not 0 < mass < 1 for mass in self.regions or ()):
+            raise RecordError("{regions} must be masses between 0 and 1, such as 0.5,0.9")
 
 
 @dataclass(frozen=True)
