@@ -12,7 +12,7 @@ from importlib import resources
 from urllib.parse import quote
 
 from orbiflow.jobs.batch.journal import Entry
-from orbiflow.jobs.batch.kinds import Column, Kind
+from orbiflow.jobs.batch.kind import Column, Kind
 
 
 def page(
@@ -88,7 +88,7 @@ def _card(entry: Entry, kind: Kind, picture: bool) -> str:
     seconds = "" if entry.seconds is None else f"{entry.seconds:.3f}"
     image = (
         f'<img src="thumbnails/{link}.png" width="240" height="160" loading="lazy" '
-        f'decoding="async" alt="Tiling of {name}">'
+        f'decoding="async" alt="{kind.shows} of {name}">'
         if picture
         else ""
     )
