@@ -35,6 +35,7 @@ class BatchFolder:
     """Where a batch's results go; in a `with` block, this batch's alone.
 
     - `keys`: of its items, in the order of the overview.
+    - `current`: of those that are done with as they are asked for now: others are not in the overview.
 
     Args:
         path: of the folder, made if need be. An earlier batch there is gone on with.
@@ -52,6 +53,7 @@ class BatchFolder:
         make_folder(path)
         self.journal = Journal(path / overview.journal)
         self.keys: Sequence[str] = ()
+        self.current: set[str] = set()
         self._open = ExitStack()
         self._written, self._cost = 0.0, 0.0
 
@@ -112,18 +114,19 @@ class BatchFolder:
         elif files:
             thumbnail.unlink(missing_ok=True)
         self.journal.add(entry)
+        self.current.add(entry.file)
         now = time.monotonic()
         if now - self._written > max(PAUSE, REST * self._cost):
             self.write_all()
 
     def write_all(self, *, last: bool = False) -> None:
-        """The overview of all `keys` that are done with.
+        """The overview of all `keys` that are `current`.
 
         Raises:
             OutputError: if it cannot be written.
         """
         begin = time.monotonic()
-        entries = [self.journal.entries[key] for key in self.keys if key in self.journal.entries]
+        entries = [self.journal.entries[key] for key in self.keys if key in self.current]
         pictures = frozenset(path.stem for path in (self.path / THUMBNAILS).glob("*.png"))
         waiting = len(self.keys) - len(entries)
         files = self.overview.files(entries, waiting, pictures, last=last)

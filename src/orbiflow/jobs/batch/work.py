@@ -79,6 +79,7 @@ def go_through(
     folder.keys = [item.key for item in items]
     kind = folder.kind
     todo = list(_todo(items, asked, folder))
+    folder.current = set(folder.keys) - {item.key for item in todo}
     kept = len(items) - len(todo)
     for text in _said_before(items, todo, folder, gone):
         tell(Note(text))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -108,7 +108,7 @@ def compared(request: DensityCvRequest, found: HeldOut, split: Split) -> ModelCo
     chosen = ~np.isnan(means).any(axis=0) & split.rows.whole
     labels, weights = split.rows.labels, split.rows.weights
     try:
-        return compare_scores(
+        made = compare_scores(
             {name: means[k, chosen] for k, name in enumerate(found.settings)},
             groups=None if labels is None else labels[chosen],
             weights=None if weights is None else weights[chosen],
@@ -118,6 +118,11 @@ def compared(request: DensityCvRequest, found: HeldOut, split: Split) -> ModelCo
         )
     except OrbiflowError as error:
         return str(error)
+    count, scored = int(split.rows.whole.sum()), int(chosen.sum())
+    if scored == count:
+        return made
+    note = f"{scored} of {count} rows so far: fits are missing"
+    return replace(made, notes=(note, *made.notes))
 
 
 @dataclass(frozen=True)
