@@ -98,7 +98,7 @@ class DensityBatchRequest(ManyRequest):
     OWN = ("data", "out")
 
     def one(self, name: str) -> DensityFitRequest:
-        return DensityFitRequest.of_fields({**self.each, "data": name})
+        return DensityFitRequest.of_fields({"picture": True, **self.each, "data": name})
 
 
 def check_workers(request: Request) -> None:

@@ -18,7 +18,7 @@ from orbiflow.density.comparing import RowSketch
 from orbiflow.density.fitting.report import FitReport
 from orbiflow.density.tables import Table
 from orbiflow.export.density_figures import MODEL
-from orbiflow.export.density_plots import PICTURES, REPORT, TABLE
+from orbiflow.export.density_plots import PICTURES, REPORT, TABLE, THUMBNAIL
 from orbiflow.files import write_atomic
 from orbiflow.folders import ResultFolder
 from orbiflow.jobs.density_data import read_weighed, unit_of
@@ -42,7 +42,8 @@ def density_fit(request: DensityFitRequest, tell: Sink, cancel: Cancel) -> Finis
     """Fit, and write the folder whole.
 
     Returns:
-        `summary`: `folder`, `rows`, `log_likelihood` and `seconds`, as in report.json.
+        `summary`: `folder`, `rows`, `log_likelihood` and `seconds`, as in report.json; `picture`, the
+        name of the small one, or None.
 
     Raises:
         OrbiflowError: for anything that the user can mend.
@@ -71,11 +72,17 @@ def density_fit(request: DensityFitRequest, tell: Sink, cancel: Cancel) -> Finis
         )
         write_atomic(staged / MODEL, saved)
         write_atomic(staged / REPORT, json.dumps(document, allow_nan=False, indent=1))
-    for name in (MODEL, REPORT):
+        if request.picture:
+            from orbiflow.figures.density_thumbnail import density_thumbnail
+
+            picture = density_thumbnail(estimator.density_, table.values)
+            write_atomic(staged / THUMBNAIL, picture)
+    for name in (MODEL, REPORT, *((THUMBNAIL,) if request.picture else ())):
         tell(Written(request.out / name))
     for note in (*estimator.report_.notes, *_told(request, document, len(table.values))):
         tell(Note(note))
     summary = {name: document[name] for name in ("log_likelihood", "seconds")}
+    summary["picture"] = THUMBNAIL if request.picture else None
     return Finished("done", {"folder": str(request.out), "rows": len(table.values), **summary})
 
 
@@ -115,7 +122,7 @@ def written_files(folder: Path) -> set[str]:
         ours = "space" in document and "report" in document
     except (OSError, ValueError, TypeError, RecursionError):
         ours = False
-    return {MODEL, REPORT, TABLE, *PICTURES} if ours else set()
+    return {MODEL, REPORT, TABLE, THUMBNAIL, *PICTURES} if ours else set()
 
 
 def _document(

@@ -44,7 +44,8 @@ class Kind:
     - `modules`: that the work needs.
     - `columns`: figures of the best result. `best`: these out of a summary, by name.
     - `picture`: path of a picture in a result's folder, out of its summary; None for none.
-    - `shows`: what is on it, before "of" and the file's name.
+    - `shows`: what is on it, before "of" and the file's name. `opens`: page in a result's folder that a
+      card with a picture opens, "" for the folder.
     - `earlier`: paths of what an earlier run wrote into a folder.
     """
 
@@ -57,6 +58,7 @@ class Kind:
     best: Callable[[Summary], dict[str, Any]]
     picture: Callable[[Summary], str | None]
     shows: str = "Picture"
+    opens: str = ""
     earlier: Callable[[Path], set[str]]
 
 

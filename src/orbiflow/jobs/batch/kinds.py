@@ -44,8 +44,15 @@ TILES = FolderKind(
     best=_best_tile,
     picture=_tiling,
     shows="Tiling",
+    opens="index.html",
     earlier=_files_of_a_search,
 )
+
+
+def _files_of_a_fit(folder: Path) -> set[str]:
+    from orbiflow.jobs.density_fit import written_files
+
+    return written_files(folder)
 
 
 def _fit(summary: Summary) -> dict[str, Any]:
@@ -66,7 +73,7 @@ DENSITIES = FolderKind(
     most_bytes=256 * 2**20,
     reads="data",
     writes="out",
-    modules=("orbiflow.jobs.density_fit",),
+    modules=("orbiflow.jobs.density_fit", "orbiflow.figures.density_thumbnail"),
     columns=(
         Column("rows", "rows", "d"),
         Column("log_likelihood", "mean log density", ".4f"),
@@ -74,8 +81,7 @@ DENSITIES = FolderKind(
         Column("held_out", "held out, on the square", ".4f"),
     ),
     best=_fit,
-    picture=lambda _summary: None,
-    earlier=lambda folder: (
-        {"density.safetensors", "report.json"} if (folder / "report.json").is_file() else set()
-    ),
+    picture=lambda summary: summary["picture"],
+    shows="Density",
+    earlier=_files_of_a_fit,
 )

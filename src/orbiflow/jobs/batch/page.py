@@ -79,7 +79,7 @@ def _card(entry: Entry, kind: Kind, picture: bool) -> str:
         if picture
         else ""
     )
-    inside = "index.html" if picture else ""
+    inside = kind.opens if picture else ""
     # the first is text, said beside the name
     texts = [
         html.escape(column.shown(entry.best.get(column.name)))
