@@ -63,7 +63,8 @@ def density_thumbnail(density: SymmetricDensity, data: ArrayLike) -> bytes:
         places = view_of(space).places(drawn)
         picture = _pairs(places) if space.dim <= MOST_PAIRS else _stripes(places)
     sheet = Image.new("RGB", SIZE, PAPER)
-    sheet.paste(picture, tuple((a - b) // 2 for a, b in zip(SIZE, picture.size, strict=True)))
+    width, height = picture.size
+    sheet.paste(picture, ((SIZE[0] - width) // 2, (SIZE[1] - height) // 2))
     out = io.BytesIO()
     sheet.save(out, "PNG", optimize=True)
     return out.getvalue()
@@ -146,7 +147,7 @@ def _pairs(places: Array) -> Image.Image:
 
 def _pair(places: Array, side: int) -> Image.Image:
     bins = max(12, side // 3)
-    counts, _, _ = np.histogram2d(*places.T, bins, ((0, 1), (0, 1)))
+    counts, _ = np.histogramdd(places, (bins, bins), ((0, 1), (0, 1)))
     shade = counts / max(1.0, float(np.quantile(counts, 0.995)))
     # a square root: most cells of many angles are nearly empty
     return _coloured(np.sqrt(shade).T[::-1]).resize((side, side), Image.Resampling.BICUBIC)
