@@ -23,7 +23,7 @@ Match = Annotated[
 Workers = Annotated[
     int | None,
     typer.Option(
-        help="Processes, each at a file at a time; default one a core.", show_default=False
+        help="Processes, each at one at a time; default one a core.", show_default=False
     ),
 ]
 Scheduler = Annotated[

@@ -19,6 +19,7 @@ from orbiflow.jobs.density_cv.splits import Fit, Split
 from orbiflow.jobs.density_cv_requests import UNIFORM, DensityCvRequest
 from orbiflow.jobs.density_fold import SCORES
 from orbiflow.symmetry.isometry import Array
+from orbiflow.threads import one_blas_thread
 
 COLUMNS = ("row", "log_prob")
 
@@ -102,6 +103,7 @@ def _read(path: Path, held: NDArray[np.int64]) -> Array:
     return table.values[:, 1]
 
 
+@one_blas_thread()  # sums of several threads differ in their last digits
 def compared(request: DensityCvRequest, found: HeldOut, split: Split) -> ModelComparison | str:
     """Settings at all rows that every one of them has scored; or why there is no comparison."""
     means = found.means()
