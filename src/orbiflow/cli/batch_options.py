@@ -22,9 +22,7 @@ Match = Annotated[
 ]
 Workers = Annotated[
     int | None,
-    typer.Option(
-        help="Processes, each at one at a time; default one a core.", show_default=False
-    ),
+    typer.Option(help="Processes, each at one at a time; default one a core.", show_default=False),
 ]
 Scheduler = Annotated[
     str | None,

@@ -12,11 +12,12 @@ import numpy as np
 
 from orbiflow.density.comparing import Difference, ModelComparison
 from orbiflow.export.web_page import CLOSING, css, opening
+from orbiflow.figures.density_axes import space_title
 from orbiflow.jobs.batch.journal import Entry
 from orbiflow.jobs.density_cv.plot import Strip, strips
 from orbiflow.jobs.density_cv.results import HeldOut
 from orbiflow.jobs.density_cv.splits import Fit, Split
-from orbiflow.jobs.density_cv_requests import DensityCvRequest
+from orbiflow.jobs.density_cv_requests import UNIFORM, DensityCvRequest
 from orbiflow.symmetry.isometry import Array
 
 HERE = "orbiflow.jobs.density_cv"
@@ -82,7 +83,7 @@ def _head(of: PageOf) -> str:
     )
     return f"""<header>
 <h1>Cross-validation of {html.escape(request.data.name)}</h1>
-<p>{html.escape(columns)} on the {html.escape(rows.space.name)}: {html.escape(count)};
+<p>{html.escape(columns)} on the {space_title(rows.space)}: {html.escape(count)};
 {request.folds} folds{times}. Each row is scored by fits that have not seen it. In numbers:
 <a href="cv.csv">a line a fold</a>, <a href="rows.csv">a line a row</a>,
 <a href="report.json">the comparison</a>.</p>
@@ -152,7 +153,7 @@ def _pictures(of: PageOf, folds: Sequence[tuple[int, int, Array]]) -> str:
             *((s.mean, s.mean - s.error, s.mean + s.error) if (s := known.get(name)) else ()),
         )
         for k, name in enumerate(names)
-        if name != "uniform" or len(names) == 2
+        if len(names) == 2 or name != UNIFORM
     ]
     text = "A dot a fold, a line the mean of all rows with one standard error to either side."
     parts = [_figure(strips(scores, "mean log density of a fold, nats"), text)]
@@ -165,6 +166,7 @@ def _pictures(of: PageOf, folds: Sequence[tuple[int, int, Array]]) -> str:
             d.high,
         )
         for d in (found.differences if found else ())
+        if len(names) == 2 or UNIFORM not in (d.first, d.second)  # far off, and in the table
     ]
     if differences:
         text = "The same of differences at equal rows, with the intervals of the table above."

@@ -7,8 +7,8 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-WIDTH, NAMES, MARGIN, STEP = 720, 190, 24, 34
-"""Of the picture, the names at its left, what is free at its right, and a line: in pixels."""
+WIDTH, NAMES, MARGIN, STEP = 720, 300, 24, 34
+"""Of the picture, the names at its left at most, what is free at its right, and a line: in pixels."""
 
 LETTER = 7.6
 """Width of a letter of a name, at most."""
@@ -47,8 +47,10 @@ def strips(lines: Sequence[Strip], label: str, *, zero: bool = False) -> str:
     ticks = _ticks(min(values), max(values))
     low, high = min(ticks[0], *values), max(ticks[-1], *values)
 
+    names = min(NAMES, 30 + LETTER * max(len(one.name) for one in lines))
+
     def place(value: float) -> float:
-        return NAMES + (WIDTH - NAMES - MARGIN) * (value - low) / (high - low)
+        return names + (WIDTH - names - MARGIN) * (value - low) / (high - low)
 
     foot = STEP * len(lines) + 8
     parts = [
@@ -60,8 +62,8 @@ def strips(lines: Sequence[Strip], label: str, *, zero: bool = False) -> str:
         parts.append(
             f'<line class="zero" x1="{place(0):.1f}" x2="{place(0):.1f}" y1="4" y2="{foot}"/>'
         )
-    parts += [_strip(one, 4 + STEP * (k + 0.5), place) for k, one in enumerate(lines)]
-    middle = (NAMES + WIDTH - MARGIN) / 2
+    parts += [_strip(one, names, 4 + STEP * (k + 0.5), place) for k, one in enumerate(lines)]
+    middle = (names + WIDTH - MARGIN) / 2
     parts.append(f'<text class="tick" x="{middle:.0f}" y="{foot + 38}">{html.escape(label)}</text>')
     said = html.escape(f"{label}: {', '.join(one.name for one in lines)}")
     return (
@@ -71,10 +73,10 @@ def strips(lines: Sequence[Strip], label: str, *, zero: bool = False) -> str:
     )
 
 
-def _strip(one: Strip, y: float, place: Placed) -> str:
-    room = int((NAMES - 20) / LETTER)
+def _strip(one: Strip, names: float, y: float, place: Placed) -> str:
+    room = int((names - 20) / LETTER)
     name = one.name if len(one.name) <= room else one.name[: room - 1] + "…"
-    parts = [f'<text class="name" x="{NAMES - 14}" y="{y + 5:.1f}">{html.escape(name)}</text>']
+    parts = [f'<text class="name" x="{names - 14:.1f}" y="{y + 5:.1f}">{html.escape(name)}</text>']
     if one.low is not None and one.high is not None:
         parts.append(
             f'<line class="interval" x1="{place(one.low):.1f}" x2="{place(one.high):.1f}" '
