@@ -11,6 +11,19 @@ from pathlib import Path, PurePosixPath
 
 from orbiflow.errors import OutputError
 
+
+def stays_inside(name: str) -> bool:
+    """Whether a name that somebody else chose, with slashes, is of something in a folder.
+
+    >>> stays_inside("folds/one"), stays_inside("../up"), stays_inside("/etc"), stays_inside("")
+    (True, False, False, False)
+    """
+    path = PurePosixPath(name)
+    return (
+        bool(path.parts) and not path.is_absolute() and ".." not in path.parts and "\\" not in name
+    )
+
+
 LITTER = frozenset({".DS_Store", "Thumbs.db", "desktop.ini"})
 """What file managers leave in folders that people look at."""
 

@@ -13,6 +13,7 @@ from typing import get_type_hints
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from jobs.batches import rows, write_boot
 from jobs.searches import ENDLESS
@@ -93,7 +94,26 @@ def test_tables(tmp_path: Path, orbiflow) -> None:
     report = json.loads((tmp_path / "out" / "one" / "report.json").read_text())
     assert float(row["log_likelihood"]) == report["log_likelihood"]["natural"]
     assert row["rows"] == "60"
-    assert "one.csv" in (tmp_path / "out" / "index.html").read_text()
+    page = (tmp_path / "out" / "index.html").read_text()
+    assert '<a href="one/"><img src="thumbnails/one.png"' in page
+    assert 'alt="Density of one.csv"' in page
+    for picture in ("one/thumbnail.png", "thumbnails/one.png"):
+        with Image.open(tmp_path / "out" / picture) as image:
+            assert image.size == (360, 240)
+    # it is a density's folder like any other: pictures may come and go there
+    model = ("--model", tmp_path / "out" / "one", "--out", tmp_path / "out" / "one")
+    for form in ("png", "svg"):
+        assert orbiflow("density", "plot", *model, "--format", form).status == 0
+    again = orbiflow(
+        *("density", "batch", tmp_path / "in", "--out", tmp_path / "out"),
+        *("--space", "torus", "--parts", "mixture", "--workers", 1),
+    )
+    assert again.status == 0, again.err
+    assert sorted(path.name for path in (tmp_path / "out" / "one").iterdir()) == [
+        "density.safetensors",
+        "report.json",
+        "thumbnail.png",
+    ]
 
 
 @pytest.mark.parametrize(

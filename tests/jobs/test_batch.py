@@ -55,6 +55,7 @@ def test_a_folder_a_row_and_a_card_for_each(here: Here, request_: BatchRequest) 
         assert (out / "thumbnails" / f"{name}.png").stat().st_size < 40_000
     page = (out / "index.html").read_text()
     assert page.count("<li data-name") == 2
+    assert 'alt="Tiling of sub/boot.json"' in page
     assert 'href="sub-boot/index.html"' in page
     assert "broken.svg" in page[page.index("Without a result") :]
     told = {event.name: event.state for event in events if isinstance(event, ItemDone)}

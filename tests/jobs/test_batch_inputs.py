@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from orbiflow.errors import InputFileError, OrbiflowError, OutputError
+from orbiflow.folders import stays_inside
 from orbiflow.jobs.batch.folder import RESERVED
 from orbiflow.jobs.batch.inputs import content, folder_names, listed
 from orbiflow.jobs.batch.journal import Entry, Journal
@@ -78,7 +79,7 @@ entries = st.lists(
     st.builds(
         Entry,
         file=st.text(min_size=1),
-        name=st.text(min_size=1),
+        name=st.text(min_size=1).filter(stays_inside),
         code=st.text("0123456789abcdef"),
         settings=st.dictionaries(st.text(), st.none() | st.integers() | st.text(), max_size=3),
         version=st.just("1"),
@@ -110,6 +111,15 @@ def test_a_journal_that_was_cut_short_loses_its_last_entry_at_most(
         for entry in added:
             journal.add(entry)
     assert Journal(path).entries == {entry.file: entry for entry in added}
+
+
+@pytest.mark.parametrize("name", ["/etc", "../up", "a/../../b", "a\\b"])
+def test_a_journal_cannot_send_results_elsewhere(name: str, tmp_path: Path) -> None:
+    path = tmp_path / "batch.jsonl"
+    with Journal(path) as journal:
+        journal.add(Entry("a.svg", name, "", {}, "1", "done"))
+        journal.add(Entry("b.svg", "b", "", {}, "1", "done"))
+    assert list(Journal(path).entries) == ["b.svg"]
 
 
 def test_what_is_no_journal(tmp_path: Path) -> None:

@@ -7,7 +7,14 @@ from typing import Annotated, Any
 
 import typer
 
-from orbiflow.cli.batch_options import Match, RetryFailed, Scheduler, Workers
+from orbiflow.cli.batch_options import (
+    Match,
+    OutFolder,
+    RetryFailed,
+    Scheduler,
+    Workers,
+    done_many,
+)
 from orbiflow.cli.search_options import (
     ChosenEffort,
     ChosenMethod,
@@ -26,7 +33,6 @@ from orbiflow.cli.search_options import (
     Turns,
     named_classes,
 )
-from orbiflow.cli.work import do_many
 from orbiflow.jobs import BatchRequest
 
 
@@ -39,12 +45,7 @@ def batch(
             show_default=False,
         ),
     ],
-    out: Annotated[
-        Path,
-        typer.Option(
-            "--out", "-o", help="Folder for the results; an earlier batch there is gone on with."
-        ),
-    ] = Path("batch"),
+    out: OutFolder = Path("batch"),
     match: Match = None,
     workers: Workers = None,
     scheduler: Scheduler = None,
@@ -86,13 +87,4 @@ def batch(
         "invert": invert,
         "force": force,
     }
-    request = BatchRequest(
-        folder=folder,
-        out=out,
-        each=asked,
-        match=match,
-        workers=workers,
-        scheduler=scheduler,
-        retry_failed=retry_failed,
-    )
-    do_many(request)
+    done_many(BatchRequest, folder, asked, out, match, workers, scheduler, retry_failed)

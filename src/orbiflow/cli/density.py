@@ -9,6 +9,7 @@ import typer
 
 from orbiflow.cli.density_batch import batch
 from orbiflow.cli.density_compare import compare
+from orbiflow.cli.density_cv import cv
 from orbiflow.cli.density_options import (
     Columns,
     Data,
@@ -18,9 +19,11 @@ from orbiflow.cli.density_options import (
     MissingOption,
     Model,
     NoHeader,
+    Parts,
     Repeats,
+    RepeatsOption,
     Space,
-    Unit,
+    UnitOption,
     Weights,
     named_columns,
 )
@@ -55,29 +58,9 @@ def fit(
     drop_missing: DropMissing = False,
     missing: MissingOption = Missing.REFUSE,
     weights: Weights = None,
-    unit: Annotated[
-        Unit | None,
-        typer.Option(
-            help="Of angles on the torus and the Klein bottle; default radians, if no value is "
-            "beyond 2 pi.",
-            show_default=False,
-        ),
-    ] = None,
-    parts: Annotated[
-        str | None,
-        typer.Option(
-            help="Of flow, kernels, mixture and chains those that may be used, such as "
-            "kernels,mixture; default all, and rows held out choose.",
-            show_default=False,
-        ),
-    ] = None,
-    repeats: Annotated[
-        Repeats,
-        typer.Option(
-            help="What rows that repeat another are: places that new rows repeat as often, or an "
-            "accident of rounding."
-        ),
-    ] = Repeats.PLACES,
+    unit: UnitOption = None,
+    parts: Parts = None,
+    repeats: RepeatsOption = Repeats.PLACES,
     detail: Annotated[
         int | None,
         typer.Option(
@@ -201,3 +184,4 @@ density.command()(compare)
 density.command("region")(region_of)
 density.command()(patches)
 density.command()(batch)
+density.command()(cv)

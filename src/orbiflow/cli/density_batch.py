@@ -7,17 +7,25 @@ from typing import Annotated, Any
 
 import typer
 
-from orbiflow.cli.batch_options import Match, RetryFailed, Scheduler, Workers
+from orbiflow.cli.batch_options import (
+    Match,
+    OutFolder,
+    RetryFailed,
+    Scheduler,
+    Workers,
+    done_many,
+)
 from orbiflow.cli.density_options import (
     Columns,
     DropMissing,
     NoHeader,
+    Parts,
     Repeats,
+    RepeatsOption,
     Space,
-    Unit,
+    UnitOption,
     named_columns,
 )
-from orbiflow.cli.work import do_many
 from orbiflow.jobs import DensityBatchRequest
 
 
@@ -30,12 +38,7 @@ def batch(
         ),
     ],
     space: Annotated[Space, typer.Option(help="Where the data live.", show_default=False)],
-    out: Annotated[
-        Path,
-        typer.Option(
-            "--out", "-o", help="Folder for the results; an earlier batch there is gone on with."
-        ),
-    ] = Path("batch"),
+    out: OutFolder = Path("batch"),
     match: Match = None,
     workers: Workers = None,
     scheduler: Scheduler = None,
@@ -43,19 +46,9 @@ def batch(
     columns: Columns = None,
     no_header: NoHeader = False,
     drop_missing: DropMissing = False,
-    unit: Annotated[
-        Unit | None, typer.Option(help="Of angles; default found out.", show_default=False)
-    ] = None,
-    parts: Annotated[
-        str | None,
-        typer.Option(
-            help="Of flow, kernels, mixture and chains those that may be used; default all.",
-            show_default=False,
-        ),
-    ] = None,
-    repeats: Annotated[
-        Repeats, typer.Option(help="What rows that repeat another are.")
-    ] = Repeats.PLACES,
+    unit: UnitOption = None,
+    parts: Parts = None,
+    repeats: RepeatsOption = Repeats.PLACES,
     seed: Annotated[int, typer.Option(help="Same seed, same machine: same densities.")] = 0,
 ) -> None:
     """Fit a density to every table of a folder, here or on a Dask cluster.
@@ -73,13 +66,4 @@ def batch(
         "repeats": repeats.value,
         "seed": seed,
     }
-    request = DensityBatchRequest(
-        folder=folder,
-        out=out,
-        each=asked,
-        match=match,
-        workers=workers,
-        scheduler=scheduler,
-        retry_failed=retry_failed,
-    )
-    do_many(request)
+    done_many(DensityBatchRequest, folder, asked, out, match, workers, scheduler, retry_failed)

@@ -10,6 +10,7 @@ import typer
 from orbiflow.cli.density_options import (
     Columns,
     DropMissing,
+    Group,
     NoHeader,
     Space,
     Unit,
@@ -49,14 +50,7 @@ def compare(
     unit: Annotated[
         Unit | None, typer.Option(help="Of angles in two data sets.", show_default=False)
     ] = None,
-    group: Annotated[
-        str | None,
-        typer.Option(
-            help="Column that names what rows belong to (a protein, a station, an event): those of one "
-            "are not independent.",
-            show_default=False,
-        ),
-    ] = None,
+    group: Group = None,
     bootstrap: Annotated[int, typer.Option(help="Resamples of rows or groups.")] = 2000,
     permutations: Annotated[int, typer.Option(help="Of the test of two data sets.")] = 999,
     level: Annotated[float, typer.Option(help="Of intervals and test.")] = 0.95,

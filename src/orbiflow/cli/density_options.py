@@ -121,6 +121,39 @@ Weights = Annotated[
 Model = Annotated[
     Path, typer.Option("--model", "-m", help="Folder that `fit` wrote.", show_default=False)
 ]
+Group = Annotated[
+    str | None,
+    typer.Option(
+        help="Column that names what rows belong to (a protein, a station, an event): those of one "
+        "are not independent.",
+        show_default=False,
+    ),
+]
+UnitOption = Annotated[
+    Unit | None,
+    typer.Option(
+        "--unit",
+        help="Of angles on the torus and the Klein bottle; default radians, if no value is beyond "
+        "2 pi.",
+        show_default=False,
+    ),
+]
+Parts = Annotated[
+    str | None,
+    typer.Option(
+        help="Of flow, kernels, mixture and chains those that may be used, such as kernels,mixture; "
+        "default all, and rows held out choose.",
+        show_default=False,
+    ),
+]
+RepeatsOption = Annotated[
+    Repeats,
+    typer.Option(
+        "--repeats",
+        help="What rows that repeat another are: places that new rows repeat as often, or an "
+        "accident of rounding.",
+    ),
+]
 
 
 def numbers_of(text: str | None, field: str) -> tuple[float, ...] | None:

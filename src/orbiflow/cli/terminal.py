@@ -13,7 +13,7 @@ from orbiflow.cli.console import errors, output
 from orbiflow.jobs import Event, Finished, ItemDone, Note, Preview, Progress, Started, TileFound
 
 INTERRUPTED = "interrupted"
-BATCHES = ("batch", "density-batch")
+BATCHES = ("batch", "density-batch", "density-cv")
 FORKING = ("escherize", "paper", *BATCHES)
 """Jobs that start processes."""
 
@@ -110,8 +110,9 @@ def _say(text: str) -> None:
 def _show_batch(event: Finished) -> None:
     """What came of many, and how to go on."""
     summary = event.summary
-    shown = [f"{summary['done']} of {summary['files']} done"]
-    if summary["kept"] == summary["files"]:
+    count = summary["files"] if "files" in summary else summary["fits"]
+    shown = [f"{summary['done']} of {count} done"]
+    if summary["kept"] == count:
         shown = ["nothing was left to do"]
     without = summary["failed"] + summary["nothing"]
     output.print(

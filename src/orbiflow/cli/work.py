@@ -12,12 +12,14 @@ from orbiflow.cli.terminal import Terminal
 from orbiflow.jobs import (
     BatchRequest,
     DensityBatchRequest,
+    DensityCvRequest,
     EscherizeRequest,
     Finished,
     Request,
     run,
 )
 
+KEEPING = (EscherizeRequest, BatchRequest, DensityBatchRequest, DensityCvRequest)
 STATUS = {"done": 0, "nothing found": 1, "cancelled": 130}
 
 
@@ -36,12 +38,12 @@ def do(request: Request) -> None:
         raise typer.Exit(STATUS[finished.state])
 
 
-def do_many(request: BatchRequest | DensityBatchRequest) -> None:
-    """Run a batch.
+def do_many(request: BatchRequest | DensityBatchRequest | DensityCvRequest) -> None:
+    """Run a batch or a cross-validation.
 
     Raises:
         OrbiflowError: for anything that the user can mend.
-        typer.Exit: with status 1 if a file has no result, 130 after Ctrl-C.
+        typer.Exit: with status 1 if a file or a fit has no result, 130 after Ctrl-C.
     """
     if request.scheduler is None:
         import torch
@@ -56,7 +58,7 @@ def do_many(request: BatchRequest | DensityBatchRequest) -> None:
 
 def _run(request: Request) -> Finished:
     # only these have something to keep
-    keeps = isinstance(request, EscherizeRequest | BatchRequest | DensityBatchRequest)
+    keeps = isinstance(request, KEEPING)
     stopping = stopped_by_interrupt() if keeps else nullcontext(Cancel())
     with stopping as cancel, Terminal() as terminal:
         return run(request, terminal, cancel)

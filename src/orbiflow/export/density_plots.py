@@ -24,6 +24,9 @@ REPORT = "report.json"
 TABLE = "density.csv"
 """What the folder of a marginal or conditional density of one or two angles has beside its model."""
 
+THUMBNAIL = "thumbnail.png"
+"""What a fit of a batch has beside its model."""
+
 PAGE = "surface.html"
 NAMES = ("density", "latlon", "square", "flow", "samples")
 PICTURES = (*(f"{name}.{form}" for form in FORMATS for name in NAMES), PAGE)
@@ -99,7 +102,7 @@ def refuse_others(out: Path) -> None:
         return
     inside = {path.name for path in out.iterdir()} - LITTER
     foreign, old = (
-        sorted(inside - {MODEL, REPORT, TABLE, *PICTURES}),
+        sorted(inside - {MODEL, REPORT, TABLE, THUMBNAIL, *PICTURES}),
         sorted(inside & set(PICTURES)),
     )
     if foreign and old:

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import html
 from collections.abc import Sequence
-from importlib import resources
 from pathlib import PurePath
 
 from orbiflow.escher.result import ClassFailure, TileResult
 from orbiflow.export.folder import TILE_FILES
 from orbiflow.export.measures import measures
+from orbiflow.export.web_page import CLOSING, css, opening
 from orbiflow.figures.captioned import window_of
 from orbiflow.silhouette.target import Target
 
@@ -61,32 +61,21 @@ def index_page(
             for failure in failures
         )
         parts.append(f"<article>\n<h2>Without a tile</h2>\n<ul>\n{rows}</ul>\n</article>\n")
-    parts.append("</main>\n</body>\n</html>\n")
+    parts.append(f"</main>\n{CLOSING}")
     return "".join(parts)
 
 
 def _head(name: str, target: Target, count: int, *, compared: bool) -> str:
-    style = resources.files("orbiflow.export").joinpath("index_page.css").read_text("utf-8")
-    title = html.escape(f"Tiles that look like {name}")
+    title = f"Tiles that look like {name}"
+    begin = opening(title, css("orbiflow.export", "index_page.css"))
     tiles = "One tile" if count == 1 else f"{count} tiles, best first"
     notes = "".join(f"<li>{html.escape(note)}</li>\n" for note in target.notes)
     decided = f'<ul class="notes" aria-label="Decided for you">\n{notes}</ul>\n' if notes else ""
     front = ', by deformation and overlap: <a href="front.png">front.png</a>' if compared else ""
-    return f"""<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<meta name="generator" content="orbiflow">
-<title>{title}</title>
-<style>
-{style}</style>
-</head>
-<body>
-<header>
+    return f"""{begin}<header>
 {_silhouette(name, target)}
 <div>
-<h1>{title}</h1>
+<h1>{html.escape(title)}</h1>
 <p>{tiles}. Everything in numbers: <a href="result.json">result.json</a>; on one sheet:
 <a href="overview.png">overview.png</a>{front}.</p>
 {decided}</div>

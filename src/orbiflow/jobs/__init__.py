@@ -11,6 +11,7 @@ True
 from orbiflow.cancel import Cancel
 from orbiflow.jobs.batch_requests import BatchRequest, DensityBatchRequest
 from orbiflow.jobs.density_compare_requests import DensityCompareRequest, DensityRegionRequest
+from orbiflow.jobs.density_cv_requests import DensityCvRequest, DensityFoldRequest
 from orbiflow.jobs.density_requests import (
     DensityConditionalRequest,
     DensityFitRequest,
@@ -56,7 +57,9 @@ __all__ = [
     "DensityBatchRequest",
     "DensityCompareRequest",
     "DensityConditionalRequest",
+    "DensityCvRequest",
     "DensityFitRequest",
+    "DensityFoldRequest",
     "DensityMarginalRequest",
     "DensityPlotRequest",
     "DensityRegionRequest",

@@ -40,13 +40,7 @@ class ManyRequest(Request):
     retry_failed: bool = False
 
     def check(self) -> None:
-        at_least_one(self, "workers")
-        if self.workers is not None and self.scheduler is not None:
-            raise RecordError(
-                "{workers} are processes of this machine, those of a {scheduler} are its own: give one"
-            )
-        if self.scheduler == "":
-            raise RecordError("{scheduler} must be an address, such as tcp://10.0.0.5:8786")
+        check_workers(self)
         if self.match is not None and not self.match.strip():
             raise RecordError("{match} must be a pattern of names, such as *.svg")
         for name in self.OWN:
@@ -104,7 +98,19 @@ class DensityBatchRequest(ManyRequest):
     OWN = ("data", "out")
 
     def one(self, name: str) -> DensityFitRequest:
-        return DensityFitRequest.of_fields({**self.each, "data": name})
+        return DensityFitRequest.of_fields({"picture": True, **self.each, "data": name})
+
+
+def check_workers(request: Request) -> None:
+    """Raises a `RecordError` unless its `workers` or its `scheduler` can be had."""
+    at_least_one(request, "workers")
+    scheduler = getattr(request, "scheduler", None)
+    if getattr(request, "workers", None) is not None and scheduler is not None:
+        raise RecordError(
+            "{workers} are processes of this machine, those of a {scheduler} are its own: give one"
+        )
+    if scheduler == "":
+        raise RecordError("{scheduler} must be an address, such as tcp://10.0.0.5:8786")
 
 
 def settings_of(request: Request, without: tuple[str, ...]) -> dict[str, Any]:

@@ -54,7 +54,7 @@ def density_compare(request: DensityCompareRequest, tell: Sink, cancel: Cancel) 
     found = compare(request, tell, cancel)
     document = found.to_json()
     cancel.check()
-    for line in [*_words(found), *found.notes]:
+    for line in [*found.words(), *found.notes]:
         tell(Note(line))
     if request.out is not None:
         as_csv = request.out.suffix.lower() == ".csv"
@@ -238,19 +238,6 @@ def _names(paths: Sequence[Path]) -> list[str]:
     return (
         full if len(set(full)) == len(full) else [f"{k}: {path}" for k, path in enumerate(full, 1)]
     )
-
-
-def _words(found: ModelComparison | DataComparison) -> list[str]:
-    if isinstance(found, DataComparison):
-        return found.words()
-    unit = "rows" if found.groups is None else f"rows in {found.groups} groups"
-    return [
-        f"mean log density at {found.rows} {unit}, in nats:",
-        *(f"  {s.name}: {s.mean:.4f} ± {s.error:.4f}" for s in found.scores),
-        f"differences, with intervals that hold all at once at {found.level:.1%}:",
-        *(f"  {difference}" for difference in found.differences),
-        found.verdict,
-    ]
 
 
 def _csv(found: ModelComparison | DataComparison) -> str:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from orbiflow.jobs.density_requests import SpaceName, Unit, columns_named
 from orbiflow.jobs.records import RecordError
-from orbiflow.jobs.request import Request
+from orbiflow.jobs.request import Request, in_range
 
 
 @dataclass(frozen=True)
@@ -45,10 +45,10 @@ class DensityCompareRequest(Request):
             self._check_models()
         else:
             self._check_data()
-        _ranged(self, "bootstrap", 100, 1_000_000)
-        _ranged(self, "permutations", 19, 100_000)
-        _ranged(self, "level", 0.5, 0.999)
-        _ranged(self, "seed", 0, 2**63 - 1)
+        in_range(self, "bootstrap", 100, 1_000_000)
+        in_range(self, "permutations", 19, 100_000)
+        in_range(self, "level", 0.5, 0.999)
+        in_range(self, "seed", 0, 2**63 - 1)
         _ending(self.out, (".json", ".csv"))
 
     def _check_models(self) -> None:
@@ -104,16 +104,10 @@ class DensityRegionRequest(Request):
             raise RecordError("{mass} and {level} need a number each, or several, as in 0.5,0.9")
         if len(self.mass or ()) + len(self.level or ()) > 50:
             raise RecordError("more than 50 regions: ask for fewer {mass} and {level}")
-        _ranged(self, "samples", 1000, 10_000_000)
-        _ranged(self, "budget", 1, 10**9)
-        _ranged(self, "seed", 0, 2**63 - 2)
+        in_range(self, "samples", 1000, 10_000_000)
+        in_range(self, "budget", 1, 10**9)
+        in_range(self, "seed", 0, 2**63 - 2)
         _ending(self.out, (".geojson", ".json", ".csv"))
-
-
-def _ranged(request: Request, name: str, low: float, high: float) -> None:
-    value = getattr(request, name)
-    if not low <= value <= high:
-        raise RecordError(f"{{{name}}} must be from {low:g} to {high:g}, got {value:g}")
 
 
 def _ending(out: Path | None, endings: tuple[str, ...]) -> None:

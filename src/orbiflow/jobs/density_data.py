@@ -21,6 +21,7 @@ from orbiflow.density.tables import (
 from orbiflow.density.tables.table import listing
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.export.density_figures import MODEL
+from orbiflow.jobs.density_requests import Unit
 from orbiflow.jobs.events import Note
 from orbiflow.jobs.run import Sink
 
@@ -112,7 +113,7 @@ def read_weighed(
     return table, column.values[np.isin(column.lines, table.lines), 0]
 
 
-def unit_of(space: str, unit: str | None, table: Table, tell: Sink) -> str:
+def unit_of(space: str, unit: Unit | None, table: Table, tell: Sink) -> Unit:
     """The unit of angles: as said, else radians where all values are within a turn either way.
 
     Raises:

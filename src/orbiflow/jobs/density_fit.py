@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import time
+from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,7 @@ from orbiflow.density.comparing import RowSketch
 from orbiflow.density.fitting.report import FitReport
 from orbiflow.density.tables import Table
 from orbiflow.export.density_figures import MODEL
-from orbiflow.export.density_plots import PICTURES, REPORT, TABLE
+from orbiflow.export.density_plots import PICTURES, REPORT, TABLE, THUMBNAIL
 from orbiflow.files import write_atomic
 from orbiflow.folders import ResultFolder
 from orbiflow.jobs.density_data import read_weighed, unit_of
@@ -41,7 +42,8 @@ def density_fit(request: DensityFitRequest, tell: Sink, cancel: Cancel) -> Finis
     """Fit, and write the folder whole.
 
     Returns:
-        `summary`: `folder`, `rows`, `log_likelihood` and `seconds`, as in report.json.
+        `summary`: `folder`, `rows`, `log_likelihood` and `seconds`, as in report.json; `picture`, the
+        name of the small one, or None.
 
     Raises:
         OrbiflowError: for anything that the user can mend.
@@ -58,29 +60,9 @@ def density_fit(request: DensityFitRequest, tell: Sink, cancel: Cancel) -> Finis
         drop_missing=request.drop_missing or request.missing == "drop",
         keep_missing=request.missing == "marginalise",
     )
-    estimator = DensityEstimator(
-        request.space,
-        unit=unit_of(request.space, request.unit, table, tell),
-        parts="auto" if request.parts is None else ",".join(request.parts),
-        repeats=request.repeats,
-        missing="marginalise" if request.missing == "marginalise" else "refuse",
-        detail=request.detail,
-        segments=request.segments,
-        kernels=request.kernels,
-        seconds=math.inf if request.seconds is None else request.seconds,
-        seed=request.seed,
-    )
+    estimator = estimator_of(request, unit_of(request.space, request.unit, table, tell))
     folder = ResultFolder(request.out, written_files)
-
-    reached = 0.0
-
-    def progress(share: float, what: str) -> None:
-        nonlocal reached
-        cancel.check()
-        reached = max(reached, share)
-        tell(Progress(reached, what))
-
-    estimator.fit(table.values, sample_weight=weights, progress=progress)
+    estimator.fit(table.values, sample_weight=weights, progress=told_of(tell, cancel))
     document = _document(request, table, weights, estimator, begin)
     with folder.replaced() as staged:
         whole = table.values[~np.isnan(table.values).any(axis=1)]
@@ -90,12 +72,47 @@ def density_fit(request: DensityFitRequest, tell: Sink, cancel: Cancel) -> Finis
         )
         write_atomic(staged / MODEL, saved)
         write_atomic(staged / REPORT, json.dumps(document, allow_nan=False, indent=1))
-    for name in (MODEL, REPORT):
+        if request.picture:
+            from orbiflow.figures.density_thumbnail import density_thumbnail
+
+            picture = density_thumbnail(estimator.density_, table.values)
+            write_atomic(staged / THUMBNAIL, picture)
+    for name in (MODEL, REPORT, *((THUMBNAIL,) if request.picture else ())):
         tell(Written(request.out / name))
     for note in (*estimator.report_.notes, *_told(request, document, len(table.values))):
         tell(Note(note))
     summary = {name: document[name] for name in ("log_likelihood", "seconds")}
+    summary["picture"] = THUMBNAIL if request.picture else None
     return Finished("done", {"folder": str(request.out), "rows": len(table.values), **summary})
+
+
+def estimator_of(request: DensityFitRequest, unit: str) -> DensityEstimator:
+    """What is asked for, before it has seen data; `unit` of its angles."""
+    return DensityEstimator(
+        request.space,
+        unit=unit,
+        parts="auto" if request.parts is None else ",".join(request.parts),
+        repeats=request.repeats,
+        missing="marginalise" if request.missing == "marginalise" else "refuse",
+        detail=request.detail,
+        segments=request.segments,
+        kernels=request.kernels,
+        seconds=math.inf if request.seconds is None else request.seconds,
+        seed=request.seed,
+    )
+
+
+def told_of(tell: Sink, cancel: Cancel) -> Callable[[float, str], None]:
+    """A fit's progress as events, whose share never falls; raises `Cancelled`."""
+    reached = 0.0
+
+    def progress(share: float, what: str) -> None:
+        nonlocal reached
+        cancel.check()
+        reached = max(reached, share)
+        tell(Progress(reached, what))
+
+    return progress
 
 
 def written_files(folder: Path) -> set[str]:
@@ -105,7 +122,7 @@ def written_files(folder: Path) -> set[str]:
         ours = "space" in document and "report" in document
     except (OSError, ValueError, TypeError, RecursionError):
         ours = False
-    return {MODEL, REPORT, TABLE, *PICTURES} if ours else set()
+    return {MODEL, REPORT, TABLE, THUMBNAIL, *PICTURES} if ours else set()
 
 
 def _document(
@@ -127,7 +144,7 @@ def _document(
             "square_train": -report.train_nll,
             "square_validation": -report.validation_nll,
         },
-        "report": _plain(report),
+        "report": plain_report(report),
         "seconds": time.perf_counter() - begin,
     }
 
@@ -154,7 +171,8 @@ def _score(estimator: DensityEstimator, table: Table, weights: Array | None) -> 
     )
 
 
-def _plain(report: FitReport) -> dict[str, Any]:
+def plain_report(report: FitReport) -> dict[str, Any]:
+    """For `json.dumps`."""
     document = asdict(report)
     for stage in document["stages"]:
         for name in ("train", "validation"):

@@ -45,6 +45,7 @@ class DensityFitRequest(Request):
     - `detail`, `segments`: of the flow, None for what suits the number of rows.
     - `kernels`: a flow and adaptive kernels, nothing else.
     - `seconds`: of training at most, None for no limit.
+    - `picture`: whether a small one is drawn as well, thumbnail.png.
     """
 
     KIND = "density-fit"
@@ -64,6 +65,7 @@ class DensityFitRequest(Request):
     segments: int | None = None
     kernels: bool = False
     seconds: float | None = None
+    picture: bool = False
     seed: int = 0
 
     def check(self) -> None:

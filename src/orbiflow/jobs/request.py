@@ -30,3 +30,10 @@ def at_least_one(request: Request, name: str) -> None:
     value = getattr(request, name)
     if value is not None and value < 1:
         raise RecordError(f"{{{name}}} must be at least 1, got {value}")
+
+
+def in_range(request: Request, name: str, low: float, high: float) -> None:
+    """Raises a `RecordError` if the field is a number beyond these."""
+    value = getattr(request, name)
+    if not low <= value <= high:
+        raise RecordError(f"{{{name}}} must be from {low:g} to {high:g}, got {value:g}")

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from orbiflow.jobs.batch_requests import BatchRequest, DensityBatchRequest
 from orbiflow.jobs.density_compare_requests import DensityCompareRequest, DensityRegionRequest
+from orbiflow.jobs.density_cv_requests import DensityCvRequest, DensityFoldRequest
 from orbiflow.jobs.density_requests import (
     DensityConditionalRequest,
     DensityFitRequest,
@@ -45,6 +46,8 @@ REQUESTS: dict[str, type[Request]] = {
         PaperRequest,
         BatchRequest,
         DensityBatchRequest,
+        DensityCvRequest,
+        DensityFoldRequest,
     )
 }
 

@@ -32,6 +32,8 @@ _MODULES = {
     "paper": "paper",
     "batch": "batch",
     "density-batch": "batch",
+    "density-cv": "density_cv",
+    "density-fold": "density_fold",
 }
 
 

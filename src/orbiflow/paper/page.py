@@ -8,8 +8,8 @@ from __future__ import annotations
 import html
 import re
 from collections.abc import Sequence
-from importlib import resources
 
+from orbiflow.export.web_page import CLOSING, css, opening
 from orbiflow.paper.canvas import Picture
 from orbiflow.paper.exhibit import Findings, Shown, Table
 from orbiflow.paper.extent import Extent
@@ -28,25 +28,14 @@ def paper_page(shown: Sequence[Shown], extent: Extent, seconds: float) -> str:
         extent: what they were made with.
         seconds: that all took.
     """
-    style = resources.files("orbiflow.paper").joinpath("page.css").read_text("utf-8")
+    begin = opening("The paper, reproduced", css("orbiflow.paper", "page.css"), dark=False)
     parts = [
-        f"""<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<meta name="generator" content="orbiflow">
-<title>The paper, reproduced</title>
-<style>
-{style}</style>
-</head>
-<body>
-{_head(extent, seconds)}
+        f"""{begin}{_head(extent, seconds)}
 {_overview(shown)}
 <main>
 """,
         *(_article(one) for one in shown),
-        "</main>\n</body>\n</html>\n",
+        f"</main>\n{CLOSING}",
     ]
     return "".join(parts)
 

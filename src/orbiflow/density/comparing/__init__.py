@@ -15,6 +15,7 @@ from orbiflow.density.comparing.paired import (
     compare_scores,
 )
 from orbiflow.density.comparing.rows import RowSketch
+from orbiflow.density.comparing.splits import cross_validation_folds
 from orbiflow.density.comparing.two_samples import TestResult, mmd_test
 
 __all__ = [
@@ -29,6 +30,7 @@ __all__ = [
     "compare_models",
     "compare_samples",
     "compare_scores",
+    "cross_validation_folds",
     "density_of",
     "mmd_test",
     "require_one_space",

@@ -91,11 +91,23 @@ class ModelComparison:
         open_ = [d.second for d in self.differences if d.first == top and d.better is None]
         return f"the rows cannot tell {_listed([top, *open_])} apart"
 
+    def words(self) -> list[str]:
+        """What came of it, in lines."""
+        unit = "rows" if self.groups is None else f"rows in {self.groups} groups"
+        return [
+            f"mean log density at {self.rows} {unit}, in nats:",
+            *(f"  {s.name}: {s.mean:.4f} ± {s.error:.4f}" for s in self.scores),
+            f"differences, with intervals that hold all at once at {self.level:.1%}:",
+            *(f"  {difference}" for difference in self.differences),
+            self.verdict,
+        ]
+
 
 def compare_scores(
     scores: Mapping[str, ArrayLike],
     *,
     groups: ArrayLike | None = None,
+    weights: ArrayLike | None = None,
     resamples: int = RESAMPLES,
     level: float = LEVEL,
     seed: int = 0,
@@ -105,18 +117,19 @@ def compare_scores(
     Intervals are by the symmetric bootstrap-t, of the largest of all pairs' |t|, so that all hold at
     once (Efron and Tibshirani, An introduction to the bootstrap, 1993, ch. 12; Romano and Wolf,
     Stepwise multiple testing, 2005). Whole groups are resampled, and the standard error is that of
-    a ratio of sums over groups.
+    a ratio of sums over groups, or of weighted rows.
 
     Args:
         scores: (N,) a model, in nats and with respect to one measure.
         groups: a label (N,) a row; rows of one group are not independent. None: all are.
+        weights: of the rows (N,) in every mean, above 0; only ratios count. None: all the same.
         resamples: of the bootstrap, 100 or more.
         level: of the intervals.
         seed: of the resamples.
 
     Raises:
-        OrbiflowError: for fewer than two models, scores of different lengths or not finite, or fewer
-            than five rows or groups.
+        OrbiflowError: for fewer than two models, scores of different lengths or not finite, weights
+            that are none, or fewer than five rows or groups.
 
     >>> rng = np.random.default_rng(0)
     >>> base = rng.normal(size=500)
@@ -129,14 +142,15 @@ def compare_scores(
     table = _table(scores)
     members = Groups.of(groups, len(table))
     members.require()
-    means, errors = _means(table, members)
+    counts = _row_weights(weights, len(table))
+    means, errors = _means(table, members, counts)
     order = np.argsort(-means, kind="stable")
     names = [list(scores)[k] for k in order]
     table, means, errors = table[:, order], means[order], errors[order]
     pairs = list(itertools.combinations(range(len(names)), 2))
     rows = np.stack([table[:, i] - table[:, j] for i, j in pairs], axis=1)
-    mean, error = _means(rows, members)
-    largest = _largest_t(rows - mean, members, resamples, seed)
+    mean, error = _means(rows, members, counts)
+    largest = _largest_t(rows - mean, members, counts, resamples, seed)
     reach = float(np.quantile(largest, level, method="higher"))
     found = []
     for k, (i, j) in enumerate(pairs):
@@ -151,7 +165,7 @@ def compare_scores(
                 float(low),
                 float(high),
                 float((1 + (largest >= t).sum()) / (1 + resamples)) if t else 1.0,
-                float((rows[:, k] > 0).mean() + (rows[:, k] == 0).mean() / 2),
+                float(np.average((rows[:, k] > 0) + (rows[:, k] == 0) / 2, weights=counts)),
                 names[i] if low > 0 else None,
             )
         )
@@ -181,20 +195,30 @@ def _table(scores: Mapping[str, ArrayLike]) -> Array:
     return np.stack(columns, axis=1)
 
 
-def _means(table: Array, groups: Groups) -> tuple[Array, Array]:
-    """Means (k,) over rows of a table (N, k), and their standard errors over groups."""
-    mean = table.mean(axis=0)
-    residuals = groups.sums(table - mean)
+def _row_weights(weights: ArrayLike | None, rows: int) -> Array:
+    """(N,) of mean 1."""
+    if weights is None:
+        return np.ones(rows)
+    found = numbers(weights, "weights", ("N",))
+    if len(found) != rows or not (found > 0).all():
+        raise OrbiflowError(f"weights must be {rows} numbers above 0, one a row")
+    return found / found.mean()
+
+
+def _means(table: Array, groups: Groups, weights: Array) -> tuple[Array, Array]:
+    """Weighted means (k,) over rows of a table (N, k), and their standard errors over groups."""
+    mean = weights @ table / len(table)
+    residuals = groups.sums(weights[:, None] * (table - mean))
     spread = (residuals**2).sum(axis=0) * groups.count / (groups.count - 1)
     error = np.sqrt(spread) / len(table)
     # what rounding leaves of equal differences is none
     return mean, np.where(error > 1e-14 * (1 + abs(mean)), error, 0.0)
 
 
-def _largest_t(centered: Array, groups: Groups, resamples: int, seed: int) -> Array:
+def _largest_t(centered: Array, groups: Groups, weights: Array, resamples: int, seed: int) -> Array:
     """(B,): of each resample the largest |t| of the columns of `centered` (N, k)."""
-    sums = groups.sums(centered)
-    sizes = np.bincount(groups.index, minlength=groups.count).astype(np.float64)[:, None]
+    sums = groups.sums(weights[:, None] * centered)
+    sizes = groups.sums(weights[:, None])
     parts = (sizes, sizes**2, sums, sums**2, sums * sizes)
     drawn = resampled_sums(np.concatenate(parts, axis=1), resamples, np.random.default_rng(seed))
     n, n2, rest = drawn[:, :1], drawn[:, 1:2], drawn[:, 2:]

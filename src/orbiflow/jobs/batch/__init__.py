@@ -4,6 +4,6 @@ What is done is done for good: a batch that was ended, in whatever way, is gone 
 again, and only what is missing, changed or new is worked on.
 """
 
-from orbiflow.jobs.batch.work import batch, density_batch
+from orbiflow.jobs.batch.files import batch, density_batch
 
 __all__ = ["batch", "density_batch"]

@@ -1,4 +1,4 @@
-"""The folder of a batch: a folder a result, the table and the page of all, the journal."""
+"""The folder of a batch: a folder a result, an overview of all, the journal."""
 
 from __future__ import annotations
 
@@ -12,23 +12,16 @@ from typing import Self
 
 from filelock import FileLock, Timeout
 
-from orbiflow.errors import OutputError
-from orbiflow.files import make_folder, write_atomic
+from orbiflow.errors import OrbiflowError, OutputError
+from orbiflow.files import make_folder, write_atomic, write_set
 from orbiflow.folders import LITTER, ResultFolder
 from orbiflow.jobs.batch.journal import Entry, Journal
-from orbiflow.jobs.batch.kinds import Kind
-from orbiflow.jobs.batch.page import page
-from orbiflow.jobs.batch.table import table
+from orbiflow.jobs.batch.kind import Kind
+from orbiflow.jobs.batch.overview import PAGE, TABLE, ContactSheet, Overview
 
-JOURNAL, TABLE, PAGE, THUMBNAILS, LOCK = (
-    "batch.jsonl",
-    "batch.csv",
-    "index.html",
-    "thumbnails",
-    ".batch.lock",
-)
-RESERVED = (JOURNAL, TABLE, PAGE, THUMBNAILS, LOCK)
-"""Names that no result has."""
+THUMBNAILS, LOCK = "thumbnails", ".batch.lock"
+RESERVED = (ContactSheet.journal, TABLE, PAGE, THUMBNAILS, LOCK)
+"""Names that no file's result has."""
 
 THUMBNAIL = (360, 240)
 """Pixels: half as many again as the page shows."""
@@ -41,22 +34,26 @@ times the seconds that it took: most of the time is for the work, however many r
 class BatchFolder:
     """Where a batch's results go; in a `with` block, this batch's alone.
 
+    - `keys`: of its items, in the order of the overview.
+    - `current`: of those that are done with as they are asked for now: others are not in the overview.
+
     Args:
         path: of the folder, made if need be. An earlier batch there is gone on with.
         kind: of the batch.
-        title: of the page.
+        overview: of all results.
 
     Raises:
         OutputError: if something else is in it, another batch is at work there, or it cannot be
             written.
     """
 
-    def __init__(self, path: Path, kind: Kind, title: str) -> None:
-        self.path, self.kind, self.title = path, kind, title
+    def __init__(self, path: Path, kind: Kind, overview: Overview) -> None:
+        self.path, self.kind, self.overview = path, kind, overview
         self._check()
         make_folder(path)
-        self.journal = Journal(path / JOURNAL)
-        self.files: Sequence[str] = ()
+        self.journal = Journal(path / overview.journal)
+        self.keys: Sequence[str] = ()
+        self.current: set[str] = set()
         self._open = ExitStack()
         self._written, self._cost = 0.0, 0.0
 
@@ -66,13 +63,14 @@ class BatchFolder:
             self._open.enter_context(lock)
         except Timeout as error:
             raise OutputError(
-                f"another batch is at work in {self.path}: wait for it or choose another --out"
+                f"another {self.overview.what} is at work in {self.path}: wait for it or choose "
+                "another --out"
             ) from error
         except OSError as error:
             raise OutputError(
                 f"cannot write into {self.path}: {error.strerror or error}"
             ) from error
-        self.journal = Journal(self.path / JOURNAL)  # as the last one left it
+        self.journal = Journal(self.path / self.overview.journal)  # as the last one left it
         self._open.enter_context(self.journal)
         return self
 
@@ -82,13 +80,13 @@ class BatchFolder:
         error: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
-        """Write the table and the page, whatever has happened."""
+        """Write the overview, whatever has happened."""
         with self._open:
             if kind is None:
-                self.write_all()
+                self.write_all(last=True)
             else:
-                with suppress(OutputError):  # the first error is the one to be told
-                    self.write_all()
+                with suppress(OrbiflowError):  # the first error is the one to be told
+                    self.write_all(last=True)
 
     def has(self, name: str) -> bool:
         """Whether a result's folder is there."""
@@ -116,29 +114,31 @@ class BatchFolder:
         elif files:
             thumbnail.unlink(missing_ok=True)
         self.journal.add(entry)
+        self.current.add(entry.file)
         now = time.monotonic()
         if now - self._written > max(PAUSE, REST * self._cost):
             self.write_all()
 
-    def write_all(self) -> None:
-        """The table and the page of all `files` that are done with.
+    def write_all(self, *, last: bool = False) -> None:
+        """The overview of all `keys` that are `current`.
 
         Raises:
-            OutputError: if they cannot be written.
+            OutputError: if it cannot be written.
         """
         begin = time.monotonic()
-        entries = [self.journal.entries[f] for f in self.files if f in self.journal.entries]
-        write_atomic(self.path / TABLE, table(entries, self.kind))
+        entries = [self.journal.entries[key] for key in self.keys if key in self.current]
         pictures = frozenset(path.stem for path in (self.path / THUMBNAILS).glob("*.png"))
-        waiting = len(self.files) - len(entries)
-        write_atomic(self.path / PAGE, page(entries, self.kind, self.title, waiting, pictures))
+        waiting = len(self.keys) - len(entries)
+        files = self.overview.files(entries, waiting, pictures, last=last)
+        gone = [name for name, data in files.items() if data is None]
+        write_set(self.path, gone, {name: data for name, data in files.items() if data is not None})
         self._written = time.monotonic()
         self._cost = self._written - begin
 
     def _check(self) -> None:
         """Raises an `OutputError` for a folder that is not a batch's."""
         try:
-            if not self.path.exists() or (self.path / JOURNAL).exists():
+            if not self.path.exists() or (self.path / self.overview.journal).exists():
                 return
             found = next((p for p in sorted(self.path.iterdir()) if not _is_litter(p)), None)
         except OSError as error:
@@ -147,8 +147,8 @@ class BatchFolder:
             ) from error
         if found is not None:
             raise OutputError(
-                f"{self.path} holds {found.name}, which is of no earlier batch: choose another --out "
-                "or move it"
+                f"{self.path} holds {found.name}, which is of no earlier {self.overview.what}: "
+                "choose another --out or move it"
             )
 
 

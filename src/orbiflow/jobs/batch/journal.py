@@ -16,6 +16,7 @@ from typing import Any, Literal, Self
 
 from orbiflow.errors import OutputError
 from orbiflow.files import write_atomic
+from orbiflow.folders import stays_inside
 from orbiflow.jobs.records import Record, RecordError
 
 MOST_BYTES = 2**30
@@ -120,7 +121,9 @@ def _entries(lines: Iterable[bytes]) -> Iterable[Entry]:
         try:
             document = json.loads(line)
             if isinstance(document, dict) and document.pop("kind", None) == Entry.KIND:
-                yield Entry.of_fields(document)
+                entry = Entry.of_fields(document)
+                if stays_inside(entry.name):  # results are written there
+                    yield entry
         except (ValueError, RecordError, RecursionError):
             continue  # cut short: to be done again
 

@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import html
 from collections.abc import Sequence
-from importlib import resources
 from urllib.parse import quote
 
+from orbiflow.export.web_page import CLOSING, css, opening
 from orbiflow.jobs.batch.journal import Entry
-from orbiflow.jobs.batch.kinds import Column, Kind
+from orbiflow.jobs.batch.kind import Column, Kind
+
+HERE = "orbiflow.jobs.batch"
 
 
 def page(
@@ -36,12 +38,8 @@ def page(
         parts.append('<h2 id="without">Without a result</h2>\n<ul class="failed">\n')
         parts += [_failure(entry) for entry in other]
         parts.append("</ul>\n")
-    parts.append(f"</main>\n<script>\n{_part('page.js')}</script>\n</body>\n</html>\n")
+    parts.append(f"</main>\n<script>\n{css(HERE, 'page.js')}</script>\n{CLOSING}")
     return "".join(parts).encode("utf-8", "replace")
-
-
-def _part(name: str) -> str:
-    return resources.files("orbiflow.jobs.batch").joinpath(name).read_text("utf-8")
 
 
 def _head(title: str, done: int, other: int, waiting: int, kind: Kind) -> str:
@@ -53,18 +51,7 @@ def _head(title: str, done: int, other: int, waiting: int, kind: Kind) -> str:
         for column in kind.columns
         if column.form
     )
-    return f"""<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<meta name="generator" content="orbiflow">
-<title>{html.escape(title)}</title>
-<style>
-{_part("page.css")}</style>
-</head>
-<body>
-<header>
+    return f"""{opening(title, css(HERE, "page.css"))}<header>
 <h1>{html.escape(title)}</h1>
 <p>{said}. Everything in numbers: <a href="batch.csv">batch.csv</a>.</p>
 <form id="tools" hidden>
@@ -88,11 +75,11 @@ def _card(entry: Entry, kind: Kind, picture: bool) -> str:
     seconds = "" if entry.seconds is None else f"{entry.seconds:.3f}"
     image = (
         f'<img src="thumbnails/{link}.png" width="240" height="160" loading="lazy" '
-        f'decoding="async" alt="Tiling of {name}">'
+        f'decoding="async" alt="{kind.shows} of {name}">'
         if picture
         else ""
     )
-    inside = "index.html" if picture else ""
+    inside = kind.opens if picture else ""
     # the first is text, said beside the name
     texts = [
         html.escape(column.shown(entry.best.get(column.name)))

@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from orbiflow.jobs.batch.journal import Entry
-from orbiflow.jobs.batch.kinds import Kind
+from orbiflow.jobs.batch.kind import Kind
 
 
 def table(entries: Iterable[Entry], kind: Kind) -> bytes:

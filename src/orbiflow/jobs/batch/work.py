@@ -1,178 +1,162 @@
-"""Going through a folder: what is to be done, who does it, where it goes."""
+"""Going through many items: what is to be done, who does it, where it goes."""
 
 from __future__ import annotations
 
-import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from orbiflow import __version__
 from orbiflow.cancel import Cancel
 from orbiflow.errors import OrbiflowError
-from orbiflow.jobs.batch.folder import RESERVED, BatchFolder
-from orbiflow.jobs.batch.inputs import code_of, content, folder_names, listed
+from orbiflow.jobs.batch.folder import BatchFolder
+from orbiflow.jobs.batch.inputs import code_of
+from orbiflow.jobs.batch.items import Item
 from orbiflow.jobs.batch.journal import Entry
-from orbiflow.jobs.batch.kinds import DENSITIES, TILES, Kind
-from orbiflow.jobs.batch_requests import (
-    BatchRequest,
-    DensityBatchRequest,
-    ManyRequest,
-    settings_of,
-)
-from orbiflow.jobs.events import Failed, Finished, ItemDone, Note, Progress
+from orbiflow.jobs.batch.kind import Kind
+from orbiflow.jobs.events import Failed, Finished, ItemDone, Note, Progress, State
 from orbiflow.jobs.executors import Answer, DaskCluster, Executor, LocalProcesses, Parcel
 from orbiflow.jobs.run import Sink
 
 MOST_NAMED = 5
-"""Files that a note names."""
+"""Items that a note names."""
 
 
-def batch(request: BatchRequest, tell: Sink, cancel: Cancel) -> Finished:
-    """Tiles for every silhouette; see `_many`."""
-    return _many(request, TILES, f"Tiles of {request.folder.name or 'a folder'}", tell, cancel)
+class Asked(Protocol):
+    """A request, as far as it says who works."""
 
-
-def density_batch(request: DensityBatchRequest, tell: Sink, cancel: Cancel) -> Finished:
-    """A density for every table; see `_many`."""
-    title = f"Densities of {request.folder.name or 'a folder'}"
-    return _many(request, DENSITIES, title, tell, cancel)
+    @property
+    def workers(self) -> int | None: ...
+    @property
+    def scheduler(self) -> str | None: ...
+    @property
+    def retry_failed(self) -> bool: ...
 
 
 @dataclass(frozen=True)
-class _Waiting:
-    """A file that is to be dealt with."""
+class Outcome:
+    """How many items are `done`, gave `nothing`, have `failed`, are `left`; were `kept` from before."""
 
-    file: str
-    name: str
-    settings: dict[str, Any]
+    done: int
+    nothing: int
+    failed: int
+    left: int
+    kept: int
+
+    @property
+    def state(self) -> State:
+        """Of a `Finished`."""
+        if self.left:
+            return "cancelled"
+        return "done" if self.done else "nothing found"
+
+    def summary(self) -> dict[str, Any]:
+        """For a `Finished`."""
+        return vars(self).copy()
 
 
-def _many(request: ManyRequest, kind: Kind, title: str, tell: Sink, cancel: Cancel) -> Finished:
+def go_through(
+    items: Sequence[Item],
+    asked: Asked,
+    folder: BatchFolder,
+    tell: Sink,
+    cancel: Cancel,
+    *,
+    gone: str,
+) -> Outcome:
     """Do what has not been done, and put it into the folder as it comes.
 
-    Returns:
-        `summary`: `folder`, `table` and `page`; `files`, and how many of them are `done`, gave
-        `nothing`, have `failed` or are `left`; how many were `kept` from before; `seconds`.
+    Args:
+        items: of different keys.
+        folder: entered.
+        gone: what earlier results are of that belong to no item, in words.
 
     Raises:
         OrbiflowError: for anything that the user can mend; what was finished is kept.
     """
-    begin = time.perf_counter()
-    files = listed(request.folder, kind.endings, request.match, request.out)
-    with BatchFolder(request.out, kind, title) as folder:
-        folder.files = files
-        given = {file: entry.name for file, entry in folder.journal.entries.items()}
-        names = folder_names(files, given, RESERVED)
-        todo = list(_todo(request, kind, files, names, folder))
-        kept = len(files) - len(todo)
-        for text in _said_before(files, todo, folder, request):
-            tell(Note(text))
-        teller = _Teller(tell, len(files), kept)
-        if todo and not cancel.cancelled:
-            _work(request, kind, todo, folder, teller, cancel)
-    entries = folder.journal.entries
-    left = [one.file for one in todo if one.file not in teller.finished]
-    states = Counter(entries[file].state for file in files if file not in set(left))
-    summary = {
-        "folder": str(request.out),
-        "table": str(request.out / "batch.csv"),
-        "page": str(request.out / "index.html"),
-        "files": len(files),
-        "done": states["done"],
-        "nothing": states["nothing found"],
-        "failed": states["failed"],
-        "left": len(left),
-        "kept": kept,
-        "seconds": time.perf_counter() - begin,
-    }
-    if left:
-        return Finished("cancelled", summary)
-    return Finished("done" if states["done"] else "nothing found", summary)
+    folder.keys = [item.key for item in items]
+    kind = folder.kind
+    todo = list(_todo(items, asked, folder))
+    folder.current = set(folder.keys) - {item.key for item in todo}
+    kept = len(items) - len(todo)
+    for text in _said_before(items, todo, folder, gone):
+        tell(Note(text))
+    teller = _Teller(tell, len(items), kept)
+    if todo and not cancel.cancelled:
+        _work(asked, kind, todo, folder, teller, cancel)
+    left = {item.key for item in todo} - teller.finished
+    states = Counter(folder.journal.entries[k].state for k in folder.keys if k not in left)
+    return Outcome(states["done"], states["nothing found"], states["failed"], len(left), kept)
 
 
-def _todo(
-    request: ManyRequest, kind: Kind, files: list[str], names: dict[str, str], folder: BatchFolder
-) -> Iterator[_Waiting]:
+def _todo(items: Sequence[Item], asked: Asked, folder: BatchFolder) -> Iterator[Item]:
     """What is new or changed, was asked for otherwise, or has lost its result."""
-    for file in files:
-        settings = _settings(request, kind, file)
-        before = folder.journal.entries.get(file)
-        if before is not None and not (request.retry_failed and before.state != "done"):
+    for item in items:
+        before = folder.journal.entries.get(item.key)
+        if before is not None and not (asked.retry_failed and before.state != "done"):
             try:
-                code = code_of(content(request.folder / file, kind.most_bytes))
+                code = item.source.code()
             except OrbiflowError:
                 code = ""
             there = before.state == "failed" or folder.has(before.name)
-            if there and before.same_work(code, settings, __version__):
+            if there and before.same_work(code, item.settings(folder.kind), __version__):
                 continue
-        yield _Waiting(file, names[file], settings)
-
-
-def _settings(request: ManyRequest, kind: Kind, file: str) -> dict[str, Any]:
-    """What decides a result besides the file's bytes and its name."""
-    own = (kind.reads, kind.writes, "workers", "called")
-    return settings_of(request.one(file), own)
+        yield item
 
 
 def _said_before(
-    files: list[str], todo: list[_Waiting], folder: BatchFolder, request: ManyRequest
+    items: Sequence[Item], todo: Sequence[Item], folder: BatchFolder, gone: str
 ) -> Iterator[str]:
     entries = folder.journal.entries
-    waiting = {one.file for one in todo}
-    states = Counter(entries[file].state for file in files if file not in waiting)
+    waiting = {item.key for item in todo}
+    states = Counter(entries[item.key].state for item in items if item.key not in waiting)
     if states:
         failed = states["failed"] + states["nothing found"]
-        text = f"{len(files)} files: {states['done']} are done already"
+        text = f"{len(items)} {folder.kind.items}: {states['done']} are done already"
         if failed:
             text += f", {failed} have failed before (--retry-failed does them again)"
         yield f"{text}, {len(todo)} to do"
-    gone = sorted(entry.name for file, entry in entries.items() if file not in set(files))
-    if gone:
-        named = ", ".join(gone[:MOST_NAMED]) + (", ..." if len(gone) > MOST_NAMED else "")
-        out = f" or that --match {request.match} leaves out" if request.match else ""
-        yield (
-            f"{len(gone)} earlier results are of files that are not in {request.folder}{out}; they "
-            f"are kept and not listed: {named}"
-        )
+    known = set(folder.keys)
+    others = sorted(entry.name for key, entry in entries.items() if key not in known)
+    if others:
+        named = ", ".join(others[:MOST_NAMED]) + (", ..." if len(others) > MOST_NAMED else "")
+        yield f"{len(others)} earlier results are {gone}; they are kept and not listed: {named}"
 
 
 def _work(
-    request: ManyRequest,
+    asked: Asked,
     kind: Kind,
-    todo: list[_Waiting],
+    todo: Sequence[Item],
     folder: BatchFolder,
     teller: _Teller,
     cancel: Cancel,
 ) -> None:
-    codes: dict[str, tuple[_Waiting, str]] = {}
+    codes: dict[str, tuple[Item, str]] = {}
 
-    def unreadable(one: _Waiting, reason: str) -> None:
-        entry = Entry(one.file, one.name, "", one.settings, __version__, "failed", reason)
+    def unreadable(item: Item, reason: str) -> None:
+        entry = Entry(item.key, item.name, "", item.settings(kind), __version__, "failed", reason)
         folder.keep(entry, {}, None)
         teller.item(entry, kind)
 
     def parcels() -> Iterator[Parcel]:
-        for one in todo:
+        for item in todo:
             try:
-                data = content(request.folder / one.file, kind.most_bytes)
+                data = item.source.read()
             except OrbiflowError as error:
-                unreadable(one, str(error))
+                unreadable(item, str(error))
                 continue
-            codes[one.file] = one, code_of(data)
-            asked, name = request.one(one.file), Path(one.file).name
-            yield Parcel(one.file, asked, kind.reads, kind.writes, name, data)
+            codes[item.key] = item, code_of(data)
+            yield Parcel(item.key, item.request, kind.reads, kind.writes, item.source.name, data)
 
-    executor = _executor(request, kind, len(todo))
+    executor = _executor(asked, kind, len(todo))
     with executor:
         teller.tell(Note(f"{len(todo)} {kind.things} for {executor.place}"))
         with closing(executor.answers(parcels(), teller.tell, cancel)) as answers:
             for answer in answers:
-                one, code = codes.pop(answer.key)
-                entry = _entry(answer, one, code, kind)
+                item, code = codes.pop(answer.key)
+                entry = _entry(answer, item, code, kind)
                 if entry is None:
                     continue
                 picture = None
@@ -182,17 +166,17 @@ def _work(
                 teller.item(entry, kind)
 
 
-def _executor(request: ManyRequest, kind: Kind, count: int) -> Executor:
-    if request.scheduler is not None:
-        return DaskCluster(request.scheduler)
-    executor = LocalProcesses(request.workers, kind.modules)
+def _executor(asked: Asked, kind: Kind, count: int) -> Executor:
+    if asked.scheduler is not None:
+        return DaskCluster(asked.scheduler)
+    executor = LocalProcesses(asked.workers, kind.modules)
     return LocalProcesses(min(executor.workers, count), kind.modules)
 
 
-def _entry(answer: Answer, one: _Waiting, code: str, kind: Kind) -> Entry | None:
+def _entry(answer: Answer, item: Item, code: str, kind: Kind) -> Entry | None:
     """Nothing of what was interrupted."""
     end = answer.end
-    known = (one.file, one.name, code, one.settings, __version__)
+    known = (item.key, item.name, code, item.settings(kind), __version__)
     if isinstance(end, Failed):
         return Entry(*known, "failed", end.message)
     if end.state == "cancelled":

@@ -7,12 +7,13 @@ import tempfile
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from typing import Any
 
 from orbiflow import __version__
 from orbiflow.cancel import Cancel
 from orbiflow.errors import OrbiflowError
+from orbiflow.folders import stays_inside
 from orbiflow.jobs.events import Event, Failed, Finished, Progress, Written, event_from_json
 from orbiflow.jobs.request import Request
 from orbiflow.jobs.requests import request_from_json
@@ -69,8 +70,7 @@ class Answer:
         if not events or not isinstance(events[-1], Finished | Failed):
             raise OrbiflowError("a worker gave an answer without an end")
         for name in files:
-            path = PurePosixPath(name)
-            if path.is_absolute() or ".." in path.parts or not path.parts or "\\" in name:
+            if not stays_inside(name):
                 raise OrbiflowError(f"a worker gave a file a name that cannot be used: {name!r}")
         return cls(key, events, files)
 

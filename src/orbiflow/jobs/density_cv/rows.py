@@ -1,0 +1,127 @@
+"""The rows of a cross-validation, what they weigh and which of them belong together."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from orbiflow.density.fitting.folds import LEAST_PLACES, places
+from orbiflow.density.fitting.rows import weighed
+from orbiflow.density.partial import chart_of_observed
+from orbiflow.density.spaces.catalogue import space_class
+from orbiflow.density.spaces.space import Space
+from orbiflow.density.tables import Table, column_names, read_labels
+from orbiflow.density.tables.table import find
+from orbiflow.errors import InputFileError, OrbiflowError
+from orbiflow.jobs.density_cv_requests import DensityCvRequest
+from orbiflow.jobs.density_data import read_weighed, unit_of
+from orbiflow.jobs.density_fit import WIDTH
+from orbiflow.jobs.density_requests import Unit
+from orbiflow.jobs.events import Note
+from orbiflow.jobs.run import Sink
+from orbiflow.symmetry.isometry import Array
+
+
+@dataclass(frozen=True, eq=False)
+class CvRows:
+    """Of a table, those that count.
+
+    - `table`: N rows, in the data's own units. `weights`: (N,), None where all weigh the same.
+    - `labels`: (N,) the group of each row, None if there are none.
+    - `together`: (N,) a label a row; rows of one label are on one side of every split.
+    - `space`, `unit`: of the whole table, for its measure; no fit sees it.
+    """
+
+    table: Table
+    weights: Array | None
+    labels: NDArray[np.str_] | None
+    together: NDArray[Any] | None
+    space: Space
+    unit: Unit
+
+    @property
+    def whole(self) -> NDArray[np.bool_]:
+        """Which rows lack nothing: of others the density is in another unit."""
+        found = np.logical_and.reduce(np.isfinite(self.table.values), axis=1)
+        return found if found.any() else np.ones_like(found)
+
+
+def read_rows(request: DensityCvRequest, tell: Sink) -> CvRows:
+    """
+    Raises:
+        OrbiflowError: for a table, columns, weights or groups that cannot be used.
+    """
+    table, weights = _counting(*_read(request, tell))
+    unit = unit_of(request.space, request.unit, table, tell)
+    space = space_class(request.space).for_data(table.values, unit=unit, seed=request.seed)
+    points = (
+        chart_of_observed(space, table.values)
+        if request.missing == "marginalise"
+        else space.to_chart(table.values)
+    )
+    counts, place = places(points)
+    if len(counts) <= LEAST_PLACES:
+        raise OrbiflowError(
+            f"{request.data}: {len(counts)} different rows; a cross-validation needs more than the "
+            f"{LEAST_PLACES} that a density needs"
+        )
+    labels = None
+    if request.group is not None:
+        labels = read_labels(request.data, request.group, table, has_header=request.header)
+    together: NDArray[Any] | None = labels
+    if labels is None and request.repeats == "rounding":
+        together = place.numpy()
+    elif request.repeats == "rounding":
+        tell(Note("groups are kept together; equal rows of different groups may be on both sides"))
+    return CvRows(table, weights, labels, together, space, unit)
+
+
+def _read(request: DensityCvRequest, tell: Sink) -> tuple[Table, Array | None]:
+    """The table without its groups, and its weights."""
+    how: dict[str, Any] = {
+        "has_header": request.header,
+        "drop_missing": request.drop_missing or request.missing == "drop",
+        "keep_missing": request.missing == "marginalise",
+    }
+    width, columns = WIDTH[request.space], request.columns
+    if request.group is None or columns is not None:
+        return read_weighed(request.data, columns, width, request.weights, tell, **how)
+    name = _name_of(request, request.group)
+    table, weights = read_weighed(request.data, None, None, request.weights, tell, **how)
+    if name in table.columns and len(table.columns) > 1:
+        table = table.without(table.columns.index(name))
+    if width is not None and len(table.columns) != width:
+        raise InputFileError(
+            f"{request.data}: {width} columns must be taken beside the groups {name!r}, there are "
+            f"{', '.join(table.columns)}; choose with --columns"
+        )
+    return table, weights
+
+
+def _name_of(request: DensityCvRequest, column: str) -> str:
+    """What a table calls a column that is given by its name or number."""
+    names = column_names(request.data, wanted=[column], has_header=request.header)
+    if names is None:
+        number = column.strip()
+        return f"column{int(number)}" if number.isdecimal() else number
+    return names[find(request.data, names, column)]
+
+
+def _counting(table: Table, weights: Array | None) -> tuple[Table, Array | None]:
+    """Without the rows of weight 0, which count for nothing."""
+    if weights is None:
+        return table, None
+    weighed(torch.zeros(len(weights), 1), weights)  # refuses what is no weight
+    kept = weights > 0
+    left = frozenset(table.lines[~kept].tolist())
+    kept_table = replace(
+        table,
+        values=table.values[kept],
+        lines=table.lines[kept],
+        dropped=table.dropped | left,
+    )
+    return kept_table, weights[kept]
