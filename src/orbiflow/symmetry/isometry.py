@@ -110,7 +110,7 @@ class Isometry:
 
     def __matmul__(self, other: Isometry) -> Isometry:
         """Composition: `(g @ h)(p) == g(h(p))`."""
-        if not isinstance(other, Isometry):
+        if not isinstance(other, Isometry):  # pyright: ignore[reportUnnecessaryIsInstance]
             return NotImplemented
         if other.dim != self.dim:
             raise GroupError(f"cannot compose isometries of R^{self.dim} and R^{other.dim}")
