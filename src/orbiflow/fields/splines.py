@@ -177,7 +177,7 @@ def _on_table(
 ) -> Tensor:
     by_value, by_divergence = gradients
     plain = [w[0] for w in weights]
-    channels = []
+    channels: list[Tensor] = []
     for c in range(shape[0]):
         factors = list(plain)
         if rates is None:

@@ -9,6 +9,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from orbiflow.errors import OrbiflowError
+from orbiflow.typed_torch import random
 
 MAX_WIDTH, MAX_DEPTH, MAX_WAVES = 1024, 8, 16
 """Bounds of `NeuralTorusField`, for settings and for files."""
@@ -72,17 +73,18 @@ class NeuralTorusField(nn.Module):
         dtype: torch.dtype = torch.float64,
     ) -> None:
         super().__init__()
-        for name, value, most in (
+        sizes: list[tuple[str, object, int]] = [
             ("dim", dim, MAX_DIM),
             ("width", width, MAX_WIDTH),
             ("depth", depth, MAX_DEPTH),
             ("waves", waves, MAX_WAVES),
-        ):
+        ]
+        for name, value, most in sizes:
             if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= most:
                 raise OrbiflowError(f"{name} must be an integer from 1 to {most}, got {value!r}")
         self.dim, self.width, self.depth, self.waves = dim, width, depth, waves
-        with torch.random.fork_rng(devices=[]):
-            torch.manual_seed(seed)
+        with random.fork_rng(devices=[]):
+            random.manual_seed(seed)
             self.first = nn.Linear(2 * waves * dim + CLOCK, width, dtype=dtype)
             self.hidden = nn.ModuleList(
                 nn.Linear(width, width, dtype=dtype) for _ in range(depth - 1)

@@ -17,6 +17,7 @@ from orbiflow.flows.coarseness import Watch
 from orbiflow.flows.integrators import RungeKutta
 from orbiflow.flows.integrators import method as find_method
 from orbiflow.threads import one_thread
+from orbiflow.typed_torch import linalg
 
 AnyField = VectorField | TimeDependentField
 State = tuple[Tensor, ...]
@@ -194,7 +195,8 @@ class Flow(nn.Module):
         For a method of order p the error at `steps` is about 2^p / (2^p - 1) times this.
         """
         fine = self.with_steps(2 * self.steps).carried(points, inverse=inverse)
-        return float((self.carried(points, inverse=inverse) - fine).norm(dim=-1).max())
+        apart = self.carried(points, inverse=inverse) - fine
+        return float(linalg.vector_norm(apart, dim=-1).max())
 
     def _look(self, points: Tensor, *, inverse: bool = False) -> None:
         _check_points(points)
@@ -252,7 +254,7 @@ def _checked_steps(value: int) -> int:
     return int(value)
 
 
-def _check_points(points: Tensor) -> None:
+def _check_points(points: object) -> None:
     if not isinstance(points, Tensor):
         raise OrbiflowError(
             f"expected points as a torch tensor (..., d), got a {type(points).__name__}: "

@@ -69,7 +69,7 @@ class RungeKutta:
 
 
 def _advance(state: State, slopes: list[State], coefficients: tuple[float, ...], h: float) -> State:
-    moved = []
+    moved: list[Tensor] = []
     for i, part in enumerate(state):
         for k, c in zip(slopes, coefficients, strict=True):
             if c != 0.0:
