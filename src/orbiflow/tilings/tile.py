@@ -71,7 +71,7 @@ Tiles: TypeAlias = Tile | Tiling
 """What the functions of this room take."""
 
 
-def as_tiling(tiles: Tiles) -> Tiling:
+def as_tiling(tiles: object) -> Tiling:
     """The tiling that is meant.
 
     Raises:
