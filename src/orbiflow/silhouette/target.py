@@ -87,11 +87,7 @@ class Target:
         >>> Target.from_bytes(b"[[0, 0], [2, 0], [2, 2], [0, 2]]").kind
         'json'
         """
-        if not isinstance(data, bytes | bytearray | memoryview):
-            raise OrbiflowError(
-                f"data must be bytes, got {described(data)}; Target.read takes paths"
-            )
-        held = Held(bytes(data), str(name))
+        held = Held(_as_bytes(data), str(name))
         return cls._of(read_outline(held, threshold=threshold, invert=invert), held.name)
 
     @classmethod
@@ -180,6 +176,13 @@ class Target:
             "y_down": self.y_down,
             "notes": list(self.notes),
         }
+
+
+def _as_bytes(data: Any) -> bytes:
+    given = data
+    if not isinstance(data, bytes | bytearray | memoryview):
+        raise OrbiflowError(f"data must be bytes, got {described(data)}; Target.read takes paths")
+    return bytes(given)
 
 
 def _held(stream: Any) -> Held:
