@@ -59,7 +59,7 @@ def faithfulness(silhouette: ArrayLike, shape: ArrayLike, *, mirror: bool = True
         for turn in turns
     ]
     rough.sort(key=lambda laying: -laying.iou)
-    found = []
+    found: list[tuple[float, Complex]] = []
     for laying in rough[:TRIED]:
         factor, middle, _ = overlaid(laying.ring, overlap, laying.turn)
         z = laid_on(body, plane_points(factor * laying.ring + middle))[:, None]
