@@ -6,12 +6,13 @@ its Python functions and methods are not annotated. Only what orbiflow calls is 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import AbstractContextManager
 from typing import Any, Literal, Protocol, overload
 
 import torch
 from torch import Tensor
+from torch.optim import Optimizer
 
 Normalisation = Literal["forward", "backward", "ortho"]
 
@@ -92,6 +93,11 @@ linalg: _Linalg = _torch.linalg
 fft: _Fft = _torch.fft
 random: _Random = _torch.random
 unique: _Unique = _torch.unique
+
+
+def adam(parameters: Iterable[Tensor] | Iterable[dict[str, Any]], lr: float = 1e-3) -> Optimizer:
+    """`torch.optim.Adam`, whose own `step` has no types."""
+    return torch.optim.Adam(parameters, lr=lr)
 
 
 def listed(tensor: Tensor) -> list[Any]:

@@ -58,11 +58,7 @@ def fit_tile(
     ('IH4', True)
     """
     instance(target, Target, "the target", _HOW)
-    if settings is not None and not isinstance(settings, OneSettings):
-        raise OrbiflowError(
-            f"settings must be of one method, got {described(settings)}; for a level of effort: "
-            'BendingSettings.for_effort("fast")'
-        )
+    _check_settings(settings)
     if pins is not None and not isinstance(settings or BendingSettings(), BendingSettings):
         raise OrbiflowError("pins belong to the search for likeness, where silhouettes bend")
     with one_thread():
@@ -75,6 +71,14 @@ def fit_tile(
             per_class=per_class,
             progress=progress,
             cancel=cancel,
+        )
+
+
+def _check_settings(settings: object) -> None:
+    if settings is not None and not isinstance(settings, OneSettings):
+        raise OrbiflowError(
+            f"settings must be of one method, got {described(settings)}; for a level of effort: "
+            'BendingSettings.for_effort("fast")'
         )
 
 

@@ -90,11 +90,7 @@ class Task:
 
     def __post_init__(self) -> None:
         instance(self.target, Target, "the target", "Target.read and Target.from_polygon make one")
-        if not isinstance(self.settings, Settings):
-            raise OrbiflowError(
-                f"settings must be of a method, got {described(self.settings)}; for a level of "
-                'effort: BendingSettings.for_effort("fast")'
-            )
+        _check_settings(self.settings)
         if self.pins is not None:
             instance(self.pins, Pins, "pins", "Pins.read and Pins.at make one")
             if not isinstance(self.settings, BendingSettings | BothSettings):
@@ -171,13 +167,25 @@ def escherize(
     return front_list(results) if isinstance(settings, BothSettings) else results, failures
 
 
-def _names(classes: ClassName | Iterable[ClassName]) -> list[str]:
-    if isinstance(classes, str | int | IsohedralClass):
-        classes = [classes]
+def _check_settings(settings: object) -> None:
+    if not isinstance(settings, Settings):
+        raise OrbiflowError(
+            f"settings must be of a method, got {described(settings)}; for a level of effort: "
+            'BendingSettings.for_effort("fast")'
+        )
+
+
+def _check_several(classes: object) -> None:
     if not isinstance(classes, Iterable):
         raise OrbiflowError(
             f'classes must be a name such as "IH4", or a list of them, got {described(classes)}'
         )
+
+
+def _names(classes: ClassName | Iterable[ClassName]) -> list[str]:
+    if isinstance(classes, str | int | IsohedralClass):
+        classes = [classes]
+    _check_several(classes)
     return list(dict.fromkeys(isohedral_class(name).name for name in classes))
 
 
