@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from abc import ABC, abstractmethod
+from typing import Self
 
 import numpy as np
 import torch
 from torch import Tensor
 
 from orbiflow.density.arguments import check_kind
+from orbiflow.density.models.moving import moved
 from orbiflow.density.spaces.space import Space, rectangle
 from orbiflow.errors import OrbiflowError
 
@@ -26,7 +29,14 @@ class Base(ABC):
 
     @abstractmethod
     def sample(self, count: int, generator: torch.Generator) -> Tensor:
-        """Canonical points (count, d), float64."""
+        """Canonical points (count, d), float64, on the CPU: the same ones wherever the base is."""
+
+    def to(self, device: torch.device | str) -> Self:
+        """A copy on a device. It stays in float64: sharp kernels need its digits."""
+        new, to = copy.copy(self), torch.device(device)
+        for name, value in vars(self).items():
+            setattr(new, name, moved(value, to))
+        return new
 
 
 class UniformBase(Base):
@@ -76,4 +86,4 @@ class VonMisesBase(Base):
         angle = np.random.default_rng(seed).vonmises(
             0.0, self.concentration, (count, self.space.dim)
         )
-        return self.space.project(0.5 + torch.tensor(angle) / (2 * math.pi) * self.periods)
+        return self.space.project(0.5 + torch.tensor(angle) / (2 * math.pi) * self.periods.cpu())

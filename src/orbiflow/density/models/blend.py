@@ -8,11 +8,11 @@ from typing import Any, ClassVar
 import torch
 from torch import Tensor
 
-from orbiflow.density.arguments import check_kind, float_tensor, points_tensor
+from orbiflow.density.arguments import check_kind, float_tensor
 from orbiflow.density.models.bases import Base, UniformBase
 from orbiflow.density.models.chains import VonMisesChains
 from orbiflow.density.models.kernels import AdaptiveKernels
-from orbiflow.density.models.symmetric import BLOCK, SymmetricDensity, shape_of
+from orbiflow.density.models.symmetric import BLOCK, SymmetricDensity, shape_of, source_of
 from orbiflow.density.spaces.space import CHART, Space, check_measure
 from orbiflow.errors import OrbiflowError
 from orbiflow.flows import Flow
@@ -84,7 +84,7 @@ class BlendedDensity(SymmetricDensity):
 
         Of integral 1 - shares_1.
         """
-        value = points_tensor(points, self.space.dim).to(self._like().dtype)
+        value = self._here(points).to(self._like().dtype)
         return self._shifted(self._parts(value, kernels=False), value, measure)
 
     @property
@@ -136,20 +136,22 @@ class BlendedDensity(SymmetricDensity):
     def rsample(self, sample_shape: Any = (), generator: torch.Generator | None = None) -> Tensor:
         """As `sample`, differentiable in the flow's parameters."""
         shape = shape_of(sample_shape)
-        source = generator or torch.default_generator
+        source = source_of(generator)
         if not shape.numel():
             return self._like().new_empty(*shape, self.space.dim)
-        part = torch.multinomial(self.shares, shape.numel(), replacement=True, generator=source)
-        counts = torch.bincount(part, minlength=len(self.shares)).tolist()
+        shares = self.shares.cpu()
+        part = torch.multinomial(shares, shape.numel(), replacement=True, generator=source)
+        counts = torch.bincount(part, minlength=len(shares)).tolist()
         drawn = self._like().new_empty(shape.numel(), self.space.dim)
         for index, count in enumerate(counts):
             if not count:  # as a flow without a share
                 continue
             if index:
-                own = self._others[index - 1].sample(count, source).to(drawn)
+                own = self._others[index - 1].sample(count, source)
             else:
                 own = super().rsample((count,), source)
-            drawn = drawn.index_put((torch.nonzero(part == index)[:, 0],), own)
+            at = torch.nonzero(part == index)[:, 0].to(drawn.device)
+            drawn = drawn.index_put((at,), own.to(drawn))
         return drawn.reshape(*shape, self.space.dim)
 
     @torch.no_grad()

@@ -63,7 +63,7 @@ class VonMisesChains(Base):
         )
         count = concentrations.shape[0] if concentrations.dim() == 2 else 0
         if order is None:
-            order = torch.arange(d).repeat(count, 1)
+            order = torch.arange(d, device=concentrations.device).repeat(count, 1)
         shapes = (
             (log_weights, (count, len(SCALES)), "log_weights"),
             (means, (count, d, 1 + 2 * d), "means"),
@@ -108,15 +108,16 @@ class VonMisesChains(Base):
         return mean.reshape(len(points), *self.concentrations.shape).neg_().add_(angle[:, None])
 
     def sample(self, count: int, generator: torch.Generator) -> Tensor:
-        weights = self.log_weights.exp().flatten()
+        own = self.to("cpu")
+        weights = own.log_weights.exp().flatten()
         chosen = torch.multinomial(weights, count, replacement=True, generator=generator)
         component = chosen // len(SCALES)
-        kappa = self.concentrations[component] / torch.tensor(SCALES)[chosen % len(SCALES), None]
+        kappa = own.concentrations[component] / torch.tensor(SCALES)[chosen % len(SCALES), None]
         rng = np.random.default_rng(int(torch.randint(2**31, (), generator=generator)))
         noise = torch.tensor(rng.vonmises(0.0, kappa.numpy()))
         angle, rows = torch.zeros(count, self.space.dim, dtype=torch.float64), torch.arange(count)
-        for now in self.order[component].mT:
-            mean = (waves(angle) * self.means[component, now]).sum(dim=-1)
+        for now in own.order[component].mT:
+            mean = (waves(angle) * own.means[component, now]).sum(dim=-1)
             angle[rows, now] = mean + noise[rows, now]
         return self.space.project(angle / (2 * math.pi))
 

@@ -84,7 +84,10 @@ class AdaptiveKernels(Base):
         """
         flat = points.reshape(-1, self.space.dim).double()
         features = self.space.features(flat)[0].mT
-        values = near_log_sum(self._terms, features.contiguous(), beside, tolerance)
+        if features.device.type == "cpu":
+            values = near_log_sum(self._terms, features.contiguous(), beside, tolerance)
+        else:
+            values = self._terms.plain_log_sum(features)
         return values.reshape(points.shape[:-1]).to(points.dtype)
 
     def parted(self, wide: Tensor) -> tuple[AdaptiveKernels | None, AdaptiveKernels | None, float]:
@@ -103,15 +106,16 @@ class AdaptiveKernels(Base):
     def sample(self, count: int, generator: torch.Generator) -> Tensor:
         seed = int(torch.randint(2**31, (), generator=generator))
         rng = np.random.default_rng(seed)
-        weights = self.weights.numpy()
+        weights = self.weights.cpu().numpy()
         chosen = rng.choice(len(weights), count, p=weights / weights.sum())
-        kappa = self.concentrations.numpy()[chosen]
+        kappa = self.concentrations.cpu().numpy()[chosen]
         if self.space.is_round:
-            vectors = _von_mises_fisher(self._center_features.numpy()[chosen], kappa[:, 0], rng)
+            centers = self._center_features.cpu().numpy()[chosen]
+            vectors = _von_mises_fisher(centers, kappa[:, 0], rng)
             return cast(RoundSpace, self.space).vectors_to_chart(vectors)
         angle = torch.tensor(rng.vonmises(0.0, kappa))
         return self.space.project(
-            self.centers[chosen] + angle / (2 * math.pi) * rectangle(self.space)
+            self.centers.cpu()[chosen] + angle / (2 * math.pi) * rectangle(self.space)
         )
 
 
@@ -122,9 +126,9 @@ def _terms(space: Space, images: Tensor, kappa: Tensor, weights: Tensor) -> Term
         peaks = _round_peaks(kappa[:, 0])
     else:
         # the lattice's rectangle leaves signed permutations of the axes
-        turns = [torch.as_tensor(np.abs(g.linear)) for g in space.group.cosets]
+        turns = [torch.as_tensor(np.abs(g.linear)).to(kappa) for g in space.group.cosets]
         every = torch.cat([turn @ kappa.mT for turn in turns], dim=1)
-        peaks = -(torch.special.i0e(kappa) * rectangle(space)).log().sum(dim=1)
+        peaks = -(torch.special.i0e(kappa) * rectangle(space).to(kappa)).log().sum(dim=1)
     centers = images.flatten(0, 1).mT.contiguous()
     return Terms(centers, every, (peaks + weights.log()).repeat(len(images)))
 
@@ -142,7 +146,7 @@ def kernel_rows(space: Space, centers: Tensor, kappa: Tensor) -> tuple[Tensor, T
     if space.is_round:
         k = kappa[:, 0]
         return kappa * centers, _round_peaks(k) - k
-    scaled = torch.special.i0e(kappa) * rectangle(space)
+    scaled = torch.special.i0e(kappa) * rectangle(space).to(kappa)
     return torch.cat([kappa, kappa], dim=1) * centers, -(scaled.log() + kappa).sum(dim=1)
 
 

@@ -13,6 +13,7 @@ from torch.distributions import Distribution, constraints
 
 from orbiflow.density.arguments import check_kind, check_range, float_tensor, points_tensor
 from orbiflow.density.models.bases import Base, UniformBase
+from orbiflow.density.models.moving import destination, moved
 from orbiflow.density.spaces.space import CHART, Space
 from orbiflow.errors import OrbiflowError
 from orbiflow.flows import Flow
@@ -64,10 +65,10 @@ class SymmetricDensity(Distribution):
         Evaluated in the dtype of the flow, returned in that of the points.
 
         Raises:
-            OrbiflowError: for points of another dimension, points that are not finite, or an unknown
-                measure.
+            OrbiflowError: for points of another dimension or on another device, points that are not
+                finite, or an unknown measure.
         """
-        points = points_tensor(value, self.space.dim)
+        points = self._here(value)
         own = points.to(self._like().dtype)
         if torch.is_grad_enabled() or own[..., 0].numel() <= self.block:
             return self._log_prob(own, measure).to(points.dtype)
@@ -100,7 +101,7 @@ class SymmetricDensity(Distribution):
     ) -> Tensor:
         """As `sample`, differentiable in the flow's parameters."""
         shape = shape_of(sample_shape)
-        source = generator or torch.default_generator
+        source = source_of(generator)
         start = self.base.sample(shape.numel(), source).to(self._like())
         if torch.is_grad_enabled():
             moved = self.flow(start)
@@ -111,13 +112,13 @@ class SymmetricDensity(Distribution):
     @one_thread()
     def to_base(self, points: Tensor) -> Tensor:
         """Where data points (..., d) come from: canonical points distributed as the base."""
-        own = points_tensor(points, self.space.dim).to(self._like().dtype)
+        own = self._here(points).to(self._like().dtype)
         return self.space.project(self.flow.inverse(self.space.project(own)))
 
     @one_thread()
     def from_base(self, points: Tensor) -> Tensor:
         """Where base points (..., d) are carried, canonical."""
-        own = points_tensor(points, self.space.dim).to(self._like().dtype)
+        own = self._here(points).to(self._like().dtype)
         return self.space.project(self.flow(own))
 
     @torch.no_grad()
@@ -183,11 +184,64 @@ class SymmetricDensity(Distribution):
         view.flow = self.flow.with_steps(steps)
         return view
 
+    def to(self, *wanted: Any) -> Self:
+        """A copy elsewhere: `to("cuda")`, `to(torch.float32)`, `to("cuda", torch.float32)`.
+
+        Or where a tensor is: `to(tensor)`. The dtype is the flow's. Kernels, chains and shares stay in
+        float64 on any device. Samples are drawn on the CPU and moved, so that the same state of a
+        generator gives the same points.
+
+        Raises:
+            OrbiflowError: for what is neither a device nor a floating dtype.
+
+        >>> from orbiflow.density import make_space
+        >>> from orbiflow.density.models.still import still_flow
+        >>> space = make_space("torus")
+        >>> single = SymmetricDensity(space, still_flow(space)).to(torch.float32)
+        >>> single.sample(5).dtype
+        torch.float32
+        """
+        device, dtype = destination(*wanted)
+        new = copy.copy(self)
+        for name, value in vars(self).items():
+            if isinstance(value, Flow):  # a module moves in place
+                setattr(new, name, moved(copy.deepcopy(value), device, dtype))
+            else:
+                setattr(new, name, moved(value, device))
+        return new
+
+    def _here(self, value: Any) -> Tensor:
+        """Points (..., d), which no device's are moved from another."""
+        points, device = points_tensor(value, self.space.dim), self._like().device
+        if not isinstance(value, Tensor):
+            return points.to(device)
+        if points.device != device and next(self.flow.parameters(), None) is not None:
+            raise OrbiflowError(
+                f"the points are on {points.device}, the density is on {device}: move one of them, "
+                "such as density.to(points.device)"
+            )
+        return points
+
     def _like(self) -> Tensor:
         return next(iter(self.flow.parameters()), torch.zeros((), dtype=torch.float64))
 
     def __repr__(self) -> str:
         return f"SymmetricDensity({self.space!r}, {type(self.base).__name__}, {self.flow})"
+
+
+def source_of(generator: torch.Generator | None) -> torch.Generator:
+    """
+    Raises:
+        OrbiflowError: for a generator that is not on the CPU.
+    """
+    if generator is None:
+        return torch.default_generator
+    if generator.device.type != "cpu":
+        raise OrbiflowError(
+            f"samples are drawn on the CPU, the generator is on {generator.device}: give a "
+            "torch.Generator() without a device"
+        )
+    return generator
 
 
 def shape_of(sample_shape: Any) -> torch.Size:

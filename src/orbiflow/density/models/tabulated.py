@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Callable
 
@@ -11,6 +12,7 @@ from torch import Tensor
 from orbiflow.density.arguments import check_kind, check_range, points_tensor
 from orbiflow.density.models.blend import BlendedDensity
 from orbiflow.density.models.kernels import AdaptiveKernels
+from orbiflow.density.models.moving import destination, moved
 from orbiflow.density.models.symmetric import SymmetricDensity, midpoints
 from orbiflow.density.spaces.space import CHART, rectangle
 from orbiflow.errors import OrbiflowError
@@ -105,6 +107,13 @@ class TabulatedDensity:
         along, across = (symbol(m) for m in sides)
         spectrum = torch.fft.fft2(whole) / (along[:, None] * across[None, :])
         return torch.fft.ifft2(spectrum).real.contiguous()
+
+    def to(self, device: torch.device | str) -> TabulatedDensity:
+        """A copy on a device; it stays in float64."""
+        new, (to, _) = copy.copy(self), destination(device)
+        for name, value in vars(self).items():
+            setattr(new, name, moved(value, to))
+        return new
 
     @one_thread()
     def log_prob(self, points: Tensor, *, measure: str = CHART) -> Tensor:

@@ -1,0 +1,180 @@
+"""Densities on another device, and in another precision."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from density.blends import random_blend
+from elsewhere import DEVICE, a_device
+from orbiflow.density import (
+    AdaptiveKernels,
+    BlendedDensity,
+    Space,
+    SymmetricDensity,
+    TabulatedDensity,
+    UniformBase,
+    VonMisesBase,
+    density_to_bytes,
+    make_space,
+    read_density,
+)
+from orbiflow.density.models.neural import NeuralFlow, NeuralTorusField
+from orbiflow.errors import OrbiflowError
+from orbiflow.fields import FourierField, SplineField
+from orbiflow.flows import Flow
+
+SPACES = ("torus", "klein-bottle", "sphere", "projective-plane")
+SEEDS = st.integers(0, 2**31)
+
+
+def spline_flow(space: Space, rng: np.random.Generator) -> Flow:
+    fields = [SplineField(space.group, 4), FourierField(space.group, 2)]
+    with torch.no_grad():
+        for field in fields:
+            shape = tuple(field.parameters_.shape)
+            field.parameters_.copy_(torch.tensor(0.01 * rng.normal(size=shape)))
+    return Flow(fields, steps=2, warn=False)
+
+
+def blend(name: str, seed: int, *, sharp: float = 1e7) -> BlendedDensity:
+    """With kernels up to that concentration."""
+    rng, space = np.random.default_rng(seed), make_space(name)
+    count, width = 7, 1 if space.is_round else space.dim
+    kernels = AdaptiveKernels(
+        space,
+        space.uniform(count, torch.Generator().manual_seed(seed)),
+        torch.tensor(np.exp(rng.uniform(0, math.log(sharp), (count, width)))),
+        torch.tensor(rng.dirichlet(np.ones(count))),
+    )
+    shares = torch.tensor(rng.dirichlet(np.ones(3)))
+    return BlendedDensity(space, spline_flow(space, rng), UniformBase(space), kernels, shares)
+
+
+def others(seed: int) -> list[SymmetricDensity]:
+    """Of the other parts."""
+    rng, bottle, torus = (
+        np.random.default_rng(seed),
+        make_space("klein-bottle"),
+        make_space("torus", dim=4),
+    )
+    neural = NeuralTorusField(4, width=8, depth=1, waves=2)
+    with torch.no_grad():
+        for parameter in neural.parameters():
+            parameter.copy_(torch.tensor(0.2 * rng.normal(size=tuple(parameter.shape))))
+    return [
+        SymmetricDensity(bottle, spline_flow(bottle, rng), VonMisesBase(bottle)),
+        SymmetricDensity(torus, NeuralFlow(neural, steps=3)),
+        random_blend(seed, 3),
+        random_blend(seed, 2, flow=True),
+    ]
+
+
+def near(density: SymmetricDensity, seed: int, count: int = 40) -> torch.Tensor:
+    """Points where kernels are felt, and others."""
+    generator = torch.Generator().manual_seed(seed)
+    even = torch.rand(count, density.space.dim, dtype=torch.float64, generator=generator)
+    return torch.cat([even, density.sample(count, generator)])
+
+
+@settings(max_examples=16)  # every operation passes through Python
+@given(SEEDS, st.integers(0, 7))
+def test_elsewhere_all_is_the_same(seed: int, kind: int) -> None:
+    density = blend(SPACES[kind], seed) if kind < 4 else others(seed)[kind - 4]
+    points = near(density, seed)
+    expected = density.log_prob(points)
+    one, two = (torch.Generator().manual_seed(seed) for _ in range(2))
+    with a_device() as device:
+        moved = density.to(device)
+        found = moved.log_prob(points.to(device))
+        drawn = moved.sample(9, one)
+        assert found.device == drawn.device == DEVICE
+        torch.testing.assert_close(found.cpu(), expected, rtol=1e-9, atol=1e-9)
+        torch.testing.assert_close(drawn.cpu(), density.sample(9, two))
+        there = moved.to_base(points.to(device))
+        assert there.device == DEVICE
+        torch.testing.assert_close(there.cpu(), density.to_base(points))
+        back = moved.to("cpu")
+    assert torch.equal(back.log_prob(points), expected)
+    assert torch.equal(density.log_prob(points), expected)
+
+
+@settings(max_examples=5)
+@given(SEEDS, st.sampled_from(SPACES))
+def test_gradients_elsewhere(seed: int, name: str) -> None:
+    density = blend(name, seed, sharp=1e3)
+    points = near(density, seed).requires_grad_()
+    (expected,) = torch.autograd.grad(density.log_prob(points).sum(), points)
+    with a_device() as device:
+        moved, there = density.to(device), points.detach().to(device).requires_grad_()
+        value = moved.log_prob(there).sum()
+        weights = list(moved.flow.parameters())
+        found, *slopes = torch.autograd.grad(value, [there, *weights])
+        torch.testing.assert_close(found.cpu(), expected, rtol=1e-6, atol=1e-6)
+        assert all(slope.device == DEVICE for slope in slopes)
+
+
+def test_tables_and_figures_elsewhere(tmp_path: Path) -> None:
+    density = blend("klein-bottle", 4, sharp=30.0)
+    points, table = near(density, 4), TabulatedDensity(density, 32)
+    with a_device() as device:
+        moved = density.to(device)
+        assert moved.mass(16) == pytest.approx(density.mass(16), abs=1e-12)
+        generators = [torch.Generator().manual_seed(0) for _ in range(2)]
+        entropies = [
+            d.entropy(99, generator=g) for d, g in zip((moved, density), generators, strict=True)
+        ]
+        torch.testing.assert_close(entropies[0].cpu(), entropies[1])
+        torch.testing.assert_close(
+            table.to(device).log_prob(points.to(device)).cpu(), table.log_prob(points)
+        )
+        (tmp_path / "moved").write_bytes(density_to_bytes(moved))
+    again, _ = read_density(tmp_path / "moved")
+    assert torch.equal(again.log_prob(points), density.log_prob(points))
+
+
+@given(SEEDS, st.sampled_from(SPACES))
+def test_single_precision(seed: int, name: str) -> None:
+    density = blend(name, seed, sharp=1e3)
+    points = near(density, seed)
+    single = density.to(torch.float32)
+    assert {p.dtype for p in single.flow.parameters()} == {torch.float32}
+    assert {p.dtype for p in density.flow.parameters()} == {torch.float64}
+    assert single.sample(3).dtype == torch.float32
+    found = single.log_prob(points)
+    assert found.dtype == torch.float64
+    # at cone points the area's logarithm is infinite, and single precision is not near it
+    clear = density.space.log_area(points).abs() < 5
+    torch.testing.assert_close(found[clear], density.log_prob(points)[clear], rtol=0, atol=0.02)
+    assert torch.equal(single.to(torch.float64, "cpu").sample(0), density.sample(0))
+
+
+def test_what_cannot_be_moved_or_evaluated() -> None:
+    density = blend("torus", 1)
+    with pytest.raises(OrbiflowError, match="expected a device or a dtype"):
+        density.to("the moon")
+    with pytest.raises(OrbiflowError, match=r"floating-point numbers, not in torch\.int64"):
+        density.to(torch.int64)
+    with a_device() as device:
+        moved, points = density.to(device), torch.rand(3, 2)
+        with pytest.raises(OrbiflowError, match="points are on cpu, the density is on meta"):
+            moved.log_prob(points)
+        with pytest.raises(OrbiflowError, match="points are on meta, the density is on cpu"):
+            density.log_prob(points.to(device))
+        numbers: Any = [[0.5, 0.5]]  # are nowhere
+        assert moved.log_prob(numbers).device == DEVICE
+
+
+def test_a_generator_elsewhere() -> None:
+    class Other(torch.Generator):
+        device = DEVICE
+
+    with pytest.raises(OrbiflowError, match="samples are drawn on the CPU, the generator is on"):
+        blend("torus", 1).sample(3, Other())
