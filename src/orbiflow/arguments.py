@@ -6,7 +6,7 @@ import math
 import operator
 import os
 from pathlib import Path
-from types import EllipsisType
+from types import EllipsisType, UnionType
 from typing import Any, TypeVar
 
 import numpy as np
@@ -29,6 +29,11 @@ def instance(value: Any, kind: type[Kind], name: str, how: str = "") -> Kind:
     raise OrbiflowError(
         f"{name} must be {_with_article(kind.__name__)}, got {described(value)}{how and '; ' + how}"
     )
+
+
+def is_a(value: object, kind: type | UnionType) -> bool:
+    """`isinstance` of what is annotated as it should be, and may be anything all the same."""
+    return isinstance(value, kind)
 
 
 def numbers(values: Any, name: str, shape: Shape, *, finite: bool = True) -> NDArray[np.float64]:

@@ -12,6 +12,7 @@ from typing import Any, Literal, Protocol, overload
 
 import torch
 from torch import Tensor
+from torch.autograd import Function
 from torch.optim import Optimizer
 
 Normalisation = Literal["forward", "backward", "ortho"]
@@ -87,17 +88,32 @@ class _Unique(Protocol):
     ) -> tuple[Tensor, Tensor, Tensor]: ...
 
 
+class _Broadcast(Protocol):
+    def __call__(self, *tensors: Tensor) -> tuple[Tensor, ...]: ...
+
+
 _torch: Any = torch
 special: _Special = _torch.special
 linalg: _Linalg = _torch.linalg
 fft: _Fft = _torch.fft
 random: _Random = _torch.random
 unique: _Unique = _torch.unique
+broadcast: _Broadcast = _torch.broadcast_tensors
 
 
-def adam(parameters: Iterable[Tensor] | Iterable[dict[str, Any]], lr: float = 1e-3) -> Optimizer:
+def adam(
+    parameters: Iterable[Tensor] | Iterable[dict[str, Any]],
+    lr: float = 1e-3,
+    betas: tuple[float, float] = (0.9, 0.999),
+) -> Optimizer:
     """`torch.optim.Adam`, whose own `step` has no types."""
-    return torch.optim.Adam(parameters, lr=lr)
+    return torch.optim.Adam(parameters, lr=lr, betas=betas)
+
+
+def applied(function: type[Function], *arguments: Any) -> Any:
+    """`function.apply`: its values, with the derivatives that it says."""
+    untyped: Any = function
+    return untyped.apply(*arguments)
 
 
 def listed(tensor: Tensor) -> list[Any]:

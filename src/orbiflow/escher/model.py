@@ -11,7 +11,7 @@ import torch
 from numpy.typing import ArrayLike
 from torch import Tensor, nn
 
-from orbiflow.arguments import instance, number, numbers, whole
+from orbiflow.arguments import instance, is_a, number, numbers, whole
 from orbiflow.errors import OrbiflowError
 from orbiflow.escher.prototiles import Prototiles
 from orbiflow.fields import FourierField
@@ -22,13 +22,6 @@ from orbiflow.symmetry.isometry import Array
 from orbiflow.tilings import IsohedralClass
 from orbiflow.tilings import isohedral_class as class_of
 from orbiflow.typed_torch import linalg
-
-
-def _check_dtype(dtype: object) -> None:
-    if not (isinstance(dtype, torch.dtype) and dtype.is_floating_point):
-        raise OrbiflowError(
-            f"dtype must be a floating-point type such as torch.float64, got {dtype}"
-        )
 
 
 class TileModel(nn.Module):
@@ -81,7 +74,10 @@ class TileModel(nn.Module):
     ) -> None:
         super().__init__()
         isohedral_class = class_of(isohedral_class)
-        _check_dtype(dtype)
+        if not (is_a(dtype, torch.dtype) and dtype.is_floating_point):
+            raise OrbiflowError(
+                f"dtype must be a floating-point type such as torch.float64, got {dtype}"
+            )
         number(smoothness, "smoothness", 0)
         whole(segments, "segments", 1)
         if prototiles is not None:

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from orbiflow.arguments import described, instance
+from orbiflow.arguments import described, instance, is_a
 from orbiflow.cancel import Cancel, Cancelled
 from orbiflow.errors import CertificationError, OrbiflowError
 from orbiflow.escher.bending_settings import BendingSettings
@@ -90,7 +90,11 @@ class Task:
 
     def __post_init__(self) -> None:
         instance(self.target, Target, "the target", "Target.read and Target.from_polygon make one")
-        _check_settings(self.settings)
+        if not is_a(self.settings, Settings):
+            raise OrbiflowError(
+                f"settings must be of a method, got {described(self.settings)}; for a level of "
+                'effort: BendingSettings.for_effort("fast")'
+            )
         if self.pins is not None:
             instance(self.pins, Pins, "pins", "Pins.read and Pins.at make one")
             if not isinstance(self.settings, BendingSettings | BothSettings):
@@ -167,25 +171,13 @@ def escherize(
     return front_list(results) if isinstance(settings, BothSettings) else results, failures
 
 
-def _check_settings(settings: object) -> None:
-    if not isinstance(settings, Settings):
-        raise OrbiflowError(
-            f"settings must be of a method, got {described(settings)}; for a level of effort: "
-            'BendingSettings.for_effort("fast")'
-        )
-
-
-def _check_several(classes: object) -> None:
-    if not isinstance(classes, Iterable):
-        raise OrbiflowError(
-            f'classes must be a name such as "IH4", or a list of them, got {described(classes)}'
-        )
-
-
 def _names(classes: ClassName | Iterable[ClassName]) -> list[str]:
     if isinstance(classes, str | int | IsohedralClass):
         classes = [classes]
-    _check_several(classes)
+    if not is_a(classes, Iterable):
+        raise OrbiflowError(
+            f'classes must be a name such as "IH4", or a list of them, got {described(classes)}'
+        )
     return list(dict.fromkeys(isohedral_class(name).name for name in classes))
 
 

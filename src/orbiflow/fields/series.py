@@ -18,6 +18,7 @@ import torch
 from torch import Tensor
 
 from orbiflow.fields.transforms import plain_gradients, refuse_old_batches, transformed
+from orbiflow.typed_torch import applied
 
 BLOCK_BYTES = 2**21
 """Size of the working arrays for one block of points; measured best between 1 and 3 MiB."""
@@ -221,7 +222,7 @@ def evaluate(weights: Tensor, u: Tensor) -> Tensor:
     if transformed():
         return evaluate_plainly(weights, u)
     if torch.is_grad_enabled() and (weights.requires_grad or u.requires_grad):
-        return _Series.apply(weights, u)  # type: ignore[no-any-return]
+        return applied(_Series, weights, u)
     return _forward(weights, u)
 
 

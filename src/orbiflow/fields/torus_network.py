@@ -8,6 +8,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
+from orbiflow.arguments import is_a
 from orbiflow.errors import OrbiflowError
 from orbiflow.typed_torch import random
 
@@ -73,14 +74,13 @@ class NeuralTorusField(nn.Module):
         dtype: torch.dtype = torch.float64,
     ) -> None:
         super().__init__()
-        sizes: list[tuple[str, object, int]] = [
+        for name, value, most in (
             ("dim", dim, MAX_DIM),
             ("width", width, MAX_WIDTH),
             ("depth", depth, MAX_DEPTH),
             ("waves", waves, MAX_WAVES),
-        ]
-        for name, value, most in sizes:
-            if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= most:
+        ):
+            if isinstance(value, bool) or not is_a(value, int) or not 1 <= value <= most:
                 raise OrbiflowError(f"{name} must be an integer from 1 to {most}, got {value!r}")
         self.dim, self.width, self.depth, self.waves = dim, width, depth, waves
         with random.fork_rng(devices=[]):

@@ -10,6 +10,7 @@ from typing import Any, Self
 import torch
 from torch import Tensor, nn
 
+from orbiflow.arguments import is_a
 from orbiflow.errors import OrbiflowError
 from orbiflow.fields.derivatives import prepared, prepared_with_divergence
 from orbiflow.fields.protocol import TimeDependentField, VectorField, is_time_dependent
@@ -254,8 +255,8 @@ def _checked_steps(value: int) -> int:
     return int(value)
 
 
-def _check_points(points: object) -> None:
-    if not isinstance(points, Tensor):
+def _check_points(points: Tensor) -> None:
+    if not is_a(points, Tensor):
         raise OrbiflowError(
             f"expected points as a torch tensor (..., d), got a {type(points).__name__}: "
             "torch.as_tensor makes one"
@@ -280,7 +281,7 @@ def _slope(field: Callable[..., Tensor], with_log_det: bool) -> Callable[[State]
 
     def slope(state: State) -> State:
         points, *time = (state[0], state[-1]) if timed else (state[0],)
-        found: State = both(points, *time) if both is not None else (plain(points, *time),)  # type: ignore[misc]
+        found: State = both(points, *time) if both is not None else (plain(points, *time),)  # pyright: ignore[reportOptionalCall]
         if found[0].shape != points.shape:
             raise OrbiflowError(
                 "a field must give vectors of its points' shape: expected "

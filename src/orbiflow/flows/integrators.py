@@ -75,7 +75,7 @@ def _advance(state: State, slopes: list[State], coefficients: tuple[float, ...],
             if c != 0.0:
                 part = part.add(k[i], alpha=h * c)
         moved.append(part)
-    return tuple(moved)  # type: ignore[return-value]
+    return tuple(moved)  # pyright: ignore[reportReturnType]
 
 
 METHODS: dict[str, RungeKutta] = {

@@ -9,7 +9,7 @@ from typing import IO, Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from orbiflow.arguments import described
+from orbiflow.arguments import described, is_a
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.geometry import centroid, orient, signed_area
 from orbiflow.silhouette.frame import Frame
@@ -87,7 +87,11 @@ class Target:
         >>> Target.from_bytes(b"[[0, 0], [2, 0], [2, 2], [0, 2]]").kind
         'json'
         """
-        held = Held(_as_bytes(data), str(name))
+        if not is_a(data, bytes | bytearray | memoryview):
+            raise OrbiflowError(
+                f"data must be bytes, got {described(data)}; Target.read takes paths"
+            )
+        held = Held(bytes(data), str(name))
         return cls._of(read_outline(held, threshold=threshold, invert=invert), held.name)
 
     @classmethod
@@ -176,13 +180,6 @@ class Target:
             "y_down": self.y_down,
             "notes": list(self.notes),
         }
-
-
-def _as_bytes(data: Any) -> bytes:
-    given = data
-    if not isinstance(data, bytes | bytearray | memoryview):
-        raise OrbiflowError(f"data must be bytes, got {described(data)}; Target.read takes paths")
-    return bytes(given)
 
 
 def _held(stream: Any) -> Held:

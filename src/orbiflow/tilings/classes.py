@@ -188,7 +188,7 @@ class IsohedralClass:
 def _same_kind(result: torch.Tensor, like: Points) -> Points:
     if isinstance(like, torch.Tensor):
         return result
-    return result.numpy().copy()  # pyright: ignore[reportReturnType]
+    return result.numpy().copy()
 
 
 CLASSES: dict[str, IsohedralClass] = {
