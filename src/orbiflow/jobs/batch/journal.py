@@ -17,6 +17,7 @@ from typing import Any, Literal, Self
 from orbiflow.errors import OutputError
 from orbiflow.files import write_atomic
 from orbiflow.jobs.records import Record, RecordError
+from orbiflow.json_values import is_object
 
 MOST_BYTES = 2**30
 """Of a journal that is read."""
@@ -44,7 +45,7 @@ class Entry(Record):
     version: str
     state: State
     reason: str = ""
-    best: dict[str, Any] = field(default_factory=dict)
+    best: dict[str, Any] = field(default_factory=dict[str, Any])
     seconds: float | None = None
 
     def same_work(self, code: str, settings: dict[str, Any], version: str) -> bool:
@@ -119,7 +120,7 @@ def _entries(lines: Iterable[bytes]) -> Iterable[Entry]:
     for line in lines:
         try:
             document = json.loads(line)
-            if isinstance(document, dict) and document.pop("kind", None) == Entry.KIND:
+            if is_object(document) and document.pop("kind", None) == Entry.KIND:
                 yield Entry.of_fields(document)
         except (ValueError, RecordError, RecursionError):
             continue  # cut short: to be done again
