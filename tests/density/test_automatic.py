@@ -106,6 +106,16 @@ def test_repeated_places_are_mass_unless_said_otherwise() -> None:
     assert values["places"] > values["rounding"] + 3
 
 
+@pytest.mark.parametrize(("close", "spiky"), [(2, False), (60, True)])
+def test_spikes_are_of_places_and_not_of_accidents(close: int, spiky: bool) -> None:
+    rng, space = np.random.default_rng(7), make_space("klein-bottle")
+    rows = np.stack([rng.vonmises(0.3, 4.0, 400), rng.vonmises(1.0, 3.0, 400)], axis=1)
+    rows[1:close:2] = rows[0:close:2] + 1e-4
+    density, _ = fit_automatic(space, space.to_chart(rows))
+    narrow = density.kernels.concentrations.amax(dim=1) > 1e5
+    assert (int(narrow.sum()) > 20) == spiky  # some follow the distance to the nearest row
+
+
 @pytest.mark.parametrize("part", PARTS[1:])
 def test_each_part_alone(part: str) -> None:
     estimator = DensityEstimator("torus", parts=part)

@@ -21,6 +21,7 @@ from orbiflow.density.fitting.weights import (
     sparse_weights,
     stacked,
     stacking_weights,
+    supported_weights,
 )
 
 SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")
@@ -57,6 +58,23 @@ def test_what_must_be_there_is_and_what_is_negligible_is_not(seed: int) -> None:
     assert float(weights[-1]) >= 0.4 / 51
     assert float(weights.sum()) == pytest.approx(1)
     assert not bool(((weights > 0) & (weights < 2e-3)).any())
+
+
+@given(seeds, st.integers(1, 40))
+@settings(deadline=None)
+def test_spikes_need_more_rows_than_a_close_pair(seed: int, pairs: int) -> None:
+    rng, rows = np.random.default_rng(seed), 600
+    smooth, spikes = 1 + 0.3 * rng.normal(size=rows), np.full(rows, -400.0)
+    spikes[: 2 * pairs] = 6.0 + rng.normal(size=2 * pairs)  # each of a pair is held out in its turn
+    table = torch.tensor(np.stack([smooth, spikes, np.zeros(rows)]))
+    always = torch.arange(3) == 2
+    weights = supported_weights(table, always)
+    assert float(weights.sum()) == pytest.approx(1)
+    if pairs <= 1:
+        assert float(weights[1]) == 0
+    if pairs >= 10:
+        assert torch.equal(weights, sparse_weights(table, always))
+        assert float(weights[1]) > 0.01
 
 
 def test_a_gain_has_its_standard_error() -> None:

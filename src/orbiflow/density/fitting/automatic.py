@@ -36,7 +36,7 @@ from orbiflow.density.fitting.rows import (
 )
 from orbiflow.density.fitting.settings import FitSettings
 from orbiflow.density.fitting.training import training
-from orbiflow.density.fitting.weights import gain_of, sparse_weights, stacked, stacking_weights
+from orbiflow.density.fitting.weights import gain_of, stacked, stacking_weights, supported_weights
 from orbiflow.density.models.blend import BlendedDensity
 from orbiflow.density.models.still import MOST_DIM
 from orbiflow.density.models.symmetric import SymmetricDensity
@@ -151,7 +151,7 @@ def fit_automatic(
     candidates = candidates_of(
         space, families, folds, lambda done, what: say(BEFORE_FLOW * done, what), budget
     )
-    weights = sparse_weights(candidates.table, candidates.floor, candidates.row_weights)
+    weights = supported_weights(candidates.table, candidates.floor, candidates.row_weights)
     tried = _try_flow(space, folds, candidates, weights, settings, budget, say)
     say(1.0, "putting together")
     density = assembled(space, families, candidates, weights, folds.rows, tried.flow, tried.share)
@@ -256,8 +256,9 @@ def _try_flow(
     both = stacking_weights(table, held.weights)
     gain = gain_of(stacked(table, both), others, held.weights)
     alone = held.mean(own - first[-1])
-    # a weight chosen on these rows gains one nat among all of them by chance
-    kept = gain.nats * len(held) >= 1
+    # a weight chosen on these rows gains one nat among all of them by chance, and a flow that few rows
+    # speak for has streaks that are not in the data
+    kept = gain.nats * len(held) >= 1 and gain.is_sure
     share = float(both[1]) if kept else 0.0
     worth = gain if kept else gain_of(others, others)
     evidence = PartEvidence("flow", share, alone, worth.nats, worth.error, len(held))

@@ -20,11 +20,20 @@ NEGLIGIBLE = 3e-3
 """Weights below are dropped."""
 
 
+SURE = 2.0
+"""Standard errors by which a gain must be above nothing, of what else would be seen for nothing."""
+
+
 class Gain(NamedTuple):
     """A mean difference of log densities in nats, and its standard error over the rows."""
 
     nats: float
     error: float
+
+    @property
+    def is_sure(self) -> bool:
+        """Whether it is no accident of few rows."""
+        return self.nats >= SURE * self.error
 
 
 def gain_of(better: Tensor, worse: Tensor, row_weights: Tensor | None = None) -> Gain:
@@ -66,6 +75,25 @@ def stacking_weights(table: Tensor, row_weights: Tensor | None = None) -> Tensor
         weights = weights * ratio
         weights = weights / weights.sum()
     return weights
+
+
+def supported_weights(table: Tensor, always: Tensor, row_weights: Tensor | None = None) -> Tensor:
+    """As `sparse_weights`, without spikes that few rows speak for.
+
+    Two rows that happen to be close give kernels as narrow as that a weight of about two rows, and
+    pictures a spike at every row. So what is worse by itself than what is `always` there must gain
+    more than chance.
+    """
+    weights = sparse_weights(table, always, row_weights)
+    means = torch.tensor([mean_of(row, row_weights) for row in table])
+    spikes = ~always & (means < means[always].max())
+    if not bool((weights[spikes] > 0).any()):
+        return weights
+    rest = ~spikes
+    others = torch.zeros_like(weights)
+    others[rest] = sparse_weights(table[rest], always[rest], row_weights)
+    gain = gain_of(stacked(table, weights), stacked(table[rest], others[rest]), row_weights)
+    return weights if gain.is_sure else others
 
 
 def sparse_weights(table: Tensor, always: Tensor, row_weights: Tensor | None = None) -> Tensor:
