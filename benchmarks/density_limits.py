@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from density_kde import KernelDensity
@@ -79,7 +80,8 @@ def neighbour_entropy(data: Data, neighbour: int = 1) -> float:
     """
     count, dim = data.shape
     turned = np.remainder(data, 2 * np.pi)
-    distance = KDTree(turned, boxsize=2 * np.pi * (1 + 1e-12)).query(turned, k=neighbour + 1)[0]
+    period: Any = 2 * np.pi * (1 + 1e-12)
+    distance = np.asarray(KDTree(turned, boxsize=period).query(turned, k=neighbour + 1)[0])
     ball = dim / 2 * math.log(math.pi) - gammaln(dim / 2 + 1)
     mean = float(np.log(distance[:, neighbour]).mean())
     return float(digamma(count) - digamma(neighbour) + ball + dim * mean)

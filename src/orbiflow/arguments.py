@@ -6,7 +6,7 @@ import math
 import operator
 import os
 from pathlib import Path
-from types import EllipsisType
+from types import EllipsisType, UnionType
 from typing import Any, TypeVar
 
 import numpy as np
@@ -29,6 +29,11 @@ def instance(value: Any, kind: type[Kind], name: str, how: str = "") -> Kind:
     raise OrbiflowError(
         f"{name} must be {_with_article(kind.__name__)}, got {described(value)}{how and '; ' + how}"
     )
+
+
+def is_a(value: object, kind: type | UnionType) -> bool:
+    """`isinstance` of what is annotated as it should be, and may be anything all the same."""
+    return isinstance(value, kind)
 
 
 def numbers(values: Any, name: str, shape: Shape, *, finite: bool = True) -> NDArray[np.float64]:
@@ -109,8 +114,9 @@ def number(
 
 def path(value: Any, name: str) -> Path:
     """`value`, text or a path, as a path."""
-    if isinstance(value, str | os.PathLike) and isinstance(os.fspath(value), str):
-        return Path(value)
+    given: Any = value  # which stays as it is: of what a PathLike is, isinstance does not say
+    if isinstance(value, str | os.PathLike) and isinstance(os.fspath(given), str):
+        return Path(given)
     raise OrbiflowError(f"{name} must be a path, got {described(value)}")
 
 
@@ -120,11 +126,12 @@ def described(value: Any) -> str:
     >>> described("IH4"), described([[0, 1]]), described(np.zeros((2, 3)))
     ("'IH4'", 'a list of 1', 'an array of shape (2, 3)')
     """
+    given: Any = value
     if isinstance(value, np.ndarray | torch.Tensor):
         what = "an array" if isinstance(value, np.ndarray) else "a tensor"
-        return f"{what} of shape {tuple(value.shape)}"
+        return f"{what} of shape {tuple(given.shape)}"
     if isinstance(value, list | tuple | dict | set):
-        return f"a {type(value).__name__} of {len(value)}"
+        return f"a {type(given).__name__} of {len(given)}"
     if value is None or isinstance(value, str | bytes | int | float | complex):
         return f"{value!a:.60}"
     return _with_article(type(value).__name__)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import secrets
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator
 from contextlib import contextmanager, suppress
 from pathlib import Path, PurePosixPath
 
@@ -60,7 +60,7 @@ class ResultFolder:
             raise self._cannot(error) from error
 
     @contextmanager
-    def replaced(self) -> Iterator[Path]:
+    def replaced(self) -> Generator[Path]:
         """Yields an empty folder to write into; afterwards it stands in the place of `path`.
 
         If the block fails, `path` is left as it was.
@@ -92,7 +92,7 @@ class ResultFolder:
         if not self._real.exists():
             return False
         entries = [p for p in self._real.iterdir() if p != staged and not _is_litter(p.name)]
-        known = self._known(self._real) if entries else set()
+        known: set[str] = self._known(self._real) if entries else set()
         above = {str(parent) for name in known for parent in PurePosixPath(name).parents}
         while entries:
             path = entries.pop()

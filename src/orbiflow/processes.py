@@ -12,9 +12,9 @@ import traceback
 import warnings
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection, wait
-from typing import Any, NamedTuple
+from typing import Any
 
 import torch
 
@@ -98,7 +98,8 @@ def work(
         pool.close()
 
 
-class _Order(NamedTuple):
+@dataclass(frozen=True)
+class _Order:
     index: int
     item: Any
     tried: int  # workers that have died of it
@@ -219,7 +220,7 @@ class _Pool:
             return False
         given_up = order.tried + 1 >= self.tries
         if not given_up:
-            self.again.append(order._replace(tried=order.tried + 1))
+            self.again.append(replace(order, tried=order.tried + 1))
         following = self._next()
         if following is not None:
             self._feed(self._new_worker(), following)
@@ -287,7 +288,7 @@ def _send(channel: Connection, value: Any) -> None:
 
 
 @contextlib.contextmanager
-def _quiet_fork() -> Iterator[None]:
+def _quiet_fork() -> Generator[None]:
     """Newer Pythons warn of every fork beside a numerical library."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DeprecationWarning)
@@ -295,7 +296,7 @@ def _quiet_fork() -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def _without_interrupts() -> Iterator[None]:
+def _without_interrupts() -> Generator[None]:
     """Ctrl-C waits while a process starts, until it takes no notice of it."""
     if not hasattr(signal, "pthread_sigmask"):
         yield

@@ -13,6 +13,7 @@ from torch import Tensor
 
 from orbiflow.arguments import path as as_path
 from orbiflow.errors import InputFileError, OrbiflowError
+from orbiflow.json_values import is_object
 
 MAX_BYTES, MAX_HEADER = 256 * 2**20, 2**20
 KEY = "orbiflow"
@@ -61,8 +62,8 @@ def read_tensors(path: str | Path, what: str) -> tuple[dict[str, Any], dict[str,
         length = int.from_bytes(data[:8], "little")
         if not 2 <= length <= min(len(data) - 8, MAX_HEADER):
             raise ValueError("no header")
-        header = json.loads(json.loads(data[8 : 8 + length])["__metadata__"][KEY])
-        if not isinstance(header, dict):
+        header: Any = json.loads(json.loads(data[8 : 8 + length])["__metadata__"][KEY])
+        if not is_object(header):
             raise ValueError("its header is no table")
         return header, load(data)
     except (SafetensorError, ValueError, KeyError, TypeError, RecursionError) as error:

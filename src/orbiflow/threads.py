@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import threading
-from collections.abc import Iterator
+from collections.abc import Generator
 
 import threadpoolctl
 import torch
@@ -17,7 +17,7 @@ _lock = threading.Lock()
 
 
 @contextlib.contextmanager
-def one_thread() -> Iterator[None]:
+def one_thread() -> Generator[None]:
     """Run torch on one thread in this block, or function if used as a decorator.
 
     Only the calling thread is limited. May be nested, and entered by any number of threads at once:
@@ -56,7 +56,7 @@ _blas_limit: threadpoolctl.threadpool_limits | None = None
 
 
 @contextlib.contextmanager
-def one_blas_thread() -> Iterator[None]:
+def one_blas_thread() -> Generator[None]:
     """Run NumPy's and SciPy's linear algebra on one thread in this block.
 
     These libraries know one number for the whole process: it is set when the first block is entered

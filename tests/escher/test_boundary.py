@@ -80,7 +80,7 @@ def test_polygon_follows_the_curve(name: str) -> None:
     assert tile.isohedral_class == name
     assert len(tile.corners) == len(kind.template())
     assert np.allclose(tile.polygon[list(tile.corners)], curve[::pieces], atol=1e-12)
-    nearest = scipy.spatial.KDTree(curve).query(tile.polygon)[0]
+    nearest = np.asarray(scipy.spatial.KDTree(curve).query(tile.polygon)[0])
     assert nearest.max() < 1e-12
     ring = shapely.Polygon(tile.polygon).exterior
     # the model has area 1, so tolerances are lengths; a partner edge is no worse

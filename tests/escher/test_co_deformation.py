@@ -29,7 +29,7 @@ def placements(name: str, count: int = 10) -> Placements:
 
 
 def objective(body: Elastic, z: Complex) -> Array:
-    copies, _ = body._copies(z)
+    copies, _ = body.copies(z)
     return body.energy(z) + body.stiffness.pose * (abs(z - copies) ** 2).mean(axis=0)
 
 

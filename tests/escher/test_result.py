@@ -112,7 +112,7 @@ def test_a_file_alone_places_the_tile_in_the_input(name: str, y_down: bool, tmp_
     with torch.no_grad():
         curve = saved.frame.to_input(loaded(loaded.boundary(pieces)))[0].numpy()
     # half of the polygon is flowed, the other half its image: the map has both
-    nearest = scipy.spatial.KDTree(curve).query(polygon)[0]
+    nearest = np.asarray(scipy.spatial.KDTree(curve).query(polygon)[0])
     assert nearest.max() < 1e-9
     assert np.abs(curve[::pieces] - polygon[list(result.tile.corners)]).max() < 1e-9
     back = loaded.inverse(torch.tensor(saved.frame.to_normal(polygon))[None]).detach()

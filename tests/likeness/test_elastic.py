@@ -39,7 +39,7 @@ def shapes(of: Elastic, seed: int, count: int = 3, size: float = 0.05) -> Comple
 
 
 def pose_energy(of: Elastic, z: Complex) -> Array:
-    copies, _ = of._copies(z)
+    copies, _ = of.copies(z)
     return of.stiffness.pose * (abs(z - copies) ** 2).mean(axis=0)
 
 

@@ -34,7 +34,7 @@ def test_the_matrix_and_the_forces_are_the_energy(keep_angle: bool) -> None:
     """z^H A z - 2 Re b^H z differs from the energy and the pose's by what does not depend on z."""
     pinned, z = body(keep_angle), shapes(1)
     rotations, goals = pinned.rotations(z), pinned._goals(z)
-    copy, _ = pinned._copies(z)
+    copy, _ = pinned.copies(z)
 
     def energy(y: Complex) -> float:
         strain, bent = pinned._misfits(y, rotations)

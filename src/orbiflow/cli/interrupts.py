@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import signal
 import threading
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 
 from orbiflow.cancel import Cancel
 
 
 @contextmanager
-def stopped_by_interrupt() -> Iterator[Cancel]:
+def stopped_by_interrupt() -> Generator[Cancel]:
     """Yields a token that the first Ctrl-C cancels; a second raises `KeyboardInterrupt`.
 
     A shell may have told this process to ignore Ctrl-C, as with `nohup` or `&` in a script: then it

@@ -61,6 +61,8 @@ class Terminal:
                     _show_tiles(event)
                 elif self.job in BATCHES:
                     _show_batch(event)
+            case _:
+                pass  # the rest is for programs
 
     def _best(self, event: Preview | TileFound) -> None:
         if self.bar is not None:

@@ -32,13 +32,17 @@ def check_kind(value: Any, kind: type[T], name: str, hint: str = "") -> T:
     return value
 
 
+def silent(*_: object) -> None:
+    """No progress wanted."""
+
+
 def check_range(name: str, value: Any, low: float, high: float, *, integer: bool = False) -> None:
     """
     Raises:
         OrbiflowError: unless `value` is a number, or an integer, from `low` to `high`.
     """
     kind = numbers.Integral if integer else numbers.Real
-    fits = isinstance(value, kind) and not isinstance(value, bool)
+    fits = not isinstance(value, bool) and isinstance(value, kind)
     if not fits or not low <= float(value) <= high:
         what = "an integer " if integer and not fits else ""
         limits = f"from {low:g} to {high:g}" if high < math.inf else f"of at least {low:g}"

@@ -12,6 +12,7 @@ import numpy as np
 import torch
 from numpy.typing import ArrayLike
 
+from orbiflow.arguments import is_a
 from orbiflow.density.arguments import check_kind
 from orbiflow.density.fitting.automatic import (
     PARTS,
@@ -324,7 +325,7 @@ class DensityEstimator(Parameters):
     def _parts(self) -> tuple[str, ...]:
         if self.parts == AUTO:
             return PARTS
-        if not isinstance(self.parts, str):
+        if not is_a(self.parts, str):
             raise OrbiflowError(
                 f'parts must be "{AUTO}" or names such as "kernels,mixture", got {self.parts!r}'
             )

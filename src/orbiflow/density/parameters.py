@@ -31,7 +31,7 @@ class Parameters:
 
     def __sklearn_tags__(self) -> Any:
         # asked for by scikit-learn alone, which is therefore there
-        from sklearn.utils import Tags, TargetTags  # pyright: ignore[reportMissingImports]
+        from sklearn.utils import Tags, TargetTags  # pyright: ignore[reportMissingImports, reportMissingTypeStubs]
 
         return Tags(
             estimator_type="density_estimator",

@@ -25,7 +25,7 @@ def seed_of(random_state: RandomState) -> int:
         return int(random_state.randint(2**31))
     if isinstance(random_state, np.random.Generator):
         return int(random_state.integers(2**31))
-    if isinstance(random_state, numbers.Integral) and not isinstance(random_state, bool):
+    if not isinstance(random_state, bool) and isinstance(random_state, numbers.Integral):
         return int(random_state) % 2**63
     raise OrbiflowError(
         "random_state must be None, an integer, a NumPy RandomState or Generator, got "

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import torch
 from numpy.typing import ArrayLike
+from torch import Tensor
 
 from orbiflow.density.arguments import check_kind
 from orbiflow.density.models.symmetric import SymmetricDensity
@@ -38,8 +39,9 @@ def log_density_gradient(density: SymmetricDensity, data: ArrayLike) -> tuple[Ar
     """
     space = check_kind(density, SymmetricDensity, "density").space
     points = space.cover(data)
-    values, slopes = [], []
-    for block in points.split(BLOCK):
+    values: list[Tensor] = []
+    slopes: list[Tensor] = []
+    for block in torch.split(points, BLOCK):
         with torch.enable_grad():
             at = block.detach().clone().requires_grad_()
             found = density.log_prob(at, measure="natural")

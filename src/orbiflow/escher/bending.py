@@ -65,6 +65,10 @@ class Bent(NamedTuple):
         return self.fidelity.score * neck_factor(self.neck, min_neck)
 
 
+def _told_nobody(_share: float) -> None:
+    """No progress wanted."""
+
+
 def bent_tiles(
     both: Sequence[Hand],
     kind: IsohedralClass,
@@ -90,7 +94,7 @@ def bent_tiles(
     Raises:
         Cancelled: if it was told to stop.
     """
-    told, cancel = progress or (lambda _share: None), cancel or Cancel()
+    told, cancel = progress or _told_nobody, cancel or Cancel()
     found: list[Bent] = []
     dropped = done = 0
     sides = both[:1] if mirror_closed(kind) else both

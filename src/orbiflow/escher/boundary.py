@@ -14,6 +14,8 @@ from orbiflow.errors import CertificationError
 from orbiflow.escher.model import TileModel
 from orbiflow.symmetry.isometry import Array
 from orbiflow.tilings import IsohedralClass, Tile
+from orbiflow.tilings.edge_identification import EdgeIdentification
+from orbiflow.typed_torch import listed
 
 DENSE = (960, 4320)
 """Least number of samples around the tile from which vertices are chosen; the second if need be."""
@@ -113,8 +115,8 @@ def _flowed_edges(model: TileModel, pieces: int, force: bool) -> list[Array]:
     kind, placed = model.isohedral_class, _placement(model)
     before = model.boundary(pieces)[0]
     closed = torch.cat([before, before[:1]])
-    first = [*(model.prototile()[1][0] * pieces).tolist(), len(before)]
-    spans = {}
+    first: list[int] = [*listed(model.prototile()[1][0] * pieces), len(before)]
+    spans: dict[EdgeIdentification, slice[int, int, None]] = {}
     for pair in kind.identified_edges:
         start, end = first[pair.first], first[pair.first + 1]
         spans[pair] = slice(start, (start + end) // 2 + 1 if pair.folded else end + 1)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, TypeVar
+from typing import Any, overload
 
 import numpy as np
 import torch
@@ -20,8 +20,6 @@ from orbiflow.silhouette.location import Locator
 from orbiflow.silhouette.unfolding import unfolded
 from orbiflow.symmetry.isometry import Array
 from orbiflow.tilings import Tile
-
-Points = TypeVar("Points", torch.Tensor, Any)
 
 MAX_POINTS, MAX_TRIANGLES = 100_000, 200_000
 """Beyond these a mesh is refused: real ones have some thousands."""
@@ -76,7 +74,11 @@ class Bending:
             array.setflags(write=False)
             object.__setattr__(self, name, array)
 
-    def forward(self, points: Points) -> Points:
+    @overload
+    def forward(self, points: torch.Tensor) -> torch.Tensor: ...
+    @overload
+    def forward(self, points: ArrayLike) -> Array: ...
+    def forward(self, points: torch.Tensor | ArrayLike) -> torch.Tensor | Array:
         """Where points (..., 2) of the silhouette go.
 
         Args:
@@ -88,7 +90,11 @@ class Bending:
         """
         return _kind_of(points, self._forward(_checked(points)))
 
-    def inverse(self, points: Points) -> Points:
+    @overload
+    def inverse(self, points: torch.Tensor) -> torch.Tensor: ...
+    @overload
+    def inverse(self, points: ArrayLike) -> Array: ...
+    def inverse(self, points: torch.Tensor | ArrayLike) -> torch.Tensor | Array:
         """Where points (..., 2) of the tile come from; as `forward`."""
         return _kind_of(points, self._backward(_checked(points)))
 
@@ -159,7 +165,11 @@ class CarriedTile:
         except OrbiflowError as error:
             return cls(placed, frame, None, (str(error),))
 
-    def forward(self, points: Points) -> Points:
+    @overload
+    def forward(self, points: torch.Tensor) -> torch.Tensor: ...
+    @overload
+    def forward(self, points: ArrayLike) -> Array: ...
+    def forward(self, points: torch.Tensor | ArrayLike) -> torch.Tensor | Array:
         """Where points (..., 2) of the silhouette go.
 
         Raises:
@@ -167,7 +177,11 @@ class CarriedTile:
         """
         return self.frame.to_input(self._map().forward(self.frame.to_normal(points)))
 
-    def inverse(self, points: Points) -> Points:
+    @overload
+    def inverse(self, points: torch.Tensor) -> torch.Tensor: ...
+    @overload
+    def inverse(self, points: ArrayLike) -> Array: ...
+    def inverse(self, points: torch.Tensor | ArrayLike) -> torch.Tensor | Array:
         """Where points (..., 2) of the tile come from; as `forward`."""
         return self.frame.to_input(self._map().inverse(self.frame.to_normal(points)))
 

@@ -131,12 +131,12 @@ def _drawn(body: Elastic, kind: IsohedralClass, placements: Placements, points: 
 def _distinct(drawn: Drawn, count: int) -> Drawn:
     """The best `count` at most, best first, no placement twice."""
     seen: set[tuple[int, ...]] = set()
-    kept = []
+    kept: list[int] = []
     for k in np.argsort(drawn.costs, kind="stable"):
         corners = (int(drawn.placements.starts[k]), *drawn.placements.lengths[k].tolist())
         if corners not in seen:
             seen.add(corners)
-            kept.append(k)
+            kept.append(int(k))
     return drawn.take(np.array(kept[:count], dtype=np.int64))
 
 
@@ -164,7 +164,7 @@ def _neighbours(
 
 def _take_better(drawn: Drawn, owners: Integers, tried: Drawn) -> Integers:
     """Let each take the best that it has tried, in place; who has moved."""
-    moved = []
+    moved: list[int] = []
     for k in np.unique(owners):
         mine = np.flatnonzero(owners == k)
         best = mine[np.argmin(tried.costs[mine])]
@@ -172,7 +172,7 @@ def _take_better(drawn: Drawn, owners: Integers, tried: Drawn) -> Integers:
             for old, new in zip(drawn.placements, tried.placements, strict=True):
                 old[k] = new[best]
             drawn.points[:, k], drawn.costs[k] = tried.points[:, best], tried.costs[best]
-            moved.append(k)
+            moved.append(int(k))
     return np.array(moved, dtype=np.int64)
 
 

@@ -23,6 +23,7 @@ from orbiflow.flows import METHODS
 from orbiflow.silhouette.soft_target import SoftTarget
 from orbiflow.symmetry.isometry import Array
 from orbiflow.tilings import IsohedralClass
+from orbiflow.typed_torch import linalg
 
 CALM = 0.4
 """Step length times the field's steepness, at most; less where `calm` finds it too bold."""
@@ -130,7 +131,7 @@ class Descent:
         momentum *= self.settings.momentum
         momentum += gradient
         flat = momentum.reshape(len(momentum), -1)
-        size = flat.norm(dim=1).clamp_min(1e-9)
+        size = linalg.vector_norm(flat, dim=1).clamp_min(1e-9)
         share = torch.minimum(torch.ones_like(size), reach / size)
         parameter += (share[:, None] * flat).reshape(parameter.shape)
 

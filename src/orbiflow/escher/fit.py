@@ -14,6 +14,10 @@ Progress = Callable[[float, float], None]
 """Called with the share of the work done and the best loss so far."""
 
 
+def silent(_share: float, _loss: float) -> None:
+    """No progress wanted."""
+
+
 class Fit(NamedTuple):
     """Finalists of one class, not certified yet.
 

@@ -13,7 +13,7 @@ from orbiflow.cancel import Cancel
 from orbiflow.errors import CertificationError
 from orbiflow.escher.bending import Bent, bent_tiles
 from orbiflow.escher.bending_settings import BendingSettings
-from orbiflow.escher.fit import Fit, Progress
+from orbiflow.escher.fit import Fit, Progress, silent
 from orbiflow.escher.hands import Hand
 from orbiflow.escher.model import TileModel
 from orbiflow.escher.placements import Complex
@@ -94,7 +94,7 @@ def _fit(
     progress: Progress | None,
     cancel: Cancel | None,
 ) -> Fit:
-    told = progress or (lambda _share, _loss: None)
+    told = progress or silent
     enough = 1 if per_class == 1 else 3 * per_class
     settings = replace(settings, min_neck=least_neck(target.normal, settings.min_neck))
     found, dropped = bent_tiles(

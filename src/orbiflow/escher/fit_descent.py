@@ -10,7 +10,7 @@ from orbiflow.arguments import instance
 from orbiflow.cancel import Cancel
 from orbiflow.escher.descent import Descent
 from orbiflow.escher.descent_settings import DescentSettings
-from orbiflow.escher.fit import Fit, Progress
+from orbiflow.escher.fit import Fit, Progress, silent
 from orbiflow.escher.model import TileModel
 from orbiflow.escher.outline_starts import Starts, outline_starts, template_starts
 from orbiflow.escher.polish import polish
@@ -58,7 +58,7 @@ def fit_descent(
     outline = shapely.Polygon(target.normal).exterior
     settings = settings.for_outline(outline.length)
     soft = soft or SoftTarget(target)
-    report = progress or (lambda _share, _loss: None)
+    report = progress or silent
     cancel = cancel or Cancel()
     starts = _starts(target, kind, settings, cancel)
     prototiles = starts.prototiles
@@ -108,7 +108,7 @@ def _polished(
     target: Target, model: TileModel, settings: DescentSettings, cancel: Cancel
 ) -> TileModel:
     """The same candidates, each with one segment more."""
-    polished = []
+    polished: list[TileModel] = []
     for index in range(model.size):
         single = model.take([index])
         if index < settings.finalists:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from orbiflow.arguments import described, instance
+from orbiflow.arguments import described, instance, is_a
 from orbiflow.cancel import Cancel
 from orbiflow.errors import OrbiflowError
 from orbiflow.escher.bending_settings import BendingSettings
@@ -58,7 +58,7 @@ def fit_tile(
     ('IH4', True)
     """
     instance(target, Target, "the target", _HOW)
-    if settings is not None and not isinstance(settings, OneSettings):
+    if settings is not None and not is_a(settings, OneSettings):
         raise OrbiflowError(
             f"settings must be of one method, got {described(settings)}; for a level of effort: "
             'BendingSettings.for_effort("fast")'

@@ -50,7 +50,7 @@ class Hand:
     mirrored: bool
     samples: Samples
     made: Callable[[str, Stiffness], Elastic]
-    _bodies: dict[Stiffness, Bodies] = field(default_factory=dict)
+    _bodies: dict[Stiffness, Bodies] = field(default_factory=dict[Stiffness, Bodies])
 
     @cached_property
     def fine(self) -> Elastic:

@@ -107,7 +107,9 @@ def _harmonic(mesh: Mesh, outline: Array) -> Array:
     ends = np.concatenate([mesh.triangles[:, [k, (k + 1) % 3]] for k in range(3)])
     links = sparse.coo_array((np.ones(len(ends)), ends.T), shape=(count, count)).tocsr()
     links = links + links.T
-    laplacian = sparse.csr_array(sparse.diags_array(np.asarray(links.sum(axis=1)).ravel()) - links)
+    own, degrees = np.arange(count), np.asarray(links.sum(axis=1)).ravel()
+    degree = sparse.coo_array((degrees, (own, own)), shape=(count, count)).tocsr()
+    laplacian = sparse.csr_array(degree - links)
     moved = outline - mesh.points[:fixed]
     inner = spsolve(
         sparse.csc_array(laplacian[fixed:, fixed:]), -(laplacian[fixed:, :fixed] @ moved)

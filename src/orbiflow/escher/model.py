@@ -11,7 +11,7 @@ import torch
 from numpy.typing import ArrayLike
 from torch import Tensor, nn
 
-from orbiflow.arguments import instance, number, numbers, whole
+from orbiflow.arguments import instance, is_a, number, numbers, whole
 from orbiflow.errors import OrbiflowError
 from orbiflow.escher.prototiles import Prototiles
 from orbiflow.fields import FourierField
@@ -21,6 +21,7 @@ from orbiflow.symmetry import CrystallographicGroup
 from orbiflow.symmetry.isometry import Array
 from orbiflow.tilings import IsohedralClass
 from orbiflow.tilings import isohedral_class as class_of
+from orbiflow.typed_torch import linalg
 
 
 class TileModel(nn.Module):
@@ -73,7 +74,7 @@ class TileModel(nn.Module):
     ) -> None:
         super().__init__()
         isohedral_class = class_of(isohedral_class)
-        if not (isinstance(dtype, torch.dtype) and dtype.is_floating_point):
+        if not (is_a(dtype, torch.dtype) and dtype.is_floating_point):
             raise OrbiflowError(
                 f"dtype must be a floating-point type such as torch.float64, got {dtype}"
             )
@@ -160,7 +161,7 @@ class TileModel(nn.Module):
 
     def unplace(self, points: Tensor) -> Tensor:
         """(A o L)^-1 at points (N, 2) or (S, N, 2) of the target's normal form."""
-        return (self._points(points) - self.offset[:, None, :]) @ torch.linalg.inv(self.linear()).mT
+        return (self._points(points) - self.offset[:, None, :]) @ linalg.inv(self.linear()).mT
 
     def forward(self, points: Tensor) -> Tensor:
         """D at points (S, N, 2) of the group's frame."""
@@ -170,7 +171,7 @@ class TileModel(nn.Module):
         """D^-1 at points (N, 2) or (S, N, 2) of the target's normal form."""
         return self.flow.inverse(self.unplace(points))
 
-    def _points(self, points: Tensor) -> Tensor:
+    def _points(self, points: Tensor | ArrayLike) -> Tensor:
         """`points` if they suit the model; arrays and lists become tensors of its dtype."""
         if not isinstance(points, Tensor):
             return torch.as_tensor(
@@ -299,7 +300,7 @@ class TileModel(nn.Module):
     def _apply(self, fn: Callable[[Tensor], Tensor], recurse: bool = True) -> Self:
         # what .float(), .half() and .to(...) go through: the start follows them to a device alone
         exact = {name: buffer for name, buffer in self._buffers.items() if buffer is not None}
-        super()._apply(fn, recurse)
+        super()._apply(fn, recurse)  # pyright: ignore[reportUnknownMemberType]
         for name, buffer in exact.items():
             setattr(self, name, buffer.to(getattr(self, name).device))
         return self

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import shapely
@@ -187,7 +188,8 @@ def _bordered(matrix: csc_array, right: Array, guess: Array, ways: Array) -> tup
     size, border = right.size, np.tile(ways, (1, len(right)))
     whole, value = matrix, right.ravel()
     if len(ways):
-        whole = bmat([[matrix, border.T], [border, None]], format="csc")
+        blocks: Any = [[matrix, border.T], [border, None]]
+        whole = bmat(blocks, format="csc")
         value = np.concatenate([value, border @ guess.ravel()])
     solved = np.asarray(spsolve(csc_array(whole), value))
     return solved[:size].reshape(-1, 2), solved[size:]

@@ -27,7 +27,7 @@ def nearest_tiles(
         placements: C of them, of this class and n.
         weights: (n,) positive weights of the points; default 1.
     """
-    found = []
+    found: list[NearestTiles] = []
     pieces = max(1, -(-len(placements.starts) // CHUNK))
     for index in np.array_split(np.arange(len(placements.starts)), pieces):
         space = TileSpace(kind, placements.take(index), weights)

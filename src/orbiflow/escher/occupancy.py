@@ -13,7 +13,7 @@ from torch import Tensor
 
 from orbiflow.arguments import instance, number, numbers, whole
 from orbiflow.cancel import Cancel
-from orbiflow.escher.fit import Progress
+from orbiflow.escher.fit import Progress, silent
 from orbiflow.escher.max_frequency import check_max_frequency
 from orbiflow.escher.model import TileModel
 from orbiflow.escher.starts import initial_poses, template_symmetries
@@ -21,6 +21,8 @@ from orbiflow.flows.integrators import method as integrator
 from orbiflow.silhouette.signed_distance import signed_distance
 from orbiflow.silhouette.target import Target
 from orbiflow.tilings import IsohedralClass, isohedral_class
+from orbiflow.typed_shapely import ufuncs
+from orbiflow.typed_torch import adam, linalg, listed
 
 SHAPE_PENALTY = 0.02
 """Factor of the squared displacement of a pentagon's free vertex: keeps the template simple."""
@@ -92,7 +94,7 @@ class OccupancySamples:
         region = shapely.Polygon(target.normal)
         uniform = count // 3
         along = rng.random(count - uniform) * region.exterior.length
-        near = shapely.get_coordinates(shapely.line_interpolate_point(region.exterior, along))
+        near = shapely.get_coordinates(ufuncs.line_interpolate_point(region.exterior, along))
         spread = rng.choice([0.02, 0.06, 0.15], size=(len(near), 1))
         near += spread * rng.standard_normal(near.shape)
         low, high = target.normal.min(axis=0) - 0.2, target.normal.max(axis=0) + 0.2
@@ -153,7 +155,7 @@ def fit_occupancy(
     cancel = cancel or Cancel()
     model = _affine_phase(_start(kind, settings), samples, settings, cancel)
     first = replace(settings, iterations=max(1, settings.iterations // 3))
-    told = progress or _silent
+    told = progress or silent
 
     def report(share: float, loss: float) -> None:
         told(share, loss)
@@ -164,10 +166,6 @@ def fit_occupancy(
         model = _ranked(model, samples, settings.hardness[1], keep=(model.size + 1) // 2)
     model = _flow_phase(model, samples, settings, first.iterations, settings.iterations, report)
     return _ranked(model, samples, settings.hardness[1], keep=model.size)
-
-
-def _silent(_share: float, _loss: float) -> None:
-    """No progress wanted."""
 
 
 def _start(isohedral_class: IsohedralClass, settings: OccupancySettings) -> TileModel:
@@ -192,13 +190,13 @@ def _pose(model: TileModel) -> list[torch.nn.Parameter]:
 def _affine_phase(
     model: TileModel, samples: OccupancySamples, settings: OccupancySettings, cancel: Cancel
 ) -> TileModel:
-    optimizer = torch.optim.Adam(_pose(model), lr=0.03)
+    optimizer = adam(_pose(model), lr=0.03)
     for _ in range(settings.affine_iterations):
         cancel.check()
         points, inside = samples.draw(512)
         optimizer.zero_grad()
         loss = occupancy_loss(model, points, inside, 15.0, affine=True)
-        (loss + _shape_penalty(model)).sum().backward()
+        torch.autograd.backward((loss + _shape_penalty(model)).sum())
         optimizer.step()
     ranked = _ranked(model, samples, 15.0, keep=model.size, affine=True)
     return ranked.take(_distinct(ranked, settings.finalists))
@@ -214,7 +212,9 @@ def _distinct(model: TileModel, count: int) -> list[int]:
     for i in range(model.size):
         shifts = [placed[i].roll(k * sides // order, dims=0) for k in range(order)]
         nearest = [
-            float((shift - placed[j]).norm(dim=-1).max()) for shift in shifts for j in chosen
+            float(linalg.vector_norm(shift - placed[j], dim=-1).max())
+            for shift in shifts
+            for j in chosen
         ]
         if min(nearest, default=math.inf) > 0.1:
             chosen.append(i)
@@ -230,7 +230,7 @@ def _flow_phase(
     report: Progress,
 ) -> TileModel:
     rate = settings.learning_rate
-    optimizer = torch.optim.Adam(
+    optimizer = adam(
         [
             {"params": _pose(model), "lr": rate / 2, "peak": rate / 2},
             {"params": list(model.flow.parameters()), "lr": rate, "peak": rate},
@@ -245,7 +245,7 @@ def _flow_phase(
         points, inside = samples.draw(settings.points)
         loss = occupancy_loss(model, points, inside, _between(settings.hardness, done))
         energy = _between(settings.penalty, done) * _energy(model)
-        (loss + energy + _shape_penalty(model)).sum().backward()
+        torch.autograd.backward((loss + energy + _shape_penalty(model)).sum())
         optimizer.step()
         report((i + 1) / settings.iterations, float(loss.detach().min()))
     return model
@@ -275,4 +275,4 @@ def _ranked(
 ) -> TileModel:
     points, inside = samples.points[::4], samples.inside[::4]
     loss = occupancy_loss(model, points, inside, hardness, affine=affine)
-    return model.take(loss.argsort(stable=True)[:keep].tolist())
+    return model.take(listed(loss.argsort(stable=True)[:keep]))

@@ -12,6 +12,7 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.geometry import arc_lengths
 from orbiflow.silhouette.mesh import Mesh
 from orbiflow.symmetry.isometry import Array
+from orbiflow.typed_shapely import ufuncs
 
 Integers = NDArray[np.int64]
 
@@ -49,7 +50,7 @@ def onto_polygon(
         raise OrbiflowError("the corners of the outline and the polygon do not correspond")
     places = _places(np.roll(images[:n], -corners[0], axis=0), polygon, knots, own, goal)
 
-    share = (np.concatenate([np.arange(n), mesh.sides + mesh.shares]) - corners[0]) % n
+    share: Array = (np.concatenate([np.arange(n), mesh.sides + mesh.shares]) - corners[0]) % n
     known = np.interp(share, np.arange(n + 1), knots)
     order = np.argsort(known)
     places, fresh = _snapped(places, known[order], knots[-1])
@@ -71,7 +72,7 @@ def _places(ring: Array, polygon: Array, knots: Array, own: Integers, goal: Inte
     ends = zip(own, [*own[1:], len(ring)], goal, [*goal[1:], len(polygon)], strict=True)
     for a, b, p, q in ends:
         edge = shapely.LineString(closed[a : b + 1])
-        at = knots[a] + shapely.line_locate_point(edge, shapely.points(loop[p : q + 1]))
+        at = knots[a] + ufuncs.line_locate_point(edge, ufuncs.points(loop[p : q + 1]))
         at[0], at[-1] = knots[a], knots[b]
         at = _on_vertices(at, loop[p : q + 1], closed[a : b + 1], knots[a : b + 1])
         if (np.diff(at) <= SAME * knots[-1]).any():

@@ -90,7 +90,7 @@ class OwnFrame:
         Its frame has the turn and the scale of this one, and no stretch.
         """
         corners = self.kind.template()
-        parts = []
+        parts: list[Array] = []
         for k in range(len(corners)):
             edge = self.edge(k)
             steps = np.linalg.norm(np.diff(edge, axis=0), axis=1)
@@ -137,7 +137,8 @@ def _offset(kind: IsohedralClass, placed: Array, starts: tuple[int, ...], linear
 
     Where the group leaves a direction open, the corners come as near to the template's as can be.
     """
-    rows, values = [], []
+    rows: list[Array] = []
+    values: list[Array] = []
     inverse = np.linalg.inv(linear)
     for pair in kind.identified_edges:
         element = pair.isometry

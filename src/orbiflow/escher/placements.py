@@ -102,7 +102,7 @@ def _compositions(multiplicities: Sequence[int], total: int) -> Integers:
     for i, m in enumerate(multiplicities[:-1]):
         most = np.maximum((left - sum(multiplicities[i + 1 :])) // m, 0)
         origin = np.repeat(np.arange(len(rows)), most)
-        value = np.arange(most.sum()) - np.repeat(np.cumsum(most) - most, most) + 1
+        value = np.arange(len(origin)) - np.repeat(np.cumsum(most) - most, most) + 1
         rows = np.column_stack([rows[origin], value])
         left = left[origin] - m * value
     last = multiplicities[-1]

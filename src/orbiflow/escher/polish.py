@@ -112,7 +112,7 @@ class _Polish:
         self.gradient = -flat.numpy()
         return 1 - value, self.gradient
 
-    def stalled(self, _x: Array) -> None:
+    def stalled(self, xk: Array) -> None:  # noqa: ARG002 - SciPy's name
         """Stops the iteration when the last ten brought nothing."""
         self.history.append(self.best_iou)
         if len(self.history) > 10 and self.history[-1] - self.history[-11] < STALL:

@@ -153,8 +153,8 @@ def _result(
         group_name=model.isohedral_class.group_name,
         tile=placed,
         normal_tile=tile,
-        metrics=compare(region, target.outline),  # pyright: ignore[reportArgumentType]
-        recognisability=recogniser(target)(region),  # pyright: ignore[reportArgumentType]
+        metrics=compare(region, target.outline),
+        recognisability=recogniser(target)(region),
         certificate=certify(placed),
         model=SavedModel.of(fine, target.frame),
         starts=starts,
@@ -182,7 +182,7 @@ def _with_bent(target: Target, result: TileResult, placed: PlacedBent) -> TileRe
         objective="likeness",
         rest=rest,
         bent=outline,
-        bent_iou=iou(whole, tile) if tile.is_valid else None,  # pyright: ignore[reportArgumentType]
+        bent_iou=iou(whole, tile) if tile.is_valid else None,
         deformation=placed.bent.fidelity.cost,
         fidelity=placed.bent.fidelity,
         pinned=body.misfit(outline_points) if isinstance(body, Pinned) else None,

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from orbiflow.arguments import described, instance
+from orbiflow.arguments import described, instance, is_a
 from orbiflow.cancel import Cancel, Cancelled
 from orbiflow.errors import CertificationError, OrbiflowError
 from orbiflow.escher.bending_settings import BendingSettings
@@ -90,7 +90,7 @@ class Task:
 
     def __post_init__(self) -> None:
         instance(self.target, Target, "the target", "Target.read and Target.from_polygon make one")
-        if not isinstance(self.settings, Settings):
+        if not is_a(self.settings, Settings):
             raise OrbiflowError(
                 f"settings must be of a method, got {described(self.settings)}; for a level of "
                 'effort: BendingSettings.for_effort("fast")'
@@ -174,7 +174,7 @@ def escherize(
 def _names(classes: ClassName | Iterable[ClassName]) -> list[str]:
     if isinstance(classes, str | int | IsohedralClass):
         classes = [classes]
-    if not isinstance(classes, Iterable):
+    if not is_a(classes, Iterable):
         raise OrbiflowError(
             f'classes must be a name such as "IH4", or a list of them, got {described(classes)}'
         )

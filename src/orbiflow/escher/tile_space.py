@@ -102,7 +102,7 @@ class TileSpace:
         # IH1 does not care about the offset: the least solution
         size = matrix.shape[-1]
         ridge = 1e-10 * np.trace(matrix, axis1=1, axis2=2)[:, None, None] * np.eye(size)
-        self._solve = np.linalg.inv(matrix + ridge) @ np.swapaxes(weighted, 1, 2)
+        self._solve: Complex = np.linalg.inv(matrix + ridge) @ np.swapaxes(weighted, 1, 2)
 
     def best_turns(self, outlines: Complex) -> Array:
         """(C,) directions of the glide axes that suit the outlines (C, n) best; 0 without glides."""
@@ -129,7 +129,7 @@ class TileSpace:
         pulled = _unturn(self._factor, orbits.flips, goal)
         means = self._orbit_means(pulled)
         rest = self._residual(pulled, means)
-        solution = np.real(self._solve @ rest)[..., 0]
+        solution: Array = np.real(self._solve @ rest)[..., 0]
         left = rest[..., 0] - (self._basis @ solution[..., None])[..., 0]
         free = means[..., 0] - (self._means @ solution[..., None])[..., 0]
         image = _turn(self._factor, orbits.flips, np.take_along_axis(free, orbits.source, axis=1))

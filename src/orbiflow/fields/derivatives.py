@@ -49,12 +49,21 @@ def prepared_with_divergence(
     if is_time_dependent(field):
         if isinstance(field, HasDivergenceInTime):
             return field.with_divergence
-        return lambda points, time: _with_trace(lambda p: field(p, time), points, field)
+
+        def in_time(points: Tensor, time: Tensor) -> tuple[Tensor, Tensor]:
+            return _with_trace(lambda p: field(p, time), points, field)
+
+        return in_time
     if isinstance(field, BindableWithDivergence):
         return field.bound_with_divergence()
-    if isinstance(field, HasDivergence | HasJacobian):
-        return lambda points: (field(points), divergence(field, points))
-    return lambda points: _with_trace(field, points, field)
+    in_closed_form = isinstance(field, HasDivergence | HasJacobian)
+
+    def both(points: Tensor) -> tuple[Tensor, Tensor]:
+        if in_closed_form:
+            return field(points), divergence(field, points)
+        return _with_trace(field, points, field)
+
+    return both
 
 
 def lipschitz_bound(field: object) -> float | None:

@@ -16,6 +16,7 @@ from orbiflow.fields.lipschitz import coefficient_bound
 from orbiflow.fields.series import differentiate, evaluate, weight_cotangent
 from orbiflow.symmetry import CrystallographicGroup
 from orbiflow.symmetry.as_written import cached_as_written
+from orbiflow.symmetry.isometry import Array
 
 
 class FourierField(InvariantField):
@@ -214,7 +215,9 @@ def tensor_layout(
     k = basis.frequencies[mode]
     size = np.abs(k)
     norm = np.where(k.any(axis=1), math.sqrt(2.0), 1.0)
-    rows, columns, values = [], [], []
+    rows: list[Array] = []
+    columns: list[Array] = []
+    values: list[Array] = []
     for choice in np.ndindex(*(2,) * d):
         sines = np.array(choice)
         # i^(number of sines): real for cosines of the phase, imaginary for sines

@@ -82,7 +82,7 @@ class InvariantField(nn.Module, ABC):
 
     def _apply(self, fn: Callable[[Tensor], Tensor], recurse: bool = True) -> Self:
         # a float32 field made float64 must be as symmetric as one born in float64
-        super()._apply(fn, recurse)
+        super()._apply(fn, recurse)  # pyright: ignore[reportUnknownMemberType]
         self._fill_buffers()
         return self
 

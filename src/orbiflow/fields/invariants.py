@@ -138,7 +138,10 @@ def invariant_basis(group: CrystallographicGroup, max_frequency: int) -> Invaria
     d = group.dim
     frequencies = frequency_set(group, max_frequency)
     targets, blocks = _action(group, frequencies)
-    rows, columns, values, magnitude = [], [], [], []
+    rows: list[Array] = []
+    columns: list[Array] = []
+    values: list[Array] = []
+    magnitude: list[Array] = []
     orbit_of = targets.min(axis=0)
     size = 0
     for orbit in _members(orbit_of):
@@ -155,9 +158,10 @@ def invariant_basis(group: CrystallographicGroup, max_frequency: int) -> Invaria
         values.append(basis[row, column])
         rows.append(orbit[row // (2 * d)] * 2 * d + row % (2 * d))
         columns.append(column + size)
+        count: int = basis.shape[1]
         kappa = np.linalg.norm(group.inverse_lattice.T @ frequencies[orbit[0]])
-        magnitude.append(np.full(basis.shape[1], kappa))
-        size += basis.shape[1]
+        magnitude.append(np.full(count, kappa))
+        size += count
     return InvariantBasis(
         frequencies,
         np.concatenate(rows),

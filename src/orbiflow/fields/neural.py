@@ -13,6 +13,7 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.fields.symmetrize import Symmetrized
 from orbiflow.symmetry import CrystallographicGroup
 from orbiflow.symmetry.group import checked_group
+from orbiflow.typed_torch import random
 
 
 class PeriodicFeatures(nn.Module):
@@ -72,8 +73,8 @@ def neural_field(
     features = PeriodicFeatures(group, max_frequency)
     sizes = (features.size, *hidden, group.dim)
     layers: list[nn.Module] = [features]
-    with torch.random.fork_rng(devices=[]):
-        torch.manual_seed(seed)
+    with random.fork_rng(devices=[]):
+        random.manual_seed(seed)
         for i, (a, b) in enumerate(itertools.pairwise(sizes)):
             layers.append(nn.Linear(a, b, dtype=dtype))
             if i < len(sizes) - 2:

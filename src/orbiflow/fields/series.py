@@ -11,13 +11,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any
 
 import torch
 from torch import Tensor
 
 from orbiflow.fields.transforms import plain_gradients, refuse_old_batches, transformed
+from orbiflow.typed_torch import applied
 
 BLOCK_BYTES = 2**21
 """Size of the working arrays for one block of points; measured best between 1 and 3 MiB."""
@@ -146,7 +147,7 @@ def _backward_block(
     before = [_partial_sums(weights, tables[-1], room.sums)] if want_points and dim > 1 else []
     for level in range(dim - 2, 0, -1) if want_points else ():
         before.append((before[-1] * _align(tables[level], level)).sum(dim=-2))
-    point_grads = []
+    point_grads: list[Tensor] = []
     dual = grad  # cotangent of the partial sums, level by level
     for level in range(dim - 1):
         if want_points:
@@ -192,18 +193,19 @@ class _Series(torch.autograd.Function):
 def evaluate_plainly(weights: Tensor, u: Tensor) -> Tensor:
     """The same values by ordinary differentiable operations, for derivatives of any order."""
     u = u - u.detach().round()
-    for i in range(u.shape[1] - 1, -1, -1):
-        order = (weights.shape[2 + i] - 1) // 2
-        angle = u[:, i, None, :] * _frequencies(order, u)[:, None]
-        table = torch.cat([torch.ones_like(u[:, i, None, :]), angle.cos(), angle.sin()], dim=1)
-        if i == u.shape[1] - 1:
-            flat = weights.flatten(1, -2)
-            # of a single stack a plain product: `vmap` would copy the weights for a batched one
-            sums = (flat[0] @ table[0])[None] if len(flat) == 1 else flat @ table
-            sums = sums.unflatten(1, weights.shape[1:-1])
-        else:
-            sums = (sums * _align(table, i)).sum(dim=-2)
+    *others, last = (_plain_table(weights, u, i) for i in range(u.shape[1]))
+    flat = weights.flatten(1, -2)
+    # of a single stack a plain product: `vmap` would copy the weights for a batched one
+    sums: Tensor = (flat[0] @ last[0])[None] if len(flat) == 1 else flat @ last
+    sums = torch.unflatten(sums, 1, weights.shape[1:-1])
+    for i, table in reversed(list(enumerate(others))):
+        sums = (sums * _align(table, i)).sum(dim=-2)
     return sums
+
+
+def _plain_table(weights: Tensor, u: Tensor, i: int) -> Tensor:
+    angle = u[:, i, None, :] * _frequencies((weights.shape[2 + i] - 1) // 2, u)[:, None]
+    return torch.cat([torch.ones_like(u[:, i, None, :]), angle.cos(), angle.sin()], dim=1)
 
 
 def evaluate(weights: Tensor, u: Tensor) -> Tensor:
@@ -220,7 +222,7 @@ def evaluate(weights: Tensor, u: Tensor) -> Tensor:
     if transformed():
         return evaluate_plainly(weights, u)
     if torch.is_grad_enabled() and (weights.requires_grad or u.requires_grad):
-        return _Series.apply(weights, u)  # type: ignore[no-any-return]
+        return applied(_Series, weights, u)
     return _forward(weights, u)
 
 
@@ -238,7 +240,7 @@ def weight_cotangent(shape: tuple[int, ...], u: Tensor, grad: Tensor) -> Tensor:
     """
     weights = u.new_zeros(shape)
     if transformed():
-        return torch.func.vjp(lambda w: evaluate_plainly(w, u), weights)[1](grad)[0]
+        return torch.func.vjp(partial(evaluate_plainly, u=u), weights)[1](grad)[0]
     total = torch.zeros_like(weights)
     for block, room in _in_blocks(weights, u.shape[2]):
         part, _ = _backward_block(weights, u[..., block], grad[..., block], False, room)

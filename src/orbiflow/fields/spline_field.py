@@ -15,6 +15,8 @@ from orbiflow.fields.invariants import InvariantBasis, invariant_basis
 from orbiflow.fields.splines import padded, spline_sum, spline_sum_with_divergence, symbol
 from orbiflow.symmetry import CrystallographicGroup
 from orbiflow.symmetry.as_written import cached_as_written
+from orbiflow.symmetry.isometry import Array
+from orbiflow.typed_torch import fft, linalg
 
 PER_WAVE = 3
 """Grid points along the shortest wave, at least: a cubic spline follows it to about 2 per cent."""
@@ -68,7 +70,7 @@ class SplineField(InvariantField):
         spectrum = self.parameters_.new_zeros(math.prod(shape))
         entries = (self.parameters_ * self.scale)[self.columns] * self.values
         spectrum = torch.view_as_complex(spectrum.index_add(0, self.rows, entries).reshape(shape))
-        return torch.fft.irfftn(spectrum, s=self.sides, dim=tuple(range(1, d + 1)), norm="forward")
+        return fft.irfftn(spectrum, s=self.sides, dim=tuple(range(1, d + 1)), norm="forward")
 
     def bound(self) -> Callable[[Tensor], Tensor]:
         """The field with its grid filled once, for many evaluations (an integrator's)."""
@@ -108,10 +110,10 @@ class SplineField(InvariantField):
         """
         table = self.table()
         steepest = [
-            rate * (table.roll(-1, axis) - table).norm(dim=0).max()
+            rate * linalg.vector_norm(table.roll(-1, axis) - table, dim=0).max()
             for axis, rate in enumerate(self._per_length, start=1)
         ]
-        return torch.stack(steepest).norm()
+        return linalg.vector_norm(torch.stack(steepest))
 
     def adjoint(self, points: Tensor, forces: Tensor) -> Tensor:
         """Gradient (P,) of sum forces . V(points) in the parameters; points, forces (N, d)."""
@@ -146,8 +148,8 @@ def grid_sides(group: CrystallographicGroup, basis: InvariantBasis) -> tuple[int
     waves = np.abs(basis.frequencies).max(axis=0) / lengths  # per unit of length
     # multiples of four: half and quarter translations stay on the grid
     density = 4 * math.ceil(PER_WAVE * waves.max() * lengths.min() / 4 + 1e-9) / lengths.min()
-    sides = density * lengths
-    shifts = np.array([g.translation for g in group.cosets]) * density
+    sides: Array = density * lengths
+    shifts: Array = np.array([g.translation for g in group.cosets]) * density
     if not np.allclose(sides, np.round(sides)) or not np.allclose(shifts, np.round(shifts)):
         raise OrbiflowError(f"no even grid is mapped to itself by {group!r}: use FourierField")
     return tuple(round(m) for m in sides)
@@ -191,7 +193,9 @@ def _spectrum_layout(
     strength = np.where(constant, 1.0, math.sqrt(0.5))
     for axis, side in enumerate(sides):
         strength = strength / symbol(side).numpy()[k[:, axis] % side]
-    rows, columns, values = [], [], []
+    rows: list[Array] = []
+    columns: list[Array] = []
+    values: list[Array] = []
     for sign in (1, -1):
         image = sign * k
         keep = (image[:, -1] >= 0) & (~constant if sign < 0 else True)

@@ -17,6 +17,7 @@ import torch
 from torch import Tensor
 
 from orbiflow.fields.transforms import plain_gradients, refuse_old_batches, transformed
+from orbiflow.typed_torch import applied
 
 TAPS = 4
 """Coefficients of a cubic spline that a point meets along an axis."""
@@ -177,7 +178,7 @@ def _on_table(
 ) -> Tensor:
     by_value, by_divergence = gradients
     plain = [w[0] for w in weights]
-    channels = []
+    channels: list[Tensor] = []
     for c in range(shape[0]):
         factors = list(plain)
         if rates is None:
@@ -228,8 +229,8 @@ def spline_sum_with_divergence(
 
 def _sum(table: Tensor, u: Tensor, rates: tuple[float, ...] | None) -> tuple[Tensor, Tensor]:
     if transformed():
-        return _plain_sum(table, u, rates)  # type: ignore[return-value]
-    return _SplineSum.apply(table, u, rates)  # type: ignore[return-value]
+        return _plain_sum(table, u, rates)  # pyright: ignore[reportReturnType]
+    return applied(_SplineSum, table, u, rates)
 
 
 def _plain_sum(

@@ -20,6 +20,7 @@ from orbiflow.fields.protocol import VectorField, is_time_dependent
 from orbiflow.symmetry import CrystallographicGroup, Line, identity, rotation, transflection
 from orbiflow.symmetry.group import checked_group
 from orbiflow.symmetry.isometry import Isometry
+from orbiflow.typed_torch import linalg
 
 
 class Symmetrized(nn.Module):
@@ -128,7 +129,7 @@ def blend_with_divergence(
     values, divergence = joint(at)
     single = torch.cos(shifted * (torch.pi / 2)).square()
     weight = single.prod(dim=-1)
-    slopes = []
+    slopes: list[Tensor] = []
     for axis in range(points.shape[-1]):
         others = [i for i in range(points.shape[-1]) if i != axis]
         along = -torch.pi / 2 * torch.sin(torch.pi * shifted[..., axis])
@@ -149,9 +150,7 @@ def _translates(lattice: ArrayLike, points: Tensor) -> tuple[Tensor, Tensor]:
 
 
 def _inverse(lattice: ArrayLike, like: Tensor) -> Tensor:
-    return torch.linalg.inv(
-        torch.as_tensor(np.array(lattice), dtype=like.dtype, device=like.device)
-    )
+    return linalg.inv(torch.as_tensor(np.array(lattice), dtype=like.dtype, device=like.device))
 
 
 def periodic_operator(field: VectorField, lattice: ArrayLike) -> VectorField:
@@ -160,7 +159,7 @@ def periodic_operator(field: VectorField, lattice: ArrayLike) -> VectorField:
 
     def operated(points: Tensor) -> Tensor:
         b = basis.to(points)
-        return field(points @ torch.linalg.inv(b).mT) @ b.mT
+        return field(points @ linalg.inv(b).mT) @ b.mT
 
     return operated
 

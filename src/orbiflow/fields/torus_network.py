@@ -8,7 +8,9 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
+from orbiflow.arguments import is_a
 from orbiflow.errors import OrbiflowError
+from orbiflow.typed_torch import random
 
 MAX_WIDTH, MAX_DEPTH, MAX_WAVES = 1024, 8, 16
 """Bounds of `NeuralTorusField`, for settings and for files."""
@@ -78,11 +80,11 @@ class NeuralTorusField(nn.Module):
             ("depth", depth, MAX_DEPTH),
             ("waves", waves, MAX_WAVES),
         ):
-            if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= most:
+            if isinstance(value, bool) or not is_a(value, int) or not 1 <= value <= most:
                 raise OrbiflowError(f"{name} must be an integer from 1 to {most}, got {value!r}")
         self.dim, self.width, self.depth, self.waves = dim, width, depth, waves
-        with torch.random.fork_rng(devices=[]):
-            torch.manual_seed(seed)
+        with random.fork_rng(devices=[]):
+            random.manual_seed(seed)
             self.first = nn.Linear(2 * waves * dim + CLOCK, width, dtype=dtype)
             self.hidden = nn.ModuleList(
                 nn.Linear(width, width, dtype=dtype) for _ in range(depth - 1)

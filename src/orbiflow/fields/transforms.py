@@ -16,6 +16,10 @@ from torch.autograd import forward_ad
 
 from orbiflow.errors import OrbiflowError
 
+# torch asks them itself, and has neither a public name nor types for them
+_core: Any = torch._C  # pyright: ignore[reportPrivateUsage]
+_forward_mode: Any = forward_ad
+
 
 def transformed() -> bool:
     """Whether `torch.func` (vmap, grad, jvp and what is made of them) or forward mode is at work.
@@ -23,7 +27,7 @@ def transformed() -> bool:
     Tensors may then stand for many, or carry tangents. torch has no public word for this; its own
     autograd functions ask the same.
     """
-    return torch._C._are_functorch_transforms_active() or forward_ad._current_level >= 0
+    return _core._are_functorch_transforms_active() or _forward_mode._current_level >= 0
 
 
 def plain_gradients(
@@ -57,9 +61,7 @@ def refuse_old_batches(*gradients: Tensor) -> None:
     Raises:
         OrbiflowError: for gradients batched by torch's older means, which know no autograd functions.
     """
-    # a module that torch's own type stubs leave out
-    is_batched: Any = torch._C._functorch.is_legacy_batchedtensor  # pyright: ignore
-    if any(is_batched(gradient) for gradient in gradients):
+    if any(_core._functorch.is_legacy_batchedtensor(gradient) for gradient in gradients):
         raise OrbiflowError(
             "a field cannot be differentiated with vectorize=True or is_grads_batched=True: "
             "torch.func.vmap(torch.func.jacrev(field))(points) gives its Jacobians"

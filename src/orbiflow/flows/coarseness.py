@@ -14,6 +14,7 @@ from torch import Tensor
 from orbiflow.errors import CoarseStepsWarning
 from orbiflow.fields.derivatives import lipschitz_bound
 from orbiflow.fields.transforms import transformed
+from orbiflow.typed_torch import linalg
 
 if TYPE_CHECKING:
     from orbiflow.flows.flow import Flow
@@ -112,5 +113,5 @@ def _some(points: Tensor) -> Tensor:
 def _relative_error(flow: Flow, points: Tensor, inverse: bool) -> float:
     coarse = flow.carried(points, inverse=inverse)
     fine = flow.with_steps(2 * flow.steps).carried(points, inverse=inverse)
-    way = max(float((end - points).norm(dim=-1).max()) for end in (coarse, fine))
-    return float((coarse - fine).norm(dim=-1).max()) / way if way > 0 else 0.0
+    way = max(float(linalg.vector_norm(end - points, dim=-1).max()) for end in (coarse, fine))
+    return float(linalg.vector_norm(coarse - fine, dim=-1).max()) / way if way > 0 else 0.0

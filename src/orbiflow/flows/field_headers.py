@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, cast
 
 import torch
 from torch import nn
@@ -20,6 +20,7 @@ from orbiflow.fields import (
     Symmetrized,
 )
 from orbiflow.fields.torus_network import MAX_DEPTH, MAX_DIM, MAX_WAVES, MAX_WIDTH
+from orbiflow.json_values import is_list
 from orbiflow.symmetry import CrystallographicGroup
 from orbiflow.symmetry.header import group_from_header, group_header
 
@@ -51,7 +52,7 @@ class Writer:
         Raises:
             OrbiflowError: for a function without a name to ask for it by.
         """
-        kind = type(field)
+        kind = type(cast(object, field))
         if kind in _SERIES_NAMES:
             return self._series(field)
         if kind is Symmetrized:
@@ -100,7 +101,7 @@ class Reader:
     """Makes fields again, without their parameters; sizes are checked before anything is made."""
 
     def __init__(self, groups: Any, shapes: Mapping[str, tuple[int, ...]], makers: Makers) -> None:
-        if not isinstance(groups, list) or len(groups) > MAX_GROUPS:
+        if not is_list(groups) or len(groups) > MAX_GROUPS:
             raise OrbiflowError(f"expected at most {MAX_GROUPS} groups")
         self.groups = [group_from_header(header, header["name"]) for header in groups]
         self.shapes, self.makers = shapes, makers
@@ -199,7 +200,7 @@ def is_perceptron(field: Any) -> bool:
     if type(field) is not nn.Sequential or len(field) < 2 or len(field) % 2:
         return False
     wanted = [PeriodicFeatures, *[nn.Linear, nn.Tanh] * (len(field) // 2)][: len(field)]
-    layers = [layer for layer in field if isinstance(layer, nn.Linear)]
+    layers: list[Any] = [layer for layer in field if isinstance(layer, nn.Linear)]
     return all(type(m) is kind for m, kind in zip(field, wanted, strict=True)) and all(
         layer.bias is not None for layer in layers
     )

@@ -10,6 +10,7 @@ from typing import Any, Self
 import torch
 from torch import Tensor, nn
 
+from orbiflow.arguments import is_a
 from orbiflow.errors import OrbiflowError
 from orbiflow.fields.derivatives import prepared, prepared_with_divergence
 from orbiflow.fields.protocol import TimeDependentField, VectorField, is_time_dependent
@@ -17,6 +18,7 @@ from orbiflow.flows.coarseness import Watch
 from orbiflow.flows.integrators import RungeKutta
 from orbiflow.flows.integrators import method as find_method
 from orbiflow.threads import one_thread
+from orbiflow.typed_torch import linalg
 
 AnyField = VectorField | TimeDependentField
 State = tuple[Tensor, ...]
@@ -194,7 +196,8 @@ class Flow(nn.Module):
         For a method of order p the error at `steps` is about 2^p / (2^p - 1) times this.
         """
         fine = self.with_steps(2 * self.steps).carried(points, inverse=inverse)
-        return float((self.carried(points, inverse=inverse) - fine).norm(dim=-1).max())
+        apart = self.carried(points, inverse=inverse) - fine
+        return float(linalg.vector_norm(apart, dim=-1).max())
 
     def _look(self, points: Tensor, *, inverse: bool = False) -> None:
         _check_points(points)
@@ -253,7 +256,7 @@ def _checked_steps(value: int) -> int:
 
 
 def _check_points(points: Tensor) -> None:
-    if not isinstance(points, Tensor):
+    if not is_a(points, Tensor):
         raise OrbiflowError(
             f"expected points as a torch tensor (..., d), got a {type(points).__name__}: "
             "torch.as_tensor makes one"
@@ -278,7 +281,7 @@ def _slope(field: Callable[..., Tensor], with_log_det: bool) -> Callable[[State]
 
     def slope(state: State) -> State:
         points, *time = (state[0], state[-1]) if timed else (state[0],)
-        found: State = both(points, *time) if both is not None else (plain(points, *time),)  # type: ignore[misc]
+        found: State = both(points, *time) if both is not None else (plain(points, *time),)  # pyright: ignore[reportOptionalCall]
         if found[0].shape != points.shape:
             raise OrbiflowError(
                 "a field must give vectors of its points' shape: expected "

@@ -69,13 +69,13 @@ class RungeKutta:
 
 
 def _advance(state: State, slopes: list[State], coefficients: tuple[float, ...], h: float) -> State:
-    moved = []
+    moved: list[Tensor] = []
     for i, part in enumerate(state):
         for k, c in zip(slopes, coefficients, strict=True):
             if c != 0.0:
                 part = part.add(k[i], alpha=h * c)
         moved.append(part)
-    return tuple(moved)  # type: ignore[return-value]
+    return tuple(moved)  # pyright: ignore[reportReturnType]
 
 
 METHODS: dict[str, RungeKutta] = {

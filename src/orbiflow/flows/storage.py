@@ -15,6 +15,7 @@ from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.files import write_atomic
 from orbiflow.flows.field_headers import Makers, Reader, Writer, finite
 from orbiflow.flows.flow import Flow
+from orbiflow.json_values import is_list
 from orbiflow.tensor_files import read_tensors, tensor_bytes
 
 FORMAT = "orbiflow-flow/1"
@@ -47,7 +48,7 @@ def save_flow(flow: Flow, path: str | Path) -> Path:
     tensors = flow.state_dict()
     _check_finite(tensors)
     writer = Writer()
-    segments = []
+    segments: list[dict[str, Any]] = []
     for number, field in enumerate(fields):
         first = next(i for i, other in enumerate(fields) if other is field)
         place = f"segments.{number}"
@@ -100,7 +101,7 @@ def load_flow(path: str | Path, *, modules: Makers | None = None) -> Flow:
 def _restored(header: Mapping[str, Any], tensors: dict[str, Tensor], makers: Makers) -> Flow:
     _check_finite(tensors)
     segments = header["segments"]
-    if not isinstance(segments, list) or not 1 <= len(segments) <= MAX_SEGMENTS:
+    if not is_list(segments) or not 1 <= len(segments) <= MAX_SEGMENTS:
         raise OrbiflowError("no segments, or too many")
     shapes = {name: tuple(tensor.shape) for name, tensor in tensors.items()}
     reader = Reader(header["groups"], shapes, makers)

@@ -83,7 +83,7 @@ def resampled_with_corners(
     starts = knots[kept]
     lengths = np.diff(starts, append=starts[0] + knots[-1])
     shares = _shared_out(lengths, count)
-    at = [
+    at: list[Ring] = [
         start + length * np.arange(share) / share
         for start, length, share in zip(starts, lengths, shares, strict=True)
     ]

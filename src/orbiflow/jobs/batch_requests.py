@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from pathlib import Path, PurePath
 from typing import Any, ClassVar
 
 from orbiflow.jobs.density_requests import DensityFitRequest
-from orbiflow.jobs.records import RecordError
+from orbiflow.jobs.records import RecordError, field_names
 from orbiflow.jobs.request import Request, at_least_one
 from orbiflow.jobs.tile_requests import EscherizeRequest
 
@@ -33,7 +33,7 @@ class ManyRequest(Request):
 
     folder: Path
     out: Path = Path("batch")
-    each: dict[str, Any] = field(default_factory=dict)
+    each: dict[str, Any] = field(default_factory=dict[str, Any])
     match: str | None = None
     workers: int | None = None
     scheduler: str | None = None
@@ -116,5 +116,4 @@ def check_workers(request: Request) -> None:
 def settings_of(request: Request, without: tuple[str, ...]) -> dict[str, Any]:
     """Its fields as JSON has them, but for some: what decides the result besides the file."""
     document = request.to_json()
-    names = [field.name for field in fields(request)]  # type: ignore[arg-type]
-    return {name: document[name] for name in names if name not in without}
+    return {name: document[name] for name in field_names(request) if name not in without}

@@ -13,6 +13,7 @@ import signal
 import sys
 import threading
 import traceback
+from collections import deque
 from typing import TextIO
 
 from orbiflow.cancel import Cancel
@@ -46,11 +47,10 @@ def main() -> int:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides
     events = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)
-    last: Event | None = None
+    last: deque[Event] = deque(maxlen=1)
 
     def tell(event: Event) -> None:
-        nonlocal last
-        last = event
+        last.append(event)
         _write(events, event)
 
     try:
@@ -68,7 +68,7 @@ def main() -> int:
     except Exception as error:
         if not isinstance(error, OrbiflowError):
             traceback.print_exc()
-    return 0 if isinstance(last, Finished) else 1
+    return 0 if last and isinstance(last[0], Finished) else 1
 
 
 def _first_line() -> bytes:

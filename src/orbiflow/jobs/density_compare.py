@@ -247,7 +247,7 @@ def _csv(found: ModelComparison | DataComparison) -> str:
         rows = found.to_json()["differences"]
     else:
         rows = [{"figure": "p", "value": found.test.p, "error": None, "low": None, "high": None}]
-        divergence = found.to_json()["divergence"] or {}
+        divergence: dict[str, Any] = found.to_json()["divergence"] or {}
         rows += [{"figure": name, **estimate} for name, estimate in divergence.items()]
     text = io.StringIO()
     writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")

@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 
 from orbiflow.cancel import Cancel
@@ -41,7 +42,8 @@ def evaluated(
     if request.table:
         source = _tabulated(density, tell)
         log_prob = TabulatedDensity.log_prob
-    scores, slopes = [], []
+    scores: list[NDArray[np.float64]] = []
+    slopes: list[NDArray[np.float64]] = []
     for start in range(0, len(points), size):
         cancel.check()
         with torch.no_grad():

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from orbiflow.jobs.records import Record, kind_of
+from orbiflow.json_values import is_object
 
 
 class Event(Record):
@@ -175,5 +176,5 @@ def event_from_json(document: object) -> Event:
     """
     kind = kind_of(document, EVENTS, "event")
     assert issubclass(kind, Event)
-    assert isinstance(document, dict), reprlib.repr(document)
+    assert is_object(document), reprlib.repr(document)
     return kind.of_fields({name: value for name, value in document.items() if name != "kind"})

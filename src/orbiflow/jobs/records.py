@@ -14,9 +14,10 @@ from dataclasses import fields
 from functools import cache
 from numbers import Integral, Real
 from pathlib import Path
-from typing import Any, ClassVar, Literal, Self, Union
+from typing import Any, ClassVar, Literal, Self, TypeGuard, Union, cast
 
 from orbiflow.errors import OrbiflowError
+from orbiflow.json_values import is_object
 
 
 class RecordError(OrbiflowError):
@@ -71,7 +72,7 @@ class Record:
 
     def to_json(self) -> dict[str, Any]:
         """An object for `json.dumps`: `kind`, and each field by its name."""
-        values = {field.name: _plain(getattr(self, field.name)) for field in fields(self)}  # type: ignore[arg-type]
+        values = {name: _plain(getattr(self, name)) for name in field_names(self)}
         return {"kind": self.KIND, **values}
 
     @classmethod
@@ -102,7 +103,7 @@ def kind_of(document: object, kinds: Mapping[str, type[Record]], what: str) -> t
     Raises:
         RecordError: if it is none.
     """
-    if not isinstance(document, dict):
+    if not is_object(document):
         raise RecordError(f"a {what} is a JSON object, got {reprlib.repr(document)}")
     kind = document.get("kind")
     if not isinstance(kind, str) or kind not in kinds:
@@ -112,10 +113,15 @@ def kind_of(document: object, kinds: Mapping[str, type[Record]], what: str) -> t
     return kinds[kind]
 
 
+def field_names(record: Any) -> tuple[str, ...]:
+    """Of a record or a class of them: bases are no dataclasses, what is made of them is."""
+    return tuple(field.name for field in fields(record))
+
+
 @cache
 def _hints(cls: type[Record]) -> dict[str, Any]:
     hints = typing.get_type_hints(cls)
-    return {field.name: hints[field.name] for field in fields(cls)}  # type: ignore[arg-type]
+    return {name: hints[name] for name in field_names(cls)}
 
 
 def _alternatives(hint: Any) -> tuple[Any, ...]:
@@ -137,17 +143,17 @@ def _checked(value: Any, hint: Any) -> Any:
     if origin is Literal:
         return arguments[arguments.index(value)]
     if origin is tuple:
-        if not isinstance(value, list | tuple):
+        if not _is_sequence(value):
             raise TypeError
         return tuple(_checked(part, arguments[0]) for part in value)
     if origin is dict:
-        return json.loads(json.dumps(value, allow_nan=False)) if isinstance(value, dict) else _no()
+        return json.loads(json.dumps(value, allow_nan=False)) if is_object(value) else _no()
     return _scalar(value, hint)
 
 
 def _scalar(value: Any, hint: Any) -> Any:
     if hint is Path and isinstance(value, str | os.PathLike):
-        text = os.fspath(value)
+        text = cast(str, os.fspath(value))
         return Path(text) if text and "\0" not in text else _no()
     if hint is str and isinstance(value, str):
         return str(value)
@@ -174,7 +180,7 @@ def _described(hint: Any) -> str:
         Path: "a path",
         type(None): "nothing",
     }
-    parts = []
+    parts: list[str] = []
     for kind in _alternatives(hint):
         arguments = typing.get_args(kind)
         if typing.get_origin(kind) is Literal:
@@ -189,4 +195,12 @@ def _described(hint: Any) -> str:
 def _plain(value: Any) -> Any:
     if isinstance(value, Path):
         return str(value)
-    return [_plain(part) for part in value] if isinstance(value, tuple) else value
+    return [_plain(part) for part in value] if _is_tuple(value) else value
+
+
+def _is_tuple(value: object) -> TypeGuard[tuple[Any, ...]]:
+    return isinstance(value, tuple)
+
+
+def _is_sequence(value: object) -> TypeGuard[list[Any] | tuple[Any, ...]]:
+    return isinstance(value, list | tuple)

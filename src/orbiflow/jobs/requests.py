@@ -26,6 +26,7 @@ from orbiflow.jobs.tile_requests import (
     ExportRequest,
     PaperRequest,
 )
+from orbiflow.json_values import is_object
 
 REQUESTS: dict[str, type[Request]] = {
     kind.KIND: kind
@@ -65,7 +66,7 @@ def request_from_json(document: object) -> Request:
     """
     kind = kind_of(document, REQUESTS, "request")
     assert issubclass(kind, Request)
-    assert isinstance(document, dict)
+    assert is_object(document)
     version = document.get("schema_version")
     if version != SCHEMA_VERSION:
         raise RecordError(f"a request has schema_version {SCHEMA_VERSION}, got {version!r}")

@@ -101,8 +101,10 @@ class Elastic:
         shape = (len(self), len(self))
         self._w, self._rod_cost = pair_weights, rod_cost
         self._weights = scipy.sparse.csr_matrix((self._w, (self._i, self._j)), shape=shape)
-        self._sums = scipy.sparse.csr_matrix((self._w * self._d, (self._i, self._j)), shape=shape)
-        self._conjugate = self._sums.conjugate().tocsr()
+        self._sums: scipy.sparse.csr_matrix = scipy.sparse.csr_matrix(
+            (self._w * self._d, (self._i, self._j)), shape=shape
+        )
+        self._conjugate: scipy.sparse.csr_matrix = self._sums.conjugate().tocsr()
         self._own = np.asarray(self._sums.sum(axis=1)).ravel()
         self._own_conjugate = np.conj(self._own)
         self._solvers: dict[float, Array] = {}
@@ -165,14 +167,15 @@ class Elastic:
         turned = np.conj(self._d)[:, None] * (z[self._i] - z[self._j])
         curved = np.conj(self._curved)[:, None] * (self._rod @ z[:n])
         r = self.rotations(z)
-        for _ in range(REWEIGHTINGS):
-            misfits = self._relative(z, r)
+        misfits = self._relative(z, r)
+        for _ in range(REWEIGHTINGS - 1):
             weights = (self._w[:, None] / np.sqrt(1 + misfits[0])) * turned
             sums = self._gather @ weights
             sums[:n] += self._rod_cost[:, None] / np.sqrt(1 + misfits[1]) * curved
             before, r = r, sums / np.maximum(abs(sums), 1e-300)
             if abs(r - before).max() < 1e-9:
                 break
+            misfits = self._relative(z, r)
         return misfits
 
     def _relative(self, z: Complex, r: Complex) -> tuple[Array, Array]:
@@ -206,14 +209,14 @@ class Elastic:
 
     def displacement(self, z: Complex) -> Array:
         """(C,) mean squared distance from the best similar copy, in areas of the copy."""
-        copy, factor = self._copies(z)
+        copy, factor = self.copies(z)
         size = np.maximum(abs(factor) ** 2, 1e-12)
         return (abs(z - copy) ** 2).mean(axis=0) / size
 
     def forces(self, z: Complex) -> Complex:
         """What the rotations and the pose of shapes (N, C) pull towards: b of matrix z = b."""
         r = self.rotations(z)
-        copy, _ = self._copies(z)
+        copy, _ = self.copies(z)
         pull = r * self._own[:, None] + self._sums @ r
         bends = (self._rod_cost * self._curved)[:, None] * r[: self.size]
         pull[: self.size] += self._rod.T @ bends
@@ -269,7 +272,7 @@ class Elastic:
             self._solvers[mu] = solver
         return solver
 
-    def _copies(self, z: Complex) -> tuple[Complex, Complex]:
+    def copies(self, z: Complex) -> tuple[Complex, Complex]:
         """Best similar copies (N, C) of the body at rest, and the similarities' factors (C,)."""
         center = z.mean(axis=0)
         factor = best_similarity(self.rest, z)
@@ -278,7 +281,9 @@ class Elastic:
     def _pairs(self, stiff: Array | None) -> Any:
         triangles, count, n = self.mesh.triangles, len(self), self.size
         factors = self._salience()
-        rows, columns, values = [], [], []
+        rows: list[NDArray[np.int64]] = []
+        columns: list[NDArray[np.int64]] = []
+        values: list[Array] = []
         for k in range(3):
             i, j, apex = triangles[:, k], triangles[:, k - 2], triangles[:, k - 1]
             u = np.conj(self.rest[i] - self.rest[apex]) * (self.rest[j] - self.rest[apex])
@@ -364,19 +369,26 @@ def _times(matrix: Array, z: Complex) -> Complex:
 
 def _inverse(matrix: Array) -> Array:
     """Of a positive definite matrix, by Cholesky: a third of the work of a general one."""
-    factorize, invert = scipy.linalg.get_lapack_funcs(("potrf", "potri"), (matrix,))
+    functions: Any = scipy.linalg.get_lapack_funcs(("potrf", "potri"), (matrix,))
+    factorize, invert = functions
     factor, failed = factorize(matrix, lower=True)
     inverse, missing = invert(factor, lower=True)
     if failed or missing:
         raise OrbiflowError("the silhouette's stiffness has no inverse: is a part without width?")
-    return np.tril(inverse) + np.tril(inverse, -1).T
+    lower: Array = inverse
+    return np.tril(lower) + np.tril(lower, -1).T
 
 
 def _squares(z: Complex) -> Array:
     return z.real**2 + z.imag**2
 
 
-def _symmetric(rows: list, columns: list, values: list, count: int) -> scipy.sparse.csr_matrix:
-    i, j, v = (np.concatenate(parts) for parts in (rows, columns, values))
+def _symmetric(
+    rows: list[NDArray[np.int64]],
+    columns: list[NDArray[np.int64]],
+    values: list[Array],
+    count: int,
+) -> scipy.sparse.csr_matrix:
+    i, j, v = np.concatenate(rows), np.concatenate(columns), np.concatenate(values)
     both = (np.concatenate([v, v]), (np.concatenate([i, j]), np.concatenate([j, i])))
     return scipy.sparse.csr_matrix(both, shape=(count, count))

@@ -59,7 +59,7 @@ def faithfulness(silhouette: ArrayLike, shape: ArrayLike, *, mirror: bool = True
         for turn in turns
     ]
     rough.sort(key=lambda laying: -laying.iou)
-    found = []
+    found: list[tuple[float, Complex]] = []
     for laying in rough[:TRIED]:
         factor, middle, _ = overlaid(laying.ring, overlap, laying.turn)
         z = laid_on(body, plane_points(factor * laying.ring + middle))[:, None]
@@ -83,7 +83,7 @@ def _hands(ring: Array, *, mirror: bool) -> list[Complex]:
 
 def _ring(points: ArrayLike, what: str) -> Array:
     """(n, 2) counter-clockwise about the origin, of area 1."""
-    as_region(points, what)  # pyright: ignore[reportArgumentType]
+    as_region(points, what)
     ring = orient(numbers(points, what, ("N", 2)), counter_clockwise=True)
     return np.ascontiguousarray((ring - centroid(ring)) / np.sqrt(signed_area(ring)))
 

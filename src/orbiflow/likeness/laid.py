@@ -67,7 +67,8 @@ class _Slide(NamedTuple):
         sides = np.roll(self.ring, -1, axis=0) - self.ring
         unit = complex_points(sides / np.linalg.norm(sides, axis=1, keepdims=True))
         knots = arc_lengths(self.ring)
-        side = np.searchsorted(knots, self.at % knots[-1], side="right") - 1
+        at: Array = self.at % knots[-1]
+        side = np.searchsorted(knots, at, side="right") - 1
         return unit[np.clip(side, 0, len(unit) - 1)]
 
 
@@ -117,7 +118,7 @@ def _step(body: Elastic, slide: _Slide, z: Complex) -> tuple[_Slide, Complex]:
 
 def _objective(body: Elastic, z: Complex) -> float:
     """What the steps lower: the energy and the pose's."""
-    copy, _ = body._copies(z)
+    copy, _ = body.copies(z)
     return float(body.energy(z)[0] + body.stiffness.pose * (abs(z - copy) ** 2).mean())
 
 

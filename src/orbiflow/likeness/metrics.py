@@ -14,6 +14,7 @@ from shapely.geometry import MultiPolygon, Polygon, box
 from orbiflow.arguments import numbers
 from orbiflow.errors import OrbiflowError
 from orbiflow.likeness.hausdorff import TOLERANCE, hausdorff_distance
+from orbiflow.typed_shapely import ufuncs
 
 WINDOW_MARGIN = 0.10
 
@@ -145,7 +146,7 @@ def _pixel_accuracy(a: Region, b: Region, window: Region) -> float:
 
 
 def _hausdorff(a: Region, b: Region) -> float:
-    xmin, ymin, xmax, ymax = shapely.total_bounds([a, b])
+    xmin, ymin, xmax, ymax = ufuncs.total_bounds([a, b])
     return hausdorff_distance(
         _edges(a), _edges(b), tolerance=TOLERANCE * float(np.hypot(xmax - xmin, ymax - ymin))
     )

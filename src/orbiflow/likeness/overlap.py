@@ -11,6 +11,7 @@ from orbiflow.arguments import numbers
 from orbiflow.errors import OrbiflowError
 from orbiflow.geometry import complex_points, plane_points, signed_area
 from orbiflow.symmetry.isometry import Array
+from orbiflow.typed_shapely import ufuncs
 
 MANY, COARSE = 1500, 2e-3
 """Vertices beyond which a region is simplified, and by how much of its size (area 1)."""
@@ -39,8 +40,8 @@ def boundary_iou(goal: shapely.Polygon, boundaries: Array) -> Array:
     polygons = np.asarray(shapely.polygons(boundaries))
     good = np.asarray(shapely.is_valid(polygons))
     scores = np.full(len(polygons), -1.0)
-    common = shapely.area(shapely.intersection(polygons[good], goal))
-    scores[good] = common / (shapely.area(polygons[good]) + goal.area - common)
+    common = ufuncs.area(shapely.intersection(polygons[good], goal))
+    scores[good] = common / (ufuncs.area(polygons[good]) + goal.area - common)
     return scores
 
 
@@ -89,10 +90,10 @@ class Overlap:
         pieces, owner = shapely.get_parts(
             shapely.intersection(lines, self.region), return_index=True
         )
-        lengths = shapely.length(pieces)
+        lengths = ufuncs.length(pieces)
         pieces, owner = pieces[lengths > 0], owner[lengths > 0]  # not where they only touch
         first, last = (
-            shapely.get_coordinates(shapely.get_point(pieces, index)) for index in (0, -1)
+            shapely.get_coordinates(ufuncs.get_point(pieces, index)) for index in (0, -1)
         )
         square = np.maximum((sides**2).sum(axis=1), 1e-300)[owner]
         start, stop = (

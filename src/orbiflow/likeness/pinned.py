@@ -17,6 +17,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -99,11 +100,12 @@ class Pinned(Elastic):
         The root of the mean squared distance after the best similarity over that from the part's
         middle (Procrustes); None if no part has three points of the outline.
         """
-        found = []
+        found: list[float] = []
         for part in self.parts:
             index = part.index[part.index < self.size]
             if len(index) >= FEWEST:
-                rest, bent = (z[index] - z[index].mean() for z in (self.rest, outline))
+                rest: Complex = self.rest[index] - self.rest[index].mean()
+                bent: Complex = outline[index] - outline[index].mean()
                 sizes = np.vdot(rest, rest).real * np.vdot(bent, bent).real
                 found.append(np.sqrt(max(0.0, 1 - abs(np.vdot(rest, bent)) ** 2 / sizes)))
         return float(max(found)) if found else None
@@ -227,7 +229,7 @@ class _Part:
         return self.weight * apart + self.stays * abs(a - goal) ** 2
 
 
-def _complex(array: NDArray) -> Complex:
+def _complex(array: NDArray[Any]) -> Complex:
     return np.asarray(array, dtype=np.complex128)
 
 

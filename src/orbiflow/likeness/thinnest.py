@@ -9,6 +9,7 @@ the segment outside.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -20,6 +21,7 @@ from scipy.spatial import KDTree
 from orbiflow.arguments import number, numbers
 from orbiflow.errors import OrbiflowError
 from orbiflow.geometry import arc_lengths, orient, polygons_in, ring_length
+from orbiflow.typed_shapely import ufuncs
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -93,7 +95,7 @@ def least_neck(silhouette: ArrayLike, min_neck: float) -> float:
         return 0.0
     _, polygon = _checked(silhouette)
     # a photo's outline may have 20,000 vertices, whose pairs fill gigabytes
-    plain = shapely.simplify(polygon, COARSE * np.sqrt(polygon.area))
+    plain = shapely.simplify(polygon, COARSE * math.sqrt(polygon.area))
     ring = shapely.get_coordinates(plain.exterior)[:-1]
     return max(min_neck, min(PINCHED * narrowest_neck(ring).share, SOUND))
 
@@ -115,9 +117,9 @@ def narrowest_neck(ring: ArrayLike) -> Thinnest:
     (0.5, 0.25)
     """
     points, polygon = _checked(ring)
-    size = np.sqrt(polygon.area)
+    size = math.sqrt(polygon.area)
     shapely.prepare(polygon)
-    found = _facing(orient(points), size, lambda lines: shapely.contains_properly(polygon, lines))
+    found = _facing(orient(points), size, lambda lines: ufuncs.contains_properly(polygon, lines))
     if found is not None:
         return found
     radius = shapely.maximum_inscribed_circle(polygon, tolerance=1e-4 * size)
@@ -134,8 +136,8 @@ def narrowest_slit(ring: ArrayLike) -> Thinnest | None:
     points, polygon = _checked(ring)
     shapely.prepare(polygon)
     outside = orient(points, counter_clockwise=False)
-    size = np.sqrt(polygon.area)
-    return _facing(outside, size, lambda lines: ~shapely.intersects(polygon, lines))
+    size = math.sqrt(polygon.area)
+    return _facing(outside, size, lambda lines: ~ufuncs.intersects(polygon, lines))
 
 
 def hair_share(ring: ArrayLike, width: float) -> float:
@@ -200,7 +202,7 @@ def _dense(ring: Array, step: float) -> Array:
     after = np.roll(ring, -1, axis=0)
     pieces = np.maximum(np.ceil(np.linalg.norm(after - ring, axis=1) / step), 1).astype(int)
     start = np.repeat(np.cumsum(pieces) - pieces, pieces)
-    share = (np.arange(pieces.sum()) - start) / np.repeat(pieces, pieces)
+    share = (np.arange(len(start)) - start) / np.repeat(pieces, pieces)
     return np.repeat(ring, pieces, axis=0) + share[:, None] * np.repeat(
         after - ring, pieces, axis=0
     )
@@ -273,12 +275,10 @@ def _thin_share(
     opened = eroded.buffer(width / 2 * (1 + SLACK), quad_segs=ROUND)
     parts = polygons_in(region.difference(opened))
     lines = shapely.get_parts(polygon.exterior.difference(opened))
-    lengths = shapely.length(lines)
+    lengths = ufuncs.length(lines)
     lines, lengths = lines[lengths > 0], lengths[lengths > 0]
     if not parts or not len(lines):
         return 0.0
-    own = shapely.STRtree(parts).nearest(
-        shapely.line_interpolate_point(lines, 0.5, normalized=True)
-    )
+    own = shapely.STRtree(parts).nearest(ufuncs.line_interpolate_point(lines, 0.5, normalized=True))
     totals = np.bincount(own, lengths)
     return float(totals[totals > FAR * width].sum() / polygon.exterior.length)

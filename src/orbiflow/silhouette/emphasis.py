@@ -107,7 +107,7 @@ class Emphasis:
         Bilinear between the centres of the mask's pixels; beyond the box it fades to 1 within
         0.05. Raises `OrbiflowError` for points of another shape or that are not finite.
         """
-        return 1 + (self.strength - 1) * self._level(points)
+        return 1 + (self.strength - 1) * self.level(points)
 
     def image(self, center: ArrayLike, reach: float, resolution: int) -> NDArray[np.float64]:
         """Weights at the pixel centres of a square, (resolution, resolution), row 0 at least y.
@@ -117,7 +117,7 @@ class Emphasis:
         (2 i + 1) / resolution - 1).
         """
         axis = reach * ((np.arange(resolution) + 0.5) / resolution * 2 - 1)
-        x0, y0 = np.asarray(center, dtype=np.float64)
+        x0, y0 = (float(c) for c in np.asarray(center, dtype=np.float64))
         return self.weight(np.stack(np.meshgrid(x0 + axis, y0 + axis), axis=-1))
 
     def report(self) -> dict[str, Any]:
@@ -129,7 +129,7 @@ class Emphasis:
             "notes": list(self.notes),
         }
 
-    def _level(self, points: ArrayLike) -> NDArray[np.float64]:
+    def level(self, points: ArrayLike) -> NDArray[np.float64]:
         at = np.asarray(points, dtype=np.float64)
         if at.ndim == 0 or at.shape[-1] != 2 or not np.isfinite(at).all():
             raise OrbiflowError(
@@ -177,8 +177,8 @@ def _grid(points: NDArray[np.float64]) -> NDArray[np.float64]:
     """Centres (GRID^2, 2) of the pixels of the box around `points`."""
     low, high = points.min(axis=0), points.max(axis=0)
     steps = (np.arange(GRID) + 0.5) / GRID
-    x, y = (low[i] + (high[i] - low[i]) * steps for i in range(2))
-    return np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    along: list[NDArray[np.float64]] = [low[i] + (high[i] - low[i]) * steps for i in range(2)]
+    return np.stack(np.meshgrid(*along), axis=-1).reshape(-1, 2)
 
 
 def _contains(ring: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -239,8 +239,8 @@ def _share_of(emphasis: Emphasis, target: Target) -> float:
     """Mean emphasis of the silhouette; an error where the mask does not touch it."""
     ring = target.normal
     points = _grid(ring)
-    levels = emphasis._level(points[_contains(ring, points)])
-    on_outline = emphasis._level(ring)
+    levels = emphasis.level(points[_contains(ring, points)])
+    on_outline = emphasis.level(ring)
     if max(levels.max(initial=0), on_outline.max()) < TOUCH:
         raise InputFileError(
             f"{emphasis.source}: the light (or opaque) part of the mask does not touch the "
@@ -250,7 +250,7 @@ def _share_of(emphasis: Emphasis, target: Target) -> float:
 
 
 def _warnings(levels: NDArray[np.float64], share: float, strength: float) -> list[str]:
-    notes = []
+    notes: list[str] = []
     lightest = float(levels.max())
     if lightest < 0.9:
         weight = 1 + (strength - 1) * lightest

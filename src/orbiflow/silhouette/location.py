@@ -8,6 +8,8 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from orbiflow.typed_shapely import ufuncs
+
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
@@ -44,6 +46,6 @@ class Locator:
         outside = np.flatnonzero(found < 0)
         if len(outside):
             found[outside] = self._tree.nearest(where[outside])
-            lines = shapely.shortest_line(self._tree.geometries[found[outside]], where[outside])
+            lines = ufuncs.shortest_line(self._tree.geometries[found[outside]], where[outside])
             nearest[outside] = shapely.get_coordinates(lines)[::2]
         return Located(found, nearest)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial import Delaunay
 
 from orbiflow.errors import OrbiflowError
+from orbiflow.typed_shapely import ufuncs
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -76,7 +77,7 @@ def triangulate(ring: Array, spacing: float | None = None) -> Mesh:
         extra = np.concatenate([extra, at + middle[:, None] * (after - at)])
         own_side = np.concatenate([own_side, sides[missing]])
         own_share = np.concatenate([own_share, middle])
-        near = shapely.distance(shapely.points(inside), shapely.MultiPoint(extra))
+        near = ufuncs.distance(ufuncs.points(inside), shapely.MultiPoint(extra))
         inside = inside[near > spacing / 4]
         old = ends[missing]
         halves = np.concatenate([np.stack([old[:, 0], fresh], 1), np.stack([fresh, old[:, 1]], 1)])
@@ -94,7 +95,7 @@ def triangulate(ring: Array, spacing: float | None = None) -> Mesh:
 def _inside(polygon: shapely.Polygon, spacing: float) -> Array:
     """Points inside on triangular grids, the farther from the outline the wider."""
     xmin, ymin, xmax, ymax = polygon.bounds
-    found = []
+    found: list[Array] = []
     for level, (least, most) in enumerate(((0.6, 1.7), (1.7, 4.5), (4.5, np.inf))):
         step = spacing * 2**level
         x = np.arange(xmin, xmax + step, step)
@@ -102,8 +103,8 @@ def _inside(polygon: shapely.Polygon, spacing: float) -> Array:
         grid = np.stack(np.meshgrid(x, y), axis=-1)
         grid[1::2, :, 0] += step / 2
         points = grid.reshape(-1, 2)
-        points = points[shapely.contains_xy(polygon, points[:, 0], points[:, 1])]
-        depth = shapely.distance(shapely.points(points), polygon.exterior) / spacing
+        points = points[ufuncs.contains_xy(polygon, points[:, 0], points[:, 1])]
+        depth = ufuncs.distance(ufuncs.points(points), polygon.exterior) / spacing
         found.append(points[(depth >= least) & (depth < most)])
     return np.concatenate(found)
 
@@ -124,7 +125,7 @@ def _kept(mesh: Mesh, polygon: shapely.Polygon) -> Mesh:
     u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     area = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
     triangles = np.where((area < 0)[:, None], mesh.triangles[:, ::-1], mesh.triangles)
-    inside = shapely.contains_xy(polygon, *middle.T)
+    inside = ufuncs.contains_xy(polygon, *middle.T)
     flat = abs(area) < FLAT * polygon.area
     triangles = _without_flat(triangles[inside & ~flat], mesh.triangles[flat])
     used = np.zeros(len(mesh.points), dtype=bool)

@@ -97,7 +97,7 @@ def _check_region(ring: NDArray[np.float64], where: str, error: type[OrbiflowErr
             f"of {_pair(low)}; move it nearer the origin or enlarge it"
         )
     # In units of the box, so that neither a huge nor a tiny shape strains the predicates.
-    local = (ring - low) / size
+    local: NDArray[np.float64] = (ring - low) / size
     polygon = Polygon(np.round(local, CLEARANCE_DIGITS))
     if polygon.convex_hull.area < MIN_RELATIVE_AREA:
         raise error(f"{where}: the polygon encloses no area, its vertices all lie on one line")
@@ -157,7 +157,7 @@ def outer_outline(geometry: BaseGeometry) -> tuple[Polygon, list[str]]:
     components = polygons_in(geometry)
     solid = polygons_in(shapely.unary_union([filled(part) for part in components]))
     shape = filled(max(solid, key=lambda part: part.area))
-    notes = []
+    notes: list[str] = []
     if len(solid) > 1:
         share = shape.area / sum(part.area for part in solid)
         notes.append(

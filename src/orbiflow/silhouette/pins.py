@@ -144,7 +144,9 @@ class Pins:
         held = self.holds(points)
         pairs = np.concatenate([triangles[:, [k - 1, k]] for k in range(3)])
         pairs = pairs[held[pairs].all(axis=1)]
-        links = scipy.sparse.coo_matrix((np.ones(len(pairs)), pairs.T), shape=(len(held),) * 2)
+        links = scipy.sparse.coo_matrix(
+            (np.ones(len(pairs)), pairs.T), shape=(len(held), len(held))
+        )
         _, label = scipy.sparse.csgraph.connected_components(links, directed=False)
         return [np.flatnonzero((label == k) & held) for k in np.unique(label[held])]
 

@@ -119,7 +119,7 @@ def with_corners(ring: Array, corners: list[int], count: int, phase: float = 0.0
     """
     along = arc_lengths(ring)
     total = along[-1]
-    at = along[corners] / total * count - phase
+    at: Array = along[corners] / total * count - phase
     index = np.round(at).astype(int)
     order = np.argsort(index % count, kind="stable")
     slots, first = np.unique((index % count)[order], return_index=True)

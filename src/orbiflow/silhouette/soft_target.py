@@ -12,6 +12,7 @@ from torch import Tensor
 from orbiflow.arguments import instance, number, whole
 from orbiflow.silhouette.emphasis import Emphasis
 from orbiflow.silhouette.target import Target
+from orbiflow.typed_shapely import ufuncs
 
 PIECES = 8
 """Of each side of a ring, in integrals along it."""
@@ -43,10 +44,10 @@ class SoftTarget:
         low, high = target.normal.min(axis=0) - margin, target.normal.max(axis=0) + margin
         center, self.reach = (low + high) / 2, float((high - low).max() / 2)
         axis = self.reach * ((np.arange(resolution) + 0.5) / resolution * 2 - 1)
-        x, y = np.meshgrid(center[0] + axis, center[1] + axis)
+        x, y = np.meshgrid(float(center[0]) + axis, float(center[1]) + axis)
         region = shapely.Polygon(target.normal)
         shapely.prepare(region)
-        inside = shapely.contains_xy(region, x.ravel(), y.ravel()).reshape(x.shape)
+        inside = ufuncs.contains_xy(region, x.ravel(), y.ravel()).reshape(x.shape)
         # half a pixel: the boundary runs between pixel centres
         steps = np.where(
             inside,

@@ -9,7 +9,7 @@ from typing import IO, Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from orbiflow.arguments import described
+from orbiflow.arguments import described, is_a
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.geometry import centroid, orient, signed_area
 from orbiflow.silhouette.frame import Frame
@@ -87,7 +87,7 @@ class Target:
         >>> Target.from_bytes(b"[[0, 0], [2, 0], [2, 2], [0, 2]]").kind
         'json'
         """
-        if not isinstance(data, bytes | bytearray | memoryview):
+        if not is_a(data, bytes | bytearray | memoryview):
             raise OrbiflowError(
                 f"data must be bytes, got {described(data)}; Target.read takes paths"
             )

@@ -9,6 +9,7 @@ from scipy.spatial import Voronoi
 
 from orbiflow.geometry import subdivided
 from orbiflow.silhouette.mesh import Mesh
+from orbiflow.typed_shapely import ufuncs
 
 Array = NDArray[np.float64]
 
@@ -36,10 +37,10 @@ def local_thickness(mesh: Mesh) -> Array:
     middle = corners.mean(axis=1)
     outline = polygon.exterior
     shapely.prepare(outline)
-    own = np.asarray(shapely.distance(shapely.points(middle), outline))
+    own = ufuncs.distance(ufuncs.points(middle), outline)
     if not len(centers):
         return own
-    radius = np.asarray(shapely.distance(shapely.points(centers), outline))
+    radius = ufuncs.distance(ufuncs.points(centers), outline)
     found = own.copy()
     for start in range(0, len(middle), 512):  # bounds the memory
         part = middle[start : start + 512]

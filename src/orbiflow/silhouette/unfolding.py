@@ -117,7 +117,7 @@ class _Distortion:
 
     def value(self, x: Array) -> tuple[float, Array]:
         j = self._jacobians(x)
-        det = np.linalg.det(j)
+        det: Array = np.linalg.det(j)
         root = np.sqrt(det**2 + self.epsilon**2)
         # (det + root) / 2 without cancellation
         bounded = np.where(det > 0, det + root, self.epsilon**2 / (root + abs(det))) / 2

@@ -12,7 +12,8 @@ from torch import Tensor
 
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry.group import CrystallographicGroup, checked_group
-from orbiflow.symmetry.isometry import Isometry, translation
+from orbiflow.symmetry.isometry import Array, Isometry, translation
+from orbiflow.typed_torch import listed
 
 Kind = Literal["field", "map", "invariant"]
 
@@ -103,7 +104,7 @@ def _failure(
     law = {"field": "V(g p) = R_g V(p)", "map": "D(g p) = g D(p)", "invariant": "f(g p) = f(p)"}
     return EquivarianceError(
         f"{law[kind]} fails for {group!r}, worst in coset {number} of {group.order}, g = "
-        f"{element!r}: off by {error:.1e} at p = {at.tolist()}, {allowed:.1e} allowed",
+        f"{element!r}: off by {error:.1e} at p = {listed(at)}, {allowed:.1e} allowed",
         element,
         error,
     )
@@ -114,7 +115,9 @@ def _elements(
 ) -> Iterator[tuple[int, Isometry]]:
     """Each coset's number from 1 with: its representative, and some of it in other cells."""
     d = group.dim
-    steps = [np.array(s) for s in itertools.product((-cells, 0, cells), repeat=d) if any(s)]
+    steps: list[Array] = [
+        np.array(s) for s in itertools.product((-cells, 0, cells), repeat=d) if any(s)
+    ]
     if len(steps) > 8:  # dimensions above two: a sample
         chosen = np.random.default_rng(seed).choice(len(steps), 8, replace=False)
         steps = [steps[i] for i in chosen]

@@ -81,7 +81,7 @@ class CrystallographicGroup:
         4
         """
         basis = checked_lattice(lattice)
-        reduced = []
+        reduced: list[Isometry] = []
         for number, generator in enumerate(generators):
             _check_maps_lattice(basis, generator, number)
             reduced.append(_reduce_translation(basis, generator))
@@ -206,7 +206,7 @@ class CrystallographicGroup:
         reach = radius * np.linalg.norm(self.inverse_lattice, axis=1)
         for coset in self.cosets:
             middle = self.inverse_lattice @ (center - coset(source))
-            ranges = [
+            ranges: list[Array] = [
                 np.arange(np.ceil(m - r), np.floor(m + r) + 1)
                 for m, r in zip(middle, reach, strict=True)
             ]
@@ -239,7 +239,7 @@ class CrystallographicGroup:
             )
         basis = checked_lattice(m @ self.lattice)
         inverse = np.linalg.inv(m)
-        cosets = []
+        cosets: list[Isometry] = []
         for g in self.cosets:
             rotated = m @ g.linear @ inverse
             cosets.append(Isometry(rotated, m @ g.translation + v - rotated @ v))

@@ -9,6 +9,7 @@ import numpy as np
 import torch
 from numpy.typing import ArrayLike, NDArray
 
+from orbiflow.arguments import is_a
 from orbiflow.errors import GroupError, NotAnIsometryError
 
 Array: TypeAlias = NDArray[Any]
@@ -110,7 +111,7 @@ class Isometry:
 
     def __matmul__(self, other: Isometry) -> Isometry:
         """Composition: `(g @ h)(p) == g(h(p))`."""
-        if not isinstance(other, Isometry):
+        if not is_a(other, Isometry):
             return NotImplemented
         if other.dim != self.dim:
             raise GroupError(f"cannot compose isometries of R^{self.dim} and R^{other.dim}")

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from orbiflow.arguments import instance
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import CrystallographicGroup, Isometry
+from orbiflow.symmetry.isometry import Array
 from orbiflow.tilings.stabiliser import Stabiliser
 
 Integers: TypeAlias = NDArray[np.int64]
@@ -120,5 +121,6 @@ def coset_and_cell(group: CrystallographicGroup, element: Isometry) -> tuple[int
     coset = int(error.argmin())
     if error[coset] > 1e-6:
         raise OrbiflowError(f"{element!r} is not an element of {group!r}")
-    first, second = np.round(steps[coset]).astype(int)
+    nearest: Array = steps[coset]
+    first, second = np.round(nearest).astype(int)
     return coset, (int(first), int(second))

@@ -24,6 +24,7 @@ from orbiflow.tilings.neighbours import touching
 from orbiflow.tilings.prototile import Prototile
 from orbiflow.tilings.tile import Tiles, as_tiling
 from orbiflow.tilings.tiling import Tiling
+from orbiflow.typed_shapely import ufuncs
 
 EdgeMatching: TypeAlias = Literal["segments", "curves", "none"]
 
@@ -84,8 +85,8 @@ class Certificate:
             value = getattr(self, item.name)
             if isinstance(value, float) and not math.isfinite(value):
                 value = None
-            values[item.name] = list(value) if isinstance(value, tuple) else value
-        return values
+            values[item.name] = value
+        return {**values, "reasons": list(self.reasons)}
 
     def require(self) -> None:
         """Do nothing if the tile is valid.
@@ -176,7 +177,7 @@ class _Figures:
     ) -> Certificate:
         """Args: areas: (K, 3) overlap, total overlap and uncovered area of each prototile."""
         overlap, total, uncovered = (float(x) for x in areas.max(axis=0))
-        reasons = []
+        reasons: list[str] = []
         if not self.error <= self.tolerance:
             reasons.append(self._area_reason())
         if not mismatch <= self.tolerance:
@@ -233,11 +234,11 @@ def _edge_mismatch(
 def _areas(around: Surroundings) -> tuple[float, float, float]:
     """Largest and total overlap with the other tiles, and uncovered area in a ring around."""
     polygon = shapely.Polygon(around.ring)
-    images = np.asarray(shapely.polygons(around.rings))
+    images = ufuncs.polygons(around.rings)
     region = shapely.buffer(polygon, _MARGIN, quad_segs=2)
     shapely.prepare(region)
     images = images[shapely.intersects(region, images)]
-    common = shapely.area(shapely.intersection(polygon, images, grid_size=_GRID))
+    common = ufuncs.area(shapely.intersection(polygon, images, grid_size=_GRID))
     covered = shapely.union_all([polygon, *images], grid_size=_GRID)
-    uncovered = shapely.area(shapely.difference(region, covered, grid_size=_GRID))
+    uncovered = ufuncs.area(shapely.difference(region, covered, grid_size=_GRID))
     return float(common.max(initial=0.0)), float(common.sum()), float(uncovered)

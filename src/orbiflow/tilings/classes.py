@@ -6,7 +6,7 @@ import math
 import re
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple, overload
 
 import numpy as np
 import torch
@@ -84,7 +84,11 @@ class IsohedralClass:
         """Number of parameters of the lattice freedom: 2, 1 or 0 (`commutant` of the point group)."""
         return len(self._freedom)
 
-    def template(self, shape: Points | None = None) -> Points:
+    @overload
+    def template(self, shape: None = None) -> Array: ...
+    @overload
+    def template(self, shape: Points) -> Points: ...
+    def template(self, shape: Any = None) -> Any:
         """Vertices (..., K, 2) of the template, counter-clockwise.
 
         Args:
@@ -95,7 +99,7 @@ class IsohedralClass:
             OrbiflowError: if the last axis of `shape` is not `shape_dim` long.
         """
         if shape is None:
-            return self._default.copy()  # pyright: ignore[reportReturnType]
+            return self._default.copy()
         tensor = self._parameters(shape, self.shape_dim, "shape")
         return _same_kind(template_vertices(self.row.template, tensor), shape)
 
@@ -184,7 +188,7 @@ class IsohedralClass:
 def _same_kind(result: torch.Tensor, like: Points) -> Points:
     if isinstance(like, torch.Tensor):
         return result
-    return result.numpy().copy()  # pyright: ignore[reportReturnType]
+    return result.numpy().copy()
 
 
 CLASSES: dict[str, IsohedralClass] = {

@@ -111,8 +111,8 @@ def _links(tiling: Tiling) -> _Links:
     shared = [neighbours(tiling, k).edge for k in range(len(tiling.prototiles))]
     links: _Links = []
     for k, coset in zip(table.prototiles, table.cosets, strict=True):
-        g = group.cosets[coset]
-        found = [table.find(group, g @ near, near.prototile) for near in shared[k]]
+        g = group.cosets[int(coset)]
+        found = [table.find(group, g @ near, near.prototile) for near in shared[int(k)]]
         links.append([(aspect, cell) for aspect, cell, _ in found])
     return links
 

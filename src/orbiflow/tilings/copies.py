@@ -131,7 +131,7 @@ class Copies:
             mine = np.flatnonzero(self.prototiles == source)
             own = np.flatnonzero(table.prototiles == source)
             found = [
-                table.find(self.group, self.group.cosets[c] @ element, prototile_of(element))
+                table.find(self.group, self.group.cosets[int(c)] @ element, prototile_of(element))
                 for c in table.cosets[own]
             ]
             place = np.searchsorted(own, self.aspects[mine])

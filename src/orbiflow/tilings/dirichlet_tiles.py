@@ -74,7 +74,7 @@ def _cell(group: CrystallographicGroup, points: Array, k: int, same: float) -> A
     # no point of the cell is further from the site than half the two shortest lattice vectors
     # together, and what bounds the cell no further than twice that
     reach = 1.01 * float(np.linalg.norm(reduced_basis(group.lattice), axis=0).sum())
-    images = []
+    images: list[Array] = []
     for number, point in enumerate(points):
         found = [g(point) - site for g in group.elements_near(site, reach, source=point)]
         if number != k and found and float(np.linalg.norm(found[0])) < same:
@@ -87,7 +87,7 @@ def _cell(group: CrystallographicGroup, points: Array, k: int, same: float) -> A
     pairs = KDTree(others).query_pairs(same, output_type="ndarray")
     sites = np.concatenate([np.zeros((1, 2)), np.delete(others, pairs[:, 1], axis=0)])
     cell = Voronoi(sites)
-    region = cell.regions[cell.point_region[0]]
+    region = cell.regions[int(cell.point_region[0])]
     corners = cell.vertices[region]
     corners = corners[np.argsort(np.arctan2(corners[:, 1], corners[:, 0]))]
     # Qhull divides a vertex of four and more cells into several, rounding apart

@@ -49,13 +49,14 @@ def edge_classes(own: Edges) -> tuple[EdgeClass, ...]:
     """
     links = _links(own)
     found: dict[int, EdgeImage] = {}
-    classes = []
+    classes: list[EdgeClass] = []
     for edge in range(len(own)):
         if edge in found:
             continue
         found[edge] = EdgeImage(edge, identity(2), reversed=False)
         folds: dict[tuple[int, bool], EdgeImage] = {}
-        members, waiting = [], deque([edge])
+        members: list[EdgeImage] = []
+        waiting = deque([edge])
         while waiting:
             here = waiting.popleft()
             for link in links[here]:

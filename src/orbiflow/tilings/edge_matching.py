@@ -88,9 +88,9 @@ def _orbits(tiling: Tiling, first: Integers) -> Integers | None:
 
     None where vertices are not taken to vertices.
     """
-    labels = []
+    labels: list[Integers] = []
     for start, own in zip(first, tiling.stabilisers, strict=True):
-        images = []
+        images: list[Integers] = []
         for element, order in zip(own.elements, own.orders, strict=True):
             if order is None:
                 return None

@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
-from orbiflow.symmetry.isometry import Array
+from orbiflow.symmetry.isometry import Array, Isometry
 from orbiflow.tilings.edges import TOLERANCE
 from orbiflow.tilings.images import Surroundings, surroundings
 from orbiflow.tilings.prototile import Prototile
 from orbiflow.tilings.tile import Tiles, as_tiling
 from orbiflow.tilings.tiling import Tiling
+from orbiflow.typed_shapely import ufuncs
 
 
 def edge_to_edge(tile: Tiles) -> Tiling:
@@ -41,13 +42,13 @@ def _with_vertices(tiling: Tiling, k: int) -> Prototile:
         [_back(around, own, tiling), *(s(ring) for s in _symmetries(tiling, k))]
     )
     reach = TOLERANCE * float(np.sqrt(tiling.tile_area))
-    line = shapely.linearrings(ring)
+    line = shapely.LinearRing(ring)
     points = points[shapely.dwithin(line, shapely.points(points), reach)]
     near = np.linalg.norm(points[:, None] - ring, axis=2).min(axis=1, initial=np.inf)
     points = points[near > 2 * reach]
     if not len(points):
         return own
-    along = np.asarray(shapely.line_locate_point(line, shapely.points(points)))
+    along = ufuncs.line_locate_point(line, ufuncs.points(points))
     order = np.argsort(along)
     fresh = np.diff(along[order], prepend=-np.inf) > 2 * reach
     points, along = points[order][fresh], along[order][fresh]
@@ -63,5 +64,5 @@ def _back(around: Surroundings, own: Prototile, tiling: Tiling) -> Array:
     return around.points * np.sqrt(tiling.tile_area) + own.center
 
 
-def _symmetries(tiling: Tiling, k: int) -> list:
+def _symmetries(tiling: Tiling, k: int) -> list[Isometry]:
     return list(tiling.stabilisers[k].elements[1:])

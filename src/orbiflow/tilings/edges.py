@@ -95,7 +95,10 @@ def edges(tile: Tiles) -> Edges:
     _require_match(tiling, matches)
     begins = [_begins(tiling, a, match) for a, match in zip(around, matches, strict=True)]
     first = np.cumsum([0] + [len(b) for b in begins])
-    owners, starts, across, partners = [], [], [], []
+    owners: list[int] = []
+    starts: list[int] = []
+    across: list[Placed] = []
+    partners: list[int] = []
     for k in numbers:
         match, near = matches[k], around[k].copies
         for segment in begins[k]:
@@ -145,7 +148,7 @@ def _edge_of(begins: Integers, segment: int) -> int:
 
 def _turned(tiling: Tiling, k: int, begins: Integers, first: Integers) -> Integers:
     own = tiling.stabilisers[k]
-    turned = np.tile(np.arange(first[-1]), (own.order, 1))
+    turned = np.tile(np.arange(int(first[-1])), (own.order, 1))
     for row, element, order in zip(turned, own.elements, own.orders, strict=True):
         assert order is not None
         # a segment read backwards begins where its end is taken
@@ -175,7 +178,7 @@ def _mutual(own: Edges) -> Edges:
         done[edge] = True
         if not len(choice):
             continue  # it has more images in its own tile than its partner has
-        by = own.tiling.stabilisers[there].elements[choice[0]].inverse()
+        by = own.tiling.stabilisers[there].elements[int(choice[0])].inverse()
         element, partner = across[edge] @ by, int(images[choice[0]])
         across[edge] = Placed(element.linear, element.translation, there)
         partners[edge] = partner

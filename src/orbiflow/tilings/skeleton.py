@@ -64,7 +64,7 @@ def _vertices(own: Edges, beyond: Beyond) -> Integers:
     """(M, E) number of the vertex in which edge k of each copy starts."""
     count, sides = beyond.copy.shape
     following = np.array(own.following)
-    links = []
+    links: list[Integers] = []
     for k, (partner, element) in enumerate(zip(own.partners, own.across, strict=True)):
         copy = np.flatnonzero(beyond.copy[:, k] >= 0)
         there, turn = beyond.copy[copy, k], beyond.turn[copy, k]
@@ -72,7 +72,8 @@ def _vertices(own: Edges, beyond: Beyond) -> Integers:
         mate = own.turned[element.prototile][turn, partner]
         symmetries = own.tiling.stabilisers[element.prototile].elements
         signs = np.array([s.determinant for s in symmetries])[turn] * element.determinant
-        begin, end = there * sides + mate, there * sides + following[mate]
+        begin: Integers = there * sides + mate
+        end: Integers = there * sides + following[mate]
         start = np.where(signs > 0, end, begin)
         stop = np.where(signs > 0, begin, end)
         links.append(np.stack([copy * sides + k, start]))

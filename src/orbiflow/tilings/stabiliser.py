@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from orbiflow.symmetry import CrystallographicGroup, Isometry
 from orbiflow.symmetry.isometry import Array
+from orbiflow.typed_shapely import ufuncs
 
 TOLERANCE = 1e-5
 """How far a polygon may be from symmetric and still be meant so, in square roots of |det B| / |G|.
@@ -71,7 +72,7 @@ def _near_center(group: CrystallographicGroup, ring: Array, reach: float) -> lis
     ahead = np.roll(ring, -1, axis=0)
     lengths = np.linalg.norm(ahead - ring, axis=1)
     center = lengths @ (ring + ahead) / (2 * lengths.sum())
-    away = group.images(center) - center
+    away: Array = group.images(center) - center
     steps = np.round(away @ group.inverse_lattice.T)
     rest = np.linalg.norm(away - steps @ group.lattice.T, axis=1)
     return [
@@ -89,9 +90,7 @@ def _image_order(element: Isometry, ring: Array) -> tuple[NDArray[np.int64] | No
     order = (first + step * np.arange(count)) % count
     error = float(np.linalg.norm(image - ring[order], axis=1).max())
     curve = shapely.linearrings(ring)
-    there = shapely.distance(
-        curve, shapely.points(np.concatenate([image, element.inverse()(ring)]))
-    )
+    there = ufuncs.distance(curve, shapely.points(np.concatenate([image, element.inverse()(ring)])))
     as_curve = float(there.max())
     # where vertices are no nearer to vertices than to the curve, they correspond
     return (

@@ -7,7 +7,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from orbiflow.arguments import described, instance
+from orbiflow.arguments import described, instance, is_a
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import CrystallographicGroup
 from orbiflow.symmetry.isometry import Array
@@ -79,7 +79,7 @@ def as_tiling(tiles: Tiles) -> Tiling:
     """
     if isinstance(tiles, Tiling):
         return tiles
-    if isinstance(tiles, Tile):
+    if is_a(tiles, Tile):
         return tiles.tiling
     raise OrbiflowError(
         f"the tile must be a Tile or a Tiling, got {described(tiles)}; Tile(polygon, group) makes one"

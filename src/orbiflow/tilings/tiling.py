@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from orbiflow.arguments import instance
 from orbiflow.errors import OrbiflowError
@@ -46,7 +47,7 @@ class Tiling:
     prototiles: tuple[Prototile, ...]
 
     def __init__(
-        self, group: CrystallographicGroup, prototiles: Sequence[Prototile | Array | list]
+        self, group: CrystallographicGroup, prototiles: Sequence[Prototile | ArrayLike]
     ) -> None:
         how = "isohedral_class(name).group() and wallpaper_group(name) make one"
         instance(group, CrystallographicGroup, "the tile's group", how)

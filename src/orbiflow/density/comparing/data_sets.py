@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from orbiflow.arguments import number, numbers, whole
+from orbiflow.arguments import is_a, number, numbers, whole
+from orbiflow.density.arguments import silent
 from orbiflow.density.comparing.divergence import Divergence, cross_fitted
 from orbiflow.density.comparing.paired import LEVEL, MOST_RESAMPLES, RESAMPLES
 from orbiflow.density.comparing.resampling import Groups
@@ -94,7 +95,7 @@ def compare_samples(
     resamples: int = RESAMPLES,
     level: float = LEVEL,
     seed: int = 0,
-    progress: Progress = lambda *_: None,
+    progress: Progress = silent,
 ) -> DataComparison:
     """Test whether two data sets come from one density, and measure how far apart they are.
 
@@ -167,7 +168,7 @@ def compare_samples(
 
 
 def _two(samples: Mapping[str, ArrayLike]) -> tuple[list[str], list[np.ndarray]]:
-    if not isinstance(samples, Mapping) or len(samples) != 2:
+    if not is_a(samples, Mapping) or len(samples) != 2:
         raise OrbiflowError("give two data sets by their names, such as {'before': a, 'after': b}")
     tables = [numbers(table, f"data set {name}", ("N", "k")) for name, table in samples.items()]
     widths = [table.shape[1] for table in tables]
@@ -185,11 +186,11 @@ def _labels(
 ) -> np.ndarray | None:
     if groups is None:
         return None
-    if not isinstance(groups, Mapping) or set(groups) != set(names):
+    if not is_a(groups, Mapping) or set(groups) != set(names):
         raise OrbiflowError(
             f"groups must have labels for {names[0]} and {names[1]}, by these names"
         )
-    found = []
+    found: list[NDArray[np.str_]] = []
     for name, table in zip(names, tables, strict=True):
         labels = np.asarray(groups[name])
         if labels.shape != (len(table),):

@@ -11,6 +11,7 @@ import torch
 from scipy.optimize import minimize_scalar
 from torch import Tensor
 
+from orbiflow.density.arguments import silent
 from orbiflow.density.comparing.resampling import Groups, resampled_sums
 from orbiflow.density.fitting.automatic import AutomaticSettings, fit_automatic
 from orbiflow.density.fitting.report import Progress
@@ -62,7 +63,7 @@ def cross_fitted(
     resamples: int,
     level: float,
     seed: int = 0,
-    progress: Progress = lambda *_: None,
+    progress: Progress = silent,
 ) -> Divergence:
     """Fit a density to half of each data set, score the other halves, and change about.
 
@@ -81,7 +82,8 @@ def cross_fitted(
     half = np.random.default_rng(seed).permutation(groups.count)[groups.index] % 2
     ratio = _held_out_ratio(space, points, first, half, seed, progress)
     own = np.where(first, ratio, -ratio)
-    weights = np.where(first, 1 / first.sum(), 1 / (~first).sum())
+    counts: tuple[float, float] = first.sum(), (~first).sum()
+    weights = np.where(first, 1 / counts[0], 1 / counts[1])
     tempered = np.empty(len(own))
     for number in (0, 1):
         tempered[half == number] = own[half == number] * _trust(own, weights * (half != number))
@@ -124,7 +126,7 @@ def _held_out_ratio(
     ratio = np.empty(len(points))
     for number in (0, 1):
         held = half == number
-        scores = []
+        scores: list[Tensor] = []
         for which, rows in enumerate((first, ~first)):
             progress((2 * number + which) / 4, "fitting halves")
             train = points[torch.as_tensor(rows & ~held)]

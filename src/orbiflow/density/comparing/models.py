@@ -8,6 +8,7 @@ import numpy as np
 import torch
 from numpy.typing import ArrayLike
 
+from orbiflow.arguments import is_a
 from orbiflow.density.arguments import check_kind
 from orbiflow.density.comparing.paired import LEVEL, RESAMPLES, ModelComparison, compare_scores
 from orbiflow.density.estimator import DensityEstimator
@@ -39,7 +40,7 @@ def compare_models(
         OrbiflowError: for models of different spaces or units, or data that are not of the space; and
             as `compare_scores`.
     """
-    if not isinstance(models, Mapping) or len(models) < 2:
+    if not is_a(models, Mapping) or len(models) < 2:
         raise OrbiflowError("give two models or more, by their names")
     densities = {name: density_of(model, name) for name, model in models.items()}
     require_one_space({name: density.space for name, density in densities.items()})

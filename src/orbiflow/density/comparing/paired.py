@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from orbiflow.arguments import number, numbers, whole
+from orbiflow.arguments import is_a, number, numbers, whole
 from orbiflow.density.comparing.resampling import Groups, resampled_sums
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry.isometry import Array
@@ -145,14 +145,14 @@ def compare_scores(
     counts = _row_weights(weights, len(table))
     means, errors = _means(table, members, counts)
     order = np.argsort(-means, kind="stable")
-    names = [list(scores)[k] for k in order]
+    names = [list(scores)[int(k)] for k in order]
     table, means, errors = table[:, order], means[order], errors[order]
     pairs = list(itertools.combinations(range(len(names)), 2))
     rows = np.stack([table[:, i] - table[:, j] for i, j in pairs], axis=1)
     mean, error = _means(rows, members, counts)
     largest = _largest_t(rows - mean, members, counts, resamples, seed)
     reach = float(np.quantile(largest, level, method="higher"))
-    found = []
+    found: list[Difference] = []
     for k, (i, j) in enumerate(pairs):
         low, high = mean[k] - reach * error[k], mean[k] + reach * error[k]
         t = _ratio(abs(mean[k]), error[k])
@@ -186,7 +186,7 @@ def compare_scores(
 
 def _table(scores: Mapping[str, ArrayLike]) -> Array:
     """Scores (N, M), checked."""
-    if not isinstance(scores, Mapping) or len(scores) < 2:
+    if not is_a(scores, Mapping) or len(scores) < 2:
         raise OrbiflowError("a comparison needs the scores of two models or more, by their names")
     columns = [numbers(v, f"scores of {name}", ("N",)) for name, v in scores.items()]
     lengths = {name: len(column) for name, column in zip(scores, columns, strict=True)}

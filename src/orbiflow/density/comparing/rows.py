@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from orbiflow.arguments import is_a
 from orbiflow.density.spaces.space import Space
 from orbiflow.errors import OrbiflowError
 
@@ -68,11 +69,12 @@ class RowSketch:
             OrbiflowError: if it is no sketch.
         """
         try:
-            assert isinstance(document, Mapping)
-            hashes = np.array(document["hashes"], dtype=np.uint64)
+            assert is_a(document, Mapping)
+            given = cast(Mapping[str, Any], document)
+            hashes = np.array(given["hashes"], dtype=np.uint64)
             if hashes.ndim != 1 or not 0 < len(hashes) <= KEPT or (hashes[1:] <= hashes[:-1]).any():
                 raise ValueError("hashes out of order")
-            return cls(int(document["rows"]), hashes, bool(document["whole"]))
+            return cls(int(given["rows"]), hashes, bool(given["whole"]))
         except (AssertionError, KeyError, TypeError, ValueError, OverflowError) as error:
             raise OrbiflowError(f"not a sketch of rows: {error}") from error
 

@@ -12,6 +12,7 @@ from orbiflow.density.comparing.resampling import Groups
 from orbiflow.density.spaces.space import Space
 from orbiflow.symmetry.isometry import Array
 from orbiflow.threads import one_thread
+from orbiflow.typed_torch import listed
 
 MOST_ROWS = 3_000
 """Of both data sets together: the test looks at all their pairs."""
@@ -77,7 +78,7 @@ def mmd_test(
     top = float(dots[0].diagonal().mean())
     scales = _scales(top - dots[0], apart, rng)
     counts = _difference(apart.double(), labels, None)
-    found = []
+    found: list[tuple[Array, Array, Array]] = []
     for scale in scales:
         kernel = sum(((dot - top) / scale).exp() for dot in dots)
         assert isinstance(kernel, Tensor)
@@ -116,7 +117,7 @@ def _scales(distances: Tensor, apart: Tensor, rng: np.random.Generator) -> list[
     pairs = torch.as_tensor(rng.integers(len(distances), size=(2, PAIRS)))
     found = distances[pairs[0], pairs[1]][apart[pairs[0], pairs[1]]]
     quantiles = torch.tensor(QUANTILES, dtype=found.dtype)
-    return torch.quantile(found, quantiles).clamp_min(LEAST_SCALE).tolist()
+    return listed(torch.quantile(found, quantiles).clamp_min(LEAST_SCALE))
 
 
 def _permuted(first: Array, groups: Groups, permutations: int, rng: np.random.Generator) -> Tensor:
@@ -145,8 +146,8 @@ def _difference(
     """
     rows = kernel.sum(dim=1)
     total = float(rows.sum())
-    parts = []
-    for block in labels.split(BLOCK, dim=1):
+    parts: list[Tensor] = []
+    for block in torch.split(labels, BLOCK, dim=1):
         within = (block * (kernel @ block)).sum(dim=0)
         parts.append(torch.stack([within, rows @ block]))
     within, touching = torch.cat(parts, dim=1).numpy()

@@ -9,7 +9,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from orbiflow.density.arguments import check_kind, check_range
+from orbiflow.density.arguments import check_kind, check_range, silent
 from orbiflow.density.fitting.assembly import assembled
 from orbiflow.density.fitting.budget import Budget
 from orbiflow.density.fitting.evidence import Candidates, PartEvidence, candidates_of, judged
@@ -43,6 +43,7 @@ from orbiflow.density.partial import at_observed
 from orbiflow.density.spaces.flat import whole_turn
 from orbiflow.density.spaces.space import Space
 from orbiflow.errors import OrbiflowError
+from orbiflow.typed_torch import listed
 
 PARTS = ("flow", "kernels", "mixture", "chains")
 """What a density may be made of, beside its uniform floor."""
@@ -130,7 +131,7 @@ def fit_automatic(
     """
     settings = AutomaticSettings() if settings is None else settings
     check_kind(settings, AutomaticSettings, "settings")
-    say = progress or (lambda _share, _what: None)
+    say = progress or silent
     budget = Budget(seconds=settings.seconds)
     rows, settings, notes = _rows(space, points, weights, settings)
     found = repeats_of(space, rows[is_whole(rows)].points)
@@ -276,7 +277,7 @@ def _report(
         steps=density.flow.steps,
         mass=mass,
         integration_error=error,
-        shares=tuple(density.shares.tolist()),
+        shares=tuple(listed(density.shares)),
         parts=parts,
         repeats=found,
         effective=None if folds.rows.weights is None else effective_rows(folds.rows.weights),

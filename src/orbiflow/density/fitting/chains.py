@@ -17,6 +17,7 @@ from orbiflow.density.models.chains import SCALES, VonMisesChains, averaged, cha
 from orbiflow.density.models.log_sum import shares_of
 from orbiflow.density.spaces.space import Space
 from orbiflow.errors import OrbiflowError
+from orbiflow.typed_torch import linalg, special
 
 PRIOR, PRIOR_RESULTANT = 0.05, 0.9
 """Imaginary points of a component and their mean cosine: none shrinks to a point."""
@@ -245,9 +246,9 @@ class _Maximization:
         """One Fisher scoring step of all circular regressions, their slopes held by a ridge."""
         count, d = center.shape
         kappa = mixture.concentrations[1:]
-        bessel = torch.special.i1e(kappa) / torch.special.i0e(kappa)
+        bessel = special.i1e(kappa) / special.i0e(kappa)
         local = _local(center)
-        back = torch.linalg.inv(local)
+        back = linalg.inv(local)
         gram = local @ (precise.mT @ self.products).reshape(count, 1 + 2 * d, -1) @ local.mT
         pull = mixture.residuals(self.points)[:, 1:].sin() * precise[..., None]
         force = torch.einsum("nkd,np->kdp", pull, self.waves) @ local.mT
@@ -261,7 +262,7 @@ class _Maximization:
             # the constant is free
             right = force[:, i, at] - ridge * torch.cat([0 * now[:, :1], now[:, 1:]], dim=1)
             matrix = bessel[:, i, None, None] * gram[:, at][:, :, at] + torch.diag_embed(ridge)
-            found[:, i, at] = now + torch.linalg.solve(matrix, right)
+            found[:, i, at] = now + linalg.solve(matrix, right)
         return (found @ local) * self.allowed
 
 
@@ -291,7 +292,7 @@ def concentration(resultant: Tensor) -> Tensor:
         torch.where(r < 0.85, -0.4 + 1.39 * r + 0.43 / (1 - r), 1 / (r**3 - 4 * r**2 + 3 * r)),
     )
     for _ in range(3):
-        ratio = torch.special.i1e(kappa) / torch.special.i0e(kappa)
+        ratio = special.i1e(kappa) / special.i0e(kappa)
         kappa = kappa - (ratio - r) / (1 - ratio / kappa - ratio**2)
         kappa = kappa.clamp(1e-6, 1e8)
     return kappa

@@ -23,6 +23,7 @@ from orbiflow.density.fitting.weights import (
 )
 from orbiflow.density.models.bases import Base, UniformBase
 from orbiflow.density.spaces.space import Space
+from orbiflow.typed_torch import listed
 
 KEPT = 2
 """Sizes of a family that are fitted to all folds, beside the best alone."""
@@ -101,7 +102,8 @@ def candidates_of(
 def _narrow(families: list[Family], block: dict[tuple[str, str], Tensor], held: Rows) -> None:
     """Of each family keep what has most weight in the first fold, and the best alone."""
     keys = list(block)
-    weights = stacking_weights(torch.stack([block[key] for key in keys]), held.weights).tolist()
+    table = torch.stack([block[key] for key in keys])
+    weights: list[float] = listed(stacking_weights(table, held.weights))
     for family in families:
         own = {name: w for (f, name), w in zip(keys, weights, strict=True) if f == family.name}
         if own:
@@ -114,7 +116,7 @@ def judged(candidates: Candidates, weights: Tensor) -> list[PartEvidence]:
     """What each family is worth in the mixture of these weights (P,)."""
     table, own_weights = candidates.table, candidates.row_weights
     whole, uniform = stacked(table, weights), table[-1]
-    found = []
+    found: list[PartEvidence] = []
     names = [name for name in dict.fromkeys(candidates.families) if name != FLOOR]
     for name in names:
         own = candidates.of(name)

@@ -159,7 +159,7 @@ class ChainFamily(Family):
     starts: int = 1
     sizes: tuple[int, ...] | None = None
     name = "chains"
-    _first: dict[str, Base] = field(default_factory=dict)
+    _first: dict[str, Base] = field(default_factory=dict[str, Base])
 
     def fitted(self, number: int, train: Rows, held: Rows, say: Say) -> dict[str, Base]:
         train = train[:MOST_CHAINED]

@@ -7,7 +7,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from orbiflow.density.arguments import check_kind
+from orbiflow.density.arguments import check_kind, silent
 from orbiflow.density.fitting.budget import Budget
 from orbiflow.density.fitting.flow_matching import coupled, match_flow
 from orbiflow.density.fitting.kernels import blend_kernels
@@ -34,6 +34,7 @@ from orbiflow.density.spaces.space import Space
 from orbiflow.errors import OrbiflowError
 from orbiflow.fields import SplineField
 from orbiflow.flows import Flow
+from orbiflow.typed_torch import listed
 
 MOST_STEPS = 256
 """Runge-Kutta steps a segment to which they are doubled, in the end, until the integral is right."""
@@ -76,7 +77,7 @@ def fit_density(
             f"splines have grids of {MOST_DIM} dimensions at most, this {space.name} has {space.dim}: "
             "call `fit_neural`"
         )
-    say = progress or (lambda _share, _what: None)
+    say = progress or silent
     generator = torch.Generator().manual_seed(settings.seed)
     rows = weighed(own_points(space, points), weights)
     order, out, duplicates = sides(rows.points, settings.validation, generator)
@@ -107,7 +108,7 @@ def fit_density(
             held_weights=validation.weights,
         )
         mass = None if mass is None else density.mass_with(mass)
-        shares = tuple(density.shares.tolist())
+        shares = tuple(listed(density.shares))
         flow, kernels, floor = (f"{share:.1%}" for share in shares)
         notes.append(
             f"the density is a blend: flow {flow}, kernels {kernels}, uniform floor {floor}"

@@ -33,7 +33,7 @@ def coupled(
     Returns:
         Starts and shortest displacements, both (N, d), in the order of `end`.
     """
-    order = []
+    order: list[Tensor] = []
     for first in range(0, len(end), group):
         cost = space.squared_distances(start[first : first + group], end[first : first + group])
         rows, columns = linear_sum_assignment(cost.cpu().numpy())

@@ -9,6 +9,7 @@ import torch
 from torch import Tensor
 
 from orbiflow.density.fitting.rows import Rows
+from orbiflow.typed_torch import unique
 
 FOLDS = 10
 """Each holds out a tenth of the rows."""
@@ -67,7 +68,7 @@ def folds_of(rows: Rows, *, together: bool, generator: torch.Generator) -> Folds
 def places(points: Tensor) -> tuple[Tensor, Tensor]:
     """How many of the points (N, d) are at each different place (M,), and the place (N,) of each."""
     # rounding keeps together what differs by the projection's last digit
-    _, place, counts = torch.unique(
+    _, place, counts = unique(
         (points * 1e9).round(), dim=0, return_inverse=True, return_counts=True
     )
     return counts, place

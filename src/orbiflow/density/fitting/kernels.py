@@ -19,6 +19,7 @@ from orbiflow.density.models.kernels import AdaptiveKernels
 from orbiflow.density.models.symmetric import SymmetricDensity
 from orbiflow.density.spaces.space import Space
 from orbiflow.errors import OrbiflowError
+from orbiflow.typed_torch import unique
 
 MOST_KERNELS, MOST_HELD = 20_000, 2_000
 """Centers at most, and held-out points that choose the widths."""
@@ -60,7 +61,7 @@ def blend_kernels(
     space = check_kind(density, SymmetricDensity, "density").space
     train = points_tensor(train, space.dim, "training points", flat=True).double()
     held = points_tensor(held, space.dim, "held points", flat=True).double()
-    centers, place, counts = torch.unique(train, dim=0, return_inverse=True, return_counts=True)
+    centers, place, counts = unique(train, dim=0, return_inverse=True, return_counts=True)
     if row_weights is not None:
         counts = row_weights.new_zeros(len(centers)).index_add_(0, place, row_weights)
     if len(centers) > MOST_KERNELS:

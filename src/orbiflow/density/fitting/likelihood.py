@@ -120,7 +120,7 @@ class Objective:
         loss = nll + self.penalty()
         if not bool(torch.isfinite(loss)):
             return 1e10, np.zeros(len(values))
-        loss.backward()
+        torch.autograd.backward(loss)
         gradient = torch.cat(
             [
                 torch.zeros_like(p).reshape(-1) if p.grad is None else p.grad.reshape(-1)
@@ -210,10 +210,10 @@ class _Descent:
         self.trains, self.scores = [self.nll], [self._score()]
         self._scored = 0
 
-    def after(self, values: Array) -> None:
+    def after(self, xk: Array) -> None:
         """Take an iterate."""
         self.done += 1
-        self.latest, self.nll = np.array(values), self.objective.last
+        self.latest, self.nll = np.array(xk), self.objective.last
         if self.done % EVERY == 0:
             self._look()
             if EVERY * (len(self.scores) - 1 - self.best) >= PATIENCE:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
+from orbiflow.typed_torch import unique
+
 LEVELS = 5
 """Halvings of the cells at most: a point is then known to 1/32 of a cell."""
 
@@ -34,7 +36,7 @@ def merged(
     left = torch.arange(len(points), device=points.device)
     groups = 0
     for level in range(LEVELS + 1):
-        _, where, counts = torch.unique(
+        _, where, counts = unique(
             _labels(points[left], cells << level), return_inverse=True, return_counts=True
         )
         settled = (counts[where] <= crowd) | (level == LEVELS)
@@ -42,7 +44,7 @@ def merged(
         left, groups = left[~settled], groups + len(counts)
         if not len(left):
             break
-    _, where, counts = torch.unique(group, return_inverse=True, return_counts=True)
+    _, where, counts = unique(group, return_inverse=True, return_counts=True)
     if row_weights is not None:
         points = points * row_weights[:, None]
         counts = row_weights.new_zeros(len(counts)).index_add_(0, where, row_weights)

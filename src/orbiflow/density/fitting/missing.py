@@ -16,6 +16,7 @@ from orbiflow.density.partial import at_observed, log_kernels
 from orbiflow.density.partial.axes import check_torus
 from orbiflow.density.spaces.space import Space
 from orbiflow.errors import OrbiflowError
+from orbiflow.typed_torch import listed, unique
 
 MISSING = ("refuse", "marginalise")
 """What is done with rows that lack an angle."""
@@ -65,7 +66,7 @@ def is_whole(rows: Rows) -> Tensor:
 def missing_notes(rows: Rows, empty: int) -> list[str]:
     """What to say of rows that lack angles, and of `empty` ones that were left out."""
     lacking = len(rows) - int(is_whole(rows).sum())
-    notes = []
+    notes: list[str] = []
     if lacking:
         notes.append(
             f"{lacking} of {len(rows)} rows lack some angles and count by the density of those that "
@@ -113,9 +114,9 @@ def with_incomplete(kernels: AdaptiveKernels, rows: Rows, total: float) -> Adapt
 
 def _patterns(rows: Rows) -> Iterator[tuple[list[int], Rows]]:
     """The angles that rows have, and the rows that have just these."""
-    kinds, number = torch.unique(~rows.points.isnan(), dim=0, return_inverse=True)
+    kinds, number = unique(~rows.points.isnan(), dim=0, return_inverse=True)
     for k, kind in enumerate(kinds):
-        yield torch.nonzero(kind)[:, 0].tolist(), rows[number == k]
+        yield listed(torch.nonzero(kind)[:, 0]), rows[number == k]
 
 
 def _blocks(rows: Rows, kernels: int) -> Iterator[Rows]:

@@ -15,6 +15,7 @@ from orbiflow.density.models.kernels import AdaptiveKernels, kernel_rows
 from orbiflow.density.models.log_sum import FAINT
 from orbiflow.density.spaces.round import RoundSpace
 from orbiflow.density.spaces.space import Space, rectangle
+from orbiflow.typed_torch import linalg, special
 
 CONVERGED = 1e-4
 """Nats that an iteration of EM must bring."""
@@ -57,9 +58,9 @@ def fit_mixture(
     images = space.features(train.nan_to_num(0.0))
     if not bool(whole.all()):
         images = images * ~torch.cat([absent, absent], dim=1)
-    blocks = images.split(BLOCK, dim=1)
-    owns = [None] * len(blocks) if row_weights is None else row_weights.split(BLOCK)
-    gaps = [None] * len(blocks) if bool(whole.all()) else absent.to(images).split(BLOCK)
+    blocks = torch.split(images, BLOCK, dim=1)
+    owns = [None] * len(blocks) if row_weights is None else torch.split(row_weights, BLOCK)
+    gaps = [None] * len(blocks) if bool(whole.all()) else torch.split(absent.to(images), BLOCK)
     start = None if row_weights is None else row_weights[whole]
     mean = _spread_out(images[:, whole], components, generator, start)
     width = 1 if space.is_round else space.dim
@@ -122,7 +123,7 @@ def _expectation(
     for images, own, absent in blocks:
         joint = images @ rows + offsets
         if absent is not None:  # a factor that is not there has no constant either
-            joint += absent @ (torch.special.i0e(kappa).log() + kappa).mT
+            joint += absent @ (special.i0e(kappa).log() + kappa).mT
         top = joint.amax(dim=(0, 2), keepdim=True)
         share = (joint - top).clamp_min_(FAINT).exp_()
         every = share.sum(dim=(0, 2), keepdim=True)
@@ -142,7 +143,7 @@ def _expectation(
 def _directions(space: Space, total: Tensor) -> tuple[Tensor, Tensor]:
     """Unit vectors of sums (K, m), and their lengths: of the whole, or an angle each."""
     parts = total[:, None] if space.is_round else torch.stack(total.chunk(2, dim=1), dim=-1)
-    length = parts.norm(dim=-1)
+    length = linalg.vector_norm(parts, dim=-1)
     unit = parts / length.clamp_min(1e-300)[..., None]
     return (unit[:, 0] if space.is_round else torch.cat(unit.unbind(dim=-1), dim=1)), length
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from orbiflow.density.arguments import check_kind, check_ranges, check_share
+from orbiflow.density.arguments import check_kind, check_ranges, check_share, silent
 from orbiflow.density.fitting.budget import Budget
 from orbiflow.density.fitting.chains import ChainsFit, fit_chains
 from orbiflow.density.fitting.flow_matching import coupled
@@ -39,6 +39,7 @@ from orbiflow.density.models.neural import (
 from orbiflow.density.models.symmetric import SymmetricDensity
 from orbiflow.density.spaces.space import Space
 from orbiflow.errors import OrbiflowError
+from orbiflow.typed_torch import adam
 
 MOST_STEPS = 128
 """Runge-Kutta steps to which they are doubled where the integrator has not converged."""
@@ -162,7 +163,7 @@ def fit_neural(
     check_kind(settings, NeuralSettings, "settings")
     if not check_kind(space, Space, "space", "see `make_space`").is_torus:
         raise OrbiflowError(f"neural flows are for tori, not for the {space.name}")
-    say = progress or (lambda _share, _what: None)
+    say = progress or silent
     budget = Budget(seconds=settings.seconds)
     generator = torch.Generator().manual_seed(settings.seed)
     points = own_points(space, points)
@@ -306,7 +307,7 @@ class _Trainer:
     ) -> Refinement:
         """`count` iterations; leaves the averaged weights that were best on the validation points."""
         field, began = self._field, time.monotonic()
-        adam = torch.optim.Adam(field.parameters(), lr=rate, betas=(0.9, 0.99))
+        optimizer = adam(field.parameters(), lr=rate, betas=(0.9, 0.99))
         mean = copy.deepcopy(field.state_dict())
         last = math.nan
         trains, scores, best, kept = [last], [self._score()], 0, copy.deepcopy(mean)
@@ -314,12 +315,12 @@ class _Trainer:
         for iteration in range(count):
             late = budget.is_spent
             if not late:
-                _set_rate(adam, rate, iteration, count)
+                _set_rate(optimizer, rate, iteration, count)
                 value = loss()
-                adam.zero_grad()
-                value.backward()
+                optimizer.zero_grad()
+                torch.autograd.backward(value)
                 torch.nn.utils.clip_grad_norm_(field.parameters(), CLIP)
-                adam.step()
+                optimizer.step()
                 # early on, an average over all so far
                 _average(mean, field.state_dict(), min(keep, (1 + iteration) / (10 + iteration)))
                 last = float(value.detach())
@@ -349,9 +350,9 @@ class _Trainer:
         return score
 
 
-def _set_rate(adam: torch.optim.Adam, rate: float, iteration: int, count: int) -> None:
+def _set_rate(optimizer: torch.optim.Optimizer, rate: float, iteration: int, count: int) -> None:
     warm = min(1.0, (iteration + 1) / WARM)
-    adam.param_groups[0]["lr"] = rate * warm * (1 + math.cos(math.pi * iteration / count)) / 2
+    optimizer.param_groups[0]["lr"] = rate * warm * (1 + math.cos(math.pi * iteration / count)) / 2
 
 
 @torch.no_grad()
@@ -361,7 +362,7 @@ def _average(mean: dict[str, Tensor], now: dict[str, Tensor], keep: float) -> No
 
 
 def _notes(mixture: ChainsFit | None, trainer: _Trainer) -> list[str]:
-    notes = []
+    notes: list[str] = []
     if mixture is not None:
         notes.append(
             f"the base is the mean of {mixture.members} mixtures of {mixture.components} components"

@@ -17,6 +17,7 @@ from orbiflow.density.fitting.rows import mean_of
 from orbiflow.density.models.symmetric import SymmetricDensity
 from orbiflow.density.spaces.space import Space
 from orbiflow.errors import OrbiflowError
+from orbiflow.typed_torch import unique
 
 MASS_TOLERANCE = 1e-3
 """Of the integral over the square, and of the log-likelihood at doubled steps."""
@@ -106,7 +107,7 @@ def report_from_json(document: Mapping[str, Any]) -> FitReport:
     try:
         values: dict[str, Any] = dict(document) | {"notes": tuple(document["notes"])}
         stages = tuple(
-            Refinement(**{**stage, **{k: _figures(stage[k]) for k in ("train", "validation")}})
+            Refinement(**stage | {k: _figures(stage[k]) for k in ("train", "validation")})
             for stage in values.pop("stages")
         )
         parts = tuple(PartEvidence(**part) for part in values.pop("parts"))
@@ -154,17 +155,17 @@ def sides(points: Tensor, share: float, generator: torch.Generator) -> tuple[Ten
         OrbiflowError: if there are fewer than ten different points.
     """
     # rounding keeps together what differs by the projection's last digit
-    unique, where = torch.unique((points * 1e9).round(), dim=0, return_inverse=True)
-    if len(unique) < 10:
+    places, where = unique((points * 1e9).round(), dim=0, return_inverse=True)
+    if len(places) < 10:
         raise OrbiflowError(
-            f"a density needs at least 10 different points, got {len(unique)} among {len(points)}"
+            f"a density needs at least 10 different points, got {len(places)} among {len(points)}"
         )
-    held = torch.zeros(len(unique), dtype=torch.bool)
-    held[torch.randperm(len(unique), generator=generator)[: max(1, round(share * len(unique)))]] = (
+    held = torch.zeros(len(places), dtype=torch.bool)
+    held[torch.randperm(len(places), generator=generator)[: max(1, round(share * len(places)))]] = (
         True
     )
     order = torch.randperm(len(points), generator=generator)
-    return order, held[where][order], len(points) - len(unique)
+    return order, held[where][order], len(points) - len(places)
 
 
 @torch.no_grad()

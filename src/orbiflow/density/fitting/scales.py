@@ -52,7 +52,7 @@ def kernel_estimates(
         if row_weights is None
         else row_weights[:MOST_CENTERS] / row_weights[:MOST_CENTERS].sum()
     )
-    found = {}
+    found: dict[str, AdaptiveKernels] = {}
     for kappa in np.geomspace(WIDEST, narrowest, LADDER):
         found[f"width {kappa**-0.5:.2g}"] = even_kernels(space, train, float(kappa), own)
     counts, place = places(train)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from orbiflow.arguments import is_a
 from orbiflow.density.arguments import check_range, check_ranges, check_share
 from orbiflow.errors import OrbiflowError
 
@@ -68,7 +69,7 @@ class FitSettings:
         check_ranges(self, whole, integer=True)
         check_ranges(self, real)
         check_share(self.validation)
-        if not isinstance(self.roughness, tuple | list) or not self.roughness:
+        if not is_a(self.roughness, tuple | list) or not self.roughness:
             raise OrbiflowError(f"roughness needs weights of at least 0, got {self.roughness!r}")
         for weight in self.roughness:
             check_range("each weight of roughness", weight, 0, math.inf)

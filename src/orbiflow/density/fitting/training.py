@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator
+from collections.abc import Generator
 
 import torch
 
@@ -11,7 +11,7 @@ from orbiflow.threads import one_thread
 
 
 @contextlib.contextmanager
-def training() -> Iterator[None]:
+def training() -> Generator[None]:
     """For a block, or for a function as its decorator; the caller's settings are left alone.
 
     Under `torch.no_grad()` or `torch.inference_mode()` there would be no gradients, and what is made

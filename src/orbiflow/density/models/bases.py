@@ -11,10 +11,12 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from orbiflow.arguments import is_a
 from orbiflow.density.arguments import check_kind
 from orbiflow.density.models.moving import moved
 from orbiflow.density.spaces.space import Space, rectangle
 from orbiflow.errors import OrbiflowError
+from orbiflow.typed_torch import special
 
 
 class Base(ABC):
@@ -66,7 +68,7 @@ class VonMisesBase(Base):
 
     def __init__(self, space: Space, concentration: float = 1.0) -> None:
         super().__init__(space)
-        real = isinstance(concentration, int | float)
+        real = is_a(concentration, int | float)
         if not real or not concentration > 0 or not math.isfinite(concentration):
             raise OrbiflowError(f"concentration must be positive, got {concentration!r}")
         self.concentration = float(concentration)
@@ -77,7 +79,7 @@ class VonMisesBase(Base):
         periods = self.periods.to(points)
         angle = 2 * math.pi * (images - 0.5) / periods
         kappa = self.concentration
-        log_normal = torch.log(torch.special.i0e(torch.tensor(kappa, dtype=torch.float64))) + kappa
+        log_normal = torch.log(special.i0e(torch.tensor(kappa, dtype=torch.float64))) + kappa
         terms = kappa * angle.cos() - log_normal.to(points) - periods.log()
         return terms.sum(dim=-1).logsumexp(dim=0)
 

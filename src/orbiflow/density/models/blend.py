@@ -17,6 +17,7 @@ from orbiflow.density.spaces.space import CHART, Space, check_measure
 from orbiflow.errors import OrbiflowError
 from orbiflow.flows import Flow
 from orbiflow.threads import one_thread
+from orbiflow.typed_torch import listed
 
 
 class BlendedDensity(SymmetricDensity):
@@ -58,7 +59,7 @@ class BlendedDensity(SymmetricDensity):
             or abs(float(shares.sum()) - 1) > 1e-6
         ):
             number = "three" if count == 3 else "four"
-            raise OrbiflowError(f"shares must be {number} proportions, got {shares.tolist()}")
+            raise OrbiflowError(f"shares must be {number} proportions, got {listed(shares)}")
         if chains is not None:
             check_kind(chains, VonMisesChains, "chains")
         self.kernels, self.shares, self.chains = kernels, shares.double(), chains
@@ -115,8 +116,8 @@ class BlendedDensity(SymmetricDensity):
         if torch.is_grad_enabled():
             start, log_det = self.flow.inverse_and_log_det(value)
             return self.base.log_prob(start) + log_det
-        parts = []
-        for block in value.reshape(-1, self.space.dim).split(BLOCK):
+        parts: list[Tensor] = []
+        for block in torch.split(value.reshape(-1, self.space.dim), BLOCK):
             start, log_det = self.flow.inverse_and_log_det(block)
             parts.append(self.base.log_prob(start) + log_det)
         return torch.cat(parts).reshape(value.shape[:-1])
@@ -141,7 +142,7 @@ class BlendedDensity(SymmetricDensity):
             return self._like().new_empty(*shape, self.space.dim)
         shares = self.shares.cpu()
         part = torch.multinomial(shares, shape.numel(), replacement=True, generator=source)
-        counts = torch.bincount(part, minlength=len(shares)).tolist()
+        counts: list[int] = listed(torch.bincount(part, minlength=len(shares)))
         drawn = self._like().new_empty(shape.numel(), self.space.dim)
         for index, count in enumerate(counts):
             if not count:  # as a flow without a share
@@ -171,6 +172,6 @@ class BlendedDensity(SymmetricDensity):
 
     def __repr__(self) -> str:
         names = ("flow", "kernels", "uniform", "chains")
-        shares = zip(names, self.shares.tolist(), strict=False)
-        listed = ", ".join(f"{name} {100 * share:.1f}%" for name, share in shares)
-        return f"BlendedDensity({self.space!r}, {listed})"
+        shares = zip(names, listed(self.shares), strict=False)
+        parts = ", ".join(f"{name} {100 * share:.1f}%" for name, share in shares)
+        return f"BlendedDensity({self.space!r}, {parts})"

@@ -13,6 +13,7 @@ from orbiflow.density.models.bases import Base
 from orbiflow.density.models.log_sum import log_sum_exp
 from orbiflow.density.spaces.space import Space
 from orbiflow.errors import OrbiflowError
+from orbiflow.typed_torch import special
 
 SCALES = (1.0, 4.0, 16.0)
 """A component's concentrations are divided by these, each with its own weight: heavy tails."""
@@ -90,7 +91,7 @@ class VonMisesChains(Base):
     def log_prob(self, points: Tensor) -> Tensor:
         """Log density (...,) at points (..., d), in their dtype; differentiable in the points."""
         flat = points.reshape(-1, self.space.dim)
-        parts = [log_sum_exp(self.joint(block).flatten(1)) for block in flat.split(BLOCK)]
+        parts = [log_sum_exp(self.joint(block).flatten(1)) for block in torch.split(flat, BLOCK)]
         return torch.cat(parts).reshape(points.shape[:-1])
 
     def joint(self, points: Tensor) -> Tensor:
@@ -124,7 +125,7 @@ class VonMisesChains(Base):
     def _constant(self) -> Tensor:
         """Log weights less log normalising constants, per unit of the cube: (L, K)."""
         kappa = self.concentrations / self.concentrations.new_tensor(SCALES)[:, None, None]
-        return self.log_weights.mT - torch.special.i0e(kappa).log().sum(dim=-1)
+        return self.log_weights.mT - special.i0e(kappa).log().sum(dim=-1)
 
 
 def chained(order: Tensor) -> Tensor:

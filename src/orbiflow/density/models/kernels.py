@@ -17,6 +17,7 @@ from orbiflow.density.spaces.round import RoundSpace
 from orbiflow.density.spaces.space import Space, rectangle
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry.isometry import Array
+from orbiflow.typed_torch import special
 
 
 class AdaptiveKernels(Base):
@@ -128,7 +129,7 @@ def _terms(space: Space, images: Tensor, kappa: Tensor, weights: Tensor) -> Term
         # the lattice's rectangle leaves signed permutations of the axes
         turns = [torch.as_tensor(np.abs(g.linear)).to(kappa) for g in space.group.cosets]
         every = torch.cat([turn @ kappa.mT for turn in turns], dim=1)
-        peaks = -(torch.special.i0e(kappa) * rectangle(space).to(kappa)).log().sum(dim=1)
+        peaks = -(special.i0e(kappa) * rectangle(space).to(kappa)).log().sum(dim=1)
     centers = images.flatten(0, 1).mT.contiguous()
     return Terms(centers, every, (peaks + weights.log()).repeat(len(images)))
 
@@ -146,7 +147,7 @@ def kernel_rows(space: Space, centers: Tensor, kappa: Tensor) -> tuple[Tensor, T
     if space.is_round:
         k = kappa[:, 0]
         return kappa * centers, _round_peaks(k) - k
-    scaled = torch.special.i0e(kappa) * rectangle(space).to(kappa)
+    scaled = special.i0e(kappa) * rectangle(space).to(kappa)
     return torch.cat([kappa, kappa], dim=1) * centers, -(scaled.log() + kappa).sum(dim=1)
 
 

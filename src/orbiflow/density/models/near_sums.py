@@ -11,6 +11,7 @@ from torch import Tensor
 
 from orbiflow.density.models.terms import Terms
 from orbiflow.density.models.tiles import Chart, Tile
+from orbiflow.typed_torch import applied
 
 TOLERANCE = 1e-12
 """Of a sum: what is left out, and what interpolation misses, at most."""
@@ -52,7 +53,7 @@ def near_log_sum(
     """
     if not (features.requires_grad and torch.is_grad_enabled()):
         return _Walk(features, terms, floor, tolerance).done()
-    return _NearLogSum.apply(features, terms, floor, tolerance)  # type: ignore[return-value]
+    return applied(_NearLogSum, features, terms, floor, tolerance)
 
 
 class _NearLogSum(torch.autograd.Function):
@@ -71,7 +72,7 @@ class _NearLogSum(torch.autograd.Function):
         if not torch.is_grad_enabled():
             return gradients[0] * slope, None, None, None
         # second derivatives were asked for: let autograd have them
-        view = features.view_as(features)
+        view: Tensor = features.view_as(features)
         plain = _Walk(view, *ctx.rest, by_autograd=True).done()
         (found,) = torch.autograd.grad(plain, view, gradients[0], create_graph=True)
         return found, None, None, None
@@ -83,7 +84,7 @@ class _Part(NamedTuple):
     - `idle`: how often in a row nothing was left out.
     """
 
-    index: np.ndarray
+    numbers: np.ndarray
     features: Tensor
     terms: Terms
     idle: int
@@ -103,7 +104,7 @@ class _Walk:
         by_autograd: bool = False,
     ) -> None:
         self.features, self.terms, self.floor = features, terms, floor
-        self.tolerance, self.each = math.log(tolerance), math.log(tolerance / terms.count)
+        self.tolerance, self.each = math.log(tolerance), math.log(tolerance / terms.size)
         self.by_autograd = by_autograd
         self.worth = math.inf if by_autograd else _worth(terms)
         plain = features.detach()
@@ -132,11 +133,11 @@ class _Walk:
         if not bool(near.all()):
             terms, least, largest = terms.only(near), least[near], largest[near]
         terms = self._interpolated(part._replace(terms=terms), tile, least, largest, bottom)
-        if not terms.count:
+        if not terms.size:
             return []
         count = len(index)
-        idle = 0 if terms.count < LESS * part.terms.count or count > self.worth else idle + 1
-        if count > FEW_POINTS and count * terms.count > FEW_PAIRS and idle <= IDLE:
+        idle = 0 if terms.size < LESS * part.terms.size or count > self.worth else idle + 1
+        if count > FEW_POINTS and count * terms.size > FEW_PAIRS and idle <= IDLE:
             return [
                 _Part(index[at], features[:, torch.as_tensor(at)], terms, idle)
                 for at in _halves(features, tile)
@@ -166,7 +167,7 @@ class _Walk:
     ) -> Terms:
         """Adds terms that are smooth across the tile to the sums; returns the others."""
         terms = part.terms
-        if len(part.index) < self.worth or terms.count < WORTH_TERMS or not tile.has_chart:
+        if len(part.numbers) < self.worth or terms.size < WORTH_TERMS or not tile.has_chart:
             return terms
         wide = (terms.kappa * tile.radius[:, None] ** 2).amax(dim=0) < HOPELESS
         if int(wide.sum()) < WORTH_TERMS:
@@ -181,7 +182,7 @@ class _Walk:
         values.clamp_min_(LEAST)  # what cannot be felt beside others may come out below 0
         if slope is not None:
             slope = slope / values
-        self._add(torch.as_tensor(part.index), values.log() + top, slope)
+        self._add(torch.as_tensor(part.numbers), values.log() + top, slope)
         return terms.only(~smooth)
 
 

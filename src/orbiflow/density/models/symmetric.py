@@ -18,6 +18,7 @@ from orbiflow.density.spaces.space import CHART, Space
 from orbiflow.errors import OrbiflowError
 from orbiflow.flows import Flow
 from orbiflow.threads import one_thread
+from orbiflow.typed_torch import linalg
 
 BLOCK = 65536
 """Points integrated at a time where no gradient is asked for: bounds the memory."""
@@ -39,7 +40,7 @@ class SymmetricDensity(Distribution):
         base: default uniform on the space.
     """
 
-    arg_constraints: ClassVar[dict[str, Any]] = {}
+    arg_constraints: ClassVar[dict[str, Any]] = {}  # pyright: ignore[reportIncompatibleMethodOverride]
     has_rsample = True
     block: ClassVar[int] = BLOCK
 
@@ -73,7 +74,7 @@ class SymmetricDensity(Distribution):
         if torch.is_grad_enabled() or own[..., 0].numel() <= self.block:
             return self._log_prob(own, measure).to(points.dtype)
         flat = own.reshape(-1, self.space.dim)
-        parts = [self._log_prob(block, measure) for block in flat.split(self.block)]
+        parts = [self._log_prob(block, measure) for block in torch.split(flat, self.block)]
         return torch.cat(parts).reshape(points.shape[:-1]).to(points.dtype)
 
     def _log_prob(self, value: Tensor, measure: str) -> Tensor:
@@ -106,7 +107,7 @@ class SymmetricDensity(Distribution):
         if torch.is_grad_enabled():
             moved = self.flow(start)
         else:
-            moved = torch.cat([self.flow(block) for block in start.split(BLOCK)])
+            moved = torch.cat([self.flow(block) for block in torch.split(start, BLOCK)])
         return self.space.project(moved).reshape(*shape, self.space.dim)
 
     @one_thread()
@@ -157,7 +158,7 @@ class SymmetricDensity(Distribution):
             OrbiflowError: in more than two dimensions, where a grid is out of reach.
         """
         grid = midpoints(self.space, resolution).to(self._like())
-        parts = [self._carried_mass(block) for block in grid.split(CARRIED)]
+        parts = [self._carried_mass(block) for block in torch.split(grid, CARRIED)]
         return float(torch.cat(parts).mean())
 
     def _carried_mass(self, start: Tensor) -> Tensor:
@@ -169,7 +170,7 @@ class SymmetricDensity(Distribution):
             ]
         with torch.no_grad():
             # signed: a map that folds still covers the square once
-            area = torch.linalg.det(torch.stack(rows, dim=1))
+            area = linalg.det(torch.stack(rows, dim=1))
             return self._log_prob(end.detach(), CHART).exp() * area
 
     @torch.no_grad()

@@ -18,6 +18,7 @@ from orbiflow.density.spaces.space import CHART, rectangle
 from orbiflow.errors import OrbiflowError
 from orbiflow.fields.splines import padded, spline_sum, symbol
 from orbiflow.threads import one_thread
+from orbiflow.typed_torch import fft
 
 CHECKED = 4096
 """Random points at which the table is compared with the density."""
@@ -105,8 +106,8 @@ class TabulatedDensity:
             values = smooth(midpoints(space, n)).double().reshape(n, n)
         whole = values[cell[:, 0], cell[:, 1]].reshape(sides)
         along, across = (symbol(m) for m in sides)
-        spectrum = torch.fft.fft2(whole) / (along[:, None] * across[None, :])
-        return torch.fft.ifft2(spectrum).real.contiguous()
+        spectrum = fft.fft2(whole) / (along[:, None] * across[None, :])
+        return fft.ifft2(spectrum).real.contiguous()
 
     def to(self, device: torch.device | str) -> TabulatedDensity:
         """A copy on a device; it stays in float64."""
@@ -127,7 +128,7 @@ class TabulatedDensity:
         points = points_tensor(points, 2)
         flat = points.reshape(-1, 2).double()
         cells = flat.mT * self.resolution - 0.5
-        parts = [spline_sum(self._table, block)[0] for block in cells.split(BLOCK, dim=1)]
+        parts = [spline_sum(self._table, block)[0] for block in torch.split(cells, BLOCK, dim=1)]
         values = torch.cat(parts)
         if self._narrow is not None:
             beside = math.log(self._floor) - self._log_share - self._shift

@@ -35,7 +35,7 @@ class Terms(NamedTuple):
     peaks: Tensor
 
     @property
-    def count(self) -> int:
+    def size(self) -> int:
         """K."""
         return len(self.peaks)
 
@@ -65,8 +65,8 @@ class Terms(NamedTuple):
         top = float(self.peaks.max())
         offset = features - middle[:, None]
         seen = torch.cat([offset, lengths2(offset, self.factors)])
-        block = max(1, BLOCK_ENTRIES // self.count)
-        parts = seen.split(block, dim=1)
+        block = max(1, BLOCK_ENTRIES // self.size)
+        parts = torch.split(seen, block, dim=1)
         if spread > WIDE:
             return torch.cat([log_sum_exp(torch.addmm(bias, part.mT, rows)) for part in parts])
         bias = bias - top
@@ -84,15 +84,16 @@ class Terms(NamedTuple):
         bias = bias - self.peaks.max()
         offset = features - middle[:, None]
         seen = torch.cat([offset, lengths2(offset, self.factors)])
-        values, slopes = [], []
-        for part in seen.split(max(1, BLOCK_ENTRIES // self.count), dim=1):
+        values: list[Tensor] = []
+        slopes: list[Tensor] = []
+        for part in torch.split(seen, max(1, BLOCK_ENTRIES // self.size), dim=1):
             table = torch.addmm(bias, part.mT, rows)
             top = table.amax(dim=1, keepdim=True) if spread > WIDE else table.new_zeros(1, 1)
             table.sub_(top).clamp_min_(-WIDE - 80).exp_()
             total = table.sum(dim=1)
             values.append(total.log() + top[:, 0])
             slopes.append(rows @ table.mT / total)
-        linear, square = torch.cat(slopes, dim=1).split([len(middle), self.factors])
+        linear, square = torch.split(torch.cat(slopes, dim=1), [len(middle), self.factors])
         repeated = square.repeat(len(middle) // self.factors, 1)
         return torch.cat(values) + self.peaks.max(), linear + 2 * repeated * offset
 
@@ -101,8 +102,8 @@ class Terms(NamedTuple):
 
         Nothing cancels, nothing is looked at in between: for devices where arithmetic is all but free.
         """
-        block = max(1, PLAIN_ENTRIES // self.count)
-        return torch.cat([self._plain(part) for part in features.split(block, dim=1)])
+        block = max(1, PLAIN_ENTRIES // self.size)
+        return torch.cat([self._plain(part) for part in torch.split(features, block, dim=1)])
 
     def _plain(self, features: Tensor) -> Tensor:
         table = self.peaks

@@ -9,6 +9,7 @@ import torch
 from torch import Tensor
 
 from orbiflow.density.models.terms import BLOCK_ENTRIES, WIDE, Terms, lengths2
+from orbiflow.typed_torch import broadcast, linalg
 
 NODES = 28
 """Chebyshev points along a side of a tile."""
@@ -69,7 +70,7 @@ class Chart:
     def __init__(self, features: Tensor, tile: Tile) -> None:
         self.factors, self._tile = tile.factors, tile
         pole = tile.middle.reshape(-1, self.factors)
-        self._frame = _frame(pole / pole.norm(dim=0))
+        self._frame = _frame(pole / linalg.vector_norm(pole, dim=0))
         self._local = self._turned(features)
         u = torch.cat([local[1:] / (1 + local[:1]) for local in self._local])
         low, high = u.amin(dim=1), u.amax(dim=1)
@@ -132,8 +133,8 @@ class Chart:
 
     def _in_features(self, slope: Tensor) -> Tensor:
         """A gradient (D, N) in the coordinates as one in the features, (m, N)."""
-        found = []
-        parts = slope.split(len(slope) // self.factors)
+        found: list[Tensor] = []
+        parts = torch.split(slope, len(slope) // self.factors)
         for frame, local, part in zip(self._frame, self._local, parts, strict=True):
             below = 1 + local[:1]
             across = part / below
@@ -158,9 +159,9 @@ class Chart:
         block = max(1, BLOCK_ENTRIES // local.shape[1])
         (centers,) = self._turned(terms.centers)
         for c, k, p in zip(
-            centers.split(block, dim=1),
-            terms.kappa[0].split(block),
-            terms.peaks.split(block),
+            torch.split(centers, block, dim=1),
+            torch.split(terms.kappa[0], block),
+            torch.split(terms.peaks, block),
             strict=True,
         ):
             found = (
@@ -172,7 +173,7 @@ class Chart:
     def _nearest2(self, terms: Terms, factor: int) -> Tensor:
         """kappa times the squared distance (K,) of centers to the tile in one factor."""
         middle = self._tile.middle.reshape(-1, self.factors)[:, factor, None]
-        centers = terms.centers.reshape(-1, self.factors, terms.count)[:, factor]
+        centers = terms.centers.reshape(-1, self.factors, terms.size)[:, factor]
         away = ((centers - middle) ** 2).sum(dim=0).sqrt_().sub_(self._tile.radius[factor])
         return away.clamp_min_(0).square_().mul_(terms.kappa[factor])
 
@@ -193,7 +194,7 @@ class Chart:
             return (_sphere(u[None]).real.mT @ centers).amax(dim=0)
         other = 1 - axis
         across = self.middle[other] + self.half[other] * torch.tensor([-1.0, 0.0, 1.0])
-        pair = torch.broadcast_tensors(u[:, None], across.to(u))
+        pair = broadcast(u[:, None], across.to(u))
         places = torch.stack(pair if axis == 0 else pair[::-1]).flatten(1)
         return (_sphere(places).real.mT @ centers).amax(dim=0)
 
@@ -230,9 +231,9 @@ def _frame(pole: Tensor) -> Tensor:
     start = pole[:, 0]
     across = torch.zeros_like(start)
     across[start.abs().argmin()] = 1
-    first = torch.linalg.cross(start, across)
-    first = first / first.norm()
-    return torch.stack([start, first, torch.linalg.cross(start, first)])[None]
+    first = linalg.cross(start, across)
+    first = first / linalg.vector_norm(first)
+    return torch.stack([start, first, linalg.cross(start, first)])[None]
 
 
 @lru_cache(maxsize=1)

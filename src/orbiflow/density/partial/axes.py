@@ -11,6 +11,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from orbiflow.arguments import is_a
 from orbiflow.density.spaces.flat import Torus
 from orbiflow.density.spaces.space import Space
 from orbiflow.errors import OrbiflowError
@@ -82,20 +83,20 @@ def given_axes(given: Mapping[int, float], dim: int) -> tuple[tuple[int, ...], t
     Raises:
         OrbiflowError: if there are none or no others, or for values that are not finite.
     """
-    if not isinstance(given, Mapping) or not given:
+    if not is_a(given, Mapping) or not given:
         raise OrbiflowError(f"given must say what is known, such as {{1: 0.25}}, got {given!r}")
     axes = tuple(_axis(axis, dim) for axis in given)
     if len(axes) == dim:
         raise OrbiflowError(f"all {dim} angles are given: nothing is left to have a density")
     for axis, value in zip(axes, given.values(), strict=True):
-        real = isinstance(value, numbers.Real) and not isinstance(value, bool)
+        real = not isinstance(value, bool) and isinstance(value, numbers.Real)
         if not real or not math.isfinite(float(value)):
             raise OrbiflowError(f"angle {axis} must be given as a finite number, got {value!r}")
     return axes, tuple(float(value) for value in given.values())
 
 
 def _axis(axis: Any, dim: int) -> int:
-    whole = isinstance(axis, numbers.Integral) and not isinstance(axis, bool)
+    whole = not isinstance(axis, bool) and isinstance(axis, numbers.Integral)
     if not whole or not 0 <= int(axis) < dim:
         raise OrbiflowError(f"axes are numbers of angles from 0 to {dim - 1}, got {axis!r}")
     return int(axis)

@@ -14,6 +14,7 @@ from orbiflow.density.models.log_sum import log_sum_exp, shares_of
 from orbiflow.density.partial.axes import Split
 from orbiflow.density.partial.nodes import Nodes, nodes_of
 from orbiflow.density.spaces.flat import Torus
+from orbiflow.typed_torch import listed, special, unique
 
 BLOCK_ENTRIES = 2_000_000
 """Of the table of points, components and nodes worked on at a time."""
@@ -91,9 +92,9 @@ def _closed(chains: VonMisesChains, split: Split, space: Torus) -> tuple[VonMise
         constant = means @ known
         residual = angle[0, given] - constant[:, given]
         kappa = chains.concentrations[:, given, None] / torch.tensor(SCALES)
-        logs = logs + (
-            kappa * (residual.cos() - 1)[..., None] - torch.special.i0e(kappa).log()
-        ).sum(dim=1)
+        logs = logs + (kappa * (residual.cos() - 1)[..., None] - special.i0e(kappa).log()).sum(
+            dim=1
+        )
         evidence = float(log_sum_exp(logs.flatten()))
         logs = shares_of(logs.flatten()).log().reshape(logs.shape)
     at = [*(1 + j for j in kept), *(1 + d + j for j in kept)]
@@ -116,8 +117,9 @@ def chains_at(chains: VonMisesChains, points: Tensor, observed: list[int], seed:
 
 
 def _groups(chains: VonMisesChains, observed: list[int]) -> Iterator[_Group]:
-    orders, number = torch.unique(chains.order, dim=0, return_inverse=True)
-    for k, order in enumerate(orders.tolist()):
+    orders, number = unique(chains.order, dim=0, return_inverse=True)
+    rows: list[list[int]] = listed(orders)
+    for k, order in enumerate(rows):
         last = max(order.index(axis) for axis in observed)
         before = order[: last + 1]
         yield _Group(
@@ -134,12 +136,13 @@ def _group_at(chains: VonMisesChains, group: _Group, angle: Tensor, seed: int) -
     means = chains.means[group.components].repeat_interleave(len(SCALES), dim=0)
     kappa = (chains.concentrations[group.components][:, None] / scale[:, None]).flatten(0, 1)
     constant = chains.log_weights[group.components].flatten()
-    constant = constant - torch.special.i0e(kappa[:, group.observed]).log().sum(dim=1)
+    constant = constant - special.i0e(kappa[:, group.observed]).log().sum(dim=1)
     found = angle.new_empty(len(angle), len(means))
     for chosen, nodes in nodes_of(means, kappa, group.hidden, group.observed, seed):
         block = max(1, BLOCK_ENTRIES // (len(chosen) * nodes.count))
         parts = [
-            _walked(part, means[chosen], kappa[chosen], group, nodes) for part in angle.split(block)
+            _walked(part, means[chosen], kappa[chosen], group, nodes)
+            for part in torch.split(angle, block)
         ]
         found[:, chosen] = torch.cat(parts) + constant[chosen]
     return found

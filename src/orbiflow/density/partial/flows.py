@@ -63,8 +63,8 @@ def _at(
     density: SymmetricDensity, points: Tensor, observed: list[int], hidden: list[int], nodes: Tensor
 ) -> Tensor:
     """Log densities (N, Q) of all angles, each point at each node."""
-    parts = []
-    for block in points.double().split(max(1, BLOCK // len(nodes))):
+    parts: list[Tensor] = []
+    for block in torch.split(points.double(), max(1, BLOCK // len(nodes))):
         whole = block.new_empty(len(block), len(nodes), density.space.dim)
         whole[:, :, observed] = block[:, None]
         whole[:, :, hidden] = nodes

@@ -11,6 +11,7 @@ from orbiflow.density.models.kernels import AdaptiveKernels
 from orbiflow.density.models.log_sum import log_sum_exp, shares_of
 from orbiflow.density.partial.axes import Split
 from orbiflow.density.spaces.flat import Torus
+from orbiflow.typed_torch import special
 
 BLOCK_ENTRIES = 250_000
 """Of the table of points against kernels worked on at a time."""
@@ -40,7 +41,8 @@ def kernels_at(kernels: AdaptiveKernels, points: Tensor, observed: list[int]) ->
     logs = kernels.weights.log()
     block = max(1, BLOCK_ENTRIES // len(kernels.weights))
     parts = [
-        log_sum_exp(log_kernels(kernels, part, observed) + logs) for part in points.split(block)
+        log_sum_exp(log_kernels(kernels, part, observed) + logs)
+        for part in torch.split(points, block)
     ]
     return torch.cat(parts)
 
@@ -51,4 +53,4 @@ def log_kernels(kernels: AdaptiveKernels, points: Tensor, observed: list[int]) -
     angle, center = 2 * math.pi * points.double(), 2 * math.pi * kernels.centers[:, observed]
     images = torch.cat([angle.cos(), angle.sin()], dim=1)
     rows = torch.cat([kappa * center.cos(), kappa * center.sin()], dim=1)
-    return images @ rows.mT - (torch.special.i0e(kappa).log() + kappa).sum(dim=1)
+    return images @ rows.mT - (special.i0e(kappa).log() + kappa).sum(dim=1)

@@ -30,7 +30,7 @@ def axes_named(wanted: Sequence[str | int], names: Sequence[str]) -> list[int]:
 
 
 def _axis(wanted: Any, names: list[str]) -> int:
-    if isinstance(wanted, numbers.Integral) and not isinstance(wanted, bool):
+    if not isinstance(wanted, bool) and isinstance(wanted, numbers.Integral):
         return int(wanted)
     hits = [i for i, name in enumerate(names) if name == wanted]
     if not hits and isinstance(wanted, str):
@@ -58,7 +58,7 @@ def given_named(
         axis = _axis(key, list(names))
         if axis in found:
             raise OrbiflowError(f"{names[axis]!r} is given twice")
-        real = isinstance(value, numbers.Real) and not isinstance(value, bool)
+        real = not isinstance(value, bool) and isinstance(value, numbers.Real)
         if not real or not math.isfinite(float(value)):
             raise OrbiflowError(f"{key} must be given as a finite number, got {value!r}")
         found[axis] = float(value) / torus.period

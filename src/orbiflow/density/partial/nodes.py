@@ -9,6 +9,8 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
+from orbiflow.typed_torch import listed, unique
+
 REACH = 7.0
 """Deviations from its mean at which an angle is not looked at any more."""
 
@@ -63,8 +65,8 @@ def nodes_of(
     reach = (REACH / kappa[:, hidden].clamp_min(1e-12).sqrt()).clamp_max(math.pi)
     sizes = (2 * reach * sharp.sqrt() / STEP).ceil().clamp_min(FEWEST)
     sizes = FEWEST * torch.exp2((sizes / FEWEST).log2().ceil())  # few different ones
-    wanted, number = torch.unique(sizes, dim=0, return_inverse=True)
-    for k, size in enumerate(wanted.tolist()):
+    wanted, number = unique(sizes, dim=0, return_inverse=True)
+    for k, size in enumerate(listed(wanted)):
         chosen = torch.nonzero(number == k)[:, 0]
         size = [min(int(s), MOST_ALONE) for s in size]
         fits = len(size) == 1 or math.prod(size) <= MOST
@@ -78,7 +80,7 @@ def _sharpness(
 ) -> Tensor:
     """Concentrations (C, H) of the integrand in each hidden angle: its own and those bent by it."""
     after = list(hidden + observed)
-    columns = []
+    columns: list[Tensor] = []
     for axis in hidden:
         slope = means[:, after, 1 + axis].square() + means[:, after, 1 + d + axis].square()
         columns.append(kappa[:, axis] + (kappa[:, after] * slope).sum(dim=1))
@@ -87,7 +89,8 @@ def _sharpness(
 
 def _trapezoidal(kappa: Tensor, reach: Tensor, sizes: list[int]) -> tuple[Tensor, list[Tensor]]:
     """A product of rules: log weights (C, Q) and offsets (C, Q) an axis."""
-    logs, offsets = [], []
+    logs: list[Tensor] = []
+    offsets: list[Tensor] = []
     for i, size in enumerate(sizes):
         step = (torch.arange(size, dtype=kappa.dtype) + 0.5) / size * 2 - 1
         offset = reach[:, i, None] * step

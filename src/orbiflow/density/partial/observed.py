@@ -19,6 +19,7 @@ from orbiflow.density.spaces.flat import Torus
 from orbiflow.density.spaces.space import CHART
 from orbiflow.errors import OrbiflowError
 from orbiflow.threads import one_thread
+from orbiflow.typed_torch import listed, unique
 
 Part = Base | SymmetricDensity
 """What a density is made of."""
@@ -31,7 +32,7 @@ def parts_of(density: SymmetricDensity) -> list[tuple[float, Part]]:
     parts: list[Part] = [density.flow_density, density.kernels, UniformBase(density.space)]
     if density.chains is not None:
         parts.append(density.chains)
-    shares = density.shares.tolist()
+    shares = listed(density.shares)
     return [(share, part) for share, part in zip(shares, parts, strict=True) if share > 0]
 
 
@@ -93,9 +94,10 @@ def log_prob_observed(density: SymmetricDensity, points: Tensor, *, measure: str
 def at_observed(part: Part, points: Tensor, *, measure: str = CHART) -> Tensor:
     """As `log_prob_observed`, of a part or a density, at float64 points (N, d) that are checked."""
     found = torch.zeros(len(points), dtype=torch.float64)
-    patterns, number = torch.unique(~points.isnan(), dim=0, return_inverse=True)
+    patterns, number = unique(~points.isnan(), dim=0, return_inverse=True)
     for k, pattern in enumerate(patterns):
-        observed, rows = torch.nonzero(pattern)[:, 0].tolist(), torch.nonzero(number == k)[:, 0]
+        observed: list[int] = listed(torch.nonzero(pattern)[:, 0])
+        rows = torch.nonzero(number == k)[:, 0]
         if not observed:
             continue
         some = points[rows][:, observed]

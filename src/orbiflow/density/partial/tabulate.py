@@ -11,6 +11,7 @@ from torch import Tensor
 
 from orbiflow.density.models.kernels import AdaptiveKernels
 from orbiflow.density.spaces.flat import Torus
+from orbiflow.typed_torch import fft, special
 
 FIRST, MOST = {1: 256, 2: 48}, {1: 4096, 2: 192}
 """Points of the grid along an angle, at first and at most, by the number of angles."""
@@ -66,11 +67,11 @@ def _on_grid(log_function: Callable[[Tensor], Tensor], space: Torus, count: int)
     kappa = (count / (2 * math.pi)) ** 2
     kernel = _kernel(line, kappa)
     shape = [count] * space.dim
-    spectrum = torch.fft.fftn(values.reshape(shape))
-    smoothing = torch.fft.fft(kernel).real
+    spectrum = fft.fftn(values.reshape(shape))
+    smoothing = fft.fft(kernel).real
     for axis in range(space.dim):
         spectrum = spectrum / smoothing.reshape([-1 if i == axis else 1 for i in range(space.dim)])
-    weights = torch.fft.ifftn(spectrum).real.flatten().clamp_min(0)
+    weights = fft.ifftn(spectrum).real.flatten().clamp_min(0)
     weights = weights / weights.sum()
     kept = _heaviest(weights)
     kernels = AdaptiveKernels(
@@ -86,7 +87,7 @@ def _on_grid(log_function: Callable[[Tensor], Tensor], space: Torus, count: int)
 
 
 def _kernel(line: Tensor, kappa: float) -> Tensor:
-    scaled = torch.special.i0e(torch.tensor(kappa, dtype=torch.float64))
+    scaled = special.i0e(torch.tensor(kappa, dtype=torch.float64))
     return (kappa * ((2 * math.pi * line).cos() - 1)).exp() / scaled
 
 

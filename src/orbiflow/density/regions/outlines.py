@@ -12,6 +12,7 @@ import torch
 from shapely.geometry.polygon import orient
 from torch import Tensor
 
+from orbiflow.density.arguments import silent
 from orbiflow.density.models.blend import BlendedDensity
 from orbiflow.density.models.symmetric import SymmetricDensity
 from orbiflow.density.regions.contours import filled
@@ -21,6 +22,7 @@ from orbiflow.density.regions.specks import with_specks
 from orbiflow.density.regions.window import Window, window_of
 from orbiflow.symmetry.isometry import Array
 from orbiflow.threads import one_thread
+from orbiflow.typed_torch import unique
 
 DOUBLINGS = 3
 """Of the coarsest grid: cells of a quarter of a degree on the globe."""
@@ -99,7 +101,7 @@ def outlines(
     *,
     budget: int = BUDGET,
     seed: int = 0,
-    told: Callable[[float, str], None] = lambda *_: None,
+    told: Callable[[float, str], None] = silent,
 ) -> list[Outline]:
     """Draw the boundaries of regions of one density of two dimensions.
 
@@ -139,7 +141,7 @@ def outlines(
     spent = grid.evaluations + len(peaks)
     generator = torch.Generator().manual_seed(seed + 1)
     fresh = window.from_chart(density.sample((CHECKED,), generator).double())
-    found = []
+    found: list[Outline] = []
     for number, region in enumerate(regions):
         told(min(0.9, spent / budget), "drawing outlines")
         shape, off = filled(grid.values, grid.low, grid.step, region.log_prob, function)
@@ -168,7 +170,7 @@ def _peaks(density: SymmetricDensity) -> Tensor:
     """Chart points (P, 2) at which narrow islands may be: centres of kernels."""
     if not isinstance(density, BlendedDensity):
         return torch.zeros(0, 2, dtype=torch.float64)
-    places = torch.unique((density.kernels.centers * 1e6).round(), dim=0) / 1e6
+    places = unique((density.kernels.centers * 1e6).round(), dim=0) / 1e6
     chosen = torch.randperm(len(places), generator=torch.Generator().manual_seed(0))
     return places[chosen[:MOST_PEAKS]]
 
@@ -192,7 +194,7 @@ def _share_inside(shape: shapely.MultiPolygon, points: Array) -> float:
 
 
 def _notes(region: DensityRegion, inside: float, error: float, missed: int) -> tuple[str, ...]:
-    notes = []
+    notes: list[str] = []
     beyond = abs(inside - region.held) - 3 * float(np.hypot(error, region.error))
     if beyond > TOLERANCE:
         notes.append(

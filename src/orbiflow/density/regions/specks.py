@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from orbiflow.density.regions.contours import filled
 from orbiflow.density.regions.grid import Function, LevelGrid, Seeds
 from orbiflow.symmetry.isometry import Array
+from orbiflow.typed_shapely import ufuncs
 
 PARTS = 12
 """A cell is cut into, each way."""
@@ -67,7 +68,7 @@ def _wrong(
 ) -> NDArray[np.int64]:
     """Cells (C, 2) with seeds on the wrong side, those with most first."""
     shapely.prepare(shape)
-    wrong = shapely.intersects_xy(shape, *seeds.points.T) != (seeds.values >= level)
+    wrong = ufuncs.intersects_xy(shape, *seeds.points.T) != (seeds.values >= level)
     most = np.array(grid.values.shape) - 2
     at = np.clip(np.floor((seeds.points[wrong] - grid.low) / grid.step).astype(int), 0, most)
     cells, counts = np.unique(at, axis=0, return_counts=True)
@@ -78,7 +79,7 @@ def _evaluated(grid: LevelGrid, cells: NDArray[np.int64], function: Function) ->
     """(C, P + 1, P + 1) of cells (C, 2)."""
     t = np.arange(PARTS + 1) / PARTS
     inside = np.stack(np.meshgrid(t, t, indexing="ij"), axis=-1)
-    found = []
+    found: list[Array] = []
     for start in range(0, len(cells), BLOCK):
         at = cells[start : start + BLOCK, None, None] + inside
         values = function((grid.low + at * grid.step).reshape(-1, 2))
@@ -104,7 +105,7 @@ def _beside(
         ((0, -1), blocks[:, :, 0]),
         ((0, 1), blocks[:, :, -1]),
     )
-    found = []
+    found: list[Array] = []
     for move, side in sides:
         drawn = side[:, :1] + t * (side[:, -1:] - side[:, :1])
         off = ((side >= level) != (drawn >= level)).sum(axis=1) >= OFF
@@ -115,5 +116,6 @@ def _beside(
 
 
 def _box(grid: LevelGrid, cell: Array) -> shapely.Geometry:
-    low = grid.low + cell * grid.step
-    return shapely.box(*low, *(low + grid.step))
+    low: Array = grid.low + cell * grid.step
+    xmin, ymin, xmax, ymax = (float(c) for c in (*low, *(low + grid.step)))
+    return shapely.box(xmin, ymin, xmax, ymax)

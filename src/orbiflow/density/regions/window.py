@@ -14,6 +14,7 @@ from orbiflow.density.spaces.round import RoundSpace, to_latlon, to_vectors
 from orbiflow.density.spaces.space import Space
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry.isometry import Array
+from orbiflow.typed_shapely import ufuncs
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +41,7 @@ class Window:
         """Natural area of a polygon or several: steradians on the globe, where sides are straight in
         longitude and latitude."""
         if not self.on_globe:
-            return float(shapely.area(shape))
+            return float(ufuncs.area(shape))
         return sum(_on_globe(part) for part in shapely.get_parts(shape))
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 from typing import Any
 
+from orbiflow.arguments import is_a
 from orbiflow.density.spaces.flat import KleinBottle, Torus
 from orbiflow.density.spaces.round import ProjectivePlane, Sphere
 from orbiflow.density.spaces.space import Space
@@ -23,7 +24,7 @@ def space_class(name: str) -> type[Space]:
     Raises:
         OrbiflowError: for an unknown name.
     """
-    if not isinstance(name, str) or name not in CLASSES:
+    if not is_a(name, str) or name not in CLASSES:
         raise OrbiflowError(f"unknown space {name!r}; the four are {', '.join(SPACES)}")
     return CLASSES[name]
 

@@ -11,6 +11,7 @@ import torch
 from numpy.typing import ArrayLike
 from torch import Tensor
 
+from orbiflow.arguments import is_a
 from orbiflow.density.arguments import check_range
 from orbiflow.density.spaces.space import Space, checked_table
 from orbiflow.errors import OrbiflowError
@@ -29,7 +30,7 @@ def whole_turn(unit: str) -> float:
     Raises:
         OrbiflowError: for an unknown unit.
     """
-    if not isinstance(unit, str) or unit not in TURN:
+    if not is_a(unit, str) or unit not in TURN:
         raise OrbiflowError(f"unit must be one of {', '.join(TURN)}, got {unit!r}")
     return TURN[unit]
 

@@ -191,7 +191,7 @@ def _nearest(units: Array) -> tuple[Array, Array]:
     theta = np.where(theta >= math.pi, 0.0, theta)  # the remainder of a tiny negative number
     edge, line = _edge(theta), _line(theta)
     first, second = ((units[:, :5] * part).sum(axis=1) for part in (edge, line))
-    phi = np.arctan2(second, first)
+    phi: Array = np.arctan2(second, first)
     phi = np.where(phi < -math.pi / 2, phi + 2 * math.pi, phi)
     foot = np.zeros_like(units)
     foot[:, :5] = np.cos(phi)[:, None] * edge + np.sin(phi)[:, None] * line

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from functools import lru_cache
 from typing import Any, Self
 
@@ -11,12 +12,14 @@ import torch
 from numpy.typing import ArrayLike, NDArray
 from torch import Tensor
 
+from orbiflow.arguments import is_a
 from orbiflow.density.arguments import check_kind
 from orbiflow.density.spaces import uniformization
 from orbiflow.density.spaces.space import Space, checked_table
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import CrystallographicGroup, identification_group
 from orbiflow.symmetry.isometry import Array
+from orbiflow.typed_torch import linalg
 
 UNIT_TOLERANCE = 1e-3
 """How far the length of what is given as a unit vector may be from 1."""
@@ -61,16 +64,16 @@ def to_vectors(data: ArrayLike) -> Array:
 def to_latlon(vectors: Array) -> Array:
     """Unit vectors (N, 3) as degrees (N, 2): latitude, longitude in [-180, 180)."""
     x, y, z = vectors.T
-    lon = np.degrees(np.arctan2(y, x))
+    lon: Array = np.degrees(np.arctan2(y, x))
     lat = np.degrees(np.arctan2(z, np.hypot(x, y)))
     return np.stack([lat, np.where(lon >= 180, lon - 360, lon)], axis=-1)
 
 
-def _refuse(wrong: NDArray[np.bool_], message: Any) -> None:
+def _refuse(wrong: NDArray[np.bool_], message: Callable[[int], str]) -> None:
     rows = np.flatnonzero(wrong)
     if len(rows):
         more = f" ({len(rows)} such rows)" if len(rows) > 1 else ""
-        raise OrbiflowError(f"row {rows[0] + 1}: {message(rows[0])}{more}")
+        raise OrbiflowError(f"row {rows[0] + 1}: {message(int(rows[0]))}{more}")
 
 
 class RoundSpace(Space):
@@ -94,7 +97,7 @@ class RoundSpace(Space):
         return cls(form=form, rotation=clear_rotation(cls(form=form), data, seed=seed))
 
     def __init__(self, *, form: str = "latlon", rotation: ArrayLike | None = None) -> None:
-        if not isinstance(form, str) or form not in FORMS:
+        if not is_a(form, str) or form not in FORMS:
             raise OrbiflowError(f"form must be one of {', '.join(FORMS)}, got {form!r}")
         turn = np.eye(3) if rotation is None else checked_table(rotation, (3,), "rotation")
         if turn.shape != (3, 3) or not np.allclose(turn @ turn.T, np.eye(3), atol=1e-9):
@@ -158,7 +161,9 @@ class RoundSpace(Space):
 
     def uniform(self, count: int, generator: torch.Generator) -> Tensor:
         vectors = torch.randn(count, 3, dtype=torch.float64, generator=generator)
-        return self.vectors_to_chart((vectors / vectors.norm(dim=1, keepdim=True)).numpy())
+        return self.vectors_to_chart(
+            (vectors / linalg.vector_norm(vectors, dim=1, keepdim=True)).numpy()
+        )
 
     def cone_vectors(self) -> Array:
         """Unit vectors of the chart's cone points, in the data's frame."""
@@ -178,7 +183,9 @@ class RoundSpace(Space):
             uniformization.to_sphere(self.project(points), self.power) for points in (start, end)
         )
         # well conditioned at both ends, as acos is not
-        angle = 2 * torch.atan2((one - other).norm(dim=-1), (one + other).norm(dim=-1))
+        angle = 2 * torch.atan2(
+            linalg.vector_norm(one - other, dim=-1), linalg.vector_norm(one + other, dim=-1)
+        )
         return angle if self.power == 4 else torch.minimum(angle, math.pi - angle)
 
 

@@ -12,10 +12,12 @@ import torch
 from numpy.typing import ArrayLike
 from torch import Tensor
 
+from orbiflow.arguments import is_a
 from orbiflow.density.arguments import float_tensor
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import CrystallographicGroup, DirichletDomain
 from orbiflow.symmetry.isometry import Array
+from orbiflow.typed_torch import linalg
 
 MEASURES = ("natural", "square", "uniform")
 """Natural: the user's units, or round area in steradians. Square: area of the canonical square.
@@ -148,7 +150,7 @@ class Space(ABC):
 
     def distance(self, start: Tensor, end: Tensor) -> Tensor:
         """Geodesic distance (...,) in the flat metric of the chart, over group images."""
-        return self.displacement(start, end).norm(dim=-1)
+        return linalg.vector_norm(self.displacement(start, end), dim=-1)
 
     def squared_distances(self, start: Tensor, end: Tensor) -> Tensor:
         """Squares (N, M) of `distance` between all of `start` (N, d) and `end` (M, d)."""
@@ -212,7 +214,7 @@ def check_measure(measure: str) -> None:
     Raises:
         OrbiflowError: for a measure that is not one of `MEASURES`.
     """
-    if not isinstance(measure, str) or measure not in MEASURES:
+    if not is_a(measure, str) or measure not in MEASURES:
         raise OrbiflowError(f"measure must be one of {', '.join(MEASURES)}, got {measure!r}")
 
 

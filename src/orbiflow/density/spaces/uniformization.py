@@ -58,7 +58,8 @@ def from_sphere(vectors: Array, power: int) -> Array:
     u = a / b with b >= 0 and Re u >= 0, then K z = sqrt(2 b) R_F(a - b, a, a + b): the inverse of
     sn^2 = 2 / (u + 1) (DLMF 19.25(v)).
     """
-    x, y, z = np.moveaxis(np.asarray(vectors, dtype=np.float64), -1, 0)
+    along: list[Array] = list(np.moveaxis(np.asarray(vectors, dtype=np.float64), -1, 0))
+    x, y, z = along
     if power == 2:  # of the two opposite vectors, that on the side x >= 0
         sign = np.where(x < 0, -1.0, 1.0)
         x, y, z = sign * x, sign * y, sign * z

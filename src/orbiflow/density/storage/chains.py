@@ -51,7 +51,7 @@ def chains_from_header(
         "concentrations": (count, d),
         "order": (count, d),
     }
-    parts = []
+    parts: list[Tensor] = []
     for name, shape in shapes.items():
         if prefix + name not in tensors:
             raise OrbiflowError(f"the tensor {prefix + name} is missing")

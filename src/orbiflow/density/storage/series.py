@@ -14,6 +14,7 @@ from orbiflow.density.storage.groups import is_same_group
 from orbiflow.errors import OrbiflowError
 from orbiflow.fields import FourierField, InvariantField, SplineField
 from orbiflow.flows import Flow
+from orbiflow.json_values import is_list
 
 MAX_SEGMENTS, MAX_FREQUENCY, MAX_STEPS, MAX_DIM = 256, 128, 4096, 3
 FIELDS: dict[str, type[FourierField | SplineField]] = {
@@ -39,7 +40,8 @@ def series_parts(flow: Flow, space: Space) -> tuple[dict[str, Any], dict[str, Te
             f"the flow has {len(flow.segments)} segments of {flow.steps} steps in {space.dim} "
             f"dimensions; saved are {MAX_SEGMENTS}, {MAX_STEPS} and {MAX_DIM} at most"
         )
-    segments, tensors = [], {}
+    segments: list[dict[str, Any]] = []
+    tensors: dict[str, Tensor] = {}
     for number, field in enumerate(flow.segments):
         segments.append(_segment(number, field, space))
         parameters = cast(InvariantField, field).parameters_
@@ -95,7 +97,7 @@ def series_from_header(
     if header["kind"] != "series":
         header, tensors = _of_version_1(header, tensors["parameters"])
     segments = header["segments"]
-    if not isinstance(segments, list) or not 1 <= len(segments) <= MAX_SEGMENTS:
+    if not is_list(segments) or not 1 <= len(segments) <= MAX_SEGMENTS:
         raise ValueError("no segments, or too many")
     return Flow(
         [_field(part, tensors[f"flow.{k}"], space) for k, part in enumerate(segments)],

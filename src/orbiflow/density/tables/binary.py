@@ -162,7 +162,7 @@ def _numbered(
     drop_missing: bool,
     keep_missing: bool,
 ) -> Table:
-    rows, dropped = np.arange(1, len(values) + 1, dtype=np.int64), frozenset()
+    rows, dropped = np.arange(1, len(values) + 1, dtype=np.int64), frozenset[int]()
     if drop_missing and len(values):
         values, rows, dropped, more = without_missing(path, values, rows, "row")
         notes = [*notes, *more]

@@ -50,7 +50,7 @@ def read_labels(
         return _picked(path, column, {k: c for k, c in enumerate(cells, start=1) if c}, table)
     layout = layout_of(path, [column], has_header)
     index = find(path, layout.names, column)
-    found = {}
+    found: dict[int, str] = {}
     for number, line, is_comment in text_lines(path):
         if is_comment:
             continue

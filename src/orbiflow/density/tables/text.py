@@ -68,7 +68,8 @@ def read_text(
     layout = layout_of(path, columns, has_header)
     picked, notes = choose(path, layout.names, layout.numeric, columns, width)
     names = tuple(layout.names[i] for i in picked)
-    values, lines, cells, comments = array("d"), array("q"), [], 0
+    values, lines, comments = array("d"), array("q"), 0
+    cells: list[str] = []
     for number, line, is_comment in text_lines(path):
         if is_comment or (number == layout.first and layout.header is not None):
             comments += is_comment
@@ -85,7 +86,7 @@ def read_text(
     values.extend(_numbers(path, cells, lines, names, layout.decimal))
     check_count(path, len(lines), max_rows, "rows")
     rows, at = np.frombuffer(values).reshape(-1, len(picked)), np.frombuffer(lines, dtype=np.int64)
-    dropped = frozenset()
+    dropped = frozenset[int]()
     if drop_missing and len(lines):
         rows, at, dropped, more = without_missing(path, rows, at, "line")
         notes += more
@@ -265,7 +266,7 @@ def _has_header(
 
 
 def _numbers(
-    path: Path, cells: list[str], lines: array, names: tuple[str, ...], decimal: str
+    path: Path, cells: list[str], lines: array[int], names: tuple[str, ...], decimal: str
 ) -> list[float]:
     """`cells` of the last of `lines`, row after row, as floats; NaN where one is missing."""
     if decimal != ".":

@@ -85,7 +85,7 @@ class Paint:
         """The texels around become what lies next to them inside: all that lookups blend in."""
         known = inside.copy()
         for _ in range(MARGIN - 1):
-            wider = np.asarray(binary_dilation(known, np.ones((3, 3))), dtype=bool)
+            wider = np.asarray(binary_dilation(known, np.ones((3, 3), dtype=int)), dtype=bool)
             rows, columns = np.nonzero(wider & ~known)
             for down, right in _AROUND:
                 there = rows + down, columns + right

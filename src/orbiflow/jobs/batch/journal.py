@@ -18,6 +18,7 @@ from orbiflow.errors import OutputError
 from orbiflow.files import write_atomic
 from orbiflow.folders import stays_inside
 from orbiflow.jobs.records import Record, RecordError
+from orbiflow.json_values import is_object
 
 MOST_BYTES = 2**30
 """Of a journal that is read."""
@@ -45,7 +46,7 @@ class Entry(Record):
     version: str
     state: State
     reason: str = ""
-    best: dict[str, Any] = field(default_factory=dict)
+    best: dict[str, Any] = field(default_factory=dict[str, Any])
     seconds: float | None = None
 
     def same_work(self, code: str, settings: dict[str, Any], version: str) -> bool:
@@ -120,7 +121,7 @@ def _entries(lines: Iterable[bytes]) -> Iterable[Entry]:
     for line in lines:
         try:
             document = json.loads(line)
-            if isinstance(document, dict) and document.pop("kind", None) == Entry.KIND:
+            if is_object(document) and document.pop("kind", None) == Entry.KIND:
                 entry = Entry.of_fields(document)
                 if stays_inside(entry.name):  # results are written there
                     yield entry

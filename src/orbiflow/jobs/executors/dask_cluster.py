@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import concurrent.futures
+import importlib
 import secrets
 import time
 import warnings
@@ -15,7 +16,7 @@ from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self, TypeAlias
 
 from orbiflow import __version__
 from orbiflow.cancel import Cancel
@@ -25,8 +26,9 @@ from orbiflow.jobs.executors.memory import keeping_memory
 from orbiflow.jobs.executors.parcel import Answer, Parcel, carry_out
 from orbiflow.jobs.run import Sink
 
-if TYPE_CHECKING:
-    from distributed import Client, Future
+Client: TypeAlias = Any
+Future: TypeAlias = Any
+"""Of `distributed`, which has no types and is not always there."""
 
 POLL = 0.05
 """Seconds between looks at the token while nothing comes."""
@@ -62,7 +64,7 @@ class DaskCluster:
                 of orbiflow on every worker.
         """
         try:
-            import distributed  # noqa: F401
+            importlib.import_module("distributed")
         except ImportError as error:
             raise OrbiflowError(
                 "a Dask scheduler needs dask.distributed: pip install 'orbiflow[dask]'"
@@ -159,7 +161,7 @@ class DaskCluster:
                 f"{self.address} --nthreads 1 --nworkers N`"
             ) from error
         try:
-            found: Any = client.run(_version_asker())
+            found = client.run(_version_asker())
         except Exception as error:
             raise OrbiflowError(
                 f"the workers of {self.address} cannot be asked: {error}"
@@ -221,8 +223,8 @@ class _Out:
             future = self.client.submit(
                 _serve, parcel.header(), parcel.data, key=key, pure=False, retries=0
             )
-        loop: Any = self.client.loop
-        fetched = asyncio.run_coroutine_threadsafe(_fetched(self.client, future), loop.asyncio_loop)
+        loop = self.client.loop.asyncio_loop
+        fetched = asyncio.run_coroutine_threadsafe(_fetched(self.client, future), loop)
         self.sent.append(_Sent(parcel, future, fetched))
 
     def came(self) -> list[_Sent]:
@@ -247,8 +249,7 @@ async def _fetched(client: Client, future: Future) -> Any:
     Not `distributed.as_completed`: a result that is lost while it fetches it, and whose task then
     fails, never comes out of it.
     """
-    gathering: Any = client.gather(future, asynchronous=True)
-    return await gathering
+    return await client.gather(future, asynchronous=True)
 
 
 class _Crew:
@@ -286,9 +287,9 @@ def _connected(address: str, timeout: float) -> Client:
     A client that could not start is closed by the garbage collector, which takes the lock of all
     clients' loops. In the midst of another's start, which holds it, that never ends.
     """
-    from distributed import Client
+    import distributed
 
-    client = Client.__new__(Client)
+    client: Client = distributed.Client.__new__(distributed.Client)
     try:
         client.__init__(address, timeout=timeout, set_as_default=False, name="orbiflow")
     except BaseException:
@@ -300,8 +301,7 @@ def _connected(address: str, timeout: float) -> Client:
 
 def _threads(client: Client) -> int:
     try:
-        found: Any = client.nthreads()
-        return sum(found.values())
+        return sum(client.nthreads().values())
     except (OSError, RuntimeError, TimeoutError, AttributeError):  # the scheduler has gone
         return 0
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import os
-from collections.abc import Iterator
+from collections.abc import Generator
 
 TRIM_THRESHOLD, MMAP_THRESHOLD = -1, -3  # of glibc's malloc.h
 ROOM = 32 * 2**20  # bytes; the most that glibc itself would come to
@@ -19,7 +19,7 @@ VARIABLE = "MALLOC_TRIM_THRESHOLD_"
 
 
 @contextlib.contextmanager
-def keeping_memory() -> Iterator[None]:
+def keeping_memory() -> Generator[None]:
     """Freed memory stays with this process in the block; where it would not, and glibc is there."""
     asked = os.environ.get(VARIABLE, "")
     set_option = getattr(_libc(), "mallopt", None) if asked.isdecimal() else None

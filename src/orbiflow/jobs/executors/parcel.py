@@ -18,6 +18,7 @@ from orbiflow.jobs.events import Event, Failed, Finished, Progress, Written, eve
 from orbiflow.jobs.request import Request
 from orbiflow.jobs.requests import request_from_json
 from orbiflow.jobs.run import run
+from orbiflow.json_values import is_list, is_object
 
 MOST_WRITTEN = 512 * 2**20
 """Bytes that one job may write."""
@@ -158,6 +159,6 @@ def _without(value: Any, folder: str) -> Any:
         for part in ("in", "out"):
             value = value.replace(str(Path(folder) / part / "_")[:-1], "")
         return value
-    if isinstance(value, dict):
+    if is_object(value):
         return {name: _without(part, folder) for name, part in value.items()}
-    return [_without(part, folder) for part in value] if isinstance(value, list) else value
+    return [_without(part, folder) for part in value] if is_list(value) else value

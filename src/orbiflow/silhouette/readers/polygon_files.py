@@ -1,10 +1,12 @@
 """Polygons written out as numbers: the `.dat` files of Nagata and Imahori, JSON and GeoJSON."""
 
 import json
+from typing import Any
 
 import numpy as np
 
 from orbiflow.errors import InputFileError
+from orbiflow.json_values import is_list, is_object
 from orbiflow.silhouette.outlines import MAX_VERTICES, clean_ring
 from orbiflow.silhouette.readers.reading import Reading, read_bytes
 from orbiflow.silhouette.readers.source import Source
@@ -103,11 +105,11 @@ def read_json(path: Source) -> Reading:
     return Reading(outline, y_down, "json", None, (*notes, *dropped))
 
 
-def _find_polygon(path: Source, content: object) -> tuple[list, bool, list[str]]:
+def _find_polygon(path: Source, content: object) -> tuple[list[Any], bool, list[str]]:
     """The list of vertices in `content`, whether y points down, and notes."""
-    if isinstance(content, list):
+    if is_list(content):
         return content, False, []
-    if not isinstance(content, dict):
+    if not is_object(content):
         raise InputFileError(f"{path}: holds a single value, not a polygon; write [[x, y], ...]")
     if "type" in content and not any(key in content for key in POLYGON_KEYS):
         points, notes = _geojson_ring(path, content)
@@ -122,39 +124,39 @@ def _find_polygon(path: Source, content: object) -> tuple[list, bool, list[str]]
     points, y_down = content[keys[0]], content.get("y_down", False)
     if not isinstance(y_down, bool):
         raise InputFileError(f'{path}: "y_down" must be true or false')
-    if not isinstance(points, list):
+    if not is_list(points):
         raise InputFileError(f'{path}: "{keys[0]}" must be a list of [x, y] pairs')
     notes = [f'took "{keys[0]}", left {", ".join(keys[1:])} unread'] if len(keys) > 1 else []
     return points, y_down, notes
 
 
-def _geojson_ring(path: Source, content: dict) -> tuple[list, list[str]]:
+def _geojson_ring(path: Source, content: dict[str, Any]) -> tuple[list[Any], list[str]]:
     geometry = content.get("geometry") if content["type"] == "Feature" else content
-    if not isinstance(geometry, dict) or geometry.get("type") != "Polygon":
-        kind = geometry.get("type") if isinstance(geometry, dict) else content["type"]
+    if not is_object(geometry) or geometry.get("type") != "Polygon":
+        kind = geometry.get("type") if is_object(geometry) else content["type"]
         raise InputFileError(
             f"{path}: GeoJSON of type {_quote(str(kind))}; save one Polygon, or a Feature with one"
         )
     rings = geometry.get("coordinates")
-    if not isinstance(rings, list) or not rings or not isinstance(rings[0], list):
+    if not is_list(rings) or not rings or not is_list(rings[0]):
         raise InputFileError(f'{path}: the GeoJSON Polygon has no ring under "coordinates"')
-    notes = []
+    notes: list[str] = []
     if len(rings) > 1:
         notes.append(f"filled {len(rings) - 1} hole{'s' * (len(rings) > 2)}")
     # A GeoJSON position may carry an altitude.
-    if any(isinstance(position, list) and len(position) == 3 for position in rings[0]):
+    if any(is_list(position) and len(position) == 3 for position in rings[0]):
         notes.append("left the altitudes unread")
-        return [p[:2] if isinstance(p, list) else p for p in rings[0]], notes
+        return [p[:2] if is_list(p) else p for p in rings[0]], notes
     return rings[0], notes
 
 
-def _check_pairs(path: Source, points: list) -> None:
+def _check_pairs(path: Source, points: list[Any]) -> None:
     if len(points) > MAX_VERTICES:
         raise InputFileError(
             f"{path}: {len(points)} vertices, at most {MAX_VERTICES} are read; simplify the outline"
         )
     for i, pair in enumerate(points):
-        if not isinstance(pair, list) or len(pair) != 2 or not all(map(_is_number, pair)):
+        if not is_list(pair) or len(pair) != 2 or not all(map(_is_number, pair)):
             raise InputFileError(
                 f"{path}: vertex {i} (counted from 0) is {_quote(json.dumps(pair))}, not a pair of "
                 "numbers [x, y]"

@@ -24,8 +24,10 @@ MIN_CONTRAST = 0.04  # of full scale, between the shape's and the background's u
 
 _FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "GIF", "TIFF")
 # What Pillow raises on a damaged file depends on the format.
-_DAMAGED = (OSError, SyntaxError, ValueError, EOFError, KeyError, IndexError, TypeError)
-_DAMAGED += (OverflowError, MemoryError, ArithmeticError, Image.DecompressionBombError)
+_DAMAGED = (
+    *(OSError, SyntaxError, ValueError, EOFError, KeyError, IndexError, TypeError),
+    *(OverflowError, MemoryError, ArithmeticError, Image.DecompressionBombError),
+)
 
 _PARTS = {"alpha": ("opaque", "transparent"), "mask": ("marked", "unmarked")}
 """Channels that say by themselves where the shape is: their high part and their low part."""
@@ -127,7 +129,7 @@ def _too_large(path: Source, size: str) -> str:
 
 def upright(image: Image.Image) -> tuple[Image.Image, list[str]]:
     """The first frame of `image`, turned as its EXIF orientation asks, with notes."""
-    notes = []
+    notes: list[str] = []
     if getattr(image, "n_frames", 1) > 1:
         notes.append("took the first frame of several")
     turned = ImageOps.exif_transpose(image)

@@ -21,6 +21,7 @@ from orbiflow.silhouette.readers.source import Source
 from orbiflow.silhouette.readers.svg_paths import MAX_POINTS, SubPath, TooManyPoints
 from orbiflow.silhouette.readers.svg_shapes import Drawing
 from orbiflow.silhouette.readers.svg_xml import parse_xml
+from orbiflow.typed_shapely import ufuncs
 
 MAX_BYTES = 16 * 2**20
 # Flattening error, of the size of each shape, and its floor, of the size of the drawing.
@@ -75,7 +76,8 @@ def _drawing_size(drawing: Drawing) -> float:
 
 def _regions(drawing: Drawing, size: float) -> tuple[list[BaseGeometry], int]:
     """Regions filled by the elements' closed sub-paths, and how many sub-paths were left open."""
-    regions, n_open, n_points = [], 0, 0
+    regions: list[BaseGeometry] = []
+    n_open, n_points = 0, 0
     for shape in drawing.shapes:
         closed = [path for path in shape.paths if _is_closed(path, size)]
         n_open += len(shape.paths) - len(closed)
@@ -117,7 +119,7 @@ def _drop_backgrounds(
     regions: list[BaseGeometry], box: tuple[float, float, float, float] | None
 ) -> tuple[list[BaseGeometry], list[str]]:
     """`regions` without rectangles that cover the page, as long as something else is there."""
-    xmin, ymin, xmax, ymax = shapely.total_bounds(regions) if box is None else box
+    xmin, ymin, xmax, ymax = ufuncs.total_bounds(regions) if box is None else box
     page = shapely.box(xmin, ymin, xmax, ymax)
     rest = [region for region in regions if not _covers(region, page)]
     n = len(regions) - len(rest)
@@ -137,7 +139,7 @@ def _covers(region: BaseGeometry, page: BaseGeometry) -> bool:
 
 def _overlay(path: Source, regions: list[BaseGeometry]) -> BaseGeometry:
     # Snapped to a grid: neighbours that all but share an edge would leave cracks between them.
-    bounds = shapely.total_bounds(regions)
+    bounds = ufuncs.total_bounds(regions)
     size = max(bounds[2] - bounds[0], bounds[3] - bounds[1])
     grid = max(GRID * size, GRID_FLOOR * float(np.abs(bounds).max()))
     try:

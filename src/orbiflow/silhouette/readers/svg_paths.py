@@ -40,7 +40,7 @@ class Bezier:
         bend = float(np.hypot(*np.diff(points, n=2, axis=0).T).max())
         steps = _steps(math.sqrt(degree * (degree - 1) / 8 * bend / tolerance))
         t = np.arange(1, steps + 1)[:, None] / steps
-        level = list(points)
+        level: list[NDArray[np.float64]] = list(points)
         while len(level) > 1:  # de Casteljau, at all parameters at once
             level = [(1 - t) * a + t * b for a, b in pairwise(level)]
         return level[0]
@@ -84,7 +84,7 @@ class SubPath:
     """A connected run of curves from `start`."""
 
     start: NDArray[np.float64]
-    curves: list[Bezier | EllipticArc] = field(default_factory=list)
+    curves: list[Bezier | EllipticArc] = field(default_factory=list[Bezier | EllipticArc])
     closed: bool = False
 
     def reach(self) -> NDArray[np.float64]:

@@ -57,7 +57,7 @@ class DrawnShape:
 
     paths: list[SubPath]
     fill_rule: str
-    paint: Mapping[str, str] = field(default_factory=dict)
+    paint: Mapping[str, str] = field(default_factory=dict[str, str])
     opacity: float = 1.0
     scale: float = 1.0
 
@@ -70,7 +70,7 @@ class _Place:
     viewport: tuple[float, float]  # what percentages refer to
     fill_rule: str = "nonzero"
     depth: int = 0
-    paint: Mapping[str, str] = field(default_factory=dict)
+    paint: Mapping[str, str] = field(default_factory=dict[str, str])
     opacity: float = 1.0
 
 
@@ -80,8 +80,8 @@ class Drawing:
 
     path: Source
     root: Element
-    shapes: list[DrawnShape] = field(default_factory=list)
-    others: dict[str, int] = field(default_factory=dict)
+    shapes: list[DrawnShape] = field(default_factory=list[DrawnShape])
+    others: dict[str, int] = field(default_factory=dict[str, int])
     visited: int = 0
     tokens: int = 0
 

@@ -69,17 +69,17 @@ def trace(
 def _largest(mask: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], list[str]]:
     """The component that is largest with its holes filled."""
     # Background holds together across corners where the shape does not: hence the full structure.
-    filled = ndimage.binary_fill_holes(mask, structure=np.ones((3, 3)))
-    labels, n = ndimage.label(filled)  # type: ignore[misc]
+    filled = ndimage.binary_fill_holes(mask, structure=np.ones((3, 3), dtype=int))
+    labels, n = ndimage.label(filled)
     areas = np.bincount(labels.ravel())
     areas[0] = 0
     shape = labels == areas.argmax()
-    notes = []
+    notes: list[str] = []
     if n > 1:
         share = areas.max() / areas.sum()
         notes.append(f"kept the largest of {n} components ({percent(share)} of the filled area)")
     holes = shape & ~mask
-    n_holes = ndimage.label(holes, structure=np.ones((3, 3)))[1]  # type: ignore[index]
+    n_holes = ndimage.label(holes, structure=np.ones((3, 3), dtype=int))[1]
     if n_holes:
         share = holes.sum() / shape.sum()
         notes.append(f"filled {n_holes} hole{'s' * (n_holes > 1)} ({percent(share)} of the area)")
@@ -119,7 +119,7 @@ def _polygon(values: NDArray[np.float64], cut: float, inside: float) -> tuple[Po
 def _is_stepped(ring: NDArray[np.float64]) -> bool:
     """Whether nearly every vertex cuts its grid line at the same fraction."""
     # Each vertex lies on one line of pixel centres and anywhere between two of them.
-    fraction = np.mod(ring - 0.5, 1.0).sum(axis=1)
+    fraction: NDArray[np.float64] = np.mod(ring - 0.5, 1.0).sum(axis=1)
     return bool(np.mean(np.abs(fraction - np.median(fraction)) < 0.05) > 0.95)
 
 
@@ -129,7 +129,7 @@ def _simplify(polygon: Polygon, tolerance: float) -> tuple[Polygon, list[str]]:
     while len(simple.exterior.coords) > MAX_OUTLINE_VERTICES:
         tolerance *= 1.5
         simple = simplified(polygon, tolerance)
-    notes = []
+    notes: list[str] = []
     if tolerance > STEP_TOLERANCE:
         notes.append(f"simplified the outline to within {tolerance:.2f} traced pixels")
     while not (simple.is_valid and simple.area > 0):
