@@ -81,8 +81,9 @@ def test_the_sum_is_that_of_all_terms(shape: str, seed: int, floored: bool) -> N
     expected = by_all(terms, features[:, some])
     beside = torch.tensor(floor, dtype=torch.float64)
     off = torch.logaddexp(found[some], beside) - torch.logaddexp(expected, beside)
-    # rounding: an exponent of size E is known to E / 2^52
-    rounding = 1e-15 * (expected.abs() + float(terms.kappa.max()) * 1e-2)
+    # rounding: an exponent of size E is known to E / 2^52; in a tile as wide as the spheres, of a
+    # concentration kappa, differences of such of size kappa
+    rounding = 1e-15 * (expected.abs() + float(terms.kappa.max()))
     assert bool((off.abs() <= 4e-12 + rounding).all())
 
 

@@ -105,9 +105,10 @@ def test_many_angles_without_tables(seed: int, data: st.DataObject) -> None:
     for axis, value in at.items():
         points[:, axis] = value
     product = found.log_prob(points[:, left]) + marginal(density, known).log_prob(points[:, known])
-    # a part keeps a share of 1e-9 where what is known leaves it less
+    # a part keeps a share of 1e-9 where what is known leaves it less; kernels of a concentration of 15
+    # in three angles have densities up to 900
     floor = (-density.log_prob(points) + marginal(density, known).log_prob(points[:, known])).exp()
-    assert ((product - density.log_prob(points)).abs() < 1e-9 * (1 + 10 * floor)).all()
+    assert ((product - density.log_prob(points)).abs() < 1e-9 * (1 + 900 * floor)).all()
     assert found.error == 0
 
 

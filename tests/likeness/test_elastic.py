@@ -152,7 +152,7 @@ def test_the_forgiving_body_touches_from_above(name: str, seed: int, size: float
 @given(names, seeds)
 def test_the_forgiving_body_has_the_same_slope(name: str, seed: int) -> None:
     own = body(name)
-    z = shapes(own, seed, 1, 0.03)  # beyond, rotations have several minima
+    z = shapes(own, seed, 1, 0.02)  # from 0.03 on rotations may have several minima
     touching = own.forgiving(z)
     rng = np.random.default_rng(seed)
     way = rng.normal(size=z.shape) + 1j * rng.normal(size=z.shape)
