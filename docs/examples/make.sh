@@ -1,5 +1,5 @@
 #!/bin/sh
-# Makes the fits, figures and pictures of docs/examples again, in about nine minutes on two cores:
+# Makes the fits, figures and pictures of docs/examples again, in about eight minutes on two cores:
 #
 #     sh docs/examples/make.sh [NAME ...]      (ramachandran, wildfires, image-patches, poles)
 #
