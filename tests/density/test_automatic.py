@@ -181,3 +181,17 @@ def test_what_cannot_be_chosen_is_refused() -> None:
 
 def test_the_request_knows_the_same_parts() -> None:
     assert density_requests.PARTS == PARTS
+
+
+def test_parts_for_new_groups() -> None:
+    """Rows of a group lie within a degree: narrow kernels are right for its rows, not for others."""
+    rng, space = np.random.default_rng(3), make_space("torus")
+    middles = rng.vonmises(0.0, 2.0, (60, 2))
+    label = np.repeat(np.arange(60), 8)
+    points = space.to_chart(middles[label] + 0.01 * rng.normal(size=(480, 2)))
+    new = space.to_chart(rng.vonmises(0.0, 2.0, (2000, 2)))
+    chosen = AutomaticSettings(parts=("kernels", "mixture"))
+    alone, _ = fit_automatic(space, points, chosen)
+    grouped, report = fit_automatic(space, points, chosen, groups=label)
+    assert "of whole groups, of which there are 60" in " ".join(report.notes)
+    assert float(grouped.log_prob(new).mean()) > float(alone.log_prob(new).mean()) + 0.5

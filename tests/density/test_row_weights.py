@@ -97,7 +97,7 @@ def test_mixtures_and_chains_of_one_component_are_those_of_repeated_rows(seed: i
     ]
     # EM from starts that are drawn nears one optimum, and is not told to reach it
     scores = [float(mixture.log_prob(rows).mean()) for mixture in chains]
-    assert scores[0] == pytest.approx(scores[1], abs=0.02)
+    assert scores[0] == pytest.approx(scores[1], abs=0.05)
 
 
 @given(seeds, st.integers(2, 9))

@@ -13,7 +13,7 @@ from orbiflow.density.fitting.assembly import mixed
 from orbiflow.density.fitting.folds import FOLDS, folds_of
 from orbiflow.density.fitting.mixtures import fit_mixture
 from orbiflow.density.fitting.repeats import repeats_of
-from orbiflow.density.fitting.rows import Rows
+from orbiflow.density.fitting.rows import Rows, group_numbers
 from orbiflow.density.fitting.scales import joined, kernel_estimates
 from orbiflow.density.fitting.weights import (
     TOLERANCE,
@@ -23,6 +23,7 @@ from orbiflow.density.fitting.weights import (
     stacking_weights,
     supported_weights,
 )
+from orbiflow.errors import OrbiflowError
 
 SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")
 names, seeds = st.sampled_from(SPACES), st.integers(0, 2**31)
@@ -187,3 +188,28 @@ def test_the_floor_is_uniform() -> None:
     assert float(UniformBase(space).log_prob(midpoints(space, 90)).exp().mean()) == pytest.approx(
         1, abs=1e-3
     )
+
+
+@given(seeds, st.integers(2, 40), st.integers(60, 300))
+@settings(deadline=None)
+def test_groups_are_held_out_whole(seed: int, count: int, rows: int) -> None:
+    rng = np.random.default_rng(seed)
+    labels = np.concatenate([np.arange(count), rng.integers(count, size=rows - count)])
+    points = torch.tensor(rng.uniform(size=(rows, 2)))
+    own = Rows(points, None, group_numbers([f"g{k}" for k in labels], rows))
+    folds = folds_of(own, together=False, generator=torch.Generator().manual_seed(seed))
+    assert folds.used == min(10, count)
+    of = {int(g): set() for g in folds.rows.groups}  # type: ignore[union-attr]
+    for group, fold in zip(folds.rows.groups.tolist(), folds.fold.tolist(), strict=True):  # type: ignore[union-attr]
+        of[group].add(fold)
+    assert all(len(found) == 1 for found in of.values())
+    assert set(folds.fold.tolist()) == set(range(min(10, count)))
+    held = torch.cat([rows.points for _, rows in folds])
+    assert torch.equal(held.sort(dim=0).values, points.sort(dim=0).values)
+
+
+def test_groups_that_cannot_be_held_out() -> None:
+    with pytest.raises(OrbiflowError, match="all 3 rows are of one group"):
+        group_numbers(["a"] * 3, 3)
+    with pytest.raises(OrbiflowError, match="a group for each of 3 rows"):
+        group_numbers(["a", "b"], 3)

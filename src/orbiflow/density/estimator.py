@@ -140,6 +140,7 @@ class DensityEstimator(Parameters):
         y: object = None,
         sample_weight: ArrayLike | None = None,
         *,
+        groups: ArrayLike | None = None,
         progress: Progress | None = None,
     ) -> DensityEstimator:
         """Fit to data (N, k) in the space's own units; `y` is ignored.
@@ -147,6 +148,8 @@ class DensityEstimator(Parameters):
         Args:
             sample_weight: of the rows (N,), at least 0: how much each counts in everything that is
                 fitted and judged. Only ratios count, equal ones are none.
+            groups: a label (N,) a row: rows of one are held out together where parts are chosen, for
+                densities of new groups (proteins, stations, fires).
 
         Raises:
             OrbiflowError: for data that are not of the space, too few points, weights that are none, a
@@ -167,7 +170,12 @@ class DensityEstimator(Parameters):
                 "flows cannot be fitted to rows that lack angles: leave out missing, or parts and "
                 "kernels"
             )
-        if not self.kernels and chosen != ("flow",):
+        if whole and groups is not None:
+            raise OrbiflowError(
+                "groups are held out where parts are chosen: leave out groups, or parts 'flow' and "
+                "kernels"
+            )
+        if not whole:
             settings = AutomaticSettings(
                 parts=chosen,
                 repeats=self.repeats,
@@ -177,8 +185,9 @@ class DensityEstimator(Parameters):
                 seed=self.seed,
             )
             found = fit_automatic(
-                self.space_, points, settings, weights=sample_weight, progress=progress
-            )
+                self.space_, points, settings, weights=sample_weight, groups=groups,
+                progress=progress,
+            )  # fmt: skip
         elif self.space_.dim <= MOST_DIM:
             found = fit_density(
                 self.space_, points, alone, weights=sample_weight, progress=progress

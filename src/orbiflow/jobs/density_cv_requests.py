@@ -31,7 +31,8 @@ class DensityFoldRequest(Request):
 
     - `data`: the table. `held`: the column that says the fold of each row; `fold`: the one held out.
     - `out`: folder for the scores and the report.
-    - `columns`, `header`, `missing`, `weights`, `unit`, `parts`, `repeats`, `seed`: as for a fit.
+    - `columns`, `header`, `missing`, `weights`, `group`, `unit`, `parts`, `repeats`, `seed`: as for a
+      fit.
     """
 
     KIND = "density-fold"
@@ -45,6 +46,7 @@ class DensityFoldRequest(Request):
     header: bool | None = None
     missing: Missing = "refuse"
     weights: str | None = None
+    group: str | None = None
     unit: Unit | None = None
     parts: tuple[str, ...] | None = None
     repeats: Literal["places", "rounding"] = "places"
@@ -67,6 +69,7 @@ class DensityFoldRequest(Request):
             header=self.header,
             missing=self.missing,
             weights=self.weights,
+            group=self.group,
             unit=self.unit,
             parts=self.parts,
             repeats=self.repeats,

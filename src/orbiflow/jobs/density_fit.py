@@ -16,12 +16,13 @@ from orbiflow.cancel import Cancel
 from orbiflow.density import DensityEstimator, density_to_bytes
 from orbiflow.density.comparing import RowSketch
 from orbiflow.density.fitting.report import FitReport
-from orbiflow.density.tables import Table
+from orbiflow.density.tables import Table, read_labels
 from orbiflow.export.density_figures import MODEL
 from orbiflow.export.density_plots import PICTURES, REPORT, TABLE, THUMBNAIL
 from orbiflow.files import write_atomic
 from orbiflow.folders import ResultFolder
-from orbiflow.jobs.density_data import read_weighed, unit_of
+from orbiflow.jobs.density_data import unit_of
+from orbiflow.jobs.density_groups import read_beside_groups
 from orbiflow.jobs.density_requests import DensityFitRequest
 from orbiflow.jobs.events import Finished, Note, Progress, Written
 from orbiflow.jobs.run import Sink
@@ -31,7 +32,9 @@ from orbiflow.threads import one_thread
 MOST_SCORED = 4_000
 """Rows over which the mean log density is taken."""
 
-SETTINGS = ("parts", "repeats", "missing", "weights", "detail", "segments", "kernels", "seed")
+SETTINGS = (
+    "parts", "repeats", "missing", "weights", "group", "detail", "segments", "kernels", "seed",
+)  # fmt: skip
 """Of a request, told in the report."""
 
 WIDTH = {"sphere": None, "projective-plane": None, "klein-bottle": 2, "torus": None}
@@ -50,19 +53,15 @@ def density_fit(request: DensityFitRequest, tell: Sink, cancel: Cancel) -> Finis
         Cancelled: if it was told to stop; nothing is written.
     """
     begin = time.perf_counter()
-    table, weights = read_weighed(
-        request.data,
-        request.columns,
-        WIDTH[request.space],
-        request.weights,
-        tell,
-        has_header=request.header,
-        drop_missing=request.drop_missing or request.missing == "drop",
-        keep_missing=request.missing == "marginalise",
-    )
+    table, weights = read_beside_groups(request, WIDTH[request.space], tell)
+    groups = None
+    if request.group is not None:
+        groups = read_labels(request.data, request.group, table, has_header=request.header)
     estimator = estimator_of(request, unit_of(request.space, request.unit, table, tell))
     folder = ResultFolder(request.out, written_files)
-    estimator.fit(table.values, sample_weight=weights, progress=told_of(tell, cancel))
+    estimator.fit(
+        table.values, sample_weight=weights, groups=groups, progress=told_of(tell, cancel)
+    )
     document = _document(request, table, weights, estimator, begin)
     with folder.replaced() as staged:
         whole = table.values[~np.isnan(table.values).any(axis=1)]

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from orbiflow.cancel import Cancel
 from orbiflow.density import DensityEstimator
 from orbiflow.density.fitting.rows import mean_of, weighed
-from orbiflow.density.tables import Table, read_table
+from orbiflow.density.tables import Table, read_labels, read_table
 from orbiflow.errors import OrbiflowError
 from orbiflow.files import write_atomic
 from orbiflow.folders import ResultFolder
@@ -56,10 +56,14 @@ def density_fold(request: DensityFoldRequest, tell: Sink, cancel: Cancel) -> Fin
     )
     held = _held(request, table)
     estimator = estimator_of(request.fit(), unit_of(request.space, request.unit, table, tell))
+    groups = None
+    if request.group is not None:
+        groups = read_labels(request.data, request.group, table, has_header=request.header)[~held]
     folder = ResultFolder(request.out, written_files)
     estimator.fit(
         table.values[~held],
         sample_weight=None if weights is None else weights[~held],
+        groups=groups,
         progress=told_of(tell, cancel),
     )
     scores = estimator.score_samples(table.values[held])

@@ -58,6 +58,7 @@ class DensityFitRequest(Request):
     drop_missing: bool = False
     missing: Missing = "refuse"
     weights: str | None = None
+    group: str | None = None
     unit: Unit | None = None
     parts: tuple[str, ...] | None = None
     repeats: Literal["places", "rounding"] = "places"
@@ -78,6 +79,8 @@ class DensityFitRequest(Request):
             )
         if self.kernels and self.parts is not None:
             raise RecordError("{kernels} means a flow with kernels: give it or {parts}, not both")
+        if self.group is not None and (self.kernels or self.parts == ("flow",)):
+            raise RecordError("{group} is for choosing among {parts}: a flow alone has no choice")
 
 
 @dataclass(frozen=True)

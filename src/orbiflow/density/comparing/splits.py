@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import heapq
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from orbiflow.arguments import whole
 from orbiflow.density.comparing.resampling import Groups
+from orbiflow.density.fitting.folds import lightest_folds
 from orbiflow.errors import OrbiflowError
 
 MOST_FOLDS = 1000
@@ -49,17 +48,5 @@ def cross_validation_folds(
     order = np.random.default_rng([seed, split]).permutation(units.count)
     sizes = np.bincount(units.index, minlength=units.count)
     fold = np.empty(units.count, dtype=np.int64)
-    fold[order] = _lightest(sizes[order], folds)
+    fold[order] = lightest_folds(sizes[order], folds)
     return fold[units.index]
-
-
-def _lightest(sizes: NDArray[np.int64], folds: int) -> NDArray[np.int64]:
-    """The fold of each, in their order: the one with the fewest rows, of such ones the first."""
-    if bool((sizes == sizes[0]).all()):
-        return np.arange(len(sizes)) % folds
-    heap = [(0, k) for k in range(folds)]
-    found = np.empty(len(sizes), dtype=np.int64)
-    for place, size in enumerate(sizes.tolist()):
-        rows, found[place] = heap[0]
-        heapq.heapreplace(heap, (rows + size, int(found[place])))
-    return found

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import torch
+from numpy.typing import ArrayLike
 from torch import Tensor
 
 from orbiflow.density.arguments import check_kind, check_range, silent
@@ -29,6 +30,7 @@ from orbiflow.density.fitting.report import FitReport, Progress, mean_nll, own_p
 from orbiflow.density.fitting.rows import (
     Rows,
     effective_rows,
+    group_numbers,
     mean_of,
     weighed,
     weights_note,
@@ -106,6 +108,7 @@ def fit_automatic(
     settings: AutomaticSettings | None = None,
     *,
     weights: Any = None,
+    groups: ArrayLike | None = None,
     progress: Progress | None = None,
 ) -> tuple[BlendedDensity, FitReport]:
     """Fit what suits the data best: a mixture of densities with weights by rows held out.
@@ -121,6 +124,8 @@ def fit_automatic(
         points: (N, d) in the chart, N >= 10 different ones.
         settings: default `AutomaticSettings()`.
         weights: of the points (N,), at least 0; only their ratios count; default equal.
+        groups: a label (N,) a point: those of one are held out together, so that parts are chosen for
+            rows of new groups. Default: each point is by itself.
         progress: told how far it is.
 
     Returns:
@@ -133,7 +138,7 @@ def fit_automatic(
     check_kind(settings, AutomaticSettings, "settings")
     say = progress or silent
     budget = Budget(seconds=settings.seconds)
-    rows, settings, notes = _rows(space, points, weights, settings)
+    rows, settings, notes = _rows(space, points, weights, groups, settings)
     found = repeats_of(space, rows[is_whole(rows)].points)
     whole = " that lack no angle" if found.places + found.rows < len(rows) else ""
     if found.places < LEAST_PLACES:
@@ -158,13 +163,16 @@ def fit_automatic(
 
 
 def _rows(
-    space: Space, points: Any, weights: Any, settings: AutomaticSettings
+    space: Space, points: Any, weights: Any, groups: ArrayLike | None, settings: AutomaticSettings
 ) -> tuple[Rows, AutomaticSettings, list[str]]:
     """Rows that say anything, the parts that can be fitted to them, and what to say of it."""
     if settings.missing == "refuse":
-        return weighed(own_points(space, points), weights), settings, []
+        own = own_points(space, points)
+        labels = None if groups is None else group_numbers(groups, len(own))
+        return weighed(own, weights, labels), settings, []
     own, known = observed_points(space, points)
-    rows = weighed(own, None if weights is None else weights_of(weights, known))
+    labels = None if groups is None else group_numbers(groups, len(known))[known]
+    rows = weighed(own, None if weights is None else weights_of(weights, known), labels)
     if not bool(rows.points.isnan().any()):
         return rows, settings, missing_notes(rows, int((~known).sum()))
     chosen = tuple(part for part in settings.parts if part in MARGINAL_PARTS)
@@ -231,6 +239,14 @@ def _try_flow(
     )  # fmt: skip
 
 
+def _shares_of(folds: Folds) -> str:
+    """Of the rows, in words."""
+    if folds.rows.groups is None:
+        return "of a tenth each"
+    count = len(folds.rows.groups.bincount().nonzero())
+    return f"of whole groups, of which there are {count}"
+
+
 def _shrunk(parts: list[PartEvidence], flow: float) -> list[PartEvidence]:
     """Beside a flow of this share."""
     return [replace(part, share=part.share * (1 - flow)) for part in parts]
@@ -255,7 +271,7 @@ def _report(
     error = flow.integration_error if flow else 0.0
     total = candidates.table.shape[1]
     chosen = [
-        f"chosen by {total} rows held out, in {folds.used} parts of a tenth each: "
+        f"chosen by {total} rows held out, in {folds.used} parts {_shares_of(folds)}: "
         f"{held - mean_of(candidates.table[-1], own_weights):.4f} nats above uniform",
         *map(str, parts),
     ]

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import heapq
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 
 from orbiflow.density.fitting.rows import Rows
@@ -53,16 +56,37 @@ def folds_of(rows: Rows, *, together: bool, generator: torch.Generator) -> Folds
 
     A new row of the same source repeats an old one as often as the old ones repeat each other, and so
     do rows held out at random. Where equal rows are an accident of rounding, that would reward peaks
-    at the values that happened to be recorded: then they are kept `together`, in one fold.
+    at the values that happened to be recorded: then they are kept `together`, in one fold. So are rows
+    of one group, whatever they are: each of fewer than ten groups is a fold.
     """
     rows = rows[torch.randperm(len(rows), generator=generator)]
-    if together:
+    folds = FOLDS
+    if rows.groups is not None:
+        sizes = torch.bincount(rows.groups)
+        order = torch.randperm(len(sizes), generator=generator)
+        folds = min(FOLDS, len(sizes))
+        dealt = torch.empty_like(order)
+        dealt[order] = torch.as_tensor(lightest_folds(sizes[order].numpy(), folds))
+        group = dealt[rows.groups]
+    elif together:
         _, place = places(rows.points)
         group = torch.randperm(int(place.max()) + 1, generator=generator)[place]
     else:
         group = torch.arange(len(rows))
     used = next((count for most, count in USED if len(rows) <= most), 2)
-    return Folds(rows, group % FOLDS, used)
+    return Folds(rows, group % folds, min(used, folds))
+
+
+def lightest_folds(sizes: NDArray[np.int64], folds: int) -> NDArray[np.int64]:
+    """The fold of each group, of these sizes, in order: the one that has the fewest rows by then."""
+    if bool((sizes == sizes[0]).all()):
+        return np.arange(len(sizes)) % folds
+    heap = [(0, k) for k in range(folds)]
+    found = np.empty(len(sizes), dtype=np.int64)
+    for place, size in enumerate(sizes.tolist()):
+        rows, found[place] = heap[0]
+        heapq.heapreplace(heap, (rows + size, int(found[place])))
+    return found
 
 
 def places(points: Tensor) -> tuple[Tensor, Tensor]:

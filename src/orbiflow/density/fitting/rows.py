@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
 import torch
+from numpy.typing import ArrayLike
 from torch import Tensor
 
 from orbiflow.density.arguments import float_tensor
@@ -14,17 +16,22 @@ from orbiflow.errors import OrbiflowError
 
 @dataclass(frozen=True)
 class Rows:
-    """Points (N, d) and their weights (N,), None where all weigh the same."""
+    """Points (N, d) and their weights (N,), None where all weigh the same.
+
+    - `groups`: whole numbers (N,), from 0; rows of one are held out together. None: each by itself.
+    """
 
     points: Tensor
     weights: Tensor | None = None
+    groups: Tensor | None = None
 
     def __len__(self) -> int:
         return len(self.points)
 
     def __getitem__(self, chosen: Tensor | slice) -> Rows:
         weights = None if self.weights is None else self.weights[chosen]
-        return Rows(self.points[chosen], weights)
+        groups = None if self.groups is None else self.groups[chosen]
+        return Rows(self.points[chosen], weights, groups)
 
     def mean(self, values: Tensor) -> float:
         """The mean of values (N,), as the rows weigh."""
@@ -65,7 +72,24 @@ def weights_of(weights: Any, known: Tensor) -> Tensor:
     return own[known]
 
 
-def weighed(points: Tensor, weights: Any) -> Rows:
+def group_numbers(groups: ArrayLike, count: int) -> Tensor:
+    """The group (N,) of each row as a whole number from 0, from labels of any kind.
+
+    Raises:
+        OrbiflowError: for another number of labels than rows, or a single group.
+    """
+    labels = np.asarray(groups)
+    if labels.shape != (count,):
+        raise OrbiflowError(
+            f"expected a group for each of {count} rows, got an array {labels.shape}"
+        )
+    known, number = np.unique(labels, return_inverse=True)
+    if len(known) < 2:
+        raise OrbiflowError(f"all {count} rows are of one group: none could be held out")
+    return torch.as_tensor(number.reshape(-1))
+
+
+def weighed(points: Tensor, weights: Any, groups: Tensor | None = None) -> Rows:
     """Rows with a weight, and their weights of mean 1: only their ratios count.
 
     Rows of weight 0 are left out; equal weights are none.
@@ -75,7 +99,7 @@ def weighed(points: Tensor, weights: Any) -> Rows:
             weights that are all 0.
     """
     if weights is None:
-        return Rows(points)
+        return Rows(points, None, groups)
     own = float_tensor(weights, "weights").detach().double().clone()
     if own.shape != points.shape[:1]:
         raise OrbiflowError(
@@ -89,10 +113,10 @@ def weighed(points: Tensor, weights: Any) -> Rows:
         )
     if not bool((own > 0).any()):
         raise OrbiflowError("all weights are 0: no row is left to fit to")
-    points, own = points[own > 0], own[own > 0]
-    if bool((own == own[0]).all()):
-        return Rows(points)
-    return Rows(points, own / own.max() / (own / own.max()).mean())
+    kept = Rows(points, own, groups)[own > 0]
+    assert kept.weights is not None
+    own = kept.weights / kept.weights.max()
+    return replace(kept, weights=None if bool((own == own[0]).all()) else own / own.mean())
 
 
 def weights_note(rows: Rows) -> list[str]:

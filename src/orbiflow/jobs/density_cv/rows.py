@@ -14,12 +14,12 @@ from orbiflow.density.fitting.rows import weighed
 from orbiflow.density.partial import chart_of_observed
 from orbiflow.density.spaces.catalogue import space_class
 from orbiflow.density.spaces.space import Space
-from orbiflow.density.tables import Table, column_names, read_labels
-from orbiflow.density.tables.table import find
-from orbiflow.errors import InputFileError, OrbiflowError
+from orbiflow.density.tables import Table, read_labels
+from orbiflow.errors import OrbiflowError
 from orbiflow.jobs.density_cv_requests import DensityCvRequest
-from orbiflow.jobs.density_data import read_weighed, unit_of
+from orbiflow.jobs.density_data import unit_of
 from orbiflow.jobs.density_fit import WIDTH
+from orbiflow.jobs.density_groups import read_beside_groups
 from orbiflow.jobs.density_requests import Unit
 from orbiflow.jobs.events import Note
 from orbiflow.jobs.run import Sink
@@ -55,7 +55,7 @@ def read_rows(request: DensityCvRequest, tell: Sink) -> CvRows:
     Raises:
         OrbiflowError: for a table, columns, weights or groups that cannot be used.
     """
-    table, weights = _counting(*_read(request, tell))
+    table, weights = _counting(*read_beside_groups(request, WIDTH[request.space], tell))
     unit = unit_of(request.space, request.unit, table, tell)
     space = space_class(request.space).for_data(table.values, unit=unit, seed=request.seed)
     points = (
@@ -78,37 +78,6 @@ def read_rows(request: DensityCvRequest, tell: Sink) -> CvRows:
     elif request.repeats == "rounding":
         tell(Note("groups are kept together; equal rows of different groups may be on both sides"))
     return CvRows(table, weights, labels, together, space, unit)
-
-
-def _read(request: DensityCvRequest, tell: Sink) -> tuple[Table, Array | None]:
-    """The table without its groups, and its weights."""
-    how: dict[str, Any] = {
-        "has_header": request.header,
-        "drop_missing": request.drop_missing or request.missing == "drop",
-        "keep_missing": request.missing == "marginalise",
-    }
-    width, columns = WIDTH[request.space], request.columns
-    if request.group is None or columns is not None:
-        return read_weighed(request.data, columns, width, request.weights, tell, **how)
-    name = _name_of(request, request.group)
-    table, weights = read_weighed(request.data, None, None, request.weights, tell, **how)
-    if name in table.columns and len(table.columns) > 1:
-        table = table.without(table.columns.index(name))
-    if width is not None and len(table.columns) != width:
-        raise InputFileError(
-            f"{request.data}: {width} columns must be taken beside the groups {name!r}, there are "
-            f"{', '.join(table.columns)}; choose with --columns"
-        )
-    return table, weights
-
-
-def _name_of(request: DensityCvRequest, column: str) -> str:
-    """What a table calls a column that is given by its name or number."""
-    names = column_names(request.data, wanted=[column], has_header=request.header)
-    if names is None:
-        number = column.strip()
-        return f"column{int(number)}" if number.isdecimal() else number
-    return names[find(request.data, names, column)]
 
 
 def _counting(table: Table, weights: Array | None) -> tuple[Table, Array | None]:

@@ -26,9 +26,8 @@ MOST_BYTES = 256 * 2**20
 class Split:
     """A table whose last column says the fold of each row, from 1: what all fits of a split read.
 
-    The columns that are fitted to, the weights if there are any, and the folds, as numbers: smaller
-    than most files, read without a thought, and the same bytes whatever else the file says. A worker
-    needs neither groups nor seeds to know what it must not see.
+    The columns that are fitted to, the weights and groups if there are any, and the folds, as numbers:
+    smaller than most files, read without a thought, and the same bytes whatever else the file says.
 
     - `fold`: (N,) from 1.
     """
@@ -42,6 +41,12 @@ class Split:
         parts = [self.rows.table.values]
         if self.rows.weights is not None:
             parts.append(self.rows.weights[:, None])
+        if self.rows.labels is not None:
+            parts.append(
+                np.unique(self.rows.labels, return_inverse=True)[1]
+                .reshape(-1, 1)
+                .astype(np.float64)
+            )
         parts.append(self.fold[:, None].astype(np.float64))
         size = 8 * sum(part.size for part in parts)
         if size > MOST_BYTES:
@@ -118,13 +123,16 @@ def item_of(fit: Fit, request: DensityCvRequest, split: Split) -> Item:
     """A fit as the machinery of batches takes it."""
     angles = len(split.rows.table.columns)
     weighted = split.rows.weights is not None
+    grouped = split.rows.labels is not None
     one = DensityFoldRequest(
         data=Path(split.name),
         space=request.space,
         fold=fit.fold,
         columns=tuple(str(k + 1) for k in range(angles)),
-        held=str(angles + weighted + 1),
+        held=str(angles + weighted + grouped + 1),
         weights=str(angles + 1) if weighted else None,
+        # a flow alone has no parts to choose
+        group=str(angles + weighted + 1) if grouped and fit.parts != ("flow",) else None,
         missing="marginalise" if request.missing == "marginalise" else "refuse",
         # said, so that it does not depend on the rows that a fit sees
         unit=split.rows.unit if request.space in ("torus", "klein-bottle") else None,
