@@ -9,7 +9,7 @@ import numpy as np
 import torch
 
 from orbiflow.density.models.symmetric import SymmetricDensity
-from orbiflow.density.spaces.space import CHART, Space
+from orbiflow.density.spaces.space import Space
 from orbiflow.figures.sheet import Sheet
 from orbiflow.symmetry.isometry import Array
 
@@ -85,8 +85,8 @@ def log_natural(
     own = np.log(np.maximum(values, 1e-300))
     if measure == "natural":
         return own
-    to_chart = space.log_density_factor(points, measure) if measure != CHART else 0.0
-    shift = space.log_density_factor(points, "natural") - to_chart
+    natural, other = (space.log_density_factor(points, name) for name in ("natural", measure))
+    shift = natural - other
     return own + shift.double().cpu().numpy()
 
 

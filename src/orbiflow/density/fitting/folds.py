@@ -11,7 +11,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from orbiflow.density.fitting.rows import Rows
+from orbiflow.density.fitting.rows import Rows, group_numbers
 from orbiflow.typed_torch import unique
 
 FOLDS = 10
@@ -62,12 +62,13 @@ def folds_of(rows: Rows, *, together: bool, generator: torch.Generator) -> Folds
     rows = rows[torch.randperm(len(rows), generator=generator)]
     folds = FOLDS
     if rows.groups is not None:
-        sizes = torch.bincount(rows.groups)
+        groups = group_numbers(rows.groups.numpy(), len(rows))  # some may have lost all their rows
+        sizes = torch.bincount(groups)
         order = torch.randperm(len(sizes), generator=generator)
         folds = min(FOLDS, len(sizes))
         dealt = torch.empty_like(order)
         dealt[order] = torch.as_tensor(lightest_folds(sizes[order].numpy(), folds))
-        group = dealt[rows.groups]
+        group = dealt[groups]
     elif together:
         _, place = places(rows.points)
         group = torch.randperm(int(place.max()) + 1, generator=generator)[place]

@@ -49,7 +49,6 @@ def density_to_bytes(density: SymmetricDensity, **extra: Any) -> bytes:
             f"the density is a {type(density).__name__}, which a file does not hold: save the "
             "SymmetricDensity or BlendedDensity that it is made of"
         )
-    density = density.to("cpu")
     space = _checked_space(density.space)
     base, tensors = _base_parts(density)
     flow, more = _flow_parts(density)
