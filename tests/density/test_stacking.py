@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from orbiflow.density import UniformBase, VonMisesChains, make_space, midpoints
 from orbiflow.density.fitting.assembly import mixed
+from orbiflow.density.fitting.automatic import AutomaticSettings, fit_automatic
 from orbiflow.density.fitting.folds import FOLDS, folds_of
 from orbiflow.density.fitting.mixtures import fit_mixture
 from orbiflow.density.fitting.repeats import repeats_of
@@ -196,7 +197,7 @@ def test_groups_are_held_out_whole(seed: int, count: int, rows: int) -> None:
     rng = np.random.default_rng(seed)
     labels = np.concatenate([np.arange(count), rng.integers(count, size=rows - count)])
     points = torch.tensor(rng.uniform(size=(rows, 2)))
-    own = Rows(points, None, group_numbers([f"g{k}" for k in labels], rows))
+    own = Rows(points, None, torch.as_tensor(group_numbers([f"g{k}" for k in labels], rows)))
     folds = folds_of(own, together=False, generator=torch.Generator().manual_seed(seed))
     assert folds.used == min(10, count)
     of = {int(g): set() for g in folds.rows.groups}  # type: ignore[union-attr]
@@ -208,8 +209,20 @@ def test_groups_are_held_out_whole(seed: int, count: int, rows: int) -> None:
     assert torch.equal(held.sort(dim=0).values, points.sort(dim=0).values)
 
 
-def test_groups_that_cannot_be_held_out() -> None:
-    with pytest.raises(OrbiflowError, match="all 3 rows are of one group"):
-        group_numbers(["a"] * 3, 3)
-    with pytest.raises(OrbiflowError, match="a group for each of 3 rows"):
-        group_numbers(["a", "b"], 3)
+@pytest.mark.parametrize(
+    ("labels", "said"),
+    [
+        ([0] * 40, "0 different rows are left"),
+        ([0] * 37 + [1, 2, 3], "3 different rows are left"),
+        ([0] * 20, "a label for each of 40 rows"),
+        ([None] * 40, "0 different rows are left"),
+    ],
+)
+def test_groups_that_cannot_be_held_out(labels: list[object], said: str) -> None:
+    space, points = make_space("torus"), torch.rand(40, 2, dtype=torch.float64)
+    chosen = AutomaticSettings(parts=("kernels", "mixture", "chains"))
+    with pytest.raises(OrbiflowError, match=said):
+        fit_automatic(space, points, chosen, groups=labels)  # type: ignore[arg-type]
+    weights = torch.arange(40) < 20
+    with pytest.raises(OrbiflowError, match="0 different rows are left"):
+        fit_automatic(space, points, chosen, weights=weights, groups=weights)  # type: ignore[arg-type]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from orbiflow.arguments import described
+from orbiflow.density.fitting.rows import group_numbers
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry.isometry import Array
 
@@ -46,15 +46,8 @@ class Groups:
         """
         if labels is None:
             return cls(np.arange(rows), rows, False)
-        array = np.asarray(labels)
-        if array.shape != (rows,):
-            raise OrbiflowError(
-                f"groups: expected a label for each of {rows} rows, got {described(labels)}"
-            )
-        if array.dtype.kind == "O":
-            array = array.astype(str)
-        names, index = np.unique(array, return_inverse=True)
-        return cls(index.astype(np.int64), len(names), True)
+        index = group_numbers(labels, rows)
+        return cls(index, int(index.max(initial=-1)) + 1, True)
 
     @property
     def what(self) -> str:

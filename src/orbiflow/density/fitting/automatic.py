@@ -168,10 +168,10 @@ def _rows(
     """Rows that say anything, the parts that can be fitted to them, and what to say of it."""
     if settings.missing == "refuse":
         own = own_points(space, points)
-        labels = None if groups is None else group_numbers(groups, len(own))
+        labels = None if groups is None else torch.as_tensor(group_numbers(groups, len(own)))
         return weighed(own, weights, labels), settings, []
     own, known = observed_points(space, points)
-    labels = None if groups is None else group_numbers(groups, len(known))[known]
+    labels = None if groups is None else torch.as_tensor(group_numbers(groups, len(known)))[known]
     rows = weighed(own, None if weights is None else weights_of(weights, known), labels)
     if not bool(rows.points.isnan().any()):
         return rows, settings, missing_notes(rows, int((~known).sum()))

@@ -38,7 +38,6 @@ class Candidates:
 
     - `families`, `names`: of each row of `table` (P, N); the last is the uniform floor.
     - `fitted`: of each family, what was fitted to each fold.
-    - `first`: rows of the first fold, which stand first.
     - `row_weights`: of the rows (N,), None where all weigh the same.
     """
 
@@ -46,7 +45,6 @@ class Candidates:
     names: list[str]
     table: Tensor
     fitted: dict[str, list[dict[str, Base]]]
-    first: int
     row_weights: Tensor | None = None
 
     @property
@@ -94,7 +92,6 @@ def candidates_of(
         [name for _, name in keys],
         table,
         fitted,
-        len(blocks[0][FLOOR, FLOOR]),
         None if weights[0] is None else torch.cat([own for own in weights if own is not None]),
     )
 

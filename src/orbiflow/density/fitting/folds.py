@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from orbiflow.density.fitting.rows import Rows, group_numbers
+from orbiflow.errors import OrbiflowError
 from orbiflow.typed_torch import unique
 
 FOLDS = 10
@@ -58,11 +59,15 @@ def folds_of(rows: Rows, *, together: bool, generator: torch.Generator) -> Folds
     do rows held out at random. Where equal rows are an accident of rounding, that would reward peaks
     at the values that happened to be recorded: then they are kept `together`, in one fold. So are rows
     of one group, whatever they are: each of fewer than ten groups is a fold.
+
+    Raises:
+        OrbiflowError: for groups without which too few rows are left.
     """
     rows = rows[torch.randperm(len(rows), generator=generator)]
     folds = FOLDS
     if rows.groups is not None:
-        groups = group_numbers(rows.groups.numpy(), len(rows))  # some may have lost all their rows
+        # some may have lost all their rows
+        groups = torch.as_tensor(group_numbers(rows.groups.numpy(), len(rows)))
         sizes = torch.bincount(groups)
         order = torch.randperm(len(sizes), generator=generator)
         folds = min(FOLDS, len(sizes))
@@ -75,7 +80,23 @@ def folds_of(rows: Rows, *, together: bool, generator: torch.Generator) -> Folds
     else:
         group = torch.arange(len(rows))
     used = next((count for most, count in USED if len(rows) <= most), 2)
-    return Folds(rows, group % folds, min(used, folds))
+    found = Folds(rows, group % folds, min(used, folds))
+    if rows.groups is not None:
+        _check_rest(found)
+    return found
+
+
+def _check_rest(folds: Folds) -> None:
+    """
+    Raises:
+        OrbiflowError: if too little is left to fit to where a fold is held out.
+    """
+    left = min(len(places(folds.train(number).points)[0]) for number in range(folds.used))
+    if left < LEAST_PLACES:
+        raise OrbiflowError(
+            f"groups: where whole groups are held out, {left} different rows are left to fit to, and "
+            f"{LEAST_PLACES} are needed: more or smaller groups"
+        )
 
 
 def lightest_folds(sizes: NDArray[np.int64], folds: int) -> NDArray[np.int64]:

@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from torch import Tensor
 
+from orbiflow.arguments import described
 from orbiflow.density.arguments import float_tensor
 from orbiflow.errors import OrbiflowError
 
@@ -72,21 +73,23 @@ def weights_of(weights: Any, known: Tensor) -> Tensor:
     return own[known]
 
 
-def group_numbers(groups: ArrayLike, count: int) -> Tensor:
-    """The group (N,) of each row as a whole number from 0, from labels of any kind.
+def group_numbers(labels: ArrayLike, rows: int) -> NDArray[np.int64]:
+    """The group (N,) of each row as a whole number from 0, from a label a row, of any kind.
 
     Raises:
-        OrbiflowError: for another number of labels than rows, or a single group.
+        OrbiflowError: for another number of labels.
+
+    >>> group_numbers(["a", "b", "a"], 3).tolist()
+    [0, 1, 0]
     """
-    labels = np.asarray(groups)
-    if labels.shape != (count,):
+    array = np.asarray(labels)
+    if array.shape != (rows,):
         raise OrbiflowError(
-            f"expected a group for each of {count} rows, got an array {labels.shape}"
+            f"groups: expected a label for each of {rows} rows, got {described(labels)}"
         )
-    known, number = np.unique(labels, return_inverse=True)
-    if len(known) < 2:
-        raise OrbiflowError(f"all {count} rows are of one group: none could be held out")
-    return torch.as_tensor(number.reshape(-1))
+    if array.dtype.kind == "O":
+        array = array.astype(str)
+    return np.unique(array, return_inverse=True)[1].astype(np.int64)
 
 
 def weighed(points: Tensor, weights: Any, groups: Tensor | None = None) -> Rows:
