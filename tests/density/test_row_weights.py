@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 
 from orbiflow.density import DensityEstimator, density_to_bytes, make_space
 from orbiflow.density.fitting.budget import Budget
-from orbiflow.density.fitting.chains import fit_chain_mixture
+from orbiflow.density.fitting.chains import fit_chain_mixture, spread_chains
 from orbiflow.density.fitting.likelihood import Objective
 from orbiflow.density.fitting.merging import merged
 from orbiflow.density.fitting.mixtures import fit_mixture
-from orbiflow.density.fitting.rows import effective_rows, mean_of, weighed
+from orbiflow.density.fitting.rows import Rows, effective_rows, mean_of, weighed
 from orbiflow.density.fitting.scales import kernel_estimates
 from orbiflow.density.fitting.weights import gain_of, sparse_weights, stacked, stacking_weights
 from orbiflow.errors import OrbiflowError
@@ -68,7 +68,7 @@ def test_stacking_of_weighted_rows_is_that_of_repeated_ones(seed: int) -> None:
 
 @given(seeds)
 @few
-def test_mixtures_and_chains_of_one_component_are_those_of_repeated_rows(seed: int) -> None:
+def test_mixtures_of_one_component_are_those_of_repeated_rows(seed: int) -> None:
     points, weights, rows = repeated(seed, 60)
     space = make_space("torus")
     at = space.uniform(30, torch.Generator().manual_seed(seed))
@@ -79,25 +79,37 @@ def test_mixtures_and_chains_of_one_component_are_those_of_repeated_rows(seed: i
     one = fit_mixture(space, points, 1, generator=generator(), row_weights=weights)
     other = fit_mixture(space, rows, 1, generator=generator())
     assert torch.allclose(one.log_prob(at), other.log_prob(at), atol=1e-6)
-    order = torch.arange(2)
-    chains = [
-        fit_chain_mixture(
-            space,
-            train,
-            train,
-            1,
-            order,
-            40,
-            generator(),
-            Budget(),
-            row_weights=own,
-            held_weights=own,
-        )
-        for train, own in ((points, weights), (rows, None))
-    ]
-    # EM from starts that are drawn nears one optimum, and is not told to reach it
-    scores = [float(mixture.log_prob(rows).mean()) for mixture in chains]
-    assert scores[0] == pytest.approx(scores[1], abs=0.05)
+
+
+@given(seeds, st.integers(1, 3))
+@few
+def test_chains_from_one_start_are_those_of_repeated_rows(seed: int, count: int) -> None:
+    points, weights, repeats = repeated(seed, 60)
+    space = make_space("torus")
+    generator = torch.Generator().manual_seed(seed)
+    order = torch.randperm(2, generator=generator)
+    start = spread_chains(space, Rows(points, weights), count, order, generator)
+    weighted, plain = (
+        fit_chain_mixture(start, rows, rows, 40, Budget())
+        for rows in (Rows(points, weights), Rows(repeats))
+    )
+    at = space.uniform(30, generator)
+    assert torch.allclose(weighted.log_prob(at), plain.log_prob(at), atol=1e-6)
+    assert float(plain.log_prob(repeats).mean()) > float(start.log_prob(repeats).mean())
+
+
+@given(seeds, st.integers(1, 6))
+@few
+def test_chains_start_at_rows_that_weigh_something(seed: int, count: int) -> None:
+    points = repeated(seed, 20)[0]
+    weights = (torch.arange(20) % 3 == 0).double()
+    generator = torch.Generator().manual_seed(seed)
+    start = spread_chains(
+        make_space("torus"), Rows(points, weights), count, torch.arange(2), generator
+    )
+    means = start.means[1:, :, 0] / (2 * math.pi)
+    away = (means[:, None] - points[weights > 0]).abs().amax(dim=2).amin(dim=1)
+    assert float(away.max()) < 1e-12
 
 
 @given(seeds, st.integers(2, 9))

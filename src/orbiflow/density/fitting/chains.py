@@ -11,7 +11,7 @@ import torch
 from torch import Tensor
 
 from orbiflow.density.fitting.budget import Budget
-from orbiflow.density.fitting.rows import mean_of
+from orbiflow.density.fitting.rows import Rows
 from orbiflow.density.fitting.training import training
 from orbiflow.density.models.chains import SCALES, VonMisesChains, averaged, chained, waves
 from orbiflow.density.models.log_sum import shares_of
@@ -92,14 +92,14 @@ def fit_chains(
     if len(train) < 2 or not len(validation):
         raise OrbiflowError(f"a mixture needs 2 training points or more, got {len(train)}")
     began, budget = time.monotonic(), Budget(seconds=seconds)
+    rows, held = Rows(train), Rows(validation)
     most = max(1, min(components, len(train) // PER_POINT))
     generator = torch.Generator().manual_seed(seed)
     size = min(SMALLEST, most)
 
     def start(count: int, order: Tensor) -> VonMisesChains:
-        return fit_chain_mixture(
-            space, train, validation, count, order, iterations, generator, budget
-        )
+        spread = spread_chains(space, rows, count, order, generator)
+        return fit_chain_mixture(spread, rows, held, iterations, budget)
 
     natural = torch.arange(space.dim)
     best = start(size, natural)
@@ -110,7 +110,7 @@ def fit_chains(
         if watch is not None:
             watch(0.0, f"mixture of {larger} components")
         found = start(larger, natural)
-        if _nll(found, validation) > _nll(best, validation) - WORTHWHILE:
+        if _nll(found, held) > _nll(best, held) - WORTHWHILE:
             break
         size, best = larger, found
     kept, score = [best], best.log_prob(validation)
@@ -130,40 +130,34 @@ def _mean(log_sum: Tensor, count: int) -> float:
     return float(log_sum.mean()) - math.log(count)
 
 
-def _nll(mixture: VonMisesChains, points: Tensor, weights: Tensor | None = None) -> float:
-    return -mean_of(mixture.log_prob(points), weights)
+def _nll(mixture: VonMisesChains, rows: Rows) -> float:
+    return -rows.mean(mixture.log_prob(rows.points))
 
 
 @torch.no_grad()
 def fit_chain_mixture(
-    space: Space,
-    train: Tensor,
-    validation: Tensor,
-    count: int,
-    order: Tensor,
+    start: VonMisesChains,
+    train: Rows,
+    held: Rows,
     iterations: int,
-    generator: torch.Generator,
     budget: Budget,
     *,
     patience: int = PATIENCE,
     worthwhile: float = 0.0,
-    row_weights: Tensor | None = None,
-    held_weights: Tensor | None = None,
 ) -> VonMisesChains:
-    """EM from seeds that are spread out; the iterate that was best on `validation`.
+    """EM from a start, all of whose chains have one order; the iterate that was best on `held`.
 
-    It ends after more looks than `patience` that bring no more than `worthwhile` nats. `row_weights`
-    (N,), of mean 1, and `held_weights` (M,) are of the rows of the two; default equal.
+    It ends after more looks than `patience` that bring no more than `worthwhile` nats.
     """
-    step = _Maximization(train, order, row_weights)
-    mixture = _started(space, step.angle, count, order, generator, row_weights)
-    best, least, idle = mixture, _nll(mixture, validation, held_weights), 0
+    step = _Maximization(train, start.order[0])
+    mixture = best = start
+    least, idle = _nll(start, held), 0
     for iteration in range(1, iterations + 1):
         late = budget.is_spent
         if not late:
             mixture = step(mixture, bent=iteration > STRAIGHT)
         if iteration % EVERY == 0 or iteration == iterations or late:
-            score = _nll(mixture, validation, held_weights)
+            score = _nll(mixture, held)
             idle = 0 if score < least - worthwhile else idle + 1
             if score < least:
                 best, least = mixture, score
@@ -174,23 +168,22 @@ def fit_chain_mixture(
     return best
 
 
-def _started(
-    space: Space,
-    angle: Tensor,
-    count: int,
-    order: Tensor,
-    generator: torch.Generator,
-    row_weights: Tensor | None,
+def spread_chains(
+    space: Space, rows: Rows, count: int, order: Tensor, generator: torch.Generator
 ) -> VonMisesChains:
-    """A uniform component and `count` round ones at points far from each other (k-means++)."""
-    own = 1.0 if row_weights is None else row_weights
-    if row_weights is None:
+    """A uniform component and `count` round ones at rows far from each other (k-means++).
+
+    Its chains take the angles in `order` (d,).
+    """
+    angle, own = 2 * math.pi * rows.points, rows.weights
+    if own is None:
         chosen = [int(torch.randint(len(angle), (), generator=generator))]
     else:
-        chosen = [int(torch.multinomial(row_weights, 1, generator=generator))]
+        chosen = [int(torch.multinomial(own, 1, generator=generator))]
     far = (1 - (angle - angle[chosen[0]]).cos()).sum(dim=1)
     for _ in range(count - 1):
-        chosen.append(int(torch.multinomial(own * (far + 1e-12), 1, generator=generator)))
+        odds = far + 1e-12 if own is None else own * (far + 1e-12)
+        chosen.append(int(torch.multinomial(odds, 1, generator=generator)))
         far = torch.minimum(far, (1 - (angle - angle[chosen[-1]]).cos()).sum(dim=1))
     d = angle.shape[1]
     means = angle.new_zeros(count + 1, d, 1 + 2 * d)
@@ -204,8 +197,9 @@ def _started(
 class _Maximization:
     """The E and M steps on fixed points, of chains of one order (d,); component 0 stays uniform."""
 
-    def __init__(self, points: Tensor, order: Tensor, row_weights: Tensor | None = None) -> None:
-        self.row_weights = row_weights
+    def __init__(self, rows: Rows, order: Tensor) -> None:
+        points = rows.points
+        self.row_weights = rows.weights
         self.points, self.allowed = points, chained(order)
         self.angle = 2 * math.pi * points
         self.waves = waves(self.angle)

@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 
 from orbiflow.density.fitting.budget import Budget
-from orbiflow.density.fitting.chains import fit_chain_mixture
+from orbiflow.density.fitting.chains import fit_chain_mixture, spread_chains
 from orbiflow.density.fitting.kernels import NARROWEST
 from orbiflow.density.fitting.missing import is_whole, log_prob_of_rows, with_incomplete
 from orbiflow.density.fitting.mixtures import fit_mixture
@@ -166,30 +166,20 @@ class ChainFamily(Family):
         generator = torch.Generator().manual_seed(self.seed + number)
         natural = torch.arange(self.space.dim)
 
-        def fit(size: int, start: int) -> VonMisesChains:
-            say(f"chains of {size}" + (f", start {start + 1}" if self.starts > 1 else ""))
-            turn = number + start > 0
-            order = torch.randperm(self.space.dim, generator=generator) if turn else natural
+        def fit(size: int, turn: int) -> VonMisesChains:
+            say(f"chains of {size}" + (f", start {turn + 1}" if self.starts > 1 else ""))
+            turned = number + turn > 0
+            order = torch.randperm(self.space.dim, generator=generator) if turned else natural
+            start = spread_chains(self.space, train, size, order, generator)
             return fit_chain_mixture(
-                self.space,
-                train.points,
-                held.points,
-                size,
-                order,
-                ITERATIONS,
-                generator,
-                Budget(),
-                patience=0,
-                worthwhile=IDLE,
-                row_weights=train.weights,
-                held_weights=held.weights,
+                start, train, held, ITERATIONS, Budget(), patience=0, worthwhile=IDLE
             )
 
         if self.sizes is None:
             sizes = [k for k in SIZES if k >= SMALLEST_CHAINS and CHAIN_ROWS * k <= len(train)]
             return _grown(lambda size: fit(size, 0), sizes, held)
         return {
-            str(size): averaged([fit(size, start) for start in range(self.starts)])
+            str(size): averaged([fit(size, turn) for turn in range(self.starts)])
             for size in self.sizes
         }
 
