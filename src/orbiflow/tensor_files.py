@@ -42,8 +42,14 @@ def tensor_bytes(
     return data
 
 
-def read_tensors(path: str | Path, what: str) -> tuple[dict[str, Any], dict[str, Tensor]]:
+def read_tensors(
+    path: str | Path, what: str, *, key: str = KEY, max_bytes: int = MAX_BYTES
+) -> tuple[dict[str, Any], dict[str, Tensor]]:
     """Header and tensors of a file; `what` it is to hold, such as "a flow", is for messages.
+
+    Args:
+        key: under which the header stands.
+        max_bytes: of the file, checked before it is read.
 
     Raises:
         InputFileError: if the file is missing, too large, damaged or of another kind.
@@ -51,22 +57,30 @@ def read_tensors(path: str | Path, what: str) -> tuple[dict[str, Any], dict[str,
     path = as_path(path, "the file")
     try:
         size = path.stat().st_size
-        if size > MAX_BYTES:
+        if size > max_bytes:
             raise InputFileError(
-                f"{path}: {size / 2**20:.0f} MB, {what} has at most {MAX_BYTES / 2**20:g} MB"
+                f"{path}: {size:,} bytes, too large for {what}: at most {max_bytes:,}"
             )
         data = path.read_bytes()
     except OSError as error:
         raise InputFileError(f"cannot read {path}: {error.strerror or error}") from error
     try:
-        length = int.from_bytes(data[:8], "little")
-        if not 2 <= length <= min(len(data) - 8, MAX_HEADER):
-            raise ValueError("no header")
-        header: Any = json.loads(json.loads(data[8 : 8 + length])["__metadata__"][KEY])
-        if not is_object(header):
-            raise ValueError("its header is no table")
-        return header, load(data)
+        return _header(data, key), load(data)
     except (SafetensorError, ValueError, KeyError, TypeError, RecursionError) as error:
         raise InputFileError(
             f"{path}: not {what} saved by orbiflow, or damaged ({error})"
         ) from error
+
+
+def _header(data: bytes, key: str) -> dict[str, Any]:
+    length = int.from_bytes(data[:8], "little")
+    if not 2 <= length <= min(len(data) - 8, MAX_HEADER):
+        raise ValueError("no header")
+    whole: Any = json.loads(data[8 : 8 + length])
+    metadata: Any = whole.get("__metadata__") if is_object(whole) else None
+    if not is_object(metadata) or key not in metadata:
+        raise ValueError(f"no {key!r} in its header")
+    header: Any = json.loads(metadata[key])
+    if not is_object(header):
+        raise ValueError("its header is no table")
+    return header

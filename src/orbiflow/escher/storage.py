@@ -11,11 +11,9 @@ from typing import Any
 
 import numpy as np
 import torch
-from safetensors import SafetensorError
-from safetensors.numpy import load, save
+from safetensors.numpy import save
 
 from orbiflow.arguments import instance
-from orbiflow.arguments import path as as_path
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.escher.carried import Bending
 from orbiflow.escher.descent_settings import MAX_SEGMENTS
@@ -23,6 +21,7 @@ from orbiflow.escher.max_frequency import MAX_FREQUENCY
 from orbiflow.escher.model import TileModel
 from orbiflow.silhouette.frame import Frame
 from orbiflow.symmetry.isometry import Array
+from orbiflow.tensor_files import read_tensors
 from orbiflow.tilings import isohedral_class
 
 FORMAT = "orbiflow-tile/1"
@@ -171,18 +170,11 @@ def load_saved(path: str | Path) -> SavedModel:
     Raises:
         InputFileError: for a file that is missing, too large or not such a model.
     """
-    path = as_path(path, "the model's file")
-    data = _read(path)
+    settings, tensors = read_tensors(path, "a tile model", key=FORMAT, max_bytes=MAX_BYTES)
     with _naming(path):
-        arrays = load(data)
-        header = json.loads(data[8 : 8 + int.from_bytes(data[:8], "little")])
-        metadata = header.get("__metadata__", {})
-        if FORMAT not in metadata:
-            raise OrbiflowError(f"no {FORMAT!r} in its header")
-        settings = dict(json.loads(metadata[FORMAT]))
+        arrays: dict[str, Array] = {name: tensor.numpy() for name, tensor in tensors.items()}
         stored = settings.pop(FRAME, None)
         frame = None if stored is None else Frame.from_dict(stored)
-        arrays = dict(arrays)
         return SavedModel(settings, arrays, frame, _bending_in(arrays))
 
 
@@ -196,7 +188,7 @@ def load_model(path: str | Path) -> TileModel:
         InputFileError: for a file that is missing, too large or not such a model.
     """
     saved = load_saved(path)
-    with _naming(Path(path)):
+    with _naming(path):
         return saved.restore()
 
 
@@ -215,22 +207,12 @@ def _bending_in(arrays: dict[str, Array]) -> Bending | None:
     return Bending(*(found[name] for name in BENDING))
 
 
-def _read(path: Path) -> bytes:
-    try:
-        size = path.stat().st_size
-        if size > MAX_BYTES:
-            raise InputFileError(f"{path}: {size:,} bytes is too large for a tile model")
-        return path.read_bytes()
-    except OSError as error:
-        raise InputFileError(f"{path}: cannot be read: {error.strerror or error}") from error
-
-
 @contextlib.contextmanager
-def _naming(path: Path) -> Generator[None]:
+def _naming(path: str | Path) -> Generator[None]:
     """Whatever is wrong inside, said with the file's name."""
     try:
         yield
-    except (SafetensorError, ValueError, KeyError, TypeError, RecursionError) as error:
+    except (ValueError, KeyError, TypeError) as error:
         raise InputFileError(f"{path}: not an orbiflow tile model: {error}") from error
 
 
