@@ -5,21 +5,43 @@ from __future__ import annotations
 import numpy as np
 import torch
 
-from orbiflow.density import AdaptiveKernels, BlendedDensity, Torus, UniformBase, VonMisesChains
+from orbiflow.density import (
+    AdaptiveKernels,
+    BlendedDensity,
+    Torus,
+    UniformBase,
+    VonMisesChains,
+    VonMisesNetwork,
+)
 from orbiflow.density.models.chains import SCALES, chained
+from orbiflow.density.models.network import Factor
 from orbiflow.density.models.still import still_flow
 from orbiflow.fields import SplineField
 from orbiflow.flows import Flow
 
 
-def random_chains(rng: np.random.Generator, space: Torus, count: int = 3) -> VonMisesChains:
+def random_chains(
+    rng: np.random.Generator, space: Torus, count: int = 3, *, natural: bool = False
+) -> VonMisesChains:
     """Components in random orders, bent by the angles before."""
     d = space.dim
-    order = torch.stack([torch.tensor(rng.permutation(d)) for _ in range(count)])
+    orders = [np.arange(d) if natural else rng.permutation(d) for _ in range(count)]
+    order = torch.tensor(np.array(orders))
     means = torch.tensor(0.6 * rng.normal(size=(count, d, 1 + 2 * d))) * chained(order)
     weights = torch.tensor(rng.dirichlet(np.ones(count * len(SCALES)))).reshape(count, -1)
     concentrations = torch.tensor(rng.uniform(0.5, 12.0, (count, d)))
     return VonMisesChains(space, weights.log(), means, concentrations, order)
+
+
+def random_network(rng: np.random.Generator, space: Torus, parents: int = 2) -> VonMisesNetwork:
+    """Angles in a random order, each with as many of those before as parents, where there are any."""
+    order: list[int] = rng.permutation(space.dim).tolist()
+    factors: list[Factor] = []
+    for place, axis in enumerate(order):
+        chosen = rng.permutation(order[:place])[:parents].tolist()
+        own = random_chains(rng, Torus(len(chosen) + 1), natural=True)
+        factors.append(Factor((*chosen, axis), own))
+    return VonMisesNetwork(space, factors)
 
 
 def random_kernels(rng: np.random.Generator, space: Torus, count: int = 4) -> AdaptiveKernels:
@@ -31,7 +53,9 @@ def random_kernels(rng: np.random.Generator, space: Torus, count: int = 4) -> Ad
     )
 
 
-def random_blend(seed: int, dim: int, *, chains: bool = True, flow: bool = False) -> BlendedDensity:
+def random_blend(
+    seed: int, dim: int, *, chains: bool = True, flow: bool = False, network: bool = False
+) -> BlendedDensity:
     rng = np.random.default_rng(seed)
     space = Torus(dim, unit="degrees")
     moving = still_flow(space)
@@ -42,7 +66,7 @@ def random_blend(seed: int, dim: int, *, chains: bool = True, flow: bool = False
                 torch.tensor(0.01 * rng.normal(size=tuple(field.parameters_.shape)))
             )
         moving = Flow([field], steps=2, warn=False)
-    shares = torch.tensor(rng.dirichlet(3 * np.ones(4 if chains else 3)))
+    shares = torch.tensor(rng.dirichlet(3 * np.ones(3 + chains + network)))
     if not flow:
         shares[0] = 0
         shares = shares / shares.sum()
@@ -53,6 +77,7 @@ def random_blend(seed: int, dim: int, *, chains: bool = True, flow: bool = False
         random_kernels(rng, space),
         shares,
         chains=random_chains(rng, space) if chains else None,
+        network=random_network(rng, space) if network else None,
     )
 
 

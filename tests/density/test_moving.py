@@ -72,7 +72,7 @@ def others(seed: int) -> list[SymmetricDensity]:
     return [
         SymmetricDensity(bottle, spline_flow(bottle, rng), VonMisesBase(bottle)),
         SymmetricDensity(torus, NeuralFlow(neural, steps=3)),
-        random_blend(seed, 3),
+        random_blend(seed, 3, network=True),
         random_blend(seed, 2, flow=True),
     ]
 

@@ -141,8 +141,8 @@ UnitOption = Annotated[
 Parts = Annotated[
     str | None,
     typer.Option(
-        help="Of flow, kernels, mixture and chains those that may be used, such as kernels,mixture; "
-        "default all, and rows held out choose.",
+        help="Of flow, kernels, mixture, chains and network those that may be used, such as "
+        "kernels,mixture; default all, and rows held out choose.",
         show_default=False,
     ),
 ]

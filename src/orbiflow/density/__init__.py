@@ -22,6 +22,7 @@ from orbiflow.density.models import (
     UniformBase,
     VonMisesBase,
     VonMisesChains,
+    VonMisesNetwork,
     kl_by_quadrature,
     midpoints,
 )
@@ -67,6 +68,7 @@ __all__ = [
     "UniformBase",
     "VonMisesBase",
     "VonMisesChains",
+    "VonMisesNetwork",
     "blend_kernels",
     "clear_rotation",
     "conditional",

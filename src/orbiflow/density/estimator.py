@@ -64,7 +64,7 @@ class DensityEstimator(Parameters):
     Args:
         space: "torus", "sphere", "klein-bottle", "projective-plane", or a `Space`.
         unit: of angles on torus and Klein bottle: "radians", "degrees" or "turns".
-        parts: "auto": of flow, kernels, mixture and chains what rows held out speak for
+        parts: "auto": of flow, kernels, mixture, chains and network what rows held out speak for
             (`fit_automatic`). Or those that may be used, such as "kernels" or "flow,chains"; "flow" is
             a flow alone (`fit_density`).
         missing: "refuse" rows that lack an angle (NaN), or, on tori, "marginalise": fit kernels and

@@ -24,6 +24,7 @@ PARTS = (
     "kernels",
     "mixture",
     "chains",
+    "network",
 )  # as `orbiflow.density` has them, without its import
 
 
@@ -39,8 +40,8 @@ class DensityFitRequest(Request):
     - `weights`: the column that says how much each row counts.
     - `drop_missing`: leave out rows that lack a value.
     - `unit`: of angles; None for radians if no value is beyond 2 pi.
-    - `parts`: of flow, kernels, mixture and chains those that may be used; None lets rows held out
-      choose among all.
+    - `parts`: of flow, kernels, mixture, chains and network those that may be used; None lets rows held
+      out choose among all.
     - `repeats`: what rows that repeat another are taken for.
     - `detail`, `segments`: of the flow, None for what suits the number of rows.
     - `kernels`: a flow and adaptive kernels, nothing else.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
+
 import torch
 from torch import Tensor
 
@@ -13,6 +15,7 @@ from orbiflow.density.models.bases import Base, UniformBase
 from orbiflow.density.models.blend import BlendedDensity
 from orbiflow.density.models.chains import VonMisesChains
 from orbiflow.density.models.kernels import AdaptiveKernels
+from orbiflow.density.models.network import VonMisesNetwork
 from orbiflow.density.models.still import still_flow
 from orbiflow.density.models.symmetric import SymmetricDensity
 from orbiflow.density.spaces.space import Space
@@ -31,8 +34,7 @@ def assembled(
     share: float,
 ) -> BlendedDensity:
     """The candidates in proportions (P,), made final with all rows; a flow of a share beside them."""
-    kernels: list[tuple[AdaptiveKernels, float]] = []
-    chains: list[tuple[VonMisesChains, float]] = []
+    sorted_ = _Sorted()
     for family in families:
         chosen = [
             (name, float(weight))
@@ -43,39 +45,53 @@ def assembled(
         ]
         found = family.final(rows, candidates.fitted[family.name], [name for name, _ in chosen])
         for part, (_, weight) in zip(found, chosen, strict=True):
-            _sort(part, weight, kernels, chains)
+            sorted_.take(part, weight)
     floor = float(weights[candidates.floor].sum())
-    if not kernels:  # a blend has some: half of the floor, as one
+    if not sorted_.kernels:  # a blend has some: half of the floor, as one
         center = rows.points.new_full((1, space.dim), 0.5)
         floor /= 2
-        kernels = [(even_kernels(space, center, FLAT), floor)]
-    sizes = [[weight for _, weight in part] for part in (kernels, chains)]
-    shares = torch.tensor([0.0, sum(sizes[0]), floor, sum(sizes[1])], dtype=torch.float64)
+        sorted_.take(even_kernels(space, center, FLAT), floor)
+    own = (sorted_.kernels, sorted_.chains, sorted_.networks)
+    sizes = [[weight for _, weight in part] for part in own]
+    broad = [sum(part) for part in sizes[1:] if part]
+    shares = torch.tensor([0.0, sum(sizes[0]), floor, *broad], dtype=torch.float64)
     shares = (1 - share) * shares / shares.sum()
     shares[0] = share
-    mixture = joined([part for part, _ in kernels], torch.tensor(sizes[0], dtype=torch.float64))
+    proportions = [torch.tensor(part, dtype=torch.float64) for part in sizes]
     carried = still_flow(space) if flow is None else flow.flow
     return BlendedDensity(
         space,
         carried,
         UniformBase(space) if flow is None else flow.base,
-        mixture,
-        shares if chains else shares[:3],
-        chains=mixed([part for part, _ in chains], torch.tensor(sizes[1])) if chains else None,
+        joined([part for part, _ in sorted_.kernels], proportions[0]),
+        shares,
+        chains=mixed([part for part, _ in sorted_.chains], proportions[1]) if sizes[1] else None,
+        network=sorted_.networks[0][0] if sizes[2] else None,
     )
 
 
-def _sort(
-    part: Base,
-    weight: float,
-    kernels: list[tuple[AdaptiveKernels, float]],
-    chains: list[tuple[VonMisesChains, float]],
-) -> None:
-    if isinstance(part, VonMisesChains):
-        chains.append((part, weight))
-    else:
-        assert isinstance(part, AdaptiveKernels)  # families have no others
-        kernels.append((part, weight))
+@dataclass
+class _Sorted:
+    """Parts that have been chosen, and their weights, by their kind; one network at most."""
+
+    kernels: list[tuple[AdaptiveKernels, float]] = field(
+        default_factory=list[tuple[AdaptiveKernels, float]]
+    )
+    chains: list[tuple[VonMisesChains, float]] = field(
+        default_factory=list[tuple[VonMisesChains, float]]
+    )
+    networks: list[tuple[VonMisesNetwork, float]] = field(
+        default_factory=list[tuple[VonMisesNetwork, float]]
+    )
+
+    def take(self, part: Base, weight: float) -> None:
+        if isinstance(part, VonMisesChains):
+            self.chains.append((part, weight))
+        elif isinstance(part, VonMisesNetwork):
+            self.networks.append((part, weight))
+        else:
+            assert isinstance(part, AdaptiveKernels)  # families have no others
+            self.kernels.append((part, weight))
 
 
 def mixed(parts: list[VonMisesChains], shares: Tensor) -> VonMisesChains:

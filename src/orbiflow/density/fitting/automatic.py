@@ -1,4 +1,4 @@
-"""A density that chooses its parts by rows held out: flow, kernels, mixtures, chains, uniform floor."""
+"""A density that chooses its parts by rows held out: flow, kernels, mixtures, chains, network."""
 
 from __future__ import annotations
 
@@ -14,7 +14,13 @@ from orbiflow.density.arguments import check_kind, check_range, silent
 from orbiflow.density.fitting.assembly import assembled
 from orbiflow.density.fitting.budget import Budget
 from orbiflow.density.fitting.evidence import Candidates, PartEvidence, candidates_of, judged
-from orbiflow.density.fitting.families import ChainFamily, Family, KernelFamily, MixtureFamily
+from orbiflow.density.fitting.families import (
+    ChainFamily,
+    Family,
+    KernelFamily,
+    MixtureFamily,
+    NetworkFamily,
+)
 from orbiflow.density.fitting.flow_trial import TriedFlow, flow_settings, try_flow
 from orbiflow.density.fitting.folds import LEAST_PLACES, Folds, folds_of
 from orbiflow.density.fitting.kernels import NARROWEST
@@ -42,12 +48,12 @@ from orbiflow.density.fitting.weights import stacked, supported_weights
 from orbiflow.density.models.blend import BlendedDensity
 from orbiflow.density.models.still import MOST_DIM
 from orbiflow.density.partial import at_observed
-from orbiflow.density.spaces.flat import whole_turn
+from orbiflow.density.spaces.flat import Torus, whole_turn
 from orbiflow.density.spaces.space import Space
 from orbiflow.errors import OrbiflowError
 from orbiflow.typed_torch import listed
 
-PARTS = ("flow", "kernels", "mixture", "chains")
+PARTS = ("flow", "kernels", "mixture", "chains", "network")
 """What a density may be made of, beside its uniform floor."""
 
 REPEATS = ("places", "rounding")
@@ -71,7 +77,7 @@ class AutomaticSettings:
     """What there is to choose of a fit that chooses by itself.
 
     - `parts`: of `PARTS`, those that may be used; chains are for tori of two or more angles, a flow for
-      spaces of three dimensions at most.
+      spaces of three dimensions at most, a network for tori of more.
     - `repeats`: "places": new rows repeat the old ones as often as these repeat each other; "rounding":
       repeated values are an accident, and the density is to have no peaks at them.
     - `missing`: "refuse" points that lack angles (NaN), or "marginalise": on tori a row counts by the
@@ -113,11 +119,11 @@ def fit_automatic(
 ) -> tuple[BlendedDensity, FitReport]:
     """Fit what suits the data best: a mixture of densities with weights by rows held out.
 
-    Kernel estimates of many widths, mixtures and von Mises chains of many sizes are fitted to the rows
-    without a tenth, and judged by that tenth, for several tenths in turn; the weights that suit the
-    rows held out best (stacking: Smyth and Wolpert, 1999) are those of the density, in which kernels
-    are about all rows and mixtures the mean of those of the folds. A flow, fitted without the first
-    tenth, is blended in if that tenth says so.
+    Kernel estimates of many widths, mixtures and von Mises chains of many sizes and, of many angles, a
+    network are fitted to the rows without a tenth, and judged by that tenth, for several tenths in
+    turn; the weights that suit the rows held out best (stacking: Smyth and Wolpert, 1999) are those of
+    the density, in which kernels are about all rows and the others the mean of those of the folds. A
+    flow, fitted without the first tenth, is blended in if that tenth says so.
 
     Args:
         space: any.
@@ -196,6 +202,8 @@ def _families(
     ]
     if space.is_torus and space.dim > 1:
         families.append(ChainFamily(space, settings.seed, starts))
+    if isinstance(space, Torus) and space.dim > MOST_DIM:
+        families.append(NetworkFamily(space, settings.seed))
     chosen = [family for family in families if family.name in settings.parts]
     beside = "flow" in settings.parts and settings.parts not in (PARTS, ("flow",))
     if beside and space.dim > MOST_DIM:
@@ -204,7 +212,9 @@ def _families(
             "others"
         )
     if not chosen and (space.dim > MOST_DIM or settings.parts != ("flow",)):
-        raise OrbiflowError(f"there are no {' or '.join(settings.parts)} on this {space!r}")
+        raise OrbiflowError(
+            f"a density on this {space!r} cannot be made of {' and '.join(settings.parts)} alone"
+        )
     return chosen
 
 

@@ -14,12 +14,15 @@ from orbiflow.density.fitting.chains import fit_chain_mixture, spread_chains
 from orbiflow.density.fitting.kernels import NARROWEST
 from orbiflow.density.fitting.missing import is_whole, log_prob_of_rows, with_incomplete
 from orbiflow.density.fitting.mixtures import fit_mixture
+from orbiflow.density.fitting.network import Shape, fit_network, network_shapes
 from orbiflow.density.fitting.rows import Rows
 from orbiflow.density.fitting.scales import joined, kernel_estimates
 from orbiflow.density.fitting.weights import gain_of
 from orbiflow.density.models.bases import Base
 from orbiflow.density.models.chains import VonMisesChains, averaged
 from orbiflow.density.models.kernels import AdaptiveKernels
+from orbiflow.density.models.network import VonMisesNetwork, averaged_networks
+from orbiflow.density.spaces.flat import Torus
 from orbiflow.density.spaces.space import Space
 
 SIZES = (1, 2, 4, 8, 16, 32, 64)
@@ -193,6 +196,35 @@ class ChainFamily(Family):
 
     def keep(self, names: set[str]) -> None:
         self.sizes = tuple(sorted(map(int, names)))
+
+
+@dataclass
+class NetworkFamily(Family):
+    """A Bayesian network on a torus of many angles: its arrows are those that the first fold says."""
+
+    space: Torus
+    seed: int
+    starts: int = 1
+    name = "network"
+    _shapes: list[Shape] = field(default_factory=list[Shape])
+
+    def fitted(self, number: int, train: Rows, held: Rows, say: Say) -> dict[str, Base]:
+        train = train[:MOST_CHAINED]
+        generator = torch.Generator().manual_seed(self.seed + number)
+        if not self._shapes:
+            for shape in network_shapes(train, held, generator):
+                self._shapes.append(shape)
+                say(f"network, angle {len(self._shapes)} of {self.space.dim}")
+        say("network")
+        return {
+            "network": fit_network(self.space, train, held, self._shapes, generator, self.starts)
+        }
+
+    def final(self, rows: Rows, folds: list[dict[str, Base]], names: list[str]) -> list[Base]:
+        del rows
+        found = [part for fold in folds for part in fold.values()]
+        mean = averaged_networks([part for part in found if isinstance(part, VonMisesNetwork)])
+        return [mean for _ in names]
 
 
 def _grown(fit: Callable[[int], Base], sizes: Iterable[int], held: Rows) -> dict[str, Base]:

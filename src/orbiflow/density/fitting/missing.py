@@ -70,8 +70,8 @@ def missing_notes(rows: Rows, empty: int) -> list[str]:
     if lacking:
         notes.append(
             f"{lacking} of {len(rows)} rows lack some angles and count by the density of those that "
-            "they have; kernels are about the whole rows alone, chains and flows were not tried, as "
-            "they need whole rows"
+            "they have; kernels are about the whole rows alone; chains, networks and flows were not "
+            "tried, as they need whole rows"
         )
     if empty:
         notes.append(f"{empty} rows lack all angles and were left out")

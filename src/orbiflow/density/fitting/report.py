@@ -34,7 +34,7 @@ Progress = Callable[[float, str], None]
 class PartEvidence:
     """What a part of a density is worth.
 
-    - `name`: "flow", "kernels", "mixture" or "chains".
+    - `name`: "flow", "kernels", "mixture", "chains" or "network".
     - `share`: of the density.
     - `alone`: mean log density of the part alone at held-out rows, in nats above the uniform one.
     - `gain`, `error`: nats that the density would lose without it, and their standard error.
@@ -73,7 +73,8 @@ class FitReport:
     - `steps`: RK4 steps a segment, in the end.
     - `mass`: integral over the square, see `SymmetricDensity.mass`; None above two dimensions.
     - `integration_error`: change of the flow's mean validation log density at doubled steps.
-    - `shares`: of flow, kernels, uniform floor and, if there are, chains; None for a flow alone.
+    - `shares`: of flow, kernels, uniform floor, and chains and network if they are there; None for a
+      flow alone.
     - `parts`: of a fit by evidence, what each part is worth.
     - `repeats`: of a fit by evidence, what was found of rows that repeat another.
     - `effective`: rows of equal weight that say as much (Kish); None where all weigh the same.

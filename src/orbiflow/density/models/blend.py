@@ -1,4 +1,4 @@
-"""A flow's density beside adaptive kernels, a uniform floor and von Mises chains."""
+"""A flow's density beside adaptive kernels, a uniform floor, von Mises chains and a network."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from orbiflow.density.arguments import check_kind, float_tensor
 from orbiflow.density.models.bases import Base, UniformBase
 from orbiflow.density.models.chains import VonMisesChains
 from orbiflow.density.models.kernels import AdaptiveKernels
+from orbiflow.density.models.network import VonMisesNetwork
 from orbiflow.density.models.symmetric import BLOCK, SymmetricDensity, shape_of, source_of
 from orbiflow.density.spaces.space import CHART, Space, check_measure
 from orbiflow.errors import OrbiflowError
@@ -21,17 +22,18 @@ from orbiflow.typed_torch import listed
 
 
 class BlendedDensity(SymmetricDensity):
-    """shares_0 flow + shares_1 kernels + shares_2 uniform (+ shares_3 chains): exact, normalised.
+    """A mixture of a flow, kernels, the uniform density and, if there are, chains and a network.
 
-    The flow and the chains give the broad shape, the kernels what is sharper than a flow's waves, the
-    floor keeps a lone observation from being impossible. `to_base` and `from_base` are the flow's.
+    Exact and normalised. The flow, the chains and the network give the broad shape, the kernels what is
+    sharper than a flow's waves, the floor keeps a lone observation from being impossible. `to_base` and
+    `from_base` are the flow's.
 
     Args:
         space, flow, base: see `SymmetricDensity`.
         kernels: on the same space.
-        shares: (3,), or (4,) with chains; of sum 1, positive but for the flow's, which may be 0: then
-            the flow is not evaluated.
-        chains: von Mises chains on the same torus.
+        shares: of flow, kernels, uniform floor, and of chains and network if they are there, in this
+            order; of sum 1, positive but for the flow's: with 0 it is not evaluated.
+        chains, network: on the same torus; None for none.
 
     Raises:
         OrbiflowError: for shares that are no proportions.
@@ -48,21 +50,24 @@ class BlendedDensity(SymmetricDensity):
         shares: Tensor,
         *,
         chains: VonMisesChains | None = None,
+        network: VonMisesNetwork | None = None,
     ) -> None:
         super().__init__(space, flow, base)
         check_kind(kernels, AdaptiveKernels, "kernels")
         shares = float_tensor(shares, "shares")
-        count = 3 if chains is None else 4
+        count = 3 + (chains is not None) + (network is not None)
         if (
             shares.shape != (count,)
             or not bool((shares[1:] > 0).all() and shares[0] >= 0)
             or abs(float(shares.sum()) - 1) > 1e-6
         ):
-            number = "three" if count == 3 else "four"
-            raise OrbiflowError(f"shares must be {number} proportions, got {listed(shares)}")
+            raise OrbiflowError(f"shares must be {count} proportions, got {listed(shares)}")
         if chains is not None:
             check_kind(chains, VonMisesChains, "chains")
-        self.kernels, self.shares, self.chains = kernels, shares.double(), chains
+        if network is not None:
+            check_kind(network, VonMisesNetwork, "network")
+        self.kernels, self.shares = kernels, shares.double()
+        self.chains, self.network = chains, network
         self._uniform = UniformBase(space)
 
     @property
@@ -71,10 +76,16 @@ class BlendedDensity(SymmetricDensity):
         return SymmetricDensity(self.space, self.flow, self.base)
 
     @property
-    def _others(self) -> tuple[Base, ...]:
-        """What is beside the flow, in the order of `shares`."""
-        others = (self.kernels, self._uniform)
-        return others if self.chains is None else (*others, self.chains)
+    def _broad(self) -> dict[str, Base]:
+        """What else there is, by name, in the order of `shares`, of which they are the last."""
+        named = {"chains": self.chains, "network": self.network}
+        return {name: part for name, part in named.items() if part is not None}
+
+    @property
+    def parts(self) -> dict[str, SymmetricDensity | Base]:
+        """All parts by name, in the order of `shares`."""
+        first = {"flow": self.flow_density, "kernels": self.kernels, "uniform": self._uniform}
+        return {**first, **self._broad}
 
     def _log_prob(self, value: Tensor, measure: str) -> Tensor:
         return self._shifted(self._parts(value, kernels=True), value, measure)
@@ -102,8 +113,8 @@ class BlendedDensity(SymmetricDensity):
         if kernels:
             own = self.kernels.log_density(value, self.kernels_beside)
             total = torch.logaddexp(total, own + log_shares[1])
-        if self.chains is not None:
-            total = torch.logaddexp(total, self.chains.log_prob(value) + log_shares[3])
+        for own, log_share in zip(self._broad.values(), log_shares[3:], strict=True):
+            total = torch.logaddexp(total, own.log_prob(value) + log_share)
         if float(self.shares[0]) > 0:
             flow = self._of_flow(value)
             if self.space.is_round:
@@ -144,11 +155,11 @@ class BlendedDensity(SymmetricDensity):
         part = torch.multinomial(shares, shape.numel(), replacement=True, generator=source)
         counts: list[int] = listed(torch.bincount(part, minlength=len(shares)))
         drawn = self._like().new_empty(shape.numel(), self.space.dim)
-        for index, count in enumerate(counts):
+        for index, (count, own_part) in enumerate(zip(counts, self.parts.values(), strict=True)):
             if not count:  # as a flow without a share
                 continue
-            if index:
-                own = self._others[index - 1].sample(count, source)
+            if isinstance(own_part, Base):
+                own = own_part.sample(count, source)
             else:
                 own = super().rsample((count,), source)
             at = torch.nonzero(part == index)[:, 0].to(drawn.device)
@@ -171,7 +182,6 @@ class BlendedDensity(SymmetricDensity):
         return share * flow_mass + 1 - share
 
     def __repr__(self) -> str:
-        names = ("flow", "kernels", "uniform", "chains")
-        shares = zip(names, listed(self.shares), strict=False)
+        shares = zip(self.parts, listed(self.shares), strict=True)
         parts = ", ".join(f"{name} {100 * share:.1f}%" for name, share in shares)
         return f"BlendedDensity({self.space!r}, {parts})"

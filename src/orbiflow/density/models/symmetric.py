@@ -188,9 +188,9 @@ class SymmetricDensity(Distribution):
     def to(self, *wanted: Any) -> Self:
         """A copy elsewhere: `to("cuda")`, `to(torch.float32)`, `to("cuda", torch.float32)`.
 
-        Or where a tensor is: `to(tensor)`. The dtype is the flow's. Kernels, chains and shares stay in
-        float64 on any device. Samples are drawn on the CPU and moved, so that the same state of a
-        generator gives the same points.
+        Or where a tensor is: `to(tensor)`. The dtype is the flow's. Kernels, chains, networks and
+        shares stay in float64 on any device. Samples are drawn on the CPU and moved, so that the same
+        state of a generator gives the same points.
 
         Raises:
             OrbiflowError: for what is neither a device nor a floating dtype.

@@ -13,6 +13,7 @@ from orbiflow.density.models.bases import UniformBase
 from orbiflow.density.models.blend import BlendedDensity
 from orbiflow.density.models.chains import VonMisesChains
 from orbiflow.density.models.kernels import AdaptiveKernels
+from orbiflow.density.models.network import VonMisesNetwork
 from orbiflow.density.models.still import still_flow
 from orbiflow.density.models.symmetric import SymmetricDensity
 from orbiflow.density.partial.axes import Split, check_torus, given_axes, kept_axes
@@ -28,7 +29,10 @@ MOST_TABULATED = 2
 """Angles of a density that can be tabulated."""
 
 DEAR = {1: 1024, 2: 48}
-"""Points along an angle at most where each is an integral of a flow, by the number of angles."""
+"""Points along an angle at most where each is a dear integral, by the number of angles."""
+
+DEAR_PARTS = (SymmetricDensity, VonMisesNetwork)
+"""Whose integrals are dear."""
 
 CHECKED_TWICE = 64
 """Points at which values by quasi-random nodes are compared with those by others."""
@@ -149,7 +153,7 @@ def _tabulated(
         logs = [log + part_at(part, whole, observed, seed) for log, part in parts]
         return torch.stack(logs).logsumexp(dim=0)
 
-    dear = split.dim > len(observed) and any(isinstance(p, SymmetricDensity) for _, p in parts)
+    dear = split.dim > len(observed) and any(isinstance(p, DEAR_PARTS) for _, p in parts)
     table = tabulated(log_function, space, DEAR[space.dim] if dear else None)
     drawn = table.kernels.sample(CHECKED_TWICE, torch.Generator().manual_seed(1))
     twice = log_function(drawn) - log_function(drawn, seed=1)  # where nodes are quasi-random
@@ -157,7 +161,9 @@ def _tabulated(
 
 
 def _kind(part: Part) -> str:
-    return "chains" if isinstance(part, VonMisesChains) else "a flow"
+    if isinstance(part, VonMisesChains):
+        return "chains"
+    return "a network" if isinstance(part, VonMisesNetwork) else "a flow"
 
 
 def _blended(

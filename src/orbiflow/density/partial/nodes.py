@@ -113,10 +113,10 @@ def _sobol(kappa: Tensor, seed: int) -> tuple[Tensor, list[Tensor]]:
     engine = torch.quasirandom.SobolEngine(axes, scramble=True, seed=seed)
     even = engine.draw(MOST, dtype=torch.float64)
     logs = kappa.new_full((count, MOST), -math.log(MOST))
-    return logs, [_quantiles(kappa[:, i], even[:, i]) for i in range(axes)]
+    return logs, [quantiles(kappa[:, i], even[:, i]) for i in range(axes)]
 
 
-def _quantiles(kappa: Tensor, even: Tensor) -> Tensor:
+def quantiles(kappa: Tensor, even: Tensor) -> Tensor:
     """Von Mises quantiles (C, Q) of probabilities (Q,), by interpolation of a table."""
     reach = (REACH / kappa.clamp_min(1e-12).sqrt()).clamp_max(math.pi)[:, None]
     edge = torch.linspace(-1, 1, TABLE + 1, dtype=kappa.dtype) * reach

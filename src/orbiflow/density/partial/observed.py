@@ -10,11 +10,13 @@ from orbiflow.density.models.bases import Base, UniformBase
 from orbiflow.density.models.blend import BlendedDensity
 from orbiflow.density.models.chains import VonMisesChains
 from orbiflow.density.models.kernels import AdaptiveKernels
+from orbiflow.density.models.network import VonMisesNetwork
 from orbiflow.density.models.symmetric import SymmetricDensity
 from orbiflow.density.partial.axes import check_torus
 from orbiflow.density.partial.chains import chains_at
 from orbiflow.density.partial.flows import flow_at
 from orbiflow.density.partial.kernels import kernels_at
+from orbiflow.density.partial.network import network_at
 from orbiflow.density.spaces.flat import Torus
 from orbiflow.density.spaces.space import CHART
 from orbiflow.errors import OrbiflowError
@@ -29,11 +31,9 @@ def parts_of(density: SymmetricDensity) -> list[tuple[float, Part]]:
     """A density's parts with a share, each with it; a flow alone is its only one."""
     if not isinstance(density, BlendedDensity):
         return [(1.0, density)]
-    parts: list[Part] = [density.flow_density, density.kernels, UniformBase(density.space)]
-    if density.chains is not None:
-        parts.append(density.chains)
-    shares = listed(density.shares)
-    return [(share, part) for share, part in zip(shares, parts, strict=True) if share > 0]
+    shares: list[float] = listed(density.shares)
+    parts = zip(shares, density.parts.values(), strict=True)
+    return [(share, part) for share, part in parts if share > 0]
 
 
 def part_at(part: Part, points: Tensor, observed: list[int], seed: int = 0) -> Tensor:
@@ -48,6 +48,8 @@ def part_at(part: Part, points: Tensor, observed: list[int], seed: int = 0) -> T
         return kernels_at(part, points, observed)
     if isinstance(part, VonMisesChains):
         return chains_at(part, points, observed, seed)
+    if isinstance(part, VonMisesNetwork):
+        return network_at(part, points, observed, seed)
     if isinstance(part, SymmetricDensity):
         return flow_at(part, points, observed)
     raise OrbiflowError(f"a {type(part).__name__} cannot be integrated over some of its angles")

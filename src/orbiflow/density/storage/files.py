@@ -23,14 +23,19 @@ from orbiflow.density.storage.chains import (
     chains_tensors,
 )
 from orbiflow.density.storage.groups import check_group, group_header, is_same_group
+from orbiflow.density.storage.network import (
+    network_from_header,
+    network_header,
+    network_tensors,
+)
 from orbiflow.density.storage.neural import neural_from_header, neural_header, neural_tensors
 from orbiflow.density.storage.series import series_from_header, series_parts
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.tensor_files import read_tensors, tensor_bytes
 
-FORMAT, FORMAT_2, FORMAT_1 = "orbiflow-density/3", "orbiflow-density/2", "orbiflow-density/1"
-"""Written, and read as well: the first had one smoothness for all segments, and no group; the second
-no chains beside a flow. What needs no chains is still written as the second."""
+FORMATS = tuple(f"orbiflow-density/{number}" for number in (1, 2, 3, 4))
+"""Read: the first had one smoothness for all segments, and no group; the second no chains beside a
+flow; the third no network. A density is written in the first of the last three that can hold it."""
 
 MAX_KERNELS = 1_000_000
 
@@ -39,7 +44,7 @@ def density_to_bytes(density: SymmetricDensity, **extra: Any) -> bytes:
     """A density as bytes that `read_density` makes the same again, with `extra` JSON for the reader.
 
     Saved are flows of Fourier, spline and neural fields on the space's own group, uniform, von Mises
-    and chain bases, and kernels. Parameters are written in float64.
+    and chain bases, kernels, chains and networks. Parameters are written in float64.
 
     Raises:
         OrbiflowError: naming the part that cannot be saved, rather than save another density.
@@ -55,12 +60,17 @@ def density_to_bytes(density: SymmetricDensity, **extra: Any) -> bytes:
     tensors |= more
     if isinstance(density, BlendedDensity):
         tensors |= _kernel_tensors(density)
-    chains = density.chains if isinstance(density, BlendedDensity) else None
+    chains, network = None, None
+    if isinstance(density, BlendedDensity):
+        chains, network = density.chains, density.network
     if chains is not None:
         _check_shared_space(density, chains, "mixture of chains")
         tensors |= chains_tensors(chains, BESIDE)
+    if network is not None:
+        _check_shared_space(density, network, "network")
+        tensors |= network_tensors(network)
     header = {
-        "format": FORMAT_2 if chains is None else FORMAT,
+        "format": FORMATS[1 if chains is None else 2] if network is None else FORMATS[3],
         "space": {"name": space.name, **space.settings()},
         "group": group_header(space.group),
         "base": base,
@@ -69,6 +79,8 @@ def density_to_bytes(density: SymmetricDensity, **extra: Any) -> bytes:
     }
     if chains is not None:
         header["chains"] = chains_header(chains)
+    if network is not None:
+        header["network"] = network_header(network)
     return tensor_bytes(header, tensors, "a density")
 
 
@@ -146,7 +158,7 @@ def read_density(path: str | Path) -> tuple[SymmetricDensity, dict[str, Any]]:
     """
     header, tensors = read_tensors(path, "a density")
     try:
-        if header["format"] not in (FORMAT, FORMAT_2, FORMAT_1):
+        if header["format"] not in FORMATS:
             raise ValueError(f"format {header['format']!r}")
         with torch.inference_mode(False):  # what is made in it could never be differentiated
             return _restored(header, tensors), header["extra"]
@@ -159,7 +171,7 @@ def read_density(path: str | Path) -> tuple[SymmetricDensity, dict[str, Any]]:
 def _restored(header: dict[str, Any], tensors: dict[str, Tensor]) -> SymmetricDensity:
     options = dict(header["space"])
     space = make_space(str(options.pop("name")), **options)
-    if header["format"] != FORMAT_1:
+    if header["format"] != FORMATS[0]:
         check_group(header["group"], space.group)
     neural = header["flow"]["kind"] == "neural"
     flow = (neural_from_header if neural else series_from_header)(header["flow"], tensors, space)
@@ -172,8 +184,12 @@ def _restored(header: dict[str, Any], tensors: dict[str, Tensor]) -> SymmetricDe
     chains = header.get("chains")
     if chains is not None:
         chains = chains_from_header(chains, tensors, space, BESIDE)
+    network = header.get("network")
+    if network is not None:
+        network = network_from_header(network, tensors, space)
     kernels = AdaptiveKernels(space, *parts)
-    return BlendedDensity(space, flow, base, kernels, tensors["shares"], chains=chains)
+    shares = tensors["shares"]
+    return BlendedDensity(space, flow, base, kernels, shares, chains=chains, network=network)
 
 
 def _restored_base(header: dict[str, Any], tensors: dict[str, Tensor], space: Space) -> Base:

@@ -1,0 +1,271 @@
+"""Bayesian networks of angles: exact, normalised, found where there is one."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from density.blends import even_grid, random_blend, random_chains, random_network
+from orbiflow.density import (
+    DensityEstimator,
+    Torus,
+    VonMisesNetwork,
+    conditional,
+    density_to_bytes,
+    make_space,
+    marginal,
+    read_density,
+)
+from orbiflow.density.fitting.network import Screen, fit_network, network_shapes
+from orbiflow.density.fitting.rows import Rows
+from orbiflow.density.models.network import Factor, averaged_networks, log_conditional
+from orbiflow.density.partial.network import network_at
+from orbiflow.density.storage.network import network_from_header, network_header, network_tensors
+from orbiflow.errors import OrbiflowError
+
+seeds = st.integers(0, 2**31)
+few = settings(deadline=None, max_examples=10)
+
+
+def network_of(seed: int, dim: int, parents: int = 2) -> VonMisesNetwork:
+    return random_network(np.random.default_rng(seed), Torus(dim), parents)
+
+
+def at_random(seed: int, count: int, dim: int) -> torch.Tensor:
+    return torch.tensor(np.random.default_rng(seed).uniform(size=(count, dim)))
+
+
+@given(seeds, st.integers(1, 3))
+@few
+def test_the_integral_is_one(seed: int, dim: int) -> None:
+    total = network_of(seed, dim).log_prob(even_grid(48, dim)).exp().mean()
+    assert float(total) == pytest.approx(1, abs=1e-7)
+
+
+@given(seeds, st.integers(2, 4))
+@few
+def test_a_factor_is_the_joint_density_over_that_of_the_parents(seed: int, dim: int) -> None:
+    chains = random_chains(np.random.default_rng(seed), Torus(dim), natural=True)
+    points = at_random(seed, 9, dim)
+    others = points[:, None].repeat(1, 400, 1)
+    others[..., -1] = torch.arange(400) / 400
+    expected = chains.log_prob(points) - chains.log_prob(others).exp().mean(dim=1).log()
+    assert torch.allclose(log_conditional(chains, points), expected, atol=1e-9)
+
+
+@given(seeds, st.integers(1, 5))
+@few
+def test_densities_are_periodic_and_of_the_points_dtype(seed: int, dim: int) -> None:
+    network, points = network_of(seed, dim), at_random(seed, 8, dim)
+    expected = network.log_prob(points)
+    assert torch.allclose(network.log_prob(points + torch.arange(8)[:, None]), expected, atol=1e-9)
+    single = network.log_prob(points.float().reshape(2, 4, dim))
+    assert single.dtype == torch.float32
+    assert torch.allclose(single.double().flatten(), expected, atol=1e-3)
+
+
+@given(seeds, st.integers(1, 4))
+@few
+def test_derivatives(seed: int, dim: int) -> None:
+    network = network_of(seed, dim)
+    points = at_random(seed, 3, dim).requires_grad_()
+    assert torch.autograd.gradcheck(network.log_prob, points)
+
+
+@given(seeds)
+@few
+def test_samples_are_of_the_density(seed: int) -> None:
+    network = network_of(seed, 3)
+    drawn = network.sample(20_000, torch.Generator().manual_seed(seed))
+    grid = even_grid(48, 3)
+    density = network.log_prob(grid).exp()
+    rng = np.random.default_rng(seed)
+    for wave in torch.tensor(rng.integers(-2, 3, (6, 3))).double():
+        values, exact = ((2 * math.pi * (p @ wave)).cos() for p in (drawn, grid))
+        off = float(values.mean() - (exact * density).mean())
+        assert abs(off) < 5.5 * float(values.std()) / math.sqrt(len(drawn)) + 1e-9
+    again = network.sample(20_000, torch.Generator().manual_seed(seed))
+    assert torch.equal(again, drawn)
+    assert network.sample(0, torch.Generator()).shape == (0, 3)
+
+
+@given(seeds, st.integers(1, 5))
+@few
+def test_a_file_gives_it_back(seed: int, dim: int) -> None:
+    network, points = network_of(seed, dim), at_random(seed, 9, dim)
+    again = network_from_header(network_header(network), network_tensors(network), Torus(dim))
+    assert torch.equal(again.log_prob(points), network.log_prob(points))
+
+
+def test_a_blend_with_a_network_is_saved(tmp_path: Path) -> None:
+    for chains in (True, False):
+        density = random_blend(3, 4, chains=chains, network=True)
+        path = tmp_path / "density.safetensors"
+        path.write_bytes(density_to_bytes(density))
+        again, _ = read_density(path)
+        points = at_random(0, 20, 4)
+        assert torch.equal(again.log_prob(points), density.log_prob(points))
+        assert repr(again) == repr(density)
+        assert "network" in repr(density)
+
+
+def without(header: dict[str, Any], **changes: Any) -> dict[str, Any]:
+    factors = [dict(own) for own in header["factors"]]
+    factors[-1] |= changes
+    return {"factors": factors}
+
+
+BROKEN: dict[str, Callable[[dict[str, Any]], dict[str, Any]]] = {
+    "no factors": lambda _: {},
+    "a factor too few": lambda header: {"factors": header["factors"][:-1]},
+    "no axes": lambda header: without(header, axes=[]),
+    "axes no list": lambda header: without(header, axes=3),
+    "an axis too large": lambda header: without(header, axes=[0, 7]),
+    "an axis no number": lambda header: without(header, axes=[0, "x"]),
+    "an axis true": lambda header: without(header, axes=[0, True]),
+    "components": lambda header: without(header, components=10**9),
+    "another order": lambda header: {"factors": header["factors"][::-1]},
+    "factors of numbers": lambda _: {"factors": [1, 2, 3]},
+}
+
+
+@pytest.mark.parametrize("case", BROKEN)
+def test_damaged_headers_are_refused(case: str) -> None:
+    network = network_of(0, 3)
+    with pytest.raises(OrbiflowError):
+        network_from_header(
+            BROKEN[case](network_header(network)), network_tensors(network), Torus(3)
+        )
+
+
+def test_what_is_no_network_is_refused() -> None:
+    rng, space = np.random.default_rng(0), Torus(2)
+    one, two = (random_chains(rng, Torus(d), natural=True) for d in (1, 2))
+    backwards = random_chains(rng, Torus(2), natural=True)
+    backwards.order = backwards.order.flip(1)
+    with pytest.raises(OrbiflowError, match="needs a torus, got the sphere"):
+        VonMisesNetwork(make_space("sphere"), [])
+    for factors, message in (
+        ([Factor((0,), one)], "2 angles needs a factor for each"),
+        ([Factor((0, 1), two), Factor((0,), one)], "before one of its parents"),
+        ([Factor((0,), one), Factor((0,), one)], "second of its angle"),
+        ([Factor((0,), two), Factor((1,), one)], "chains of 2 angles"),
+        ([Factor((0,), one), Factor((0, 1), backwards)], "must end in its own angle"),
+    ):
+        with pytest.raises(OrbiflowError, match=message):
+            VonMisesNetwork(space, factors)
+    first, second = (
+        VonMisesNetwork(space, [Factor((a,), one), Factor((a, 1 - a), two)]) for a in (0, 1)
+    )
+    with pytest.raises(OrbiflowError, match="other arrows"):
+        averaged_networks([first, second])
+
+
+@given(seeds, st.integers(2, 4), st.data())
+@few
+def test_some_angles_without_hidden_parents_are_exact(
+    seed: int, dim: int, data: st.DataObject
+) -> None:
+    network = network_of(seed, dim)
+    order = [axes[-1] for axes, _ in network.factors]
+    seen = order[: data.draw(st.integers(1, dim))]
+    points = at_random(seed, 5, len(seen))
+    hidden = [axis for axis in range(dim) if axis not in seen]
+    grid = even_grid(32, len(hidden)) if hidden else torch.zeros(1, 0).double()
+    whole = torch.zeros(5, len(grid), dim, dtype=torch.float64)
+    whole[..., seen], whole[..., hidden] = points[:, None], grid
+    expected = network.log_prob(whole).exp().mean(dim=1).log()
+    assert torch.allclose(network_at(network, points, seen), expected, atol=1e-6)
+
+
+@given(seeds, st.integers(2, 3), st.data())
+@few
+def test_hidden_parents_are_integrated_by_draws(seed: int, dim: int, data: st.DataObject) -> None:
+    network = network_of(seed, dim)
+    seen = data.draw(st.permutations(range(dim)))[: dim - 1]
+    points = at_random(seed, 5, len(seen))
+    hidden = [axis for axis in range(dim) if axis not in seen]
+    whole = torch.zeros(5, 256, dim, dtype=torch.float64)
+    whole[..., seen], whole[..., hidden] = points[:, None], even_grid(256, 1)
+    expected = network.log_prob(whole).exp().mean(dim=1).log()
+    found = torch.stack([network_at(network, points, list(seen), seed=k) for k in range(4)])
+    assert float((found.exp().mean(dim=0).log() - expected).abs().max()) < 0.1
+    assert torch.equal(found[0], network_at(network, points, list(seen), seed=0))
+
+
+def test_conditional_and_marginal_say_how_far_they_are_off() -> None:
+    density = random_blend(7, 4, network=True)
+    line = even_grid(256, 1)
+    for found in (conditional(density, {0: 0.3, 2: 0.8}, 1), marginal(density, 3)):
+        assert float(found.log_prob(line).exp().mean()) == pytest.approx(1, abs=1e-6)
+        assert 0 < found.error < 0.05
+    with pytest.raises(OrbiflowError, match="no closed form where a network and chains"):
+        marginal(density, [0, 1, 2])
+
+
+def states(seed: int, count: int, dim: int) -> np.ndarray:
+    """A chain of angles, each in one of three states that the one before speaks for; shuffled."""
+    rng = np.random.default_rng(seed)
+    state = rng.integers(0, 3, count)
+    columns: list[np.ndarray] = []
+    for _ in range(dim):
+        state = np.where(rng.uniform(size=count) < 0.85, state, rng.integers(0, 3, count))
+        columns.append(rng.vonmises(2.1 * state, 12.0))
+    return np.stack(columns, axis=1)
+
+
+def test_arrows_are_along_the_chain() -> None:
+    for seed in range(3):
+        angles = torch.tensor(states(seed, 900, 6)) / (2 * math.pi) % 1
+        shuffled = torch.randperm(6, generator=torch.Generator().manual_seed(seed))
+        rows = Rows(angles[:, shuffled])
+        generator = torch.Generator().manual_seed(seed)
+        shapes = list(network_shapes(rows[:800], rows[800:], generator))
+        assert sorted(shape.axes[-1] for shape in shapes) == list(range(6))
+        near = [
+            abs(int(shuffled[shape.axes[0]]) - int(shuffled[shape.axes[-1]]))
+            for shape in shapes
+            if len(shape.axes) > 1
+        ]
+        assert near == [1] * 5
+        network = fit_network(Torus(6), rows[:800], rows[800:], shapes, generator)
+        alone = sum(
+            float(fit_network(Torus(1), Rows(part[:800]), Rows(part[800:]), [((0,), 8)], generator)  # type: ignore[list-item]
+                  .log_prob(part[800:]).mean())
+            for part in rows.points.split(1, dim=1)
+        )  # fmt: skip
+        assert float(network.log_prob(rows.points[800:]).mean()) > alone + 5 * 0.4
+
+
+def test_the_default_takes_a_network_where_states_multiply() -> None:
+    angles = states(5, 1200, 8)
+    scores = {
+        parts: DensityEstimator("torus", parts=parts, seed=1).fit(angles[:900]).score(angles[900:])
+        for parts in ("kernels,mixture", "network", "auto")
+    }
+    assert scores["network"] > scores["kernels,mixture"] + 0.5
+    assert scores["auto"] > scores["network"] - 0.05
+    small = np.random.default_rng(0).vonmises(0, 2, (50, 2))
+    with pytest.raises(OrbiflowError, match="cannot be made of network alone"):
+        DensityEstimator("torus", parts="network").fit(small)
+
+
+@given(seeds)
+@few
+def test_what_angles_say_of_each_other(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    free = rng.uniform(-np.pi, np.pi, (800, 3))
+    tied = np.concatenate([free, free[:, :1] + rng.vonmises(0, 8, (800, 1))], axis=1)
+    screen = Screen(torch.tensor(tied / (2 * np.pi)))
+    assert screen.between(0, 3) == pytest.approx(screen.between(3, 0), abs=1e-9)
+    assert screen.between(0, 3) > 0.5 > 0.15 > abs(screen.between(0, 1))
+    assert screen.parents(3, (), [0, 1, 2])[0] == 0
+    assert set(screen.order()[:2]) == {0, 3}
