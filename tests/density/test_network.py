@@ -15,8 +15,12 @@ from hypothesis import strategies as st
 
 from density.blends import even_grid, random_blend, random_chains, random_network
 from orbiflow.density import (
+    AdaptiveKernels,
+    BlendedDensity,
     DensityEstimator,
     Torus,
+    UniformBase,
+    VonMisesChains,
     VonMisesNetwork,
     conditional,
     density_to_bytes,
@@ -27,7 +31,7 @@ from orbiflow.density import (
 from orbiflow.density.fitting.network import Screen, fit_network, network_shapes
 from orbiflow.density.fitting.rows import Rows
 from orbiflow.density.models.network import Factor, averaged_networks, log_conditional
-from orbiflow.density.partial.network import network_at
+from orbiflow.density.partial.network import draws_anew, network_at
 from orbiflow.density.storage.network import network_from_header, network_header, network_tensors
 from orbiflow.errors import OrbiflowError
 
@@ -209,6 +213,35 @@ def test_conditional_and_marginal_say_how_far_they_are_off() -> None:
         assert 0 < found.error < 0.05
     with pytest.raises(OrbiflowError, match="no closed form where a network and chains"):
         marginal(density, [0, 1, 2])
+
+
+def test_what_cannot_be_had_well_is_refused() -> None:
+    """The second parent of the last angle is drawn for each value of the first; and both are sharp."""
+    torus, pair = Torus(4), Torus(2)
+    means = torch.zeros(1, 2, 5, dtype=torch.float64)
+    means[0, 1, 1] = 1.0
+    weights = torch.tensor([[0.0, -math.inf, -math.inf]], dtype=torch.float64)
+    link = VonMisesChains(pair, weights, means, torch.tensor([[0.1, 3e3]], dtype=torch.float64))
+    first = VonMisesChains(
+        Torus(1), weights, means[:, :1, [0, 1, 3]] * 0, torch.full((1, 1), 0.1).double()
+    )
+    factors = [Factor((0,), first), *(Factor((k, k + 1), link) for k in range(3))]
+    blend = random_blend(0, 4, chains=False, network=True)
+    sharp = BlendedDensity(
+        torus,
+        blend.flow,
+        UniformBase(torus),
+        AdaptiveKernels(
+            torus, blend.kernels.centers, blend.kernels.concentrations, blend.kernels.weights
+        ),
+        torch.tensor([0.0, 0.01, 0.01, 0.98]),
+        network=VonMisesNetwork(torus, factors),
+    )
+    assert draws_anew(sharp.parts["network"], [0, 3], [0, 3])  # type: ignore[arg-type]
+    assert not draws_anew(sharp.parts["network"], [0, 3], [3])  # type: ignore[arg-type]
+    with pytest.raises(OrbiflowError, match=r"within [\d.]+ nats .*keep one angle"):
+        marginal(sharp, [0, 3])
+    assert marginal(sharp, 3).error < 0.05
 
 
 def states(seed: int, count: int, dim: int) -> np.ndarray:

@@ -13,7 +13,13 @@ from torch import Tensor
 from orbiflow.density.arguments import check_kind, check_range, silent
 from orbiflow.density.fitting.assembly import assembled
 from orbiflow.density.fitting.budget import Budget
-from orbiflow.density.fitting.evidence import Candidates, PartEvidence, candidates_of, judged
+from orbiflow.density.fitting.evidence import (
+    Candidates,
+    PartEvidence,
+    candidates_of,
+    judged,
+    without_idle,
+)
 from orbiflow.density.fitting.families import (
     ChainFamily,
     Family,
@@ -159,6 +165,8 @@ def fit_automatic(
         space, families, folds, lambda done, what: say(BEFORE_FLOW * done, what), budget
     )
     weights = supported_weights(candidates.table, candidates.floor, candidates.row_weights)
+    if space.dim > MOST_DIM:  # each part makes integrals dearer
+        weights = without_idle(candidates, weights)
     tried = _try_flow(space, folds, candidates, weights, settings, budget, say)
     say(1.0, "putting together")
     density = assembled(space, families, candidates, weights, folds.rows, tried.flow, tried.share)

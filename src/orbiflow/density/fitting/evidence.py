@@ -109,6 +109,22 @@ def _narrow(families: list[Family], block: dict[tuple[str, str], Tensor], held: 
             family.keep({best, *sorted(weighty, key=lambda name, w=own: -w[name])[:KEPT]})
 
 
+def without_idle(candidates: Candidates, weights: Tensor) -> Tensor:
+    """The weights (P,) without families that held-out rows are as well or better off without."""
+    while True:
+        idle = [part for part in judged(candidates, weights) if part.share and part.gain <= 0]
+        if not idle:
+            return weights
+        worst = min(idle, key=lambda part: part.gain).name
+        rest = torch.tensor([family != worst for family in candidates.families]) & (
+            (weights > 0) | candidates.floor
+        )
+        weights = torch.zeros_like(weights)
+        weights[rest] = sparse_weights(
+            candidates.table[rest], candidates.floor[rest], candidates.row_weights
+        )
+
+
 def judged(candidates: Candidates, weights: Tensor) -> list[PartEvidence]:
     """What each family is worth in the mixture of these weights (P,)."""
     table, own_weights = candidates.table, candidates.row_weights

@@ -19,6 +19,7 @@ from orbiflow.density.models.symmetric import SymmetricDensity
 from orbiflow.density.partial.axes import Split, check_torus, given_axes, kept_axes
 from orbiflow.density.partial.chains import partial_chains
 from orbiflow.density.partial.kernels import partial_kernels
+from orbiflow.density.partial.network import draws_anew
 from orbiflow.density.partial.observed import Part, part_at, parts_of
 from orbiflow.density.partial.tabulate import Tabulated, tabulated
 from orbiflow.density.spaces.flat import Torus
@@ -29,10 +30,10 @@ MOST_TABULATED = 2
 """Angles of a density that can be tabulated."""
 
 DEAR = {1: 1024, 2: 48}
-"""Points along an angle at most where each is a dear integral, by the number of angles."""
+"""Points along an angle at most where each is an integral of its own, by the number of angles."""
 
-DEAR_PARTS = (SymmetricDensity, VonMisesNetwork)
-"""Whose integrals are dear."""
+MOST_OFF = 0.5
+"""Nats, root mean square, by which what is handed out may be off."""
 
 CHECKED_TWICE = 64
 """Points at which values by quasi-random nodes are compared with those by others."""
@@ -133,6 +134,11 @@ def _derived(density: SymmetricDensity, split: Split, torus: Torus) -> BlendedDe
     ]
     share = 1 / (1 + math.exp(torch.tensor(closed).double().logsumexp(0).item() - table.log_total))
     found.error = math.sqrt(share) * max(table.error, off)
+    if found.error > MOST_OFF:
+        raise OrbiflowError(
+            f"the density of these angles can only be had within {found.error:.1f} nats (root mean "
+            'square): keep one angle, or fit with --parts kernels,mixture (parts="kernels,mixture")'
+        )
     return found
 
 
@@ -153,11 +159,17 @@ def _tabulated(
         logs = [log + part_at(part, whole, observed, seed) for log, part in parts]
         return torch.stack(logs).logsumexp(dim=0)
 
-    dear = split.dim > len(observed) and any(isinstance(p, DEAR_PARTS) for _, p in parts)
+    dear = any(_is_dear(part, split) for _, part in parts)
     table = tabulated(log_function, space, DEAR[space.dim] if dear else None)
     drawn = table.kernels.sample(CHECKED_TWICE, torch.Generator().manual_seed(1))
     twice = log_function(drawn) - log_function(drawn, seed=1)  # where nodes are quasi-random
     return table, float(twice.square().mean().sqrt())
+
+
+def _is_dear(part: Part, split: Split) -> bool:
+    if isinstance(part, VonMisesNetwork):
+        return draws_anew(part, list(split.observed), list(split.kept))
+    return isinstance(part, SymmetricDensity) and split.dim > len(split.observed)
 
 
 def _kind(part: Part) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import torch
 from torch import Tensor
@@ -17,13 +18,16 @@ from orbiflow.density.models.network import (
     log_of_parents,
 )
 from orbiflow.density.partial.nodes import quantiles
-from orbiflow.typed_torch import broadcast
+from orbiflow.typed_torch import broadcast, listed, special, unique
 
-DRAWS = 1024
+DRAWS = 4096
 """Quasi-random draws of the hidden angles."""
 
 AT_ONCE = 2**17
 """Points times draws that are worked on at a time."""
+
+ROWS, ENTRIES = 256, 2**18
+"""Rows of angles, and terms of a sum, at a time: few enough for the cache."""
 
 
 def network_at(
@@ -35,6 +39,9 @@ def network_at(
     drawn, each given its own, and the observed angles weigh the draws (likelihood weighting: Fung and
     Chang, 1990). The draws are quasi-random and the same at all points; `seed` is theirs.
     """
+    points = points.double()
+    if not len(points):
+        return points.new_zeros(0)
     factors = _leading_to(network, observed)
     hidden = [axes[-1] for axes, _ in factors if axes[-1] not in observed]
     count = DRAWS if hidden else 1
@@ -42,11 +49,24 @@ def network_at(
         count, dtype=torch.float64
     )
     even = {axis: draws[:, 2 * k : 2 * k + 2] for k, axis in enumerate(hidden)}
+    same: list[bool] = listed((points == points[0]).all(dim=0))
+    known = {axis: points[:1, k, None] for k, axis in enumerate(observed) if same[k]}
+    once = _Once.of(factors, known, even)
     found: list[Tensor] = []
-    for block in torch.split(points.double(), AT_ONCE // count):
-        seen = dict(zip(observed, block.mT, strict=True))
-        found.append(_weighted(factors, seen, even).expand(len(block), count))
-    return log_sum_exp(torch.cat(found)) - math.log(count)
+    for block in torch.split(points, AT_ONCE // count):
+        at = {axis: block[:, k, None] for k, axis in enumerate(observed) if not same[k]}
+        logs = once.weighted(at, even).expand(len(block), count)
+        found.append(log_sum_exp(logs) - math.log(count))
+    return torch.cat(found)
+
+
+def draws_anew(network: VonMisesNetwork, observed: list[int], kept: list[int]) -> bool:
+    """Whether hidden angles are drawn for each point anew, as they depend on angles that are kept."""
+    moving = set(kept)
+    for axes, _ in _leading_to(network, observed):
+        if axes[-1] not in observed and moving & set(axes[:-1]):
+            return True
+    return False
 
 
 def _leading_to(network: VonMisesNetwork, observed: list[int]) -> list[Factor]:
@@ -60,21 +80,80 @@ def _leading_to(network: VonMisesNetwork, observed: list[int]) -> list[Factor]:
     return found[::-1]
 
 
-def _weighted(factors: list[Factor], seen: dict[int, Tensor], even: dict[int, Tensor]) -> Tensor:
-    """Log density of what is seen (N,) given what is drawn: (N, Q), or what broadcasts to it."""
-    at = {axis: _once(value)[:, None] for axis, value in seen.items()}
-    total = torch.zeros(1, 1, dtype=torch.float64)
-    for axes, chains in factors:
-        if axes[-1] in seen:
-            total = total + _along(lambda p, c=chains: log_conditional(c, p), axes, at)
-        else:
-            at[axes[-1]] = _drawn(chains, axes, at, even[axes[-1]])
-    return total
+@dataclass(frozen=True)
+class _Mixture:
+    """Of an angle given draws of its parents: logs of weights (Q, C), means (Q, C), kappa (C,)."""
+
+    logs: Tensor
+    means: Tensor
+    kappa: Tensor
+
+    @classmethod
+    def of(cls, chains: VonMisesChains, axes: tuple[int, ...], at: dict[int, Tensor]) -> _Mixture:
+        around = {**at, axes[-1]: torch.zeros(1, 1, dtype=torch.float64)}
+        logs = _along(lambda p: log_of_parents(chains, p).mT.flatten(1), axes, around)[0]
+        scale = torch.tensor(SCALES, dtype=torch.float64)
+        kappa = (chains.concentrations[:, -1, None] / scale).flatten()
+        logs = logs - log_sum_exp(logs)[:, None] - special.i0e(kappa).log()
+        wave = _along(lambda p: waves(2 * math.pi * p), axes, around)[0]
+        means = (wave @ chains.means[:, -1].mT).repeat_interleave(len(SCALES), dim=1)
+        return cls(logs, means, kappa)
+
+    def log_prob(self, angle: Tensor) -> Tensor:
+        """(N, Q) at angles (N, 1) in turns; equal ones are worked on once."""
+        own, place = unique(angle[:, 0], return_inverse=True)
+        rows = torch.split(2 * math.pi * own[:, None, None], max(1, ENTRIES // self.logs.numel()))
+        found = [
+            log_sum_exp((row - self.means).cos_().sub_(1).mul_(self.kappa).add_(self.logs))
+            for row in rows
+        ]
+        return torch.cat(found)[place]
 
 
-def _once(value: Tensor) -> Tensor:
-    """What is known is the same at all points, and is worked on once."""
-    return value[:1] if bool((value == value[0]).all()) else value
+@dataclass(frozen=True)
+class _Once:
+    """What does not depend on the points, and is worked on once.
+
+    - `factors`: those that do.
+    - `at`: angles that are known (1, 1) or drawn (1, Q). `total`: log density of those that are known.
+    - `mixtures`: of angles whose parents are among them.
+    """
+
+    factors: list[Factor]
+    at: dict[int, Tensor]
+    total: Tensor
+    mixtures: dict[int, _Mixture]
+
+    @classmethod
+    def of(cls, factors: list[Factor], known: dict[int, Tensor], even: dict[int, Tensor]) -> _Once:
+        at, mixtures = dict(known), dict[int, _Mixture]()
+        total = torch.zeros(1, 1, dtype=torch.float64)
+        left: list[Factor] = []
+        for axes, chains in factors:
+            axis = axes[-1]
+            fixed = all(parent in at for parent in axes[:-1])
+            if fixed and axis in even:
+                at[axis] = _drawn(chains, axes, at, even[axis])
+            elif fixed and axis in at:
+                total = total + _along(lambda p, c=chains: log_conditional(c, p), axes, at)
+            else:
+                left.append(Factor(axes, chains))
+                if fixed:
+                    mixtures[axis] = _Mixture.of(chains, axes, at)
+        return cls(left, at, total, mixtures)
+
+    def weighted(self, points: dict[int, Tensor], even: dict[int, Tensor]) -> Tensor:
+        """Log density of what is seen, given what is drawn: (N, Q), or what broadcasts to it."""
+        at, total = {**self.at, **points}, self.total
+        for axes, chains in self.factors:
+            axis = axes[-1]
+            if axis in even:
+                at[axis] = _drawn(chains, axes, at, even[axis])
+            elif axis in self.mixtures:
+                total = total + self.mixtures[axis].log_prob(at[axis])
+            else:
+                total = total + _along(lambda p, c=chains: log_conditional(c, p), axes, at)
+        return total
 
 
 def _along(
@@ -82,14 +161,15 @@ def _along(
 ) -> Tensor:
     """A function of points (R, len(axes)), at angles whose shapes broadcast: in their common one."""
     own = broadcast(*[at[axis] for axis in axes])
-    value = function(torch.stack(own, dim=-1).flatten(0, 1))
+    rows = torch.stack(own, dim=-1).flatten(0, 1)
+    value = torch.cat([function(block) for block in torch.split(rows, ROWS)])
     return value.reshape(*own[0].shape, *value.shape[1:])
 
 
 def _drawn(
     chains: VonMisesChains, axes: tuple[int, ...], at: dict[int, Tensor], even: Tensor
 ) -> Tensor:
-    """The last of the angles (N or 1, Q), given its parents, at probabilities (Q, 2)."""
+    """The last of the angles, (N, Q) or (1, Q), given its parents, at probabilities (Q, 2)."""
     around = {**at, axes[-1]: even.new_zeros(1, 1)}
     shares = _along(lambda p: shares_of(log_of_parents(chains, p).mT.flatten(1)), axes, around)
     rows = len(shares)
