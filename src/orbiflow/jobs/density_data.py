@@ -21,6 +21,7 @@ from orbiflow.density.tables import (
 from orbiflow.density.tables.table import listing
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.export.density_figures import MODEL
+from orbiflow.jobs.density_columns import check_order
 from orbiflow.jobs.density_requests import Unit
 from orbiflow.jobs.events import Note
 from orbiflow.jobs.run import Sink
@@ -117,10 +118,19 @@ def unit_of(space: str, unit: Unit | None, table: Table, tell: Sink) -> Unit:
     """The unit of angles: as said, else radians where all values are within a turn either way.
 
     Raises:
-        OrbiflowError: if none was said and the values cannot be radians.
+        OrbiflowError: if none was said and the values cannot be radians; for another unit than degrees,
+            or a longitude before its latitude, where columns are latitude and longitude.
     """
-    if unit is not None or space not in ("torus", "klein-bottle"):
-        return unit or "radians"
+    if space not in ("torus", "klein-bottle"):
+        check_order(table.columns, space)
+        if unit in ("radians", "turns"):
+            raise OrbiflowError(
+                f"--unit {unit}: on the {space} latitude and longitude are degrees, vectors have no "
+                "unit; leave out --unit"
+            )
+        return "radians"
+    if unit is not None:
+        return unit
     beyond = np.nanmax(abs(table.values), axis=0, initial=0) > 2 * math.pi + 1e-9
     if beyond.any():
         column = int(beyond.argmax())
