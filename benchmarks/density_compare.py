@@ -24,9 +24,10 @@ PARTS: dict[str, dict[str, Any]] = {
     "kernels": {"parts": "kernels"},
     "mixture": {"parts": "mixture"},
     "chains": {"parts": "chains"},
+    "network": {"parts": "network"},
 }
 
-COLUMNS = ("kernel", "flow", "kernels", "mixture", "chains", "default")
+COLUMNS = ("kernel", "flow", "kernels", "mixture", "chains", "network", "default")
 
 HEAD = (
     f"{'data':14}{'space':11}{'n':>7}"
