@@ -85,7 +85,8 @@ def compare(
     scores["kernel"] = kernel_estimate(forms[0], drawn.space)(forms[1])
     seconds["kernel"] = time.process_time() - begin
     for part in parts:
-        if part == "chains" and (drawn.space != "torus" or train.shape[1] == 1):
+        least = {"chains": 2, "network": 4}.get(part, 0)
+        if least and (drawn.space != "torus" or train.shape[1] < least):
             continue
         begin = time.process_time()
         estimator = DensityEstimator(drawn.space, seed=seed, **PARTS[part]).fit(train)

@@ -8,8 +8,8 @@ the repository: data/sidechains.npz). backbone-D: phi, psi of D / 2 residues in 
 known-D: a hidden Markov chain of rotamers, whose density is known. rna-7: the RNA benchmark. Random
 90/10 splits, or with --grouped those that keep the rows of a protein or molecule on one side; test
 NLL in nats per radian^D, beside a von Mises kernel estimate of one width and a floor, tuned.
---alone: kernels, mixtures, chains and networks alone as well, --flow: a neural flow on chains. Differences,
-regret, bar and seconds are those of density_default.py.
+--alone: kernels, mixtures, chains and networks alone as well, --flow: a neural flow on chains.
+Differences, regret, bar and seconds are those of density_default.py.
 """
 
 from __future__ import annotations

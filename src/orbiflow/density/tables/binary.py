@@ -117,9 +117,7 @@ def _arrow(path: Path) -> tuple[Any, Any]:
     try:
         return importlib.import_module("pyarrow"), importlib.import_module("pyarrow.parquet")
     except ImportError as exc:
-        raise OrbiflowError(
-            f"{path}: reading Parquet needs pyarrow: pip install 'orbiflow[parquet]'"
-        ) from exc
+        raise OrbiflowError(f"{path}: reading Parquet needs pyarrow: pip install pyarrow") from exc
 
 
 def read_parquet(

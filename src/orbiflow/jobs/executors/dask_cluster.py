@@ -67,7 +67,7 @@ class DaskCluster:
             importlib.import_module("distributed")
         except ImportError as error:
             raise OrbiflowError(
-                "a Dask scheduler needs dask.distributed: pip install 'orbiflow[dask]'"
+                "a Dask scheduler needs dask.distributed: pip install distributed"
             ) from error
         try:
             self._client = _connected(self.address, self.timeout)
