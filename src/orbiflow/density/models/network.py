@@ -78,7 +78,11 @@ class VonMisesNetwork(Base):
         return torch.cat(parts).reshape(points.shape[:-1])
 
     def _block(self, points: Tensor) -> Tensor:
-        found = [log_conditional(chains, points[:, list(axes)]) for axes, chains in self.factors]
+        angles = points.unbind(dim=1)
+        found = [
+            log_conditional(chains, torch.stack([angles[axis] for axis in axes], dim=1))
+            for axes, chains in self.factors
+        ]
         return torch.stack(found).sum(dim=0)
 
     def sample(self, count: int, generator: torch.Generator) -> Tensor:
