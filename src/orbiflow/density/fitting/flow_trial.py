@@ -96,8 +96,15 @@ def _worth(tables: list[Tensor], held: list[Rows]) -> PartEvidence:
     table = torch.stack([others, own])
     both = stacking_weights(table, row_weights)
     gain = gain_of(stacked(table, both), others, row_weights)
-    alone = mean_of(own - uniform, row_weights)
-    return PartEvidence("flow", float(both[1]), alone, gain.nats, gain.error, len(own))
+    return PartEvidence(
+        "flow",
+        float(both[1]),
+        mean_of(own - uniform, row_weights),
+        gain.nats,
+        gain.error,
+        len(own),
+        mean_of(others - uniform, row_weights),
+    )
 
 
 def _is_worth_it(worth: PartEvidence) -> bool:
