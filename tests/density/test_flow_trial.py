@@ -1,4 +1,4 @@
-"""Whether a flow belongs beside other parts: what it is compared with."""
+"""Whether a flow belongs beside other parts: what it is compared with, how far it is."""
 
 from dataclasses import asdict
 
@@ -8,10 +8,16 @@ import torch
 
 from orbiflow.density import FitSettings, Torus
 from orbiflow.density.fitting import flow_trial
+from orbiflow.density.fitting.automatic import (
+    BEFORE_END,
+    PARTS,
+    AutomaticSettings,
+    fit_automatic,
+)
 from orbiflow.density.fitting.budget import Budget
 from orbiflow.density.fitting.evidence import Candidates, candidates_of, judged
 from orbiflow.density.fitting.families import KernelFamily
-from orbiflow.density.fitting.flow_trial import TriedFlow, try_flow
+from orbiflow.density.fitting.flow_trial import FIRST, TriedFlow, try_flow
 from orbiflow.density.fitting.folds import Folds, folds_of
 from orbiflow.density.fitting.report import PartEvidence
 from orbiflow.density.fitting.rows import weighed
@@ -41,6 +47,31 @@ def tried(
     folds: Folds, candidates: Candidates, weights: torch.Tensor, told=lambda *_: None
 ) -> TriedFlow:
     return try_flow(SPACE, folds, candidates, weights, QUICK, Budget(), told)
+
+
+@pytest.mark.parametrize("tenths", [1, 2])
+def test_progress_goes_on_from_one_tenth_to_the_next(
+    tenths: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Gain, "is_sure", property(lambda _: tenths == 1))
+    monkeypatch.setattr(flow_trial, "_is_worth_it", lambda _: True)
+    said: list[tuple[float, str]] = []
+    tried(*evidence(), told=lambda done, what: said.append((done, what)))
+    shares = [done for done, _ in said]
+    assert shares == sorted(shares)
+    assert [done for done, what in said if what == "flow: matching"] == [0, FIRST][:tenths]
+    assert max(shares) <= (FIRST, 1)[tenths - 1]
+
+
+@pytest.mark.parametrize("parts", [PARTS, PARTS[1:], ("kernels",)])
+def test_no_step_of_a_fit_is_half_of_it(parts: tuple[str, ...]) -> None:
+    rng, shares = np.random.default_rng(0), [0.0]
+    points = SPACE.project(torch.tensor(0.1 * rng.normal(size=(700, 2))))
+    settings = AutomaticSettings(parts=parts, flow=QUICK if "flow" in parts else None)
+    fit_automatic(SPACE, points, settings, progress=lambda done, _: shares.append(done))
+    assert shares == sorted(shares)
+    assert shares[-1] == BEFORE_END
+    assert max(np.diff(shares)) < 0.35
 
 
 @pytest.mark.parametrize("weighted", [False, True])
