@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple, TypedDict, Unpack, cast
 
 import numpy as np
@@ -144,7 +144,7 @@ class ColouredMap(NamedTuple):
 
     - `places`: (N,) of its pixels on the colour bar.
     - `why`: the scale is linear or logarithmic.
-    - `log_natural`: (N,) logarithms of the density in natural measure.
+    - `log_natural`: called, (N,) logarithms of the density in natural measure: for lines alone.
     """
 
     projection: Projection
@@ -152,14 +152,14 @@ class ColouredMap(NamedTuple):
     places: Array
     shade: Shade
     why: str
-    log_natural: Array
+    log_natural: Callable[[], Array]
 
     def draw_regions(self, axes: Axes, regions: Sequence[RegionLine], sheet: Sheet) -> None:
         """Lines about regions, cut out along the outline as the picture is."""
         from matplotlib.patches import Polygon
 
         table = np.full(self.pixels.shown.shape, np.nan)
-        table[self.pixels.shown] = self.log_natural
+        table[self.pixels.shown] = self.log_natural()
         ends, counts = np.reshape(self.pixels.extent, (2, 2)), table.shape[::-1]
         x, y = (
             low + (high - low) * (np.arange(count) + 0.5) / count
@@ -197,7 +197,10 @@ def coloured_map(
     values = density_on_map(density, points, measure, pixels.angle)
     chosen = chosen_scale(density, measure, scale)
     shade = shading(values[pixels.within], pixels.areas[pixels.within], log=chosen.log)
-    logs = log_natural(density, values, points, measure)
+
+    def logs() -> Array:
+        return log_natural(density, values, points, measure)
+
     return ColouredMap(projection, pixels, shade.places(values), shade, chosen.why, logs)
 
 

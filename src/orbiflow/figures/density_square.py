@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple, TypedDict, Unpack
 
 import numpy as np
@@ -115,7 +115,7 @@ def density_picture(
     image = drawn.on(frame.axes)
     if regions:
         middles = (np.arange(count) + 0.5) / count
-        draw_regions(frame.axes, regions, middles, middles, drawn.log_natural.T, sheet)
+        draw_regions(frame.axes, regions, middles, middles, drawn.log_natural().T, sheet)
     if samples is not None:
         draw_dots(
             frame.axes, view.places(samples), 0.55, limit=most, shrink=dot_shrink(sheet, frame.side)
@@ -137,13 +137,13 @@ class Coloured(NamedTuple):
     """A density on the window of a square: places of its pixels (N, N) on the colour bar, first x.
 
     - `why`: the scale is linear or logarithmic.
-    - `log_natural`: (N, N) logarithms of the density in natural measure.
+    - `log_natural`: called, (N, N) logarithms of the density in natural measure: for lines alone.
     """
 
     places: Array
     shade: Shade
     why: str
-    log_natural: Array
+    log_natural: Callable[[], Array]
 
     def on(self, axes: Axes) -> AxesImage:
         """The picture of it."""
@@ -165,9 +165,13 @@ def square_colours(density: SymmetricDensity, view: View, measure: str, scale: s
     areas = space.log_area(midpoints(space, count)).exp().numpy().reshape(count, count)
     chosen = chosen_scale(density, measure, scale)
     shade = shading(values, areas, log=chosen.log)
-    grid = torch.stack(torch.meshgrid(*(middles + low for low in view.low), indexing="ij"), dim=-1)
-    logs = log_natural(density, values.ravel(), grid.reshape(-1, 2), measure)
-    return Coloured(shade.places(values), shade, chosen.why, logs.reshape(count, count))
+
+    def logs() -> Array:
+        ends = torch.meshgrid(*(middles + low for low in view.low), indexing="ij")
+        points = torch.stack(ends, dim=-1).reshape(-1, 2)
+        return log_natural(density, values.ravel(), points, measure).reshape(count, count)
+
+    return Coloured(shade.places(values), shade, chosen.why, logs)
 
 
 def average_note(count: int) -> str:
