@@ -16,6 +16,7 @@ from orbiflow.jobs.density_data import model_at
 from orbiflow.jobs.events import Finished, Note, Progress, Written
 from orbiflow.jobs.place import check_place
 from orbiflow.jobs.run import Sink
+from orbiflow.jobs.wording import counted, percentage, with_error
 from orbiflow.threads import one_thread
 
 MASSES = (0.5, 0.9)
@@ -137,10 +138,11 @@ def _said(region: DensityRegion, outline: Outline | None, unit: str) -> str:
     if outline is not None:
         size, fraction = outline.size, outline.fraction
         count = len(outline.shape.geoms)
-        drawn = f"; {count} polygon{'s' * (count != 1)}, which hold {outline.mass:.4f}"
-        drawn += f" ± {outline.error:.4f}"
-    what = f"mass {region.held:.4f} ± {region.error:.4f}"
+        holds = "holds" if count == 1 else "hold"
+        drawn = f"; {counted(count, 'polygon')}, which {holds} "
+        drawn += with_error(outline.mass, outline.error)
     return (
-        f"{what}: log density of at least {region.log_prob:.4f} ({region.log_prob_low:.4f} to "
-        f"{region.log_prob_high:.4f}), {size:.6g} {unit}, {fraction:.2%} of the space{drawn}"
+        f"mass {with_error(region.held, region.error)}: log density of at least "
+        f"{region.log_prob:.4f} ({region.log_prob_low:.4f} to {region.log_prob_high:.4f}), "
+        f"{size:.6g} {unit}, {percentage(fraction)} of the space{drawn}"
     )
