@@ -13,6 +13,7 @@ from orbiflow.cli.density_options import (
     Measure,
     Model,
     Projection,
+    RegionSamples,
     Scale,
     named_columns,
     numbers_of,
@@ -98,6 +99,7 @@ def plot(
             show_default=False,
         ),
     ] = None,
+    region_samples: RegionSamples = None,
     samples: Annotated[
         int | None,
         typer.Option(
@@ -133,6 +135,7 @@ def plot(
         projection=projection.value,
         radius=radius,
         regions=numbers_of(regions, "regions"),
+        region_samples=region_samples,
         samples=samples,
         dots=dots,
         seed=seed,

@@ -16,7 +16,7 @@ from orbiflow.arguments import path as as_path
 from orbiflow.density.estimator import DensityEstimator
 from orbiflow.density.models.blend import BlendedDensity
 from orbiflow.density.models.symmetric import SymmetricDensity
-from orbiflow.density.regions import DensityLevels
+from orbiflow.density.regions import DensityLevels, samples_for
 from orbiflow.density.spaces.space import Space
 from orbiflow.density.storage import read_density
 from orbiflow.errors import OrbiflowError
@@ -207,7 +207,8 @@ def _regions(density: SymmetricDensity, settings: PlotSettings) -> tuple[RegionL
         raise OrbiflowError(
             f"regions are drawn in two dimensions, this {density.space.name} has {density.space.dim}"
         )
-    levels = DensityLevels(density, seed=settings.seed % 2**63)
+    count = samples_for(settings.regions, settings.region_samples)
+    levels = DensityLevels(density, samples=count, seed=settings.seed % 2**63)
     return tuple(
         RegionLine(mass, levels.highest(mass).log_prob) for mass in map(float, settings.regions)
     )
