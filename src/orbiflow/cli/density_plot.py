@@ -111,7 +111,8 @@ def plot(
     dots: Annotated[
         bool,
         typer.Option(
-            "--dots", help="Draw data, or else samples, over the density and the surface."
+            "--dots",
+            help="Draw data, or else samples, over density and surface, smaller where they crowd.",
         ),
     ] = False,
     seed: Annotated[int, typer.Option(help="Of the samples.")] = 0,

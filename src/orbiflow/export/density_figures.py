@@ -24,12 +24,13 @@ from orbiflow.export.density_plot_settings import PlotSettings
 from orbiflow.figures.coastlines import read_coastlines, simplified
 from orbiflow.figures.density_axes import space_title, view_of
 from orbiflow.figures.density_corner import MOST_COLUMNS, corner_picture
+from orbiflow.figures.density_dots import MAX_DOTS
 from orbiflow.figures.density_flow import flow_picture
 from orbiflow.figures.density_map import map_picture
 from orbiflow.figures.density_page import density_page
 from orbiflow.figures.density_regions import RegionLine
 from orbiflow.figures.density_samples import samples_picture
-from orbiflow.figures.density_square import MAX_DOTS, density_picture
+from orbiflow.figures.density_square import density_picture
 from orbiflow.figures.map_choice import chosen_map
 from orbiflow.figures.map_samples import map_samples_picture
 from orbiflow.figures.projections import Projection
