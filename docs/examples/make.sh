@@ -85,9 +85,9 @@ sample() {
 
 ramachandran() {
     fit ramachandran "$data/backbone.csv" phi,psi --space torus --unit degrees
-    draw "density samples" --regions 0.5,0.9,0.98,0.999
-    region 0.5,0.9,0.98,0.9995 --samples 200000
-    score --region <<'TABLE'
+    draw "density samples" --regions 0.5,0.9,0.98,0.9995
+    region 0.5,0.9,0.98,0.9995
+    score --region --samples 200000 <<'TABLE'
 phi,psi
 -63,-43
 -120,135

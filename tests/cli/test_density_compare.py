@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -171,6 +172,26 @@ def test_regions(folder: Path, orbiflow: Any) -> None:
     for row in rows:
         inside = float(row["log_prob"]) >= level
         assert inside == (float(row["hdr"]) < 0.9)
+
+
+def test_what_is_said_of_a_region_has_an_error_and_its_numbers(folder: Path, orbiflow: Any) -> None:
+    def said(*options: object) -> str:
+        out = folder / "said.json"
+        done = orbiflow("density", "region", "-m", folder / "good", "--out", out, *options)
+        assert done.status == 0, done.err
+        (line,) = [line for line in done.out.splitlines() if line.startswith("  mass ")]
+        assert not re.search(r"± 0\.0*( |:|$)", line)
+        return line
+
+    assert re.search(
+        r"mass 0\.5000 ± 0\.0035: .*; \d+ polygons?, which holds? 0\.", said("--mass", 0.5)
+    )
+    # all samples are inside, or none: one more might have told otherwise
+    everything = said("--level", "-1000", "--samples", 200_000)
+    assert "mass 1.0000000 ± 0.0000050: " in everything
+    assert everything.endswith("100.00% of the space; 1 polygon, which holds 1.000000 ± 0.000010")
+    nothing = said("--level", "1000")
+    assert nothing.endswith("0.00% of the space; 0 polygons, which hold 0.000000 ± 0.000010")
 
 
 def test_geojson_of_directions_and_thresholds_of_many_angles(tmp_path: Path, orbiflow: Any) -> None:

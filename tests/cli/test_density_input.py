@@ -6,6 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from orbiflow.density import DensityEstimator, read_density
+from orbiflow.jobs import density_fit
+
 SMALL = ["--parts", "kernels"]
 
 
@@ -79,3 +82,33 @@ def test_parts_that_are_none(tmp_path: Path, orbiflow) -> None:
         outcome = orbiflow(*fit, *options)
         assert outcome.status == 2
         assert message in outcome.err
+
+
+def test_the_mean_says_of_how_many_rows_it_is(
+    tmp_path: Path, orbiflow, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    data, out = table(tmp_path, 1.0, count=60), tmp_path / "model"
+    fit = ("density", "fit", data, "--space", "torus", "--out", out, *SMALL)
+    values = np.loadtxt(data, delimiter=",", skiprows=1, encoding="utf-8-sig")
+
+    def mean_of(done, rows: str) -> tuple[int, float]:
+        assert done.status == 0, done.err
+        likelihood = json.loads((out / "report.json").read_text())["log_likelihood"]
+        assert f"mean log density at {rows} {likelihood['natural']:.4f} nats" in done.out
+        return likelihood["natural_rows"], likelihood["natural"]
+
+    count, mean = mean_of(orbiflow(*fit), "these rows")
+    fitted = DensityEstimator.fitted(read_density(out / "density.safetensors")[0])
+    scores = fitted.score_samples(values)
+    assert (count, mean) == (60, pytest.approx(scores.mean()))
+    # few of many are drawn by the seed: the same at every run, and not every so many-th
+    monkeypatch.setattr(density_fit, "MOST_SCORED", 25)
+    count, mean = mean_of(orbiflow(*fit), "25 of them")
+    assert (count, mean_of(orbiflow(*fit), "25 of them")) == (25, (25, mean))
+    assert mean != pytest.approx(scores.mean(), abs=1e-9)
+    assert mean == pytest.approx(scores.mean(), abs=1.0)
+    data.write_text(data.read_text() + "0.5,\n")
+    mean_of(orbiflow(*fit, "--missing", "marginalise"), "25 of them")
+    monkeypatch.undo()
+    count, _ = mean_of(orbiflow(*fit, "--missing", "marginalise"), "60 of them")
+    assert count == 60

@@ -87,6 +87,27 @@ def test_lines_on_a_map(measure: str) -> None:
     assert "The line is about the smallest region that holds 90 %." in picture.caption
 
 
+@pytest.mark.parametrize("name", ["torus", "sphere"])
+def test_logarithms_are_for_lines_alone(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    called: list[int] = []
+
+    def counted(_: SymmetricDensity, values: np.ndarray, *_rest: object) -> np.ndarray:
+        called.append(len(values))
+        return np.log(values)
+
+    figures = "orbiflow.figures.density"
+    for room in ("square", "map"):
+        monkeypatch.setattr(f"{figures}_{room}.log_natural", counted)
+    monkeypatch.setattr(f"{figures}_square._FINE_GRID", 30)
+    monkeypatch.setattr(f"{figures}_map._PIXELS", 2000)
+    density = broad(name)
+    draw = density_picture if name == "torus" else map_picture
+    draw(density)
+    assert not called
+    draw(density, regions=lines_of(density))
+    assert len(called) == 1
+
+
 def test_masses_that_cannot_be_drawn(tmp_path: Any) -> None:
     for masses, said in (
         ((0.5, 0.5), "different masses"),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +33,7 @@ from orbiflow.jobs import (
     density_requests,
     request_from_json,
 )
+from orbiflow.jobs.density_cv_requests import DensityCvRequest, DensityFoldRequest
 
 names = st.text(st.characters(exclude_characters="\0"), min_size=1)
 paths = names.map(Path)
@@ -260,3 +262,24 @@ def test_a_message_can_name_fields_as_its_reader_does() -> None:
 def test_no_numerical_library_is_imported() -> None:
     code = "import sys, orbiflow.jobs; sys.exit(bool({'torch', 'numpy'} & set(sys.modules)))"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_a_fit_has_every_field_that_its_request_shares_with_it() -> None:
+    own: dict[str, Any] = {
+        "data": Path("a.csv"), "space": "klein-bottle", "out": Path("b"), "columns": ("x", "y"),
+        "header": False, "missing": "drop", "weights": "w", "unit": "degrees", "parts": ("kernels",),
+        "repeats": "rounding", "seed": 7,
+    }  # fmt: skip
+    cases = (
+        (DensityFoldRequest, DensityFoldRequest(fold=1, group="g", **own).fit(), {"group": "g"}),
+        # groups make the folds of a cross-validation; its fits of a flow alone would refuse them
+        (
+            DensityCvRequest,
+            DensityCvRequest(group="g", drop_missing=True, **own).whole_fit(),
+            {"group": None, "drop_missing": True},
+        ),
+    )
+    for kind, fit, more in cases:
+        expected = own | more
+        assert {f.name for f in fields(kind)} & {f.name for f in fields(fit)} == set(expected)
+        assert {name: getattr(fit, name) for name in expected} == expected

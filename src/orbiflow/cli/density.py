@@ -132,6 +132,14 @@ def score(
             "the row.",
         ),
     ] = False,
+    samples: Annotated[
+        int | None,
+        typer.Option(
+            help="Of the density, by which hdr is known: default 20000, which tell masses up to "
+            "0.9995.",
+            show_default=False,
+        ),
+    ] = None,
     gradient: Annotated[
         bool,
         typer.Option(
@@ -161,6 +169,7 @@ def score(
         weights=weights,
         measure=measure.value,
         region=region,
+        samples=samples,
         gradient=gradient,
         table=table,
     )

@@ -156,6 +156,16 @@ RepeatsOption = Annotated[
 ]
 
 
+RegionSamples = Annotated[
+    int | None,
+    typer.Option(
+        help="By which regions are known: 20000 tell a half within 0.35 %, and up to 0.9995. Default "
+        "20000, or more where a mass needs it.",
+        show_default=False,
+    ),
+]
+
+
 def numbers_of(text: str | None, field: str) -> tuple[float, ...] | None:
     """Numbers with commas between them; None stays None.
 

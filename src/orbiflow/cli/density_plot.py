@@ -13,6 +13,7 @@ from orbiflow.cli.density_options import (
     Measure,
     Model,
     Projection,
+    RegionSamples,
     Scale,
     named_columns,
     numbers_of,
@@ -98,6 +99,7 @@ def plot(
             show_default=False,
         ),
     ] = None,
+    region_samples: RegionSamples = None,
     samples: Annotated[
         int | None,
         typer.Option(
@@ -109,7 +111,8 @@ def plot(
     dots: Annotated[
         bool,
         typer.Option(
-            "--dots", help="Draw data, or else samples, over the density and the surface."
+            "--dots",
+            help="Draw data, or else samples, over density and surface, smaller where they crowd.",
         ),
     ] = False,
     seed: Annotated[int, typer.Option(help="Of the samples.")] = 0,
@@ -133,6 +136,7 @@ def plot(
         projection=projection.value,
         radius=radius,
         regions=numbers_of(regions, "regions"),
+        region_samples=region_samples,
         samples=samples,
         dots=dots,
         seed=seed,

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from orbiflow.cli.density_options import Model, numbers_of
+from orbiflow.cli.density_options import Model, RegionSamples, numbers_of
 from orbiflow.cli.work import do
 from orbiflow.jobs import DensityRegionRequest
 
@@ -29,9 +29,7 @@ def region_of(
             show_default=False,
         ),
     ] = None,
-    samples: Annotated[
-        int, typer.Option(help="By which masses are known: 20000 for 0.35 % of a half.")
-    ] = 20_000,
+    samples: RegionSamples = None,
     budget: Annotated[
         int, typer.Option(help="Evaluations after which outlines get no finer.")
     ] = 300_000,

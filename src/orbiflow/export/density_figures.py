@@ -16,7 +16,7 @@ from orbiflow.arguments import path as as_path
 from orbiflow.density.estimator import DensityEstimator
 from orbiflow.density.models.blend import BlendedDensity
 from orbiflow.density.models.symmetric import SymmetricDensity
-from orbiflow.density.regions import DensityLevels
+from orbiflow.density.regions import DensityLevels, samples_for
 from orbiflow.density.spaces.space import Space
 from orbiflow.density.storage import read_density
 from orbiflow.errors import OrbiflowError
@@ -24,12 +24,13 @@ from orbiflow.export.density_plot_settings import PlotSettings
 from orbiflow.figures.coastlines import read_coastlines, simplified
 from orbiflow.figures.density_axes import space_title, view_of
 from orbiflow.figures.density_corner import MOST_COLUMNS, corner_picture
+from orbiflow.figures.density_dots import MAX_DOTS
 from orbiflow.figures.density_flow import flow_picture
 from orbiflow.figures.density_map import map_picture
 from orbiflow.figures.density_page import density_page
 from orbiflow.figures.density_regions import RegionLine
 from orbiflow.figures.density_samples import samples_picture
-from orbiflow.figures.density_square import MAX_DOTS, density_picture
+from orbiflow.figures.density_square import density_picture
 from orbiflow.figures.map_choice import chosen_map
 from orbiflow.figures.map_samples import map_samples_picture
 from orbiflow.figures.projections import Projection
@@ -207,7 +208,8 @@ def _regions(density: SymmetricDensity, settings: PlotSettings) -> tuple[RegionL
         raise OrbiflowError(
             f"regions are drawn in two dimensions, this {density.space.name} has {density.space.dim}"
         )
-    levels = DensityLevels(density, seed=settings.seed % 2**63)
+    count = samples_for(settings.regions, settings.region_samples)
+    levels = DensityLevels(density, samples=count, seed=settings.seed % 2**63)
     return tuple(
         RegionLine(mass, levels.highest(mass).log_prob) for mass in map(float, settings.regions)
     )

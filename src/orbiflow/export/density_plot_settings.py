@@ -9,6 +9,7 @@ from pathlib import Path
 from numpy.typing import ArrayLike
 
 from orbiflow.arguments import number, whole
+from orbiflow.density.regions import samples_for
 from orbiflow.density.spaces.space import MEASURES
 from orbiflow.errors import OrbiflowError
 from orbiflow.figures.density_regions import STYLES
@@ -17,17 +18,16 @@ from orbiflow.figures.map_choice import PROJECTIONS
 from orbiflow.figures.sheet import FigureFormat, Sheet
 
 MOST_SAMPLES = 100_000
-LEAST_MASS = 1e-3
-"""Of a region that is drawn: what twenty thousand samples can tell from none."""
 
 
 def check_masses(masses: Sequence[float]) -> None:
     """
     Raises:
-        OrbiflowError: unless `masses` are different numbers between 0.001 and 0.999, four at most.
+        OrbiflowError: unless `masses` are different numbers between 0 and 1, four at most.
     """
     for mass in masses:
-        number(mass, "a region's mass", LEAST_MASS, 1 - LEAST_MASS)
+        if not number(mass, "a region's mass", 0.0, 1.0, above=True) < 1:
+            raise OrbiflowError("a region's mass must be below 1: all of it is the whole space")
     if len(masses) > len(STYLES) or len(set(masses)) < len(masses):
         raise OrbiflowError(
             f"regions must be of at most {len(STYLES)} different masses, got {list(masses)}"
@@ -49,6 +49,8 @@ class PlotSettings:
     - `coastlines`: of the sphere: lines (N, 2) of latitude and longitude, or a file of them; see
       `orbiflow.figures.coastlines.read_coastlines`.
     - `regions`: masses between 0 and 1: lines about the smallest regions that hold them, four at most.
+    - `region_samples`: by which these are found; None for as many as the masses need, see
+      `orbiflow.density.regions.samples_for`.
     - `dots`: draw data, or else samples, over the density.
     - `samples`: how many beside the data, or, if there are none, beside the density; None for 3,000
       beside data alone. More than 3,000 are pixels in a PDF or SVG.
@@ -71,6 +73,7 @@ class PlotSettings:
     radius: float | None = None
     coastlines: Sequence[ArrayLike] | str | Path | None = None
     regions: Sequence[float] = ()
+    region_samples: int | None = None
     dots: bool = False
     samples: int | None = None
     seed: int = 0
@@ -84,6 +87,7 @@ class PlotSettings:
                     f"{name} must be one of {', '.join(known)}, got {getattr(self, name)!r}"
                 )
         check_masses(self.regions)
+        samples_for(self.regions, self.region_samples, name="region_samples")
         if self.samples is not None:
             whole(self.samples, "samples", 1, MOST_SAMPLES)
 

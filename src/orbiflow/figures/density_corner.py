@@ -22,7 +22,8 @@ from orbiflow.figures.density_axes import (
     unit_of,
     view_of,
 )
-from orbiflow.figures.density_square import MAX_DOTS, AxesOptions, draw_dots
+from orbiflow.figures.density_dots import MAX_DOTS, draw_dots
+from orbiflow.figures.density_square import AxesOptions
 from orbiflow.figures.density_values import density_at
 from orbiflow.figures.sheet import Picture, Sheet
 from orbiflow.symmetry.isometry import Array
@@ -97,7 +98,7 @@ def corner_picture(
             points, colour = (below, _DATA) if row > column else (above, _DRAWN)
             fill = _DRAWN if data is None else colour
             draw_dots(
-                axes, points[:, [column, row]], 0.4, limit=most, fill=fill, rim="none",
+                axes, points[:, [column, row]], 0.4, limit=most, fill=fill,
                 shrink=grid.shrink, rasterized=dim > 3,
             )  # fmt: skip
         _label(axes, view, row, column, grid)

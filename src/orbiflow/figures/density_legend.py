@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 TURNS = {2: "half", 4: "quarter"}
+SMALLER = "dots are smaller where they crowd"
 CROWDED = "dots crowd where the square shrinks areas"
 
 

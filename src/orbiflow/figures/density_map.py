@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple, TypedDict, Unpack, cast
 
 import numpy as np
@@ -17,8 +17,9 @@ from orbiflow.density.spaces.space import Space, checked_table
 from orbiflow.figures.azimuthal import Azimuthal
 from orbiflow.figures.density_axes import chart_points, space_title
 from orbiflow.figures.density_bar import shade_bar
+from orbiflow.figures.density_dots import MAX_DOTS, dot_shrink, draw_dots_over
 from orbiflow.figures.density_frame import NARROW, Room, bar_beside, bar_under, framed
-from orbiflow.figures.density_legend import wrapped_words, write_below
+from orbiflow.figures.density_legend import SMALLER, wrapped_words, write_below
 from orbiflow.figures.density_regions import (
     RegionLine,
     draw_regions,
@@ -26,7 +27,7 @@ from orbiflow.figures.density_regions import (
     region_note,
 )
 from orbiflow.figures.density_scale import Shade, bar_label, bar_ticks, shading
-from orbiflow.figures.density_square import COLOURS, MAX_DOTS, dot_shrink, draw_dots
+from orbiflow.figures.density_square import COLOURS
 from orbiflow.figures.density_values import chosen_scale, density_on_map, is_sharp_on_map
 from orbiflow.figures.map_axes import aspect, dress_map, set_limits
 from orbiflow.figures.map_choice import chosen_map
@@ -75,7 +76,7 @@ def map_picture(
 
     Args:
         density: on the sphere or the projective plane.
-        samples: data or samples to draw as dots, chart points (N, 2).
+        samples: data or samples to draw as dots, chart points (N, 2); smaller where they crowd.
         measure, scale: as for `orbiflow.figures.density_square.density_picture`.
         sheet: default a screen of 1600 pixels.
         most: dots, of more samples a random choice that is always the same.
@@ -93,7 +94,8 @@ def map_picture(
     shade = drawn.shade
     label = bar_label(shade, space, measure)
     dots = None if samples is None else places_on(space, projection, samples)
-    notes = [drawn.why, *([region_note(regions)] if regions else [])]
+    notes = [*([] if dots is None else [SMALLER]), drawn.why]
+    notes += [region_note(regions)] if regions else []
     if is_sharp_on_map(density, drawn.pixels.angle):
         size = f"{math.degrees(drawn.pixels.angle):.2g}°"
         notes.append(f"peaks narrower than {size} are averaged over it")
@@ -107,7 +109,8 @@ def map_picture(
         drawn.draw_regions(frame.axes, regions, sheet)
     if dots is not None:
         shrink = dot_shrink(sheet, max(1.0, frame.side / aspect(projection)))
-        draw_dots(frame.axes, dots, 0.55, limit=most, shrink=shrink)
+        left, right = frame.axes.get_xlim()
+        draw_dots_over(frame.axes, dots, frame.side / (right - left), limit=most, shrink=shrink)
     dress_map(frame.axes, projection, sheet, frame.side, coastlines=coasts)
     shade_bar(image, frame, sheet, shade, label)
     title = f"Density on the {space_title(space)}"
@@ -144,7 +147,7 @@ class ColouredMap(NamedTuple):
 
     - `places`: (N,) of its pixels on the colour bar.
     - `why`: the scale is linear or logarithmic.
-    - `log_natural`: (N,) logarithms of the density in natural measure.
+    - `log_natural`: called, (N,) logarithms of the density in natural measure: for lines alone.
     """
 
     projection: Projection
@@ -152,14 +155,14 @@ class ColouredMap(NamedTuple):
     places: Array
     shade: Shade
     why: str
-    log_natural: Array
+    log_natural: Callable[[], Array]
 
     def draw_regions(self, axes: Axes, regions: Sequence[RegionLine], sheet: Sheet) -> None:
         """Lines about regions, cut out along the outline as the picture is."""
         from matplotlib.patches import Polygon
 
         table = np.full(self.pixels.shown.shape, np.nan)
-        table[self.pixels.shown] = self.log_natural
+        table[self.pixels.shown] = self.log_natural()
         ends, counts = np.reshape(self.pixels.extent, (2, 2)), table.shape[::-1]
         x, y = (
             low + (high - low) * (np.arange(count) + 0.5) / count
@@ -197,7 +200,10 @@ def coloured_map(
     values = density_on_map(density, points, measure, pixels.angle)
     chosen = chosen_scale(density, measure, scale)
     shade = shading(values[pixels.within], pixels.areas[pixels.within], log=chosen.log)
-    logs = log_natural(density, values, points, measure)
+
+    def logs() -> Array:
+        return log_natural(density, values, points, measure)
+
     return ColouredMap(projection, pixels, shade.places(values), shade, chosen.why, logs)
 
 

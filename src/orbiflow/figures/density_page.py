@@ -21,9 +21,11 @@ from orbiflow.density.spaces.round import to_vectors
 from orbiflow.density.spaces.space import Space, checked_table
 from orbiflow.errors import OrbiflowError
 from orbiflow.figures.density_axes import chart_points, space_title, view_of
+from orbiflow.figures.density_dots import roomy, thinned
 from orbiflow.figures.density_drawings import DRAWINGS
+from orbiflow.figures.density_legend import SMALLER
 from orbiflow.figures.density_scale import bar_label, bar_ticks, shading
-from orbiflow.figures.density_square import COLOURS, average_note, thinned
+from orbiflow.figures.density_square import COLOURS, average_note
 from orbiflow.figures.density_values import density_on_grid, is_sharp, takes_logarithms
 from orbiflow.figures.immersions import Mesh, immersion, mesh, normals, of_vectors
 from orbiflow.figures.viewpoint import EYE, viewpoint
@@ -90,6 +92,7 @@ def density_page(
             if lines
         ],
         "samples": "",
+        "widths": "",
         "dots": dots,
         "labels": drawing.labels(view),
         "colours": _packed(_colours(), "u1"),
@@ -98,8 +101,11 @@ def density_page(
     }
     if samples is not None:
         points = torch.tensor(thinned(chart_points(space, samples).numpy()))
-        data["samples"] = _packed(immersion(space)(space.project(points)), "<f4")
+        places, widths = roomy(immersion(space)(space.project(points)))
+        data["samples"], data["widths"] = _packed(places, "<f4"), _packed(widths, "<f4")
     caption = drawing.caption(view)
+    if samples is not None:
+        caption += f" {SMALLER[0].upper()}{SMALLER[1:]}."
     if is_sharp(density, _SOFT / cells):
         note = average_note(round(cells / _SOFT))
         caption += f" {note[0].upper()}{note[1:]}."

@@ -37,7 +37,7 @@ def region_note(lines: Sequence[RegionLine]) -> str:
     'lines are about the smallest regions that hold 50 % (solid) and 90 % (dashed)'
     """
     said = [
-        f"{100 * line.mass:.4g} % ({style})"
+        f"{100 * line.mass:.10g} % ({style})"
         for line, style in zip(_in_order(lines), STYLES, strict=False)
     ]
     if len(said) == 1:

@@ -9,15 +9,10 @@ from torch import Tensor
 
 from orbiflow.density.models.symmetric import SymmetricDensity
 from orbiflow.figures.density_axes import ANGLE_AXES, check_plane, dress, space_title, view_of
+from orbiflow.figures.density_dots import MAX_DOTS, dot_shrink, draw_dots
 from orbiflow.figures.density_frame import NARROW, Room, two_panels
 from orbiflow.figures.density_legend import caption, wrapped_words, write_below
-from orbiflow.figures.density_square import (
-    MAX_DOTS,
-    DensityOptions,
-    dot_shrink,
-    draw_dots,
-    square_colours,
-)
+from orbiflow.figures.density_square import DensityOptions, square_colours
 from orbiflow.figures.sheet import Picture, Sheet
 from orbiflow.symmetry.isometry import Array
 
@@ -122,7 +117,7 @@ def with_words(room: Room, words: str, sheet: Sheet) -> Room:
 def draw_panel(axes: Axes, points: Array, count: int, shrink: float) -> None:
     """Points (N, 2) on a light ground."""
     axes.set_facecolor(GROUND)
-    draw_dots(axes, points, 0.5, limit=count, fill=DOT, rim="none", shrink=shrink)
+    draw_dots(axes, points, 0.5, limit=count, fill=DOT, shrink=shrink)
 
 
 def head(name: str, points: Array | None, count: int, known: int = 0) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple, TypedDict, Unpack
 
 import numpy as np
@@ -11,10 +11,11 @@ from torch import Tensor
 
 from orbiflow.density.models.blend import BlendedDensity
 from orbiflow.density.models.symmetric import SymmetricDensity, midpoints
-from orbiflow.figures.density_axes import INK, View, check_plane, dress, space_title, view_of
+from orbiflow.figures.density_axes import View, check_plane, dress, space_title, view_of
 from orbiflow.figures.density_bar import shade_bar
+from orbiflow.figures.density_dots import MAX_DOTS, dot_shrink, draw_dots_over
 from orbiflow.figures.density_frame import framed
-from orbiflow.figures.density_legend import caption, legend
+from orbiflow.figures.density_legend import SMALLER, caption, legend
 from orbiflow.figures.density_regions import (
     RegionLine,
     draw_regions,
@@ -31,7 +32,6 @@ if TYPE_CHECKING:
     from matplotlib.image import AxesImage
 
 COLOURS = "viridis"
-MAX_DOTS = 3000
 
 _GRID, _FINE_GRID = 240, 360
 """Pixels along a side at which a density is evaluated: of a flow, and with kernels beside it."""
@@ -93,7 +93,7 @@ def density_picture(
     Args:
         density: on a two-dimensional space.
         samples: data or samples to draw as dots, chart points (N, 2); of more than `most`, a random
-            choice that is always the same. They hide what they lie on.
+            choice that is always the same; smaller where they crowd, so that peaks stay in sight.
         measure: with respect to which the density is drawn (`orbiflow.density.spaces.space.MEASURES`).
         scale: of the colours, one of `orbiflow.figures.density_scale.SCALES`.
         names, center: of the axes; see `orbiflow.figures.density_axes.view_of`.
@@ -115,16 +115,16 @@ def density_picture(
     image = drawn.on(frame.axes)
     if regions:
         middles = (np.arange(count) + 0.5) / count
-        draw_regions(frame.axes, regions, middles, middles, drawn.log_natural.T, sheet)
+        draw_regions(frame.axes, regions, middles, middles, drawn.log_natural().T, sheet)
     if samples is not None:
-        draw_dots(
-            frame.axes, view.places(samples), 0.55, limit=most, shrink=dot_shrink(sheet, frame.side)
-        )
+        shrink = dot_shrink(sheet, frame.side)
+        draw_dots_over(frame.axes, view.places(samples), frame.side, limit=most, shrink=shrink)
     shade_bar(image, frame, sheet, shade, label)
     dress(frame.axes, view, sheet)
     title = f"Density on the {space_title(space)}"
     signs: dict[str, Any] = {"dots": samples is not None}
-    signs["notes"] = [drawn.why, *([region_note(regions)] if regions else [])]
+    signs["notes"] = [*([SMALLER] if signs["dots"] else []), drawn.why]
+    signs["notes"] += [region_note(regions)] if regions else []
     if is_sharp(density, 1 / count):
         signs["notes"].append(average_note(count))
     if not sheet.printed:
@@ -137,13 +137,13 @@ class Coloured(NamedTuple):
     """A density on the window of a square: places of its pixels (N, N) on the colour bar, first x.
 
     - `why`: the scale is linear or logarithmic.
-    - `log_natural`: (N, N) logarithms of the density in natural measure.
+    - `log_natural`: called, (N, N) logarithms of the density in natural measure: for lines alone.
     """
 
     places: Array
     shade: Shade
     why: str
-    log_natural: Array
+    log_natural: Callable[[], Array]
 
     def on(self, axes: Axes) -> AxesImage:
         """The picture of it."""
@@ -165,51 +165,15 @@ def square_colours(density: SymmetricDensity, view: View, measure: str, scale: s
     areas = space.log_area(midpoints(space, count)).exp().numpy().reshape(count, count)
     chosen = chosen_scale(density, measure, scale)
     shade = shading(values, areas, log=chosen.log)
-    grid = torch.stack(torch.meshgrid(*(middles + low for low in view.low), indexing="ij"), dim=-1)
-    logs = log_natural(density, values.ravel(), grid.reshape(-1, 2), measure)
-    return Coloured(shade.places(values), shade, chosen.why, logs.reshape(count, count))
+
+    def logs() -> Array:
+        ends = torch.meshgrid(*(middles + low for low in view.low), indexing="ij")
+        points = torch.stack(ends, dim=-1).reshape(-1, 2)
+        return log_natural(density, values.ravel(), points, measure).reshape(count, count)
+
+    return Coloured(shade.places(values), shade, chosen.why, logs)
 
 
 def average_note(count: int) -> str:
     """What a picture of `count` pixels along a side says of peaks that are narrower."""
     return f"peaks narrower than 1/{count} of a side are averaged over it"
-
-
-def draw_dots(
-    axes: Axes,
-    points: Array,
-    alpha: float,
-    *,
-    limit: int = MAX_DOTS,
-    fill: str = "#ffffff",
-    rim: str = INK,
-    shrink: float = 1.0,
-    rasterized: bool = False,
-) -> None:
-    """Points (N, 2) of the window as dots, at most `limit` of them.
-
-    Args:
-        shrink: what to multiply the dots' area by.
-        rasterized: whether they are pixels in a PDF or SVG, too; more than `MAX_DOTS` always are.
-    """
-    points = thinned(points, limit)
-    crowd = max(1.0, len(points) / MAX_DOTS)
-    rasterized = rasterized or crowd > 1
-    shrink = max(shrink / crowd**0.7, 0.04)
-    axes.scatter(
-        *points.T, s=shrink * max(2.0, 9.0 - len(points) / 500), c=fill, edgecolors=rim,
-        linewidths=0.35 * shrink**0.5, alpha=alpha, zorder=5,
-        rasterized=rasterized,
-    )  # fmt: skip
-
-
-def thinned(points: Array, limit: int = MAX_DOTS) -> Array:
-    """A random choice of at most `limit` of points (N, d), always the same."""
-    if len(points) <= limit:
-        return points
-    return points[np.random.default_rng(0).choice(len(points), limit, replace=False)]
-
-
-def dot_shrink(sheet: Sheet, side: float) -> float:
-    """Of dots in a square of so many inches: those on a screen have one of 5.6."""
-    return max(0.2, (side / 5.6) ** 2) if sheet.printed else 1.0

@@ -9,6 +9,7 @@ from torch import Tensor
 from orbiflow.density.models.symmetric import SymmetricDensity
 from orbiflow.figures.azimuthal import Azimuthal
 from orbiflow.figures.density_axes import space_title
+from orbiflow.figures.density_dots import MAX_DOTS, dot_shrink
 from orbiflow.figures.density_frame import Room, two_panels
 from orbiflow.figures.density_legend import write_below
 from orbiflow.figures.density_map import (
@@ -25,7 +26,6 @@ from orbiflow.figures.density_samples import (
     same_number,
     with_words,
 )
-from orbiflow.figures.density_square import MAX_DOTS, dot_shrink
 from orbiflow.figures.map_axes import aspect, dress_map, set_limits
 from orbiflow.figures.map_words import caption
 from orbiflow.figures.sheet import Picture, Sheet

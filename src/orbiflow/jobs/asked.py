@@ -23,6 +23,20 @@ def given(request: Request, names: Iterable[str]) -> dict[str, Any]:
     return {name: value for name, value in values.items() if value is not None}
 
 
+def samples_asked(request: Request, masses: Iterable[float] = (), field: str = "samples") -> int:
+    """How many samples regions of these masses get, by the request's field.
+
+    Raises:
+        RecordError: where these are too few, by the field's name.
+    """
+    from orbiflow.density.regions import samples_for  # not where requests alone are wanted
+
+    try:
+        return samples_for(masses, getattr(request, field), name=f"{{{field}}}")
+    except OrbiflowError as error:
+        raise RecordError(str(error)) from error
+
+
 def read_as(name: str, read: Callable[[str], Value], text: str) -> Value:
     """A field's text, read.
 

@@ -6,7 +6,12 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
-from orbiflow.jobs.density_requests import SpaceName, Unit, columns_named
+from orbiflow.jobs.density_requests import (
+    SpaceName,
+    Unit,
+    columns_named,
+    region_samples_in_range,
+)
 from orbiflow.jobs.records import RecordError
 from orbiflow.jobs.request import Request, in_range
 
@@ -78,7 +83,8 @@ class DensityRegionRequest(Request):
 
     - `mass`: that regions hold. `level`: log densities in natural measure, above which a region lies.
       Neither: 0.5 and 0.9.
-    - `samples`: of the density, by which the masses are known.
+    - `samples`: of the density, by which the masses are known; None for 20,000, or more where a mass
+      needs it.
     - `budget`: evaluations after which outlines get no finer.
     - `out`: .geojson (spheres and projective planes), .json or .csv.
     """
@@ -89,7 +95,7 @@ class DensityRegionRequest(Request):
     out: Path = Path("regions.json")
     mass: tuple[float, ...] | None = None
     level: tuple[float, ...] | None = None
-    samples: int = 20_000
+    samples: int | None = None
     budget: int = 300_000
     seed: int = 0
 
@@ -104,7 +110,7 @@ class DensityRegionRequest(Request):
             raise RecordError("{mass} and {level} need a number each, or several, as in 0.5,0.9")
         if len(self.mass or ()) + len(self.level or ()) > 50:
             raise RecordError("more than 50 regions: ask for fewer {mass} and {level}")
-        in_range(self, "samples", 1000, 10_000_000)
+        region_samples_in_range(self, "samples")
         in_range(self, "budget", 1, 10**9)
         in_range(self, "seed", 0, 2**63 - 2)
         _ending(self.out, (".geojson", ".json", ".csv"))

@@ -61,20 +61,7 @@ class DensityFoldRequest(Request):
         Raises:
             RecordError: for a field that cannot be used, by its name.
         """
-        return DensityFitRequest(
-            data=self.data,
-            space=self.space,
-            out=self.out,
-            columns=self.columns,
-            header=self.header,
-            missing=self.missing,
-            weights=self.weights,
-            group=self.group,
-            unit=self.unit,
-            parts=self.parts,
-            repeats=self.repeats,
-            seed=self.seed,
-        )
+        return _fit_of(self, group=self.group)
 
 
 @dataclass(frozen=True)
@@ -149,20 +136,36 @@ class DensityCvRequest(Request):
         Raises:
             RecordError: for a field that cannot be used, by its name.
         """
-        return DensityFitRequest(
-            data=self.data,
-            space=self.space,
-            out=self.out,
-            columns=self.columns,
-            header=self.header,
-            drop_missing=self.drop_missing,
-            missing=self.missing,
-            weights=self.weights,
-            unit=self.unit,
-            parts=self.parts,
-            repeats=self.repeats,
-            seed=self.seed,
-        )
+        # groups make the folds: a flow alone is split by them, too, and would refuse them in a fit
+        return _fit_of(self, drop_missing=self.drop_missing)
+
+
+def _fit_of(
+    request: DensityFoldRequest | DensityCvRequest,
+    *,
+    group: str | None = None,
+    drop_missing: bool = False,
+) -> DensityFitRequest:
+    """A fit with what both requests have.
+
+    Raises:
+        RecordError: for a field that cannot be used, by its name.
+    """
+    return DensityFitRequest(
+        data=request.data,
+        space=request.space,
+        out=request.out,
+        columns=request.columns,
+        header=request.header,
+        drop_missing=drop_missing,
+        missing=request.missing,
+        weights=request.weights,
+        group=group,
+        unit=request.unit,
+        parts=request.parts,
+        repeats=request.repeats,
+        seed=request.seed,
+    )
 
 
 def setting_of(parts: Sequence[str] | None, field: str) -> tuple[str, tuple[str, ...] | None]:

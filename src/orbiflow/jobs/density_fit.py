@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from orbiflow.cancel import Cancel
 from orbiflow.density import DensityEstimator, density_to_bytes
@@ -29,8 +30,9 @@ from orbiflow.jobs.run import Sink
 from orbiflow.symmetry.isometry import Array
 from orbiflow.threads import one_thread
 
-MOST_SCORED = 4_000
-"""Rows over which the mean log density is taken."""
+MOST_SCORED = 20_000
+"""Rows over which the mean log density is taken: up to here all of them, for a few hundredths of the
+fit's time at most; of 100,000 rows of six angles it would be two fifths."""
 
 SETTINGS = (
     "parts", "repeats", "missing", "weights", "group", "detail", "segments", "kernels", "seed",
@@ -133,12 +135,16 @@ def _document(
 ) -> dict[str, Any]:
     """Of report.json."""
     report = estimator.report_
+    scored = _scored(table, weights, request.seed)
     return {
         "space": {"name": estimator.space_.name, **estimator.space_.settings()},
         "columns": table.columns,
         "settings": {name: getattr(request, name) for name in SETTINGS},
         "log_likelihood": {
-            "natural": _score(estimator, table, weights),
+            "natural": estimator.score(
+                table.values[scored], sample_weight=None if weights is None else weights[scored]
+            ),
+            "natural_rows": len(scored),
             "uniform": -math.log(estimator.space_.volume),
             "square_train": -report.train_nll,
             "square_validation": -report.validation_nll,
@@ -152,22 +158,24 @@ def _told(request: DensityFitRequest, document: dict[str, Any], rows: int) -> tu
     """What came of it, in words."""
     likelihood, mass = document["log_likelihood"], document["report"]["mass"]
     gain = likelihood["natural"] - likelihood["uniform"]
+    scored = likelihood["natural_rows"]
+    which = "these rows" if scored == rows else f"{scored} of them"
     return (
-        f"{rows} rows: mean log density {likelihood['natural']:.4f} nats, {gain:.4f} more than the "
-        f"uniform density; integral {'not checked' if mass is None else f'{mass:.5f}'}",
+        f"{rows} rows: mean log density at {which} {likelihood['natural']:.4f} nats, {gain:.4f} more "
+        f"than the uniform density; integral {'not checked' if mass is None else f'{mass:.5f}'}",
         f"written to {request.out} in {document['seconds']:.0f} s",
     )
 
 
-def _score(estimator: DensityEstimator, table: Table, weights: Array | None) -> float:
-    """Mean log density of the rows that lack nothing, of enough of them: each costs all kernels."""
-    whole = np.flatnonzero(~np.isnan(table.values).any(axis=1))
+def _scored(table: Table, weights: Array | None, seed: int) -> NDArray[np.int64]:
+    """Which rows the mean log density is of: those that count and lack nothing, or many of them."""
+    whole = ~np.isnan(table.values).any(axis=1)
     if weights is not None:
-        whole = whole[weights[whole] > 0]
-    some = whole[:: max(1, math.ceil(len(whole) / MOST_SCORED))]
-    return estimator.score(
-        table.values[some], sample_weight=None if weights is None else weights[some]
-    )
+        whole &= weights > 0
+    found = np.flatnonzero(whole)
+    if len(found) <= MOST_SCORED:
+        return found
+    return np.sort(np.random.default_rng(seed).choice(found, MOST_SCORED, replace=False))
 
 
 def plain_report(report: FitReport) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from orbiflow.export.density_plot_settings import PlotSettings
 from orbiflow.export.density_plots import is_one_file, plot_density
 from orbiflow.export.lengths import column_width
 from orbiflow.figures.coastlines import read_coastlines
-from orbiflow.jobs.asked import given, read_as
+from orbiflow.jobs.asked import given, read_as, samples_asked
 from orbiflow.jobs.density_data import model_at, read_data, same_columns
 from orbiflow.jobs.density_requests import DensityPlotRequest
 from orbiflow.jobs.events import Finished, Note, Progress, Written
@@ -93,7 +93,9 @@ def _settings(request: DensityPlotRequest, space: Space, columns: list[str] | No
                 raise RecordError(f"{{{name}}} belongs to maps, not to the {space.name}")
     wanted = (
         "format", "measure", "scale", "projection", "radius", "regions", "samples", "dots", "seed",
+        "region_samples",
     )  # fmt: skip
+    samples_asked(request, request.regions or (), "region_samples")
     asked: dict[str, Any] = given(request, wanted)
     if request.width is not None:
         asked["width"] = read_as("width", column_width, request.width)

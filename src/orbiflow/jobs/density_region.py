@@ -11,11 +11,13 @@ from orbiflow.cancel import Cancel
 from orbiflow.density.regions import DensityLevels, DensityRegion, Outline, outlines, to_geojson
 from orbiflow.errors import OrbiflowError
 from orbiflow.files import write_atomic
+from orbiflow.jobs.asked import samples_asked
 from orbiflow.jobs.density_compare_requests import DensityRegionRequest
 from orbiflow.jobs.density_data import model_at
 from orbiflow.jobs.events import Finished, Note, Progress, Written
 from orbiflow.jobs.place import check_place
 from orbiflow.jobs.run import Sink
+from orbiflow.jobs.wording import counted, percentage, with_error
 from orbiflow.threads import one_thread
 
 MASSES = (0.5, 0.9)
@@ -47,10 +49,11 @@ def density_region(request: DensityRegionRequest, tell: Sink, cancel: Cancel) ->
             f"{space.name} has {space.dim}: write .json, and `orbiflow density "
             "score --region` for the rows inside"
         )
-    tell(Progress(0.0, "drawing samples"))
-    cancel.check()
-    levels = DensityLevels(density, samples=request.samples, seed=request.seed)
     masses = MASSES if request.mass is None and request.level is None else request.mass or ()
+    samples = samples_asked(request, masses)
+    tell(Progress(0.0, f"drawing {samples} samples"))
+    cancel.check()
+    levels = DensityLevels(density, samples=samples, seed=request.seed)
     regions = [levels.highest(mass) for mass in masses]
     regions += [levels.above(level) for level in request.level or ()]
 
@@ -77,7 +80,9 @@ def density_region(request: DensityRegionRequest, tell: Sink, cancel: Cancel) ->
     elif kind == ".csv":
         text = _csv(drawn)
     else:
-        text = json.dumps(_document(request, density.space, regions, drawn), allow_nan=False)
+        text = json.dumps(
+            _document(request, samples, density.space, regions, drawn), allow_nan=False
+        )
     cancel.check()
     write_atomic(request.out, text)
     tell(Written(request.out))
@@ -92,14 +97,18 @@ def density_region(request: DensityRegionRequest, tell: Sink, cancel: Cancel) ->
 
 
 def _document(
-    request: DensityRegionRequest, space: Any, regions: list[DensityRegion], drawn: list[Outline]
+    request: DensityRegionRequest,
+    samples: int,
+    space: Any,
+    regions: list[DensityRegion],
+    drawn: list[Outline],
 ) -> dict[str, Any]:
     """Of a .json."""
     document: dict[str, Any] = {
         "kind": "regions",
         "space": {"name": space.name, **space.settings()},
         "size_unit": _unit(space),
-        "samples": request.samples,
+        "samples": samples,
         "seed": request.seed,
     }
     if drawn:
@@ -137,10 +146,11 @@ def _said(region: DensityRegion, outline: Outline | None, unit: str) -> str:
     if outline is not None:
         size, fraction = outline.size, outline.fraction
         count = len(outline.shape.geoms)
-        drawn = f"; {count} polygon{'s' * (count != 1)}, which hold {outline.mass:.4f}"
-        drawn += f" ± {outline.error:.4f}"
-    what = f"mass {region.held:.4f} ± {region.error:.4f}"
+        holds = "holds" if count == 1 else "hold"
+        drawn = f"; {counted(count, 'polygon')}, which {holds} "
+        drawn += with_error(outline.mass, outline.error)
     return (
-        f"{what}: log density of at least {region.log_prob:.4f} ({region.log_prob_low:.4f} to "
-        f"{region.log_prob_high:.4f}), {size:.6g} {unit}, {fraction:.2%} of the space{drawn}"
+        f"mass {with_error(region.held, region.error)}: log density of at least "
+        f"{region.log_prob:.4f} ({region.log_prob_low:.4f} to {region.log_prob_high:.4f}), "
+        f"{size:.6g} {unit}, {percentage(fraction)} of the space{drawn}"
     )

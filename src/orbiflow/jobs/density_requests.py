@@ -7,10 +7,11 @@ from pathlib import Path
 from typing import Literal
 
 from orbiflow.jobs.records import RecordError
-from orbiflow.jobs.request import Request
+from orbiflow.jobs.request import Request, in_range
 
 MOST_SAMPLES = 100_000_000
 MOST_DOTS = 100_000
+MOST_REGION_SAMPLES = 10_000_000
 
 SpaceName = Literal["torus", "sphere", "klein-bottle", "projective-plane"]
 Unit = Literal["radians", "degrees", "turns"]
@@ -90,7 +91,8 @@ class DensityScoreRequest(Request):
 
     - `columns`, `header`, `drop_missing`, `missing`, `weights`: as for a fit; rows left out get an
       empty cell, weights are of the mean.
-    - `region`: add the mass of the smallest highest-density region that holds each row, too.
+    - `region`: add the mass of the smallest highest-density region that holds each row, too, by so many
+      `samples` of the density; None for 20,000.
     - `gradient`: whether the gradient in the data's own coordinates is added, a column each.
     - `table`: whether log densities are read off a table, whose error is told.
     """
@@ -107,12 +109,16 @@ class DensityScoreRequest(Request):
     weights: str | None = None
     measure: Measure = "natural"
     region: bool = False
+    samples: int | None = None
     gradient: bool = False
     table: bool = False
 
     def check(self) -> None:
         columns_named(self.columns)
         _check_missing(self.drop_missing, self.missing)
+        region_samples_in_range(self, "samples")
+        if self.samples is not None and not self.region:
+            raise RecordError("{samples} are those of {region}: give both, or neither")
         if self.region and self.missing == "marginalise":
             raise RecordError("{region} is of whole rows: leave it out, or {missing} marginalise")
         if self.gradient and self.table:
@@ -149,7 +155,8 @@ class DensityPlotRequest(Request):
       a longitude, in the middle of a map.
     - `projection`, `radius`: of a map; the radius in degrees.
     - `coastlines`: GeoJSON or a table of latitude and longitude, for the sphere.
-    - `regions`: masses of the smallest regions that hold them, about which lines are drawn.
+    - `regions`: masses of the smallest regions that hold them, about which lines are drawn, by so many
+      `region_samples`; None for 20,000, or more where a mass needs it.
     - `samples`: how many beside data or density, None for 3,000 beside data alone.
     """
 
@@ -168,6 +175,7 @@ class DensityPlotRequest(Request):
     projection: Projection = "auto"
     radius: float | None = None
     regions: tuple[float, ...] | None = None
+    region_samples: int | None = None
     dots: bool = False
     samples: int | None = None
     seed: int = 0
@@ -180,6 +188,9 @@ class DensityPlotRequest(Request):
             raise RecordError(f"{{radius}} must be above 0 and at most 90, got {self.radius:g}")
         if any(not 0 < mass < 1 for mass in self.regions or ()):
             raise RecordError("{regions} must be masses between 0 and 1, such as 0.5,0.9")
+        region_samples_in_range(self, "region_samples")
+        if self.region_samples is not None and not self.regions:
+            raise RecordError("{region_samples} are those of {regions}: give both, or neither")
 
 
 @dataclass(frozen=True)
@@ -245,6 +256,12 @@ def _check_missing(drop: bool, missing: str) -> None:
         raise RecordError(
             "{drop_missing} leaves out the rows that {missing} marginalise is for: give one"
         )
+
+
+def region_samples_in_range(request: Request, name: str) -> None:
+    """Raises a `RecordError` for a number that `orbiflow.density.regions` does not draw."""
+    if getattr(request, name) is not None:
+        in_range(request, name, 1000, MOST_REGION_SAMPLES)
 
 
 def columns_named(columns: tuple[str, ...] | None) -> None:

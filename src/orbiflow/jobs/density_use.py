@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import torch
 from numpy.typing import NDArray
@@ -12,11 +14,12 @@ from orbiflow.density import log_prob_observed
 from orbiflow.density.comparing import scores_of
 from orbiflow.density.fitting.rows import mean_of, weighed
 from orbiflow.density.partial import chart_of_observed
-from orbiflow.density.regions import DensityLevels
+from orbiflow.density.regions import DensityLevels, told_masses
 from orbiflow.density.spaces.patches import to_klein
 from orbiflow.density.tables import append_columns, to_csv
 from orbiflow.errors import OrbiflowError
 from orbiflow.files import write_atomic
+from orbiflow.jobs.asked import samples_asked
 from orbiflow.jobs.density_data import model_at, read_data, read_weighed, same_columns
 from orbiflow.jobs.density_requests import DensitySampleRequest, DensityScoreRequest, PatchesRequest
 from orbiflow.jobs.density_scores import evaluated
@@ -61,14 +64,11 @@ def density_score(request: DensityScoreRequest, tell: Sink, cancel: Cancel) -> F
     scores = added.pop("log_prob")
     added = {name: scores, **added}
     if request.region:
-        tell(Progress(1.0, "drawing samples"))
+        samples = samples_asked(request)
+        tell(Progress(1.0, f"drawing {samples} samples"))
         natural = scores_of(density, table.values) if request.measure != "natural" else scores
-        added["hdr"] = DensityLevels(density).hdr_of(natural)
-        tell(
-            Note(
-                "hdr: the mass of the smallest highest-density region that holds the row, ± 0.0035"
-            )
-        )
+        added["hdr"] = DensityLevels(density, samples=samples).hdr_of(natural)
+        tell(Note(_said_of_regions(samples)))
     write_atomic(request.out, append_columns(table, request.data, added))
     tell(Written(request.out))
     if lacking:
@@ -78,6 +78,16 @@ def density_score(request: DensityScoreRequest, tell: Sink, cancel: Cancel) -> F
     weighted = "" if weights is None else f", weighted by {request.weights}"
     tell(Note(f"mean log density {mean:.4f} nats over {over}{weighted}; written to {request.out}"))
     return Finished("done", {"file": str(request.out), "rows": len(scores), "mean": mean})
+
+
+def _said_of_regions(samples: int) -> str:
+    """How far `hdr` can be trusted."""
+    low, high = told_masses(samples)
+    return (
+        "hdr: the mass of the smallest highest-density region that holds the row, by "
+        f"{samples} samples (--samples): ± {0.5 / math.sqrt(samples):.2g} at most; what is below "
+        f"{low:g} or above {high:.10g} they do not tell apart"
+    )
 
 
 def _said_of_missing(known: Tensor, name: str) -> str:

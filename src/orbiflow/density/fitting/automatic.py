@@ -74,8 +74,8 @@ MEMBERS = 12
 SCORED = 2_000
 """Rows over which the report's mean log density is taken: each costs all kernels."""
 
-BEFORE_FLOW = 0.7
-"""Of the work."""
+BEFORE_FLOW, BEFORE_END = 0.7, 0.95
+"""Of the work told: before a flow, if one is tried, and before all is put together."""
 
 
 @dataclass(frozen=True)
@@ -161,14 +161,18 @@ def fit_automatic(
     generator = torch.Generator().manual_seed(settings.seed)
     folds = folds_of(rows, together=settings.repeats == "rounding", generator=generator)
     families = _families(space, folds, settings, found)
+    flows = _wants_flow(space, folds, settings)
+    before = BEFORE_FLOW if flows else BEFORE_END
     candidates = candidates_of(
-        space, families, folds, lambda done, what: say(BEFORE_FLOW * done, what), budget
+        space, families, folds, lambda done, what: say(before * done, what), budget
     )
     weights = supported_weights(candidates.table, candidates.floor, candidates.row_weights)
     if space.dim > MOST_DIM:  # each part makes integrals dearer
         weights = without_idle(candidates, weights)
-    tried = _try_flow(space, folds, candidates, weights, settings, budget, say)
-    say(1.0, "putting together")
+    tried = TriedFlow()
+    if flows and not budget.is_spent:
+        tried = _try_flow(space, folds, candidates, weights, settings, budget, say)
+    say(BEFORE_END, "putting together")
     density = assembled(space, families, candidates, weights, folds.rows, tried.flow, tried.share)
     parts = (*tried.evidence, *_shrunk(judged(candidates, weights), tried.share))
     return density, _report(
@@ -237,6 +241,11 @@ def _narrowest(space: Space, step: float | None) -> float:
     return min(NARROWEST, 1 / angle**2)
 
 
+def _wants_flow(space: Space, folds: Folds, settings: AutomaticSettings) -> bool:
+    enough = len(folds.rows) >= LEAST_FLOW_ROWS or settings.parts == ("flow",)
+    return "flow" in settings.parts and space.dim <= MOST_DIM and enough
+
+
 def _try_flow(
     space: Space,
     folds: Folds,
@@ -246,14 +255,10 @@ def _try_flow(
     budget: Budget,
     say: Progress,
 ) -> TriedFlow:
-    wanted = "flow" in settings.parts and space.dim <= MOST_DIM and not budget.is_spent
-    only = settings.parts == ("flow",)
-    if not wanted or (len(folds.rows) < LEAST_FLOW_ROWS and not only):
-        return TriedFlow()
     chosen = settings.flow or flow_settings(space, len(folds.rows), settings.seed)
     return try_flow(
         space, folds, candidates, weights, chosen, budget,
-        lambda done, what: say(BEFORE_FLOW + (1 - BEFORE_FLOW) * done, what),
+        lambda done, what: say(BEFORE_FLOW + (BEFORE_END - BEFORE_FLOW) * done, what),
     )  # fmt: skip
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import count
 
 import torch
 from torch import Tensor
@@ -27,6 +29,9 @@ from orbiflow.typed_torch import listed
 
 KEPT = 2
 """Sizes of a family that are fitted to all folds, beside the best alone."""
+
+STEP = 0.85
+"""Of a fold's work, what is left of it after each thing that is tried."""
 
 FLOOR = "uniform"
 """Name of the part that is always there."""
@@ -68,10 +73,7 @@ def candidates_of(
         if number and budget.is_spent:
             break
 
-        def tell(what: str, number: int = number) -> None:
-            # the first fold tries more
-            done = (number + bool(number)) / (folds.used + 1)
-            say(done, f"held-out part {number + 1} of {folds.used}: {what}")
+        tell = _teller(number, folds.used, say)
 
         block: dict[tuple[str, str], Tensor] = {}
         for family in families:
@@ -94,6 +96,18 @@ def candidates_of(
         fitted,
         None if weights[0] is None else torch.cat([own for own in weights if own is not None]),
     )
+
+
+def _teller(number: int, used: int, say: Progress) -> Callable[[str], None]:
+    """Tells what is tried in a fold; how much that will be is not known beforehand."""
+    begin, size = (number + 1, 1) if number else (0, 2)  # the first fold tries more
+    tried = count()
+
+    def tell(what: str) -> None:
+        share = 1 - STEP ** next(tried)
+        say((begin + share * size) / (used + 1), f"held-out part {number + 1} of {used}: {what}")
+
+    return tell
 
 
 def _narrow(families: list[Family], block: dict[tuple[str, str], Tensor], held: Rows) -> None:

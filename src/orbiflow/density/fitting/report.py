@@ -39,6 +39,8 @@ class PartEvidence:
     - `alone`: mean log density of the part alone at held-out rows, in nats above the uniform one.
     - `gain`, `error`: nats that the density would lose without it, and their standard error.
     - `rows`: held-out rows by which it was judged.
+    - `others`: as `alone`, of all other parts together, at the same rows; None where these are the rows
+      of all parts. A flow is tried on fewer: compare `alone` with this.
     """
 
     name: str
@@ -47,13 +49,17 @@ class PartEvidence:
     gain: float
     error: float
     rows: int
+    others: float | None = None
 
     def __str__(self) -> str:
         worth = f"worth {self.gain:.4f} ± {self.error:.4f} nats"
-        return (
+        words = (
             f"{self.name}: {self.share:.1%}, {worth if self.share else 'would add nothing'}; alone "
             f"{self.alone:.4f} over uniform"
         )
+        if self.others is None:
+            return words
+        return f"{words} at {self.rows} of these rows, where the others have {self.others:.4f}"
 
 
 @dataclass(frozen=True)

@@ -15,14 +15,15 @@ from orbiflow.arguments import number, whole
 from orbiflow.density.comparing.models import density_of, scores_of
 from orbiflow.density.estimator import DensityEstimator
 from orbiflow.density.models.symmetric import SymmetricDensity
-from orbiflow.errors import OrbiflowError
+from orbiflow.density.regions.enough import (
+    LEAST_SAMPLES,
+    MOST_SAMPLES,
+    SAMPLES,
+    samples_for,
+)
 from orbiflow.symmetry.isometry import Array
 from orbiflow.threads import one_thread
 
-SAMPLES = 20_000
-"""By default: the mass of a region of half of it is right within 0.35 %."""
-
-LEAST_SAMPLES, MOST_SAMPLES = 1000, 10_000_000
 EVEN = 4
 """Samples for each point that is drawn evenly, for sizes: of regions of hardly any mass, too."""
 
@@ -80,7 +81,7 @@ class DensityLevels:
 
     Args:
         density: or a fitted estimator.
-        samples: that are drawn, 1000 to 10 million.
+        samples: that are drawn, 1000 to 10 million; `samples_for` says how many some masses need.
         seed: of them.
 
     Raises:
@@ -109,20 +110,10 @@ class DensityLevels:
         """The smallest region that holds a mass between 0 and 1.
 
         Raises:
-            OrbiflowError: for a mass out of range.
+            OrbiflowError: for a mass out of range, or one that these samples cannot tell.
         """
-        mass = number(mass, "mass", 0.0, 1.0, above=True)
-        least = 1 / math.sqrt(len(self._sorted))
-        if not mass < 1:
-            raise OrbiflowError(
-                "mass must be below 1: the region of all the mass is the whole space"
-            )
-        if min(mass, 1 - mass) < least / 10:
-            raise OrbiflowError(
-                f"a mass of {mass:g} cannot be told from {round(mass)} with {len(self._sorted)} "
-                f"samples: take one from {least / 10:.2g} to {1 - least / 10:.4g}, or more samples"
-            )
-        return self._region(self._threshold(mass), mass)
+        samples_for([mass], len(self._sorted))
+        return self._region(self._threshold(float(mass)), float(mass))
 
     def above(self, log_prob: float) -> DensityRegion:
         """Where the log density is at least `log_prob`, in natural measure."""
@@ -187,14 +178,17 @@ def highest_density_region(
     density: SymmetricDensity | DensityEstimator,
     mass: float = 0.9,
     *,
-    samples: int = SAMPLES,
+    samples: int | None = None,
     seed: int = 0,
 ) -> DensityRegion:
     """The smallest region that holds `mass` (Hyndman, Computing and graphing highest density regions,
     1996): a quantile of the log density at samples of the density itself, in any dimension.
 
+    Args:
+        samples: that are drawn; None for as many as the mass needs, see `samples_for`.
+
     Raises:
-        OrbiflowError: as `DensityLevels` and its `highest`.
+        OrbiflowError: as `DensityLevels` and `samples_for`.
 
     >>> rng = np.random.default_rng(0)
     >>> angles = rng.vonmises([0.0, 1.0], 4.0, (200, 2))
@@ -203,4 +197,5 @@ def highest_density_region(
     >>> region.contains([[0.0, 1.0], [3.0, -2.0]]).tolist()
     [True, False]
     """
-    return DensityLevels(density, samples=samples, seed=seed).highest(mass)
+    count = samples_for([mass], samples)
+    return DensityLevels(density, samples=count, seed=seed).highest(mass)

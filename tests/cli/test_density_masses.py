@@ -1,0 +1,101 @@
+"""`region`, `score --region`, `plot --regions`: how many samples tell a mass, and what is refused."""
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from orbiflow.density import DensityEstimator, density_to_bytes, read_density
+from orbiflow.density.regions import DensityLevels
+
+
+@pytest.fixture(name="folder", scope="module")
+def folder_fixture(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a model and its data."""
+    folder = tmp_path_factory.mktemp("masses")
+    angles = np.random.default_rng(0).vonmises([0.0, 1.0], 4.0, (60, 2))
+    np.savetxt(folder / "data.csv", angles, delimiter=",", header="phi,psi", comments="")
+    fitted = DensityEstimator("torus", parts="mixture").fit(angles)
+    (folder / "density.safetensors").write_bytes(
+        density_to_bytes(fitted.density_, columns=["phi", "psi"])
+    )
+    return folder
+
+
+@pytest.fixture(autouse=True)
+def small(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("orbiflow.figures.density_square._FINE_GRID", 40)
+    monkeypatch.setattr("orbiflow.figures.density_page._FINE_CELLS", 20)
+
+
+def test_a_mass_gets_the_samples_that_it_needs(folder: Path, orbiflow) -> None:
+    region = ("density", "region", "-m", folder, "--budget", 5000, "--out", folder / "r.json")
+    for mass, options, count in (
+        ("0.5,0.9", (), 20_000),
+        ("0.5,0.9995", (), 200_000),
+        ("0.5,0.9995", ("--samples", 20_000), 20_000),
+    ):
+        done = orbiflow(*region, "--mass", mass, *options)
+        assert done.status == 0, done.err
+        assert json.loads((folder / "r.json").read_text())["samples"] == count
+
+
+def test_rows_far_out_are_told_apart_by_more_samples(folder: Path, orbiflow) -> None:
+    out = folder / "s.csv"
+    score = ("density", "score", folder / "data.csv", "-m", folder, "--region", "--out", out)
+    done = orbiflow(*score)
+    assert "by 20000 samples (--samples): ± 0.0035 at most" in done.out
+    assert "below 0.0005 or above 0.9995" in done.out
+    done = orbiflow(*score, "--samples", 200_000)
+    assert done.status == 0, done.err
+    assert "by 200000 samples (--samples): ± 0.0011 at most" in done.out
+    assert "below 5e-05 or above 0.99995" in done.out
+    density, _ = read_density(folder / "density.safetensors")
+    with out.open() as file:
+        rows = list(csv.DictReader(file))
+    expected = DensityLevels(density, samples=200_000).hdr(
+        np.loadtxt(folder / "data.csv", delimiter=",", skiprows=1)
+    )
+    assert [float(row["hdr"]) for row in rows] == pytest.approx(expected.tolist(), abs=1e-9)
+
+
+def test_lines_far_out(folder: Path, orbiflow) -> None:
+    plot = ("density", "plot", "-m", folder, "--out", folder / "plots", "--format", "svg")
+    done = orbiflow(*plot, "--regions", "0.5,0.9995", "--region-samples", 20_000)
+    assert done.status == 0, done.err
+    assert "hold 50 % (solid) and 99.95 % (dashed)" in done.out
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ("region --mass 0.99999 --samples 20000", "--samples must be at least 1000000"),
+        ("region --mass 0.000001 --samples 20000", "cannot be told from 0 with 20000 samples"),
+        ("region --mass 0.99999999", "too near to 1: take one from 1e-06 to 0.999999"),
+        ("region --samples 10", "--samples must be from 1000 to 1e+07, got 10"),
+        (
+            "score data.csv --samples 20000",
+            "--samples are those of --region: give both, or neither",
+        ),
+        ("score data.csv --region --samples 20", "--samples must be from 1000 to 1e+07, got 20"),
+        (
+            "plot --regions 0.99999 --region-samples 20000",
+            "--region-samples must be at least 1000000",
+        ),
+        ("plot --regions 0.9999999", "too near to 1"),
+        ("plot --region-samples 20000", "--region-samples are those of --regions: give both, or"),
+        ("plot --regions 0.5 --region-samples 3", "--region-samples must be from 1000 to 1e+07"),
+        ("plot --regions abc", "--regions must be numbers such as 0.5,0.9, got 'abc'"),
+        ("plot --regions 1.2", "--regions must be masses between 0 and 1"),
+    ],
+)
+def test_mistakes(words: str, message: str, folder: Path, orbiflow) -> None:
+    command, *options = (str(folder / word) if ".csv" in word else word for word in words.split())
+    before = sorted(folder.iterdir())
+    out = {"region": "x.json", "score": "x.csv", "plot": "x"}[command]
+    done = orbiflow("density", command, *options, "-m", folder, "--out", folder / out)
+    assert done.status == 2, done.out
+    assert message in done.err
+    assert sorted(folder.iterdir()) == before
