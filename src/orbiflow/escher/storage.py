@@ -14,6 +14,7 @@ import torch
 from safetensors.numpy import save
 
 from orbiflow.arguments import instance
+from orbiflow.arguments import path as as_path
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.escher.carried import Bending
 from orbiflow.escher.descent_settings import MAX_SEGMENTS
@@ -170,6 +171,7 @@ def load_saved(path: str | Path) -> SavedModel:
     Raises:
         InputFileError: for a file that is missing, too large or not such a model.
     """
+    path = as_path(path, "the model's file")
     settings, tensors = read_tensors(path, "a tile model", key=FORMAT, max_bytes=MAX_BYTES)
     with _naming(path):
         arrays: dict[str, Array] = {name: tensor.numpy() for name, tensor in tensors.items()}
