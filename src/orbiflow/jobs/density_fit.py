@@ -7,7 +7,6 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import asdict
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,10 +17,11 @@ from orbiflow.density.comparing import RowSketch
 from orbiflow.density.fitting.report import FitReport
 from orbiflow.density.tables import Table, read_labels
 from orbiflow.export.density_figures import MODEL
-from orbiflow.export.density_plots import PICTURES, REPORT, TABLE, THUMBNAIL
+from orbiflow.export.density_plots import REPORT, THUMBNAIL
 from orbiflow.files import write_atomic
 from orbiflow.folders import ResultFolder
 from orbiflow.jobs.density_data import unit_of
+from orbiflow.jobs.density_folder import written_files
 from orbiflow.jobs.density_groups import read_beside_groups
 from orbiflow.jobs.density_requests import DensityFitRequest
 from orbiflow.jobs.events import Finished, Note, Progress, Written
@@ -112,16 +112,6 @@ def told_of(tell: Sink, cancel: Cancel) -> Callable[[float, str], None]:
         tell(Progress(reached, what))
 
     return progress
-
-
-def written_files(folder: Path) -> set[str]:
-    """What an earlier fit wrote into the folder, and pictures of its model."""
-    try:
-        document = json.loads((folder / REPORT).read_text(encoding="utf-8"))
-        ours = "space" in document and "report" in document
-    except (OSError, ValueError, TypeError, RecursionError):
-        ours = False
-    return {MODEL, REPORT, TABLE, THUMBNAIL, *PICTURES} if ours else set()
 
 
 def _document(
