@@ -25,6 +25,7 @@ from orbiflow.jobs.density_folder import written_files
 from orbiflow.jobs.density_groups import read_beside_groups
 from orbiflow.jobs.density_requests import DensityFitRequest
 from orbiflow.jobs.events import Finished, Note, Progress, Written
+from orbiflow.jobs.place import check_folder
 from orbiflow.jobs.run import Sink
 from orbiflow.symmetry.isometry import Array
 from orbiflow.threads import one_thread
@@ -59,6 +60,7 @@ def density_fit(request: DensityFitRequest, tell: Sink, cancel: Cancel) -> Finis
         groups = read_labels(request.data, request.group, table, has_header=request.header)
     estimator = estimator_of(request, unit_of(request.space, request.unit, table, tell))
     folder = ResultFolder(request.out, written_files)
+    check_folder(request.out, request.data)
     estimator.fit(
         table.values, sample_weight=weights, groups=groups, progress=told_of(tell, cancel)
     )

@@ -37,7 +37,7 @@ def export(request: ExportRequest, tell: Sink, cancel: Cancel) -> Finished:
     settings = _settings(request)
     tile = read_result(request.result, request.tile)
     out = request.out or Path(f"{tile.name}.{settings.format}")
-    check_place(out)
+    check_place(out, request.result)
     tell(Progress(0.0, "laying out"))
     found, notes = scenes(tile, settings, force=request.force)
     contents: list[str | bytes] = []

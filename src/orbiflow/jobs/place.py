@@ -7,7 +7,7 @@ from pathlib import Path, PurePosixPath
 
 from orbiflow.errors import OutputError
 from orbiflow.export.density_figures import MODEL
-from orbiflow.export.gallery import RESULT
+from orbiflow.export.gallery import OVERVIEW, RESULT
 from orbiflow.export.gallery import written_files as files_of_a_search
 from orbiflow.folders import LITTER
 from orbiflow.jobs.density_folder import written_files as files_of_a_density
@@ -21,7 +21,7 @@ def check_place(out: Path, *reads: Path | None) -> None:
         reads: what the job reads, files and folders of runs; None is passed over.
 
     Raises:
-        OutputError: if it is a folder or a device, its folder is not there, it is one of `reads`, or
+        OutputError: if it is a folder or a device, its folder is not there, or `keep_inputs` or
             `keep_apart` refuses it.
     """
     if out.is_dir():
@@ -30,12 +30,24 @@ def check_place(out: Path, *reads: Path | None) -> None:
         raise OutputError(f"cannot write {out}: it is not a file; choose another name")
     if not out.parent.is_dir():
         raise OutputError(f"cannot write {out}: there is no folder {out.parent}; create it first")
+    keep_inputs(out, *reads)
+    keep_apart(out, *reads)
+
+
+def keep_inputs(out: Path, *reads: Path | None) -> None:
+    """Nothing, unless a file that is written is one that is read.
+
+    Args:
+        out, reads: as in `check_place`.
+
+    Raises:
+        OutputError: if it is, by whatever name or link.
+    """
     for read in reads:
         if read is not None and any(_same(out, file) for file in _files_read(read)):
             raise OutputError(
                 f"cannot write {out}: it would replace what is read: choose another --out"
             )
-    keep_apart(out, *reads)
 
 
 def check_folder(out: Path, *reads: Path | None, what: str = "file") -> None:
@@ -102,7 +114,9 @@ def _folder_of_run(read: Path) -> Path | None:
 
 
 def _known(folder: Path) -> set[str]:
-    return files_of_a_search(folder) | files_of_a_density(folder)
+    # a result.json alone is somebody's copy
+    found = files_of_a_search(folder) if (folder / OVERVIEW).is_file() else set[str]()
+    return found | files_of_a_density(folder)
 
 
 def _is_of_one_run(folder: Path, known: set[str]) -> bool:
