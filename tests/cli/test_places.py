@@ -1,4 +1,7 @@
-"""Commands do not write over what they read, nor into a run's folder that the next run then refuses."""
+"""Commands do not write over what they read, nor into a run's folder that the next run then refuses.
+
+Nor do they write a file that its name's ending belies.
+"""
 
 from __future__ import annotations
 
@@ -129,3 +132,37 @@ def test_the_next_run_is_not_refused(here: Path, orbiflow: Run) -> None:
     done = orbiflow("density", "fit", "data.csv", *KERNELS, "--out", "m")
     assert done.status == 0, done.err
     assert json.loads((here / "m" / "report.json").read_text())["columns"] == ["phi", "psi"]
+
+
+@pytest.mark.parametrize(
+    ("words", "endings"),
+    [
+        ("density sample -m m --out s.npy", ".csv, .tsv, .txt, .dat"),
+        ("density sample -m m --out x.geojson", ".csv, .tsv, .txt, .dat"),
+        ("density score data.csv -m m --out s.XLSX", ".csv, .tsv, .txt, .dat"),
+        ("density patches data.csv --out s.parquet", ".csv, .tsv, .txt, .dat"),
+        ("classes --out c.svg", ".png"),
+        ("classes --out c.jpg", ".png"),
+    ],
+)
+def test_an_ending_of_another_format_is_refused(
+    words: str, endings: str, here: Path, orbiflow: Run
+) -> None:
+    before = contents(here)
+    done = orbiflow(*words.split())
+    assert done.status == 2
+    assert f"--out must end in {endings}, got '{words.split()[-1]}'" in done.err
+    assert not done.out
+    assert contents(here) == before
+
+
+@pytest.mark.parametrize("name", ["s", "s.txt", "s.tsv", "s.dat", "run-1.5"])
+def test_text_may_be_called_otherwise(name: str, here: Path, orbiflow: Run) -> None:
+    done = orbiflow("density", "sample", "-m", "m", "-n", 2, "--out", name)
+    assert done.status == 0, done.err
+    assert (here / name).read_text().startswith("phi,psi\n")
+
+
+def test_a_picture_without_an_ending(here: Path, orbiflow: Run) -> None:
+    assert orbiflow("classes", "--out", "c").status == 0
+    assert (here / "c").read_bytes().startswith(b"\x89PNG")
