@@ -50,6 +50,7 @@ def here_fixture(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     here = tmp_path / "here"
     shutil.copytree(made, here)
     (here / "link.csv").symlink_to("data.csv")
+    shutil.copy(here / "m" / "density.safetensors", here / "model")
     (here / "linked").symlink_to("m", target_is_directory=True)
     monkeypatch.chdir(here)
     return here
@@ -62,12 +63,11 @@ def here_fixture(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
         ("density score data.csv -m m --out ./m/../data.csv", KEPT),
         ("density score link.csv -m m --out data.csv", KEPT),
         ("density score data.csv -m m --out link.csv", KEPT),
-        ("density score data.csv -m m --out m/density.safetensors", KEPT),
-        ("density score data.csv -m m/density.safetensors --out m/density.safetensors", KEPT),
+        ("density score data.csv -m model --out model", KEPT),
+        ("density sample -m model --out ./model", KEPT),
         ("density score data.csv -m m --out m/scores.csv", ALONE),
         ("density score data.csv -m m --out linked/scores.csv", ALONE),
         ("density score data.csv -m m --out m/density.csv", OWN),
-        ("density sample -m linked --out m/density.safetensors", KEPT),
         ("density sample -m m/density.safetensors --out m/s.csv", ALONE),
         ("density region -m m --out m/report.json", OWN),
         ("density region -m m --out m/regions.json", ALONE),
@@ -138,6 +138,7 @@ def test_the_next_run_is_not_refused(here: Path, orbiflow: Run) -> None:
     ("words", "endings"),
     [
         ("density sample -m m --out s.npy", ".csv, .tsv, .txt, .dat"),
+        ("density sample -m linked --out density.safetensors", ".csv, .tsv, .txt, .dat"),
         ("density sample -m m --out x.geojson", ".csv, .tsv, .txt, .dat"),
         ("density score data.csv -m m --out s.XLSX", ".csv, .tsv, .txt, .dat"),
         ("density patches data.csv --out s.parquet", ".csv, .tsv, .txt, .dat"),
