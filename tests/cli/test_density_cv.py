@@ -70,6 +70,8 @@ def test_ctrl_c_says_how_to_go_on(tmp_path: Path) -> None:
         (("--group", "chain"), "no column 'chain'; it has phi, psi, protein"),
         (("--columns", "phi,chi"), "no column 'chi'"),
         (("--against", "kernels,magic"), "--against must be of flow, kernels, mixture, chains"),
+        (("--against", "kernels"), "--parts and --against are both kernels: compare it with"),
+        (("--parts", "mixture,chains", "--against", "chains+mixture"), "both mixture+chains"),
         (("--workers", "0"), "--workers must be at least 1"),
         (("--workers", "2", "--scheduler", "tcp://127.0.0.1:1"), "of a --scheduler are its"),
         (("--out", "diary"), "holds page.txt, which is of no earlier cross-validation"),

@@ -132,3 +132,24 @@ def test_mistakes_of_rows(options: str, message: str, tmp_path: Path, orbiflow: 
     done = orbiflow(*("density", "fit", data, *KERNELS, "--out", tmp_path / "m", *options.split()))
     assert done.status == 2
     assert message in done.err
+
+
+@pytest.mark.parametrize("words", ["marginal --columns psi", "conditional --given chi=-100"])
+@pytest.mark.parametrize("place", [".", "density.safetensors", "link"])
+def test_the_model_is_not_replaced(
+    words: str, place: str, tmp_path: Path, model: Path, orbiflow: Run
+) -> None:
+    folder = tmp_path / "m"
+    done = orbiflow("density", "marginal", "-m", model, "--columns", "psi,chi", "--out", folder)
+    assert done.status == 0, done.err
+    before = {path.name: path.read_bytes() for path in folder.iterdir()}
+    (tmp_path / "link").symlink_to(folder, target_is_directory=True)
+    out = tmp_path / "link" if place == "link" else folder
+    given = folder / ("." if place == "link" else place)
+    done = orbiflow("density", *words.split(), "--model", given, "--out", out)
+    assert done.status == 2
+    assert "would replace the model that it reads: choose another --out" in done.err
+    inside = orbiflow("density", *words.split(), "--model", given, "--out", folder / "psi")
+    assert inside.status == 2
+    assert "holds the files of one run alone" in inside.err
+    assert {path.name: path.read_bytes() for path in folder.iterdir()} == before

@@ -132,6 +132,16 @@ MISTAKES: dict[str, tuple[list[str], str]] = {
     "ending": (["--format", "pdf"], "--out ends in .svg but --format is pdf"),
     "format": (["--format", "doc"], "--format"),
     "dots": (["--dpi", "0"], "--dpi must be from 1 to 10000"),
+    "dots of no picture": (["--dpi", "600"], "--dpi belongs to --format png, not to svg"),
+    "colours of lines": (
+        ["--for", "laser", "--palette", "sea"],
+        "--palette is of fills: it belongs to --cut none, not skeleton",
+    ),
+    "colours of pieces": (["--cut", "pieces", "--palette", "sea"], "--cut none, not pieces"),
+    "colours of a plotter": (
+        ["--for", "plotter", "--cut", "none", "--palette", "sea"],
+        "--palette is of fills, and --for plotter has none",
+    ),
     "tiny tiles": (["--tile-size", "0.5mm", "--tolerance", "0.01mm"], "the most is 20000"),
 }
 

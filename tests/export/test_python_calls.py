@@ -115,6 +115,20 @@ def test_the_ending_decides_an_animation_s_format(tmp_path: Path, found: TileRes
     assert animate(found, tmp_path / "a.gif", settings).read_bytes().startswith(b"GIF")
 
 
+def test_an_ending_of_no_format_is_refused_unless_settings_say_it(
+    tmp_path: Path, found: TileResult
+) -> None:
+    out = tmp_path / "a.xyz"
+    with pytest.raises(
+        OutputError, match=r"a\.xyz ends in \.xyz; give ExportSettings .*\.svg, \.pdf"
+    ):
+        export(found, out)
+    with pytest.raises(OutputError, match=r"a\.xyz ends in \.xyz; give AnimationSettings .*\.gif"):
+        animate(found, out)
+    assert not out.exists()
+    assert export(found, out, ExportSettings(format="json")).files == (out,)
+
+
 def test_a_tile_without_a_map_needs_the_target_for_pictures(tmp_path: Path) -> None:
     target, tile = animal("squirrel.dat"), squirrel("IH4").given.tile
     plain = Tile(tile.polygon, tile.group, "IH4")

@@ -7,6 +7,7 @@ from pathlib import Path
 from rich.table import Table
 
 from orbiflow.cli.console import output
+from orbiflow.errors import OutputError
 from orbiflow.figures import classes_png
 from orbiflow.files import write_atomic
 from orbiflow.symmetry.elements import symmetry_elements
@@ -16,7 +17,13 @@ _FREEDOM = {0: "none", 1: "one axis", 2: "any"}
 
 
 def run(out: Path | None) -> None:
-    """Print the table; draw the classes into `out`, a PNG file, if it is given."""
+    """Print the table; draw the classes into `out`, a PNG file, if it is given.
+
+    Raises:
+        OutputError: if it is named after another format, or cannot be written.
+    """
+    if out is not None and out.suffix.lower() not in ("", ".png"):
+        raise OutputError(f"--out must end in .png, got {out.name!r}")
     table = Table(title="The nine isohedral classes")
     for column in (
         "class",

@@ -9,7 +9,7 @@ from typing import Literal
 
 from orbiflow.arguments import number, whole
 from orbiflow.arguments import path as as_path
-from orbiflow.errors import CertificationError, OrbiflowError
+from orbiflow.errors import CertificationError, OrbiflowError, OutputError
 from orbiflow.escher.result import TileResult
 from orbiflow.escher.storage import SavedModel, load_saved
 from orbiflow.export.motion import Motion
@@ -84,19 +84,25 @@ def animate(
     Args:
         tile: in memory, or a run's folder; see `read_result`.
         out: the file; an ending .gif, .mp4 or .svg decides the format.
-        settings: see `AnimationSettings`; their format counts for other endings.
+        settings: see `AnimationSettings`; their format counts for other endings, which are refused
+            without them.
         force: take a tile that is not certified.
 
     Raises:
         CertificationError: for a tile that is not certified.
         OrbiflowError: for settings that cannot be met, in words.
-        OutputError: if the file cannot be written.
+        OutputError: if the file cannot be written, or nothing says its format.
     """
     out = as_path(out, "the file to animate to")
-    settings = settings or AnimationSettings()
     ending = out.suffix.lower().lstrip(".")
-    form = next((known for known in FORMATS if known == ending), settings.format)
-    settings = replace(settings, format=form)
+    form = next((known for known in FORMATS if known == ending), None)
+    if settings is None and ending and form is None:
+        raise OutputError(
+            f"{out.name} ends in .{ending}; give AnimationSettings with a format, or end it in "
+            f".{', .'.join(FORMATS)}"
+        )
+    settings = settings or AnimationSettings()
+    settings = replace(settings, format=form or settings.format)
     return write_atomic(out, animation(tile, settings, force=force))
 
 

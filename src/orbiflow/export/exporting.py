@@ -8,7 +8,7 @@ from pathlib import Path
 
 from orbiflow import __version__
 from orbiflow.arguments import path as as_path
-from orbiflow.errors import CertificationError, OrbiflowError
+from orbiflow.errors import CertificationError, OrbiflowError, OutputError
 from orbiflow.export.dxf_writer import write_dxf
 from orbiflow.export.json_writer import write_json
 from orbiflow.export.layout import Layout, layout
@@ -69,16 +69,17 @@ def export(
         tile: in memory, or a run's folder; see `read_result`.
         out: the file; with several sheets its name gets a number. An ending of a known format, such as
             .pdf, decides the format.
-        settings: see `ExportSettings`; their format counts for other endings.
+        settings: see `ExportSettings`; their format counts for other endings, which are refused
+            without them.
         force: export a tile that is not certified; the file says so.
 
     Raises:
         CertificationError: for a tile that is not certified.
         OrbiflowError: for settings that cannot be met, in words.
-        OutputError: if a file cannot be written.
+        OutputError: if a file cannot be written, or nothing says its format.
     """
     out = as_path(out, "the file to export to")
-    settings = _for_file(settings or ExportSettings(), out)
+    settings = _for_file(settings, out)
     found, notes = scenes(tile, settings, force=force)
     # all contents before the first file
     contents = [write_scene(scene, settings) for scene in found]
@@ -87,10 +88,16 @@ def export(
     return Exported(tuple(files), tuple(found), notes)
 
 
-def _for_file(settings: ExportSettings, out: Path) -> ExportSettings:
+def _for_file(settings: ExportSettings | None, out: Path) -> ExportSettings:
     ending = out.suffix.lower().lstrip(".")
-    known = next((form for form in FORMATS if form == ending), settings.format)
-    return replace(settings, format=known)
+    known = next((form for form in FORMATS if form == ending), None)
+    if settings is None and ending and known is None:
+        raise OutputError(
+            f"{out.name} ends in .{ending}; give ExportSettings with a format, or end it in "
+            f".{', .'.join(FORMATS)}"
+        )
+    settings = settings or ExportSettings()
+    return replace(settings, format=known or settings.format)
 
 
 def scenes(

@@ -6,6 +6,8 @@ import re
 from dataclasses import dataclass, fields
 from typing import Any, Literal
 
+import numpy as np
+
 from orbiflow.arguments import number, whole
 from orbiflow.errors import OrbiflowError
 from orbiflow.figures.palette import DEFAULT_PALETTE, palette
@@ -89,7 +91,7 @@ class ExportSettings:
         if self.copies is not None:
             whole(self.copies, "copies", 1)
         palette(self.palette)
-        if self.stroke is not None and not re.fullmatch("#[0-9a-fA-F]{6}", self.stroke):
+        if self.stroke is not None and not re.fullmatch("#[0-9a-fA-F]{6}", str(self.stroke)):
             raise OrbiflowError(f"stroke must be a colour such as #ff0000, got {self.stroke!r}")
         if self.tolerance is not None and self.tolerance > self.tile_size / 20:
             raise OrbiflowError(
@@ -99,8 +101,9 @@ class ExportSettings:
         self._check_cut()
 
     def _check_sides(self, name: str) -> None:
-        sides = getattr(self, name)
-        if len(sides) != 2:
+        sides: Any = getattr(self, name)
+        # neither text nor a set, which has no order
+        if not isinstance(sides, tuple | list | np.ndarray) or len(sides) != 2:
             raise OrbiflowError(f"{name} must be a width and a height in mm, got {sides!r}")
         for side in sides:
             number(side, name, 0, LARGEST, above=True)

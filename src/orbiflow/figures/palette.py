@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from typing import NamedTuple
 
+from orbiflow.arguments import instance
 from orbiflow.errors import OrbiflowError
 
 
@@ -98,6 +99,7 @@ def palette(name: str | Palette) -> Palette:
     """
     if isinstance(name, Palette):
         return name
+    name = instance(name, str, "a palette", "a name or colours")
     if name in PALETTES:
         return PALETTES[name]
     if "," in name or "=" in name or _HEX.fullmatch(name):

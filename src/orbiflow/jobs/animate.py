@@ -30,7 +30,7 @@ def animate(request: AnimateRequest, tell: Sink, cancel: Cancel) -> Finished:
     settings = _settings(request)
     tile = read_result(request.result, request.tile)
     out = request.out or Path(f"{tile.name}-{settings.kind}.{settings.format}")
-    check_place(out)
+    check_place(out, request.result)
 
     def told(share: float) -> None:
         cancel.check()

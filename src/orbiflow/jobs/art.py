@@ -37,7 +37,7 @@ def art(request: ArtRequest, tell: Sink, cancel: Cancel) -> Finished:
     tile = read_art_tile(request.result, request.tile)
     require_certified(tile.given, force=request.force)
     out = request.out or Path(f"{tile.given.name}.png")
-    check_place(out)
+    check_place(out, request.result, request.picture)
     tell(Progress(0.0, "laying out"))
     made = _prepared(request, tile, settings)
     cancel.check()

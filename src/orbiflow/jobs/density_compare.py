@@ -49,7 +49,7 @@ def density_compare(request: DensityCompareRequest, tell: Sink, cancel: Cancel) 
         Cancelled: if it was told to stop; nothing is written.
     """
     if request.out is not None:
-        check_place(request.out)
+        check_place(request.out, *request.models, *request.data)
     compare = _compare_models if request.models else _compare_data
     found = compare(request, tell, cancel)
     document = found.to_json()

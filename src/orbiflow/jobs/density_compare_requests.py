@@ -13,7 +13,7 @@ from orbiflow.jobs.density_requests import (
     region_samples_in_range,
 )
 from orbiflow.jobs.records import RecordError
-from orbiflow.jobs.request import Request, in_range
+from orbiflow.jobs.request import Request, ends_in, in_range
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class DensityCompareRequest(Request):
         in_range(self, "permutations", 19, 100_000)
         in_range(self, "level", 0.5, 0.999)
         in_range(self, "seed", 0, 2**63 - 1)
-        _ending(self.out, (".json", ".csv"))
+        ends_in(self.out, (".json", ".csv"))
 
     def _check_models(self) -> None:
         if len(self.models) < 2:
@@ -113,9 +113,4 @@ class DensityRegionRequest(Request):
         region_samples_in_range(self, "samples")
         in_range(self, "budget", 1, 10**9)
         in_range(self, "seed", 0, 2**63 - 2)
-        _ending(self.out, (".geojson", ".json", ".csv"))
-
-
-def _ending(out: Path | None, endings: tuple[str, ...]) -> None:
-    if out is not None and out.suffix.lower() not in endings:
-        raise RecordError(f"{{out}} must end in {', '.join(endings)}, got {out.name!r}")
+        ends_in(self.out, (".geojson", ".json", ".csv"))

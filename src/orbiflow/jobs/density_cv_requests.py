@@ -113,16 +113,22 @@ class DensityCvRequest(Request):
         in_range(self, "level", 0.5, 0.999)
         in_range(self, "bootstrap", 100, 1_000_000)
         in_range(self, "seed", 0, 2**63 - 1)
-        self.settings()
+        self._check_against()
         self.whole_fit()
+
+    def _check_against(self) -> None:
+        name, _ = setting_of(self.parts, "parts")
+        if name in [_setting_in(text)[0] for text in self.against or () if text != UNIFORM]:
+            raise RecordError(
+                f"{{parts}} and {{against}} are both {name}: compare it with others, or with uniform"
+            )
 
     def settings(self) -> dict[str, tuple[str, ...] | None]:
         """Parts by the name of each setting that is fitted; the first is the one in question."""
         found = dict([setting_of(self.parts, "parts")])
         for text in self.against or (() if self.against == () else ("kernels",)):
             if text != UNIFORM:
-                parts = None if text == DEFAULT else parts_in(text)
-                found.setdefault(*setting_of(parts, "against"))
+                found.setdefault(*_setting_in(text))
         return found
 
     @property
@@ -189,6 +195,11 @@ def setting_of(parts: Sequence[str] | None, field: str) -> tuple[str, tuple[str,
         )
     own = tuple(part for part in PARTS if part in parts)
     return (DEFAULT, None) if own == PARTS else ("+".join(own), own)
+
+
+def _setting_in(text: str) -> tuple[str, tuple[str, ...] | None]:
+    """Of a word of `against`."""
+    return setting_of(None if text == DEFAULT else parts_in(text), "against")
 
 
 def parts_in(text: str) -> list[str]:

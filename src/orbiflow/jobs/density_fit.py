@@ -7,7 +7,6 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import asdict
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,13 +18,15 @@ from orbiflow.density.comparing import RowSketch
 from orbiflow.density.fitting.report import FitReport
 from orbiflow.density.tables import Table, read_labels
 from orbiflow.export.density_figures import MODEL
-from orbiflow.export.density_plots import PICTURES, REPORT, TABLE, THUMBNAIL
+from orbiflow.export.density_plots import REPORT, THUMBNAIL
 from orbiflow.files import write_atomic
 from orbiflow.folders import ResultFolder
 from orbiflow.jobs.density_data import unit_of
+from orbiflow.jobs.density_folder import written_files
 from orbiflow.jobs.density_groups import read_beside_groups
 from orbiflow.jobs.density_requests import DensityFitRequest
 from orbiflow.jobs.events import Finished, Note, Progress, Written
+from orbiflow.jobs.place import check_folder
 from orbiflow.jobs.run import Sink
 from orbiflow.symmetry.isometry import Array
 from orbiflow.threads import one_thread
@@ -61,6 +62,7 @@ def density_fit(request: DensityFitRequest, tell: Sink, cancel: Cancel) -> Finis
         groups = read_labels(request.data, request.group, table, has_header=request.header)
     estimator = estimator_of(request, unit_of(request.space, request.unit, table, tell))
     folder = ResultFolder(request.out, written_files)
+    check_folder(request.out, request.data)
     estimator.fit(
         table.values, sample_weight=weights, groups=groups, progress=told_of(tell, cancel)
     )
@@ -114,16 +116,6 @@ def told_of(tell: Sink, cancel: Cancel) -> Callable[[float, str], None]:
         tell(Progress(reached, what))
 
     return progress
-
-
-def written_files(folder: Path) -> set[str]:
-    """What an earlier fit wrote into the folder, and pictures of its model."""
-    try:
-        document = json.loads((folder / REPORT).read_text(encoding="utf-8"))
-        ours = "space" in document and "report" in document
-    except (OSError, ValueError, TypeError, RecursionError):
-        ours = False
-    return {MODEL, REPORT, TABLE, THUMBNAIL, *PICTURES} if ours else set()
 
 
 def _document(

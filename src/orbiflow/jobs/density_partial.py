@@ -27,9 +27,10 @@ from orbiflow.figures import corner_picture, density_picture
 from orbiflow.files import write_atomic
 from orbiflow.folders import ResultFolder
 from orbiflow.jobs.density_data import model_at
-from orbiflow.jobs.density_fit import written_files
+from orbiflow.jobs.density_folder import written_files
 from orbiflow.jobs.density_requests import DensityConditionalRequest, DensityMarginalRequest
 from orbiflow.jobs.events import Finished, Note, Progress, Written
+from orbiflow.jobs.place import check_folder
 from orbiflow.jobs.records import RecordError
 from orbiflow.jobs.run import Sink
 from orbiflow.symmetry.isometry import Array
@@ -55,6 +56,7 @@ def density_marginal(request: DensityMarginalRequest, tell: Sink, cancel: Cancel
         OrbiflowError: for anything that the user can mend.
         Cancelled: if it was told to stop; nothing is written.
     """
+    check_folder(request.out, request.model, what="model")
     density, extra = model_at(request.model)
     names = _names(density, extra)
     axes = _axes(request.columns, names)
@@ -77,6 +79,7 @@ def density_conditional(request: DensityConditionalRequest, tell: Sink, cancel: 
         OrbiflowError: for anything that the user can mend.
         Cancelled: if it was told to stop; nothing is written.
     """
+    check_folder(request.out, request.model, what="model")
     density, extra = model_at(request.model)
     names = _names(density, extra)
     pairs = [_pair(text) for text in request.given]

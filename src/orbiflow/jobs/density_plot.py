@@ -19,7 +19,7 @@ from orbiflow.jobs.asked import given, read_as, samples_asked
 from orbiflow.jobs.density_data import model_at, read_data, same_columns
 from orbiflow.jobs.density_requests import DensityPlotRequest
 from orbiflow.jobs.events import Finished, Note, Progress, Written
-from orbiflow.jobs.place import check_place
+from orbiflow.jobs.place import check_place, keep_apart
 from orbiflow.jobs.records import RecordError
 from orbiflow.jobs.run import Sink
 from orbiflow.threads import one_thread
@@ -40,8 +40,11 @@ def density_plot(request: DensityPlotRequest, tell: Sink, cancel: Cancel) -> Fin
     """
     single = is_one_file(request.out)
     _check_format(request, single)
+    reads = (request.model, request.data, request.coastlines)
     if single:
-        check_place(request.out)
+        check_place(request.out, *reads)
+    else:  # pictures may stand beside their model
+        keep_apart(request.out, *reads)
     density, extra = model_at(request.model)
     settings = _settings(request, density.space, extra.get("columns"))
     points = None

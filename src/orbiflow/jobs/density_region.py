@@ -34,7 +34,7 @@ def density_region(request: DensityRegionRequest, tell: Sink, cancel: Cancel) ->
         OrbiflowError: for anything that the user can mend.
         Cancelled: if it was told to stop; nothing is written.
     """
-    check_place(request.out)
+    check_place(request.out, request.model)
     density, _ = model_at(request.model)
     kind = request.out.suffix.lower()
     space = density.space

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Literal
 
 from orbiflow.jobs.records import RecordError
-from orbiflow.jobs.request import Request, in_range
+from orbiflow.jobs.request import Request, ends_as_table, in_range
 
 MOST_SAMPLES = 100_000_000
 MOST_DOTS = 100_000
@@ -114,6 +114,7 @@ class DensityScoreRequest(Request):
     table: bool = False
 
     def check(self) -> None:
+        ends_as_table(self.out)
         columns_named(self.columns)
         _check_missing(self.drop_missing, self.missing)
         region_samples_in_range(self, "samples")
@@ -141,6 +142,7 @@ class DensitySampleRequest(Request):
     seed: int = 0
 
     def check(self) -> None:
+        ends_as_table(self.out)
         if not 1 <= self.count <= MOST_SAMPLES:
             raise RecordError(f"{{count}} must be from 1 to {MOST_SAMPLES}, got {self.count}")
 
@@ -206,6 +208,7 @@ class PatchesRequest(Request):
     farthest: float | None = None
 
     def check(self) -> None:
+        ends_as_table(self.out)
         columns_named(self.columns)
         if self.farthest is not None and not self.farthest >= 0:
             raise RecordError(f"{{farthest}} must be at least 0, got {self.farthest:g}")

@@ -24,6 +24,7 @@ from orbiflow.jobs.density_data import model_at, read_data, read_weighed, same_c
 from orbiflow.jobs.density_requests import DensitySampleRequest, DensityScoreRequest, PatchesRequest
 from orbiflow.jobs.density_scores import evaluated
 from orbiflow.jobs.events import Finished, Note, Progress, Written
+from orbiflow.jobs.place import check_place
 from orbiflow.jobs.run import Sink
 from orbiflow.symmetry.isometry import Array
 from orbiflow.threads import one_thread
@@ -41,6 +42,7 @@ def density_score(request: DensityScoreRequest, tell: Sink, cancel: Cancel) -> F
         OrbiflowError: for anything that the user can mend.
         Cancelled: if it was told to stop; nothing is written.
     """
+    check_place(request.out, request.data, request.model)
     density, extra = model_at(request.model)
     columns = request.columns or same_columns(request.data, extra, tell, has_header=request.header)
     keep = request.missing == "marginalise"
@@ -118,6 +120,7 @@ def density_sample(request: DensitySampleRequest, tell: Sink, cancel: Cancel) ->
         OrbiflowError: for anything that the user can mend.
         Cancelled: if it was told to stop; nothing is written.
     """
+    check_place(request.out, request.model)
     density, extra = model_at(request.model)
     generator = torch.Generator().manual_seed(request.seed)
     data = density.space.from_chart(density.sample((request.count,), generator))
@@ -142,6 +145,7 @@ def density_patches(request: PatchesRequest, tell: Sink, cancel: Cancel) -> Fini
         OrbiflowError: for anything that the user can mend.
         Cancelled: if it was told to stop; nothing is written.
     """
+    check_place(request.out, request.data)
     table = read_data(request.data, request.columns, None, tell)
     angles, distances = to_klein(table.values, unit=request.unit)
     near = distances <= (np.inf if request.farthest is None else request.farthest)

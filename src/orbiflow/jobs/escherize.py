@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import time
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 from orbiflow.cancel import Cancel
@@ -35,6 +36,7 @@ from orbiflow.jobs.events import (
     TileFound,
     Written,
 )
+from orbiflow.jobs.place import check_folder
 from orbiflow.jobs.records import RecordError
 from orbiflow.jobs.run import Sink
 from orbiflow.jobs.tile_requests import EscherizeRequest
@@ -67,6 +69,8 @@ def escherize(request: EscherizeRequest, tell: Sink, cancel: Cancel) -> Finished
     workers = min(request.workers or os.cpu_count() or 1, len(names))
     target, emphasis, pins = _read(request)
     folder = ResultFolder(request.out, written_files)
+    masks = [Path(pin) for pin in request.pin or ()]
+    check_folder(request.out, request.image, request.emphasis, *masks)
     for source in (target, emphasis, pins):
         for note in source.notes if source else ():
             tell(Note(note))

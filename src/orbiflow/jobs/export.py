@@ -37,7 +37,7 @@ def export(request: ExportRequest, tell: Sink, cancel: Cancel) -> Finished:
     settings = _settings(request)
     tile = read_result(request.result, request.tile)
     out = request.out or Path(f"{tile.name}.{settings.format}")
-    check_place(out)
+    check_place(out, request.result)
     tell(Progress(0.0, "laying out"))
     found, notes = scenes(tile, settings, force=request.force)
     contents: list[str | bytes] = []
@@ -93,8 +93,23 @@ def _settings(request: ExportRequest) -> ExportSettings:
             f"{{out}} ends in .{ending} but {{format}} is {asked['format']}; make them the same"
         )
     if request.purpose is None:
-        return ExportSettings(**asked)
-    return ExportSettings.preset(request.purpose, **asked)
+        settings = ExportSettings(**asked)
+    else:
+        settings = ExportSettings.preset(request.purpose, **asked)
+    _refuse_unused(request, settings)
+    return settings
+
+
+def _refuse_unused(request: ExportRequest, settings: ExportSettings) -> None:
+    """Raises a `RecordError` for what was asked for and would change nothing."""
+    if request.dpi is not None and settings.format != "png":
+        raise RecordError(f"{{dpi}} belongs to {{format}} png, not to {settings.format}")
+    if request.palette is not None and settings.cut != "none":
+        raise RecordError(
+            f"{{palette}} is of fills: it belongs to {{cut}} none, not {settings.cut}"
+        )
+    if request.palette is not None and not settings.filled:
+        raise RecordError(f"{{palette}} is of fills, and {{purpose}} {request.purpose} has none")
 
 
 def _lengths(request: ExportRequest) -> dict[str, Any]:

@@ -50,7 +50,7 @@ TILES = FolderKind(
 
 
 def _files_of_a_fit(folder: Path) -> set[str]:
-    from orbiflow.jobs.density_fit import written_files
+    from orbiflow.jobs.density_folder import written_files
 
     return written_files(folder)
 

@@ -15,6 +15,7 @@ from orbiflow.jobs.density_cv.splits import fits_of, item_of, splits_of
 from orbiflow.jobs.density_cv_requests import DensityCvRequest
 from orbiflow.jobs.density_fold import written_files
 from orbiflow.jobs.events import Finished, Note
+from orbiflow.jobs.place import keep_apart, keep_inputs
 from orbiflow.jobs.run import Sink
 from orbiflow.threads import one_thread
 
@@ -48,6 +49,9 @@ def density_cv(request: DensityCvRequest, tell: Sink, cancel: Cancel) -> Finishe
         OrbiflowError: for anything that the user can mend; what was finished is kept.
     """
     begin = time.perf_counter()
+    keep_apart(request.out, request.data)
+    for name in (TABLE, ROWS, REPORT, PAGE):
+        keep_inputs(request.out / name, request.data)
     with one_thread():
         rows = read_rows(request, tell)
     splits = splits_of(request, rows)

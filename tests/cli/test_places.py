@@ -1,0 +1,169 @@
+"""Commands do not write over what they read, nor into a run's folder that the next run then refuses.
+
+Nor do they write a file that its name's ending belies.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cli.conftest import Run, call_main
+from jobs.searches import boot_request
+from orbiflow.jobs import run
+
+KERNELS = ("--parts", "kernels", "--space", "torus", "--unit", "degrees")
+KEPT = "would replace what is read: choose another --out"
+OWN = "is a file of the run in"
+ALONE = "holds the files of one run alone, and the next run there would refuse others"
+
+
+@pytest.fixture(name="made", scope="module")
+def made_fixture(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """`data.csv`, its fit `m` and a marginal `psi`; `r`, what a search of `boot.json` left."""
+    folder = tmp_path_factory.mktemp("made")
+    angles = np.random.default_rng(0).normal([20.0, 60.0], 25.0, (40, 2))
+    np.savetxt(folder / "data.csv", angles, "%.3f", ",", header="phi,psi", comments="")
+    fit = ("density", "fit", folder / "data.csv", *KERNELS, "--out", folder / "m")
+    marginal = ("density", "marginal", "-m", folder / "m", "--columns", "psi")
+    for words in (fit, (*marginal, "--out", folder / "psi")):
+        assert call_main(lambda: ("", ""), *words).status == 0
+    run(boot_request(folder, "IH4"), lambda _: None)
+    (folder / "out").rename(folder / "r")
+    return folder
+
+
+def contents(folder: Path) -> dict[str, bytes | None]:
+    """Of all files; folders, too."""
+    return {
+        path.relative_to(folder).as_posix(): path.read_bytes() if path.is_file() else None
+        for path in folder.rglob("*")
+    }
+
+
+@pytest.fixture(name="here")
+def here_fixture(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    here = tmp_path / "here"
+    shutil.copytree(made, here)
+    (here / "link.csv").symlink_to("data.csv")
+    shutil.copy(here / "m" / "density.safetensors", here / "model")
+    (here / "linked").symlink_to("m", target_is_directory=True)
+    monkeypatch.chdir(here)
+    return here
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ("density score data.csv -m m --out data.csv", KEPT),
+        ("density score data.csv -m m --out ./m/../data.csv", KEPT),
+        ("density score link.csv -m m --out data.csv", KEPT),
+        ("density score data.csv -m m --out link.csv", KEPT),
+        ("density score data.csv -m model --out model", KEPT),
+        ("density sample -m model --out ./model", KEPT),
+        ("density score data.csv -m m --out m/scores.csv", ALONE),
+        ("density score data.csv -m m --out linked/scores.csv", ALONE),
+        ("density score data.csv -m m --out m/density.csv", OWN),
+        ("density sample -m m/density.safetensors --out m/s.csv", ALONE),
+        ("density region -m m --out m/report.json", OWN),
+        ("density region -m m --out m/regions.json", ALONE),
+        ("density compare -m m -m psi -d data.csv --out data.csv", KEPT),
+        ("density compare -m m -m psi -d data.csv --out psi/c.json", ALONE),
+        ("density patches data.csv --out data.csv", KEPT),
+        ("density plot -m m --out m/plots.pdf", ALONE),
+        ("density plot -m m --out m/pictures", ALONE),
+        (
+            "density fit psi/density.csv --space torus --unit degrees --out psi",
+            "would replace the file",
+        ),
+        ("density fit psi/density.csv --space torus --unit degrees --out psi/again", ALONE),
+        ("density cv cv/rows.csv --space torus --out cv", KEPT),
+        ("density marginal -m m --columns psi --out m/psi", ALONE),
+        ("export r --out r/result.json", KEPT),
+        ("export r/result.json --out r/result.json", KEPT),
+        ("export r --out r/k.svg", ALONE),
+        ("export r/result.json --out r/k.svg", ALONE),
+        ("export r --out r/IH4/tiling.svg", OWN),
+        ("art r --out r/overview.png", OWN),
+        ("art r --picture picture.svg --out picture.svg", KEPT),
+        ("animate r --out r/turtle.gif", ALONE),
+        ("escherize r/IH4/tile.svg --classes IH4 --out r", "would replace the file that it reads"),
+    ],
+)
+def test_what_is_read_stays(words: str, message: str, here: Path, orbiflow: Run) -> None:
+    shutil.copy(here / "r" / "IH4" / "tile.svg", here / "picture.svg")
+    (here / "cv").mkdir()
+    shutil.copy(here / "data.csv", here / "cv" / "rows.csv")
+    before = contents(here)
+    done = orbiflow(*words.split())
+    assert done.status == 2, done.out
+    assert message in done.err
+    assert "choose another --out" in done.err
+    assert contents(here) == before
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "density score data.csv -m m --out scores.csv",  # beside the data
+        "density score psi/density.csv -m psi --out scores.csv",
+        "export r --out k.svg",
+        "export copy/result.json --out copy/k.svg",  # no run's folder: it holds other files
+        "density sample -m copy/density.safetensors --out copy/s.csv",
+        "density plot -m m --out m",  # documented
+    ],
+)
+def test_other_places_are_fine(words: str, here: Path, orbiflow: Run) -> None:
+    (here / "copy").mkdir()
+    (here / "copy" / "notes.txt").write_text("mine")
+    shutil.copy(here / "r" / "result.json", here / "copy")
+    for path in (here / "m").iterdir():
+        shutil.copy(path, here / "copy")
+    done = orbiflow(*words.split())
+    assert done.status == 0, done.err
+
+
+def test_the_next_run_is_not_refused(here: Path, orbiflow: Run) -> None:
+    assert orbiflow("density", "plot", "-m", "m", "--out", "m").status == 0
+    done = orbiflow("density", "fit", "data.csv", *KERNELS, "--out", "m")
+    assert done.status == 0, done.err
+    assert json.loads((here / "m" / "report.json").read_text())["columns"] == ["phi", "psi"]
+
+
+@pytest.mark.parametrize(
+    ("words", "endings"),
+    [
+        ("density sample -m m --out s.npy", ".csv, .tsv, .txt, .dat"),
+        ("density sample -m linked --out density.safetensors", ".csv, .tsv, .txt, .dat"),
+        ("density sample -m m --out x.geojson", ".csv, .tsv, .txt, .dat"),
+        ("density score data.csv -m m --out s.XLSX", ".csv, .tsv, .txt, .dat"),
+        ("density patches data.csv --out s.parquet", ".csv, .tsv, .txt, .dat"),
+        ("classes --out c.svg", ".png"),
+        ("classes --out c.jpg", ".png"),
+    ],
+)
+def test_an_ending_of_another_format_is_refused(
+    words: str, endings: str, here: Path, orbiflow: Run
+) -> None:
+    before = contents(here)
+    done = orbiflow(*words.split())
+    assert done.status == 2
+    assert f"--out must end in {endings}, got '{words.split()[-1]}'" in done.err
+    assert not done.out
+    assert contents(here) == before
+
+
+@pytest.mark.parametrize("name", ["s", "s.txt", "s.tsv", "s.dat", "run-1.5"])
+def test_text_may_be_called_otherwise(name: str, here: Path, orbiflow: Run) -> None:
+    done = orbiflow("density", "sample", "-m", "m", "-n", 2, "--out", name)
+    assert done.status == 0, done.err
+    assert (here / name).read_text().startswith("phi,psi\n")
+
+
+def test_a_picture_without_an_ending(here: Path, orbiflow: Run) -> None:
+    assert orbiflow("classes", "--out", "c").status == 0
+    assert (here / "c").read_bytes().startswith(b"\x89PNG")
