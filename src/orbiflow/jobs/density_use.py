@@ -17,16 +17,23 @@ from orbiflow.density.partial import chart_of_observed
 from orbiflow.density.regions import DensityLevels, told_masses
 from orbiflow.density.spaces.patches import to_klein
 from orbiflow.density.tables import append_columns, to_csv
+from orbiflow.density.tables.table import listing
 from orbiflow.errors import OrbiflowError
 from orbiflow.files import write_atomic
 from orbiflow.jobs.asked import samples_asked
-from orbiflow.jobs.density_data import model_at, read_data, read_weighed, same_columns
+from orbiflow.jobs.density_data import read_data, read_weighed, same_columns
+from orbiflow.jobs.density_models import check_fits, model_at
 from orbiflow.jobs.density_requests import DensitySampleRequest, DensityScoreRequest, PatchesRequest
 from orbiflow.jobs.density_scores import evaluated
 from orbiflow.jobs.events import Finished, Note, Progress, Written
+from orbiflow.jobs.place import check_text
 from orbiflow.jobs.run import Sink
+from orbiflow.jobs.wording import counted
 from orbiflow.symmetry.isometry import Array
 from orbiflow.threads import one_thread
+
+PATCH_WIDTHS = (8, 9)
+"""Columns of image patches."""
 
 
 @one_thread()
@@ -41,6 +48,7 @@ def density_score(request: DensityScoreRequest, tell: Sink, cancel: Cancel) -> F
         OrbiflowError: for anything that the user can mend.
         Cancelled: if it was told to stop; nothing is written.
     """
+    check_text(request.out)
     density, extra = model_at(request.model)
     columns = request.columns or same_columns(request.data, extra, tell, has_header=request.header)
     keep = request.missing == "marginalise"
@@ -55,6 +63,7 @@ def density_score(request: DensityScoreRequest, tell: Sink, cancel: Cancel) -> F
         keep_missing=keep,
     )
     space = density.space
+    check_fits(request.data, table, space, extra, tell)
     points = chart_of_observed(space, table.values) if keep else space.to_chart(table.values)
     known = ~points.isnan()
     lacking = int((~known.all(dim=1)).sum())
@@ -118,6 +127,7 @@ def density_sample(request: DensitySampleRequest, tell: Sink, cancel: Cancel) ->
         OrbiflowError: for anything that the user can mend.
         Cancelled: if it was told to stop; nothing is written.
     """
+    check_text(request.out)
     density, extra = model_at(request.model)
     generator = torch.Generator().manual_seed(request.seed)
     data = density.space.from_chart(density.sample((request.count,), generator))
@@ -142,7 +152,14 @@ def density_patches(request: PatchesRequest, tell: Sink, cancel: Cancel) -> Fini
         OrbiflowError: for anything that the user can mend.
         Cancelled: if it was told to stop; nothing is written.
     """
+    check_text(request.out)
     table = read_data(request.data, request.columns, None, tell)
+    if len(table.columns) not in PATCH_WIDTHS:
+        raise OrbiflowError(
+            f"{request.data}: a patch has 9 pixel values or 8 DCT coordinates, and there "
+            f"{'is' if len(table.columns) == 1 else 'are'} {counted(len(table.columns), 'column')} "
+            f"({listing(table.columns)}): choose with --columns"
+        )
     angles, distances = to_klein(table.values, unit=request.unit)
     near = distances <= (np.inf if request.farthest is None else request.farthest)
     if not near.any():

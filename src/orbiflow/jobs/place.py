@@ -6,6 +6,26 @@ from pathlib import Path
 
 from orbiflow.errors import OutputError
 
+NOT_TEXT = frozenset(
+    {
+        ".npy",
+        ".npz",
+        ".parquet",
+        ".feather",
+        ".mat",
+        ".xls",
+        ".xlsx",
+        ".ods",
+        ".json",
+        ".pdf",
+        ".png",
+        ".svg",
+        ".html",
+        ".safetensors",
+    }
+)
+"""Endings of names of other files than tables in text."""
+
 
 def check_place(out: Path) -> None:
     """Nothing, if a file can be written there; a device must not be replaced by one.
@@ -19,3 +39,17 @@ def check_place(out: Path) -> None:
         raise OutputError(f"cannot write {out}: it is not a file; choose another name")
     if not out.parent.is_dir():
         raise OutputError(f"cannot write {out}: there is no folder {out.parent}; create it first")
+
+
+def check_text(out: Path) -> None:
+    """As `check_place`, of a table that is written as text, whose name must not say otherwise.
+
+    Raises:
+        OutputError: as `check_place`, and for a name like that of another kind of file.
+    """
+    if out.suffix.lower() in NOT_TEXT:
+        raise OutputError(
+            f"cannot write {out}: tables are written as text, and nothing would read it by this name: "
+            "choose one that ends in .csv"
+        )
+    check_place(out)
