@@ -30,7 +30,10 @@ def test_mistakes(tmp_path: Path, orbiflow) -> None:
     data.write_text("1,2,3,1,2,3,1,2,3\n" + "5,5,5,5,5,5,5,5,5\n")
     for arguments, message in (
         ((data,), "row 2: a patch without contrast"),
-        ((data, "--columns", "1,2,3"), "(N, 8) or (N, 9)"),
+        (
+            (data, "--columns", "1,2,3"),
+            "9 pixel values or 8 DCT coordinates, and there are 3 columns",
+        ),
         ((data, "--farthest", -1), "--farthest must be at least 0"),
         ((tmp_path / "nowhere.csv",), "no such file"),
     ):

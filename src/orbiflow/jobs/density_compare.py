@@ -27,7 +27,8 @@ from orbiflow.density.tables import Table, column_names, read_labels
 from orbiflow.errors import OrbiflowError
 from orbiflow.files import write_atomic
 from orbiflow.jobs.density_compare_requests import DensityCompareRequest
-from orbiflow.jobs.density_data import model_at, read_data, same_columns, unit_of
+from orbiflow.jobs.density_data import read_data, same_columns, unit_of
+from orbiflow.jobs.density_models import check_fits, model_at
 from orbiflow.jobs.events import Finished, Note, Progress, Written
 from orbiflow.jobs.place import check_place
 from orbiflow.jobs.run import Sink
@@ -78,7 +79,9 @@ def _compare_models(request: DensityCompareRequest, tell: Sink, cancel: Cancel) 
     notes: list[str] = []
     for k, (name, own, (density, extra)) in enumerate(zip(names, columns, read, strict=True)):
         if own not in tables:
-            tables[own] = _table(request, data, own, tell if not tables else lambda _: None)
+            told_once: Sink = (lambda _: None) if tables else tell
+            tables[own] = _table(request, data, own, told_once)
+            check_fits(data, tables[own], density.space, extra, told_once)
         values = tables[own].values
 
         def told(share: float, k: int = k) -> None:

@@ -1,4 +1,4 @@
-"""Tables and models that the density jobs read."""
+"""Tables that the density jobs read."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from orbiflow.density import SymmetricDensity, read_density
 from orbiflow.density.tables import (
     Table,
     column_names,
@@ -20,16 +19,10 @@ from orbiflow.density.tables import (
 )
 from orbiflow.density.tables.table import listing
 from orbiflow.errors import InputFileError, OrbiflowError
-from orbiflow.export.density_figures import MODEL
 from orbiflow.jobs.density_columns import check_order
 from orbiflow.jobs.density_requests import Unit
 from orbiflow.jobs.events import Note
 from orbiflow.jobs.run import Sink
-
-
-def model_at(path: Path) -> tuple[SymmetricDensity, dict[str, Any]]:
-    """The density in a file or in the folder of a fit, and what was saved with it."""
-    return read_density(path / MODEL if path.is_dir() else path)
 
 
 def read_data(

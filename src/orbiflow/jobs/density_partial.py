@@ -26,8 +26,8 @@ from orbiflow.export.density_plots import REPORT, TABLE
 from orbiflow.figures import corner_picture, density_picture
 from orbiflow.files import write_atomic
 from orbiflow.folders import ResultFolder
-from orbiflow.jobs.density_data import model_at
 from orbiflow.jobs.density_folder import written_files
+from orbiflow.jobs.density_models import model_at, unit_warning
 from orbiflow.jobs.density_requests import DensityConditionalRequest, DensityMarginalRequest
 from orbiflow.jobs.events import Finished, Note, Progress, Written
 from orbiflow.jobs.place import check_folder
@@ -86,6 +86,11 @@ def density_conditional(request: DensityConditionalRequest, tell: Sink, cancel: 
     axes = _axes([name for name, _ in pairs], names)
     values = list(zip(axes, (value for _, value in pairs), strict=True))
     given = given_named(density.space, values, names)
+    warning = unit_warning(
+        density.space, np.array([[value for _, value in values]]), [names[axis] for axis in axes]
+    )
+    if warning:
+        tell(Note(f"WARNING: {warning}"))
     left = [axis for axis in range(len(names)) if axis not in given]
     kept = left
     if request.columns is not None:

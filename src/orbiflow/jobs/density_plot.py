@@ -16,7 +16,8 @@ from orbiflow.export.density_plots import is_one_file, plot_density
 from orbiflow.export.lengths import column_width
 from orbiflow.figures.coastlines import read_coastlines
 from orbiflow.jobs.asked import given, read_as, samples_asked
-from orbiflow.jobs.density_data import model_at, read_data, same_columns
+from orbiflow.jobs.density_data import read_data, same_columns
+from orbiflow.jobs.density_models import check_fits, model_at
 from orbiflow.jobs.density_requests import DensityPlotRequest
 from orbiflow.jobs.events import Finished, Note, Progress, Written
 from orbiflow.jobs.place import check_place, keep_apart
@@ -50,7 +51,9 @@ def density_plot(request: DensityPlotRequest, tell: Sink, cancel: Cancel) -> Fin
     points = None
     if request.data is not None:
         columns = request.columns or same_columns(request.data, extra, tell)
-        points = read_data(request.data, columns, None, tell).values
+        table = read_data(request.data, columns, None, tell)
+        check_fits(request.data, table, density.space, extra, tell)
+        points = table.values
 
     def told(share: float, what: str) -> None:
         cancel.check()

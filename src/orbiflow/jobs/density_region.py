@@ -13,7 +13,7 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.files import write_atomic
 from orbiflow.jobs.asked import samples_asked
 from orbiflow.jobs.density_compare_requests import DensityRegionRequest
-from orbiflow.jobs.density_data import model_at
+from orbiflow.jobs.density_models import model_at
 from orbiflow.jobs.events import Finished, Note, Progress, Written
 from orbiflow.jobs.place import check_place
 from orbiflow.jobs.run import Sink

@@ -17,17 +17,23 @@ from orbiflow.density.partial import chart_of_observed
 from orbiflow.density.regions import DensityLevels, told_masses
 from orbiflow.density.spaces.patches import to_klein
 from orbiflow.density.tables import append_columns, to_csv
+from orbiflow.density.tables.table import listing
 from orbiflow.errors import OrbiflowError
 from orbiflow.files import write_atomic
 from orbiflow.jobs.asked import samples_asked
-from orbiflow.jobs.density_data import model_at, read_data, read_weighed, same_columns
+from orbiflow.jobs.density_data import read_data, read_weighed, same_columns
+from orbiflow.jobs.density_models import check_fits, model_at
 from orbiflow.jobs.density_requests import DensitySampleRequest, DensityScoreRequest, PatchesRequest
 from orbiflow.jobs.density_scores import evaluated
 from orbiflow.jobs.events import Finished, Note, Progress, Written
 from orbiflow.jobs.place import check_place
 from orbiflow.jobs.run import Sink
+from orbiflow.jobs.wording import counted
 from orbiflow.symmetry.isometry import Array
 from orbiflow.threads import one_thread
+
+PATCH_WIDTHS = (8, 9)
+"""Columns of image patches."""
 
 
 @one_thread()
@@ -57,6 +63,7 @@ def density_score(request: DensityScoreRequest, tell: Sink, cancel: Cancel) -> F
         keep_missing=keep,
     )
     space = density.space
+    check_fits(request.data, table, space, extra, tell)
     points = chart_of_observed(space, table.values) if keep else space.to_chart(table.values)
     known = ~points.isnan()
     lacking = int((~known.all(dim=1)).sum())
@@ -147,6 +154,12 @@ def density_patches(request: PatchesRequest, tell: Sink, cancel: Cancel) -> Fini
     """
     check_place(request.out, request.data)
     table = read_data(request.data, request.columns, None, tell)
+    if len(table.columns) not in PATCH_WIDTHS:
+        raise OrbiflowError(
+            f"{request.data}: a patch has 9 pixel values or 8 DCT coordinates, and there "
+            f"{'is' if len(table.columns) == 1 else 'are'} {counted(len(table.columns), 'column')} "
+            f"({listing(table.columns)}): choose with --columns"
+        )
     angles, distances = to_klein(table.values, unit=request.unit)
     near = distances <= (np.inf if request.farthest is None else request.farthest)
     if not near.any():

@@ -60,7 +60,7 @@ def given_named(
             raise OrbiflowError(f"{names[axis]!r} is given twice")
         real = not isinstance(value, bool) and isinstance(value, numbers.Real)
         if not real or not math.isfinite(float(value)):
-            raise OrbiflowError(f"{key} must be given as a finite number, got {value!r}")
+            raise OrbiflowError(f"{names[axis]!r} must be given as a finite number, got {value!r}")
         found[axis] = float(value) / torus.period
     return found
 

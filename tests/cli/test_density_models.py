@@ -1,0 +1,143 @@
+"""Models that are not there, tables that are not theirs, names of files that lie."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from orbiflow.density import DensityEstimator, density_to_bytes
+
+
+@pytest.fixture(name="folder", scope="module")
+def folder_fixture(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with models of two angles and of directions, and their data."""
+    folder = tmp_path_factory.mktemp("models")
+    angles = np.random.default_rng(0).vonmises([0.0, 1.0], 4.0, (60, 2))
+    for name, space, unit, data, columns in (
+        ("torus", "torus", "radians", angles, ["phi", "psi"]),
+        ("degrees", "torus", "degrees", np.degrees(angles), ["phi", "psi"]),
+        ("sphere", "sphere", "radians", np.degrees(angles).clip(-80, 80), ["lat", "lon"]),
+    ):
+        write(folder / f"{name}.csv", columns, data)
+        fitted = DensityEstimator(space, unit=unit, parts="mixture").fit(data)
+        (folder / name).mkdir()
+        (folder / name / "density.safetensors").write_bytes(
+            density_to_bytes(fitted.density_, columns=columns)
+        )
+    (folder / "empty").mkdir()
+    (folder / "damaged").mkdir()
+    whole = (folder / "torus" / "density.safetensors").read_bytes()
+    (folder / "damaged" / "density.safetensors").write_bytes(whole[:-9])
+    write(folder / "one.csv", ["phi"], angles[:, :1])
+    return folder
+
+
+def write(path: Path, columns: list[str], values: np.ndarray) -> None:
+    np.savetxt(path, values, delimiter=",", header=",".join(columns), comments="")
+
+
+@pytest.mark.parametrize(
+    ("model", "message"),
+    [
+        (
+            "nowhere",
+            "nowhere: there is no such folder; give the folder that `orbiflow density fit`",
+        ),
+        ("empty", "empty: there is no density.safetensors in it; give the folder that"),
+        ("damaged", "not a density saved by orbiflow, or damaged"),
+        ("torus.csv", "not a density saved by orbiflow, or damaged"),
+    ],
+)
+@pytest.mark.parametrize("command", ["score", "sample", "plot", "region", "marginal", "compare"])
+def test_models_that_are_none(
+    command: str, model: str, message: str, folder: Path, tmp_path: Path, orbiflow
+) -> None:
+    options = {
+        "score": (folder / "torus.csv", "--out", tmp_path / "x.csv"),
+        "sample": ("--out", tmp_path / "x.csv"),
+        "plot": ("--out", tmp_path / "x"),
+        "region": ("--out", tmp_path / "x.json"),
+        "marginal": ("--columns", "phi", "--out", tmp_path / "x"),
+        "compare": ("-m", folder / "torus", "-d", folder / "torus.csv"),
+    }[command]
+    done = orbiflow("density", command, "-m", folder / model, *options)
+    assert done.status == 2
+    assert message in done.err
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("command", ["score", "plot", "compare"])
+def test_another_number_of_columns(command: str, folder: Path, tmp_path: Path, orbiflow) -> None:
+    models = [word for name in ("torus", "degrees") for word in ("-m", folder / name)]
+    options = {
+        "score": (*models[:2], "--out", tmp_path / "x.csv", folder / "torus.csv"),
+        "plot": (*models[:2], "--out", tmp_path / "x", "--data", folder / "torus.csv"),
+        "compare": ("-m", folder / "torus", "-m", folder / "torus2", "-d", folder / "torus.csv"),
+    }[command]
+    other = folder / "torus2"
+    other.mkdir(exist_ok=True)
+    model = folder / "torus" / "density.safetensors"
+    (other / model.name).write_bytes(model.read_bytes())
+    done = orbiflow("density", command, *options, "--columns", "phi")
+    assert done.status == 2
+    assert (
+        "1 column (phi) cannot be those of the model, which was fitted to 2 (phi, psi)" in done.err
+    )
+
+
+def test_angles_that_seem_to_be_in_another_unit(folder: Path, tmp_path: Path, orbiflow) -> None:
+    out = tmp_path / "x.csv"
+
+    def said(data: str, model: str) -> str:
+        done = orbiflow("density", "score", folder / data, "-m", folder / model, "--out", out)
+        assert done.status == 0, done.err
+        return done.out
+
+    assert "WARNING" not in said("torus.csv", "torus")
+    assert "WARNING" not in said("degrees.csv", "degrees")
+    assert "WARNING" not in said("sphere.csv", "sphere")
+    words = said("degrees.csv", "torus")
+    assert "degrees.csv: column 'p" in words
+    assert "beyond 2 pi, and the model's angles are in radians: if these are degrees" in words
+    assert "all values are within 2 pi, and the model's angles are in degrees" in said(
+        "torus.csv", "degrees"
+    )
+    one = ("density", "conditional", "-m", folder / "torus", "--out", tmp_path / "m", "--given")
+    assert "WARNING: column 'psi' has 45, beyond 2 pi" in orbiflow(*one, "psi=45").out
+    assert "WARNING" not in orbiflow(*one, "psi=4.5").out
+    assert "'psi' must be given as a finite number, got inf" in orbiflow(*one, "psi=1e400").err
+
+
+@pytest.mark.parametrize(
+    ("out", "message"),
+    [
+        ("x.parquet", "tables are written as text, and nothing would read it by this name"),
+        ("x.NPY", "choose one that ends in .csv"),
+        ("empty", "it is a folder; give a file's name in it"),
+        ("none/x.csv", "create it first"),
+    ],
+)
+@pytest.mark.parametrize("command", ["score", "sample", "patches"])
+def test_where_a_table_goes_is_looked_at_first(
+    command: str, out: str, message: str, folder: Path, orbiflow, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("orbiflow.jobs.density_use.model_at", None)
+    monkeypatch.setattr("orbiflow.jobs.density_use.read_data", None)
+    options = {
+        "score": (folder / "torus.csv", "-m", folder / "torus"),
+        "sample": ("-m", folder / "torus"),
+        "patches": (folder / "torus.csv",),
+    }[command]
+    before = sorted(folder.rglob("*"))
+    done = orbiflow("density", command, *options, "--out", folder / out)
+    assert done.status == 2
+    assert message in done.err
+    assert sorted(folder.rglob("*")) == before
+
+
+def test_patches_of_another_number_of_columns(folder: Path, tmp_path: Path, orbiflow) -> None:
+    done = orbiflow("density", "patches", folder / "torus.csv", "--out", tmp_path / "x.csv")
+    assert done.status == 2
+    assert "9 pixel values or 8 DCT coordinates, and there are 2 columns (phi, psi)" in done.err
+    one = orbiflow("density", "patches", folder / "one.csv", "--out", tmp_path / "x.csv")
+    assert "and there is 1 column (phi)" in one.err
