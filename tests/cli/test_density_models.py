@@ -111,8 +111,8 @@ def test_angles_that_seem_to_be_in_another_unit(folder: Path, tmp_path: Path, or
 @pytest.mark.parametrize(
     ("out", "message"),
     [
-        ("x.parquet", "tables are written as text, and nothing would read it by this name"),
-        ("x.NPY", "choose one that ends in .csv"),
+        ("x.parquet", "--out must end in .csv, .tsv, .txt, .dat, got 'x.parquet'"),
+        ("x.NPY", "--out must end in .csv, .tsv, .txt, .dat, got 'x.NPY'"),
         ("empty", "it is a folder; give a file's name in it"),
         ("none/x.csv", "create it first"),
     ],
