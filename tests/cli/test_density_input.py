@@ -62,7 +62,7 @@ def test_missing_values_and_no_header(tmp_path: Path, orbiflow) -> None:
     assert "--drop-missing" in orbiflow(*fit).err
     fitted = orbiflow(*fit, "--drop-missing")
     assert fitted.status == 0, fitted.err
-    assert "left out 1 rows with missing values" in fitted.out
+    assert "left out 1 row with missing values" in fitted.out
     scores = tmp_path / "scores.csv"
     score = ("density", "score", data, "--model", out, "--out", scores, "--drop-missing")
     assert orbiflow(*score).status == 0

@@ -95,7 +95,7 @@ def test_weights_and_missing_angles(tmp_path: Path, orbiflow: Run) -> None:
     done = orbiflow(*fit, "--missing", "marginalise")
     assert done.status == 0, done.err
     assert "2 of 59 rows lack some angles" in done.out
-    assert "1 rows lack all angles and were left out" in done.out
+    assert "1 row lacks all angles and was left out" in done.out
     assert "rows say as much as" in done.out
     assert json.loads((model / "report.json").read_text())["columns"] == ["phi", "psi", "chi"]
     done = orbiflow(

@@ -105,7 +105,7 @@ def test_weights_and_rows_without_any_angle() -> None:
     )
     assert density_to_bytes(found) == density_to_bytes(again)
     assert report.points == 89
-    assert any("1 rows lack all angles" in note for note in report.notes)
+    assert any("1 row lacks all angles" in note for note in report.notes)
 
 
 def test_scores_are_of_the_angles_that_are_there() -> None:

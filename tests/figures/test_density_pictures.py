@@ -14,6 +14,7 @@ from orbiflow.density.models.bases import UniformBase
 from orbiflow.density.models.blend import BlendedDensity
 from orbiflow.density.models.kernels import AdaptiveKernels
 from orbiflow.density.models.neural import NeuralFlow, NeuralTorusField
+from orbiflow.density.models.still import still_flow
 from orbiflow.density.models.symmetric import SymmetricDensity
 from orbiflow.density.spaces.flat import KleinBottle, Torus
 from orbiflow.density.spaces.round import ProjectivePlane, Sphere, to_vectors
@@ -376,3 +377,20 @@ def test_coastlines_on_axes_and_nowhere_else():
     )
     with pytest.raises(OrbiflowError, match="coastlines"):
         density_page(example(SPACES[0]), resolution=4, coastlines=[where])
+
+
+@pytest.mark.parametrize("space", SPACES[:2], ids=lambda s: s.name)
+def test_kernels_are_summed_in_blocks(space, monkeypatch):
+    rng = np.random.default_rng(4)
+    kernels = AdaptiveKernels(
+        space,
+        points(50),
+        torch.tensor(rng.uniform(5, 500, (50, 2))),
+        torch.full((50,), 0.02).double(),
+    )
+    shares = torch.tensor([0.0, 0.9, 0.1]).double()
+    density = BlendedDensity(space, still_flow(space), UniformBase(space), kernels, shares)
+    t = (torch.arange(30, dtype=torch.float64) + 0.5) / 30
+    whole = density_on_grid(density, t, t, "natural")
+    monkeypatch.setattr("orbiflow.figures.density_values._KERNELS", 7)
+    np.testing.assert_allclose(density_on_grid(density, t, t, "natural"), whole, rtol=1e-12)

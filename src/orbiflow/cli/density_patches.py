@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from orbiflow.cli.density_options import Unit, named_columns
+from orbiflow.cli.density_options import DropMissing, NoHeader, Unit, named_columns
 from orbiflow.cli.work import do
 from orbiflow.jobs import PatchesRequest
 
@@ -27,6 +27,8 @@ def patches(
         str | None,
         typer.Option(help="Names or numbers of the 9 or 8 columns.", show_default=False),
     ] = None,
+    no_header: NoHeader = False,
+    drop_missing: DropMissing = False,
     unit: Annotated[Unit, typer.Option(help="Of theta and phi.")] = Unit.RADIANS,
     farthest: Annotated[
         float | None,
@@ -41,6 +43,12 @@ def patches(
     The distance is between patches of mean 0 and contrast 1.
     """
     request = PatchesRequest(
-        data=data, out=out, columns=named_columns(columns), unit=unit.value, farthest=farthest
+        data=data,
+        out=out,
+        columns=named_columns(columns),
+        header=False if no_header else None,
+        drop_missing=drop_missing,
+        unit=unit.value,
+        farthest=farthest,
     )
     do(request)

@@ -9,9 +9,11 @@ import typer
 
 from orbiflow.cli.density_options import (
     Columns,
+    DropMissing,
     Format,
     Measure,
     Model,
+    NoHeader,
     Projection,
     RegionSamples,
     Scale,
@@ -40,6 +42,8 @@ def plot(
         ),
     ] = None,
     columns: Columns = None,
+    no_header: NoHeader = False,
+    drop_missing: DropMissing = False,
     coastlines: Annotated[
         Path | None,
         typer.Option(
@@ -127,6 +131,8 @@ def plot(
         out=out,
         data=data,
         columns=named_columns(columns),
+        header=False if no_header else None,
+        drop_missing=drop_missing,
         coastlines=coastlines,
         format=file_format.value if file_format else None,
         width=width,

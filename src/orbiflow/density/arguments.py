@@ -45,7 +45,8 @@ def check_range(name: str, value: Any, low: float, high: float, *, integer: bool
     fits = not isinstance(value, bool) and isinstance(value, kind)
     if not fits or not low <= float(value) <= high:
         what = "an integer " if integer and not fits else ""
-        limits = f"from {low:g} to {high:g}" if high < math.inf else f"of at least {low:g}"
+        least = f"{'of ' if what else ''}at least {low:g}"
+        limits = f"from {low:g} to {high:g}" if high < math.inf else least
         raise OrbiflowError(f"{name} must be {what}{limits}, got {value!r}")
 
 

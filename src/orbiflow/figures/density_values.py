@@ -20,6 +20,9 @@ from orbiflow.symmetry.isometry import Array
 _TOLERANCE = 1e-5
 """Of what is drawn, relative to it."""
 
+_KERNELS = 4096
+"""Summed at a time: tables of all would be gigabytes."""
+
 _COARSE = 120
 """Points along a side by which a scale is chosen."""
 
@@ -166,12 +169,14 @@ def _flat_sums(kernels: AdaptiveKernels, kappa: Tensor, x: Tensor, y: Tensor) ->
     along = space.group.images(ends[1].flip(-1))[..., 1]
     total = x.new_zeros(len(x), len(y))
     for images in zip(across, along, strict=True):
-        tables = []
-        for axis, (image, period) in enumerate(zip(images, rectangle(space).tolist(), strict=True)):
-            angle = 2 * math.pi * (image[:, None] - kernels.centers[:, axis]) / period
-            peak = period * torch.special.i0e(kappa[:, axis])
-            tables.append((kappa[:, axis] * (angle.cos() - 1)).exp() / peak)
-        total += (tables[0] * kernels.weights) @ tables[1].T
+        for part in torch.arange(len(kappa)).split(_KERNELS):
+            tables: list[Tensor] = []
+            sides = zip(images, rectangle(space).tolist(), strict=True)
+            for axis, (image, period) in enumerate(sides):
+                own = kappa[part, axis]
+                angle = 2 * math.pi * (image[:, None] - kernels.centers[part, axis]) / period
+                tables.append((own * (angle.cos() - 1)).exp() / (period * torch.special.i0e(own)))
+            total += (tables[0] * kernels.weights[part]) @ tables[1].T
     return total
 
 

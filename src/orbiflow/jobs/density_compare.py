@@ -31,6 +31,7 @@ from orbiflow.jobs.density_data import read_data, same_columns, unit_of
 from orbiflow.jobs.density_models import check_fits, model_at
 from orbiflow.jobs.events import Finished, Note, Progress, Written
 from orbiflow.jobs.place import check_place
+from orbiflow.jobs.records import RecordError
 from orbiflow.jobs.run import Sink
 from orbiflow.threads import one_thread
 
@@ -102,6 +103,8 @@ def _compare_models(request: DensityCompareRequest, tell: Sink, cancel: Cancel) 
 
 def _compare_data(request: DensityCompareRequest, tell: Sink, cancel: Cancel) -> DataComparison:
     assert request.space is not None
+    if request.data[0].resolve() == request.data[1].resolve():
+        raise RecordError("{data} names one file twice: give two data sets")
     names = _names(request.data)
     columns = request.columns or _common_columns(request)
     tables = [_table(request, data, columns, tell) for data in request.data]

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orbiflow.density.tables import (
+    MissingCellsError,
     Table,
     column_names,
     is_identifier,
@@ -22,6 +23,7 @@ from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.jobs.density_columns import check_order
 from orbiflow.jobs.density_requests import Unit
 from orbiflow.jobs.events import Note
+from orbiflow.jobs.records import RecordError
 from orbiflow.jobs.run import Sink
 
 
@@ -33,29 +35,50 @@ def read_data(
     *,
     has_header: bool | None = None,
     drop_missing: bool = False,
-    keep_missing: bool = False,
+    keep_missing: bool | None = None,
 ) -> Table:
-    """The columns asked for, else those of numbers, `width` of them, less identifiers; tells notes."""
-    chosen = None if columns is None else list(columns)
+    """The columns asked for, else those of numbers, `width` of them, less identifiers; tells notes.
+
+    Args:
+        keep_missing: None where the request could not ask for it.
+
+    Raises:
+        InputFileError: for a table that cannot be read, or lacks values that it must have.
+    """
     how: dict[str, Any] = {"has_header": has_header, "drop_missing": drop_missing}
-    how["keep_missing"] = keep_missing
-    if chosen is not None:
-        table = read_table(data, columns=chosen, width=None, **how)
-    else:
-        try:
-            table = read_table(data, columns=None, width=width, **how)
-        except InputFileError:
-            # one more than wanted may be an identifier
-            if width is None:
-                raise
-            table = _without_identifiers(read_table(data, columns=None, width=None, **how), tell)
-            if len(table.columns) != width:
-                raise
-        else:
-            table = table if width is not None else _without_identifiers(table, tell)
+    try:
+        table = _read(data, columns, width, tell, {**how, "keep_missing": bool(keep_missing)})
+    except MissingCellsError as error:
+        if keep_missing is None:
+            raise
+        raise InputFileError(f"{error} (on tori --missing marginalise keeps them)") from error
     for note in table.notes:
         tell(Note(note))
     return table
+
+
+def _read(
+    data: Path,
+    columns: tuple[str, ...] | None,
+    width: int | None,
+    tell: Sink,
+    how: dict[str, Any],
+) -> Table:
+    """As `read_data`, whose notes are still to be told."""
+    chosen = None if columns is None else list(columns)
+    if chosen is not None:
+        return read_table(data, columns=chosen, width=None, **how)
+    try:
+        table = read_table(data, columns=None, width=width, **how)
+    except InputFileError:
+        # one more than wanted may be an identifier
+        if width is None:
+            raise
+        table = _without_identifiers(read_table(data, columns=None, width=None, **how), tell)
+        if len(table.columns) != width:
+            raise
+        return table
+    return table if width is not None else _without_identifiers(table, tell)
 
 
 def _without_identifiers(table: Table, tell: Sink) -> Table:
@@ -117,9 +140,9 @@ def unit_of(space: str, unit: Unit | None, table: Table, tell: Sink) -> Unit:
     if space not in ("torus", "klein-bottle"):
         check_order(table.columns, space)
         if unit in ("radians", "turns"):
-            raise OrbiflowError(
-                f"--unit {unit}: on the {space} latitude and longitude are degrees, vectors have no "
-                "unit; leave out --unit"
+            raise RecordError(
+                f"{{unit}} {unit} is of angles on the torus and the Klein bottle: latitude and "
+                "longitude are degrees; convert them, or give unit vectors x,y,z"
             )
         return "radians"
     if unit is not None:

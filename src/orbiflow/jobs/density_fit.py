@@ -13,10 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orbiflow.cancel import Cancel
-from orbiflow.density import DensityEstimator, density_to_bytes
+from orbiflow.density import DensityEstimator, FitSettings, density_to_bytes
 from orbiflow.density.comparing import RowSketch
 from orbiflow.density.fitting.report import FitReport
 from orbiflow.density.tables import Table, read_labels
+from orbiflow.errors import OrbiflowError
 from orbiflow.export.density_figures import MODEL
 from orbiflow.export.density_plots import REPORT, THUMBNAIL
 from orbiflow.files import write_atomic
@@ -27,6 +28,7 @@ from orbiflow.jobs.density_groups import read_beside_groups
 from orbiflow.jobs.density_requests import DensityFitRequest
 from orbiflow.jobs.events import Finished, Note, Progress, Written
 from orbiflow.jobs.place import check_folder
+from orbiflow.jobs.records import RecordError
 from orbiflow.jobs.run import Sink
 from orbiflow.symmetry.isometry import Array
 from orbiflow.threads import one_thread
@@ -56,6 +58,7 @@ def density_fit(request: DensityFitRequest, tell: Sink, cancel: Cancel) -> Finis
         Cancelled: if it was told to stop; nothing is written.
     """
     begin = time.perf_counter()
+    _check_flow(request)
     table, weights = read_beside_groups(request, WIDTH[request.space], tell)
     groups = None
     if request.group is not None:
@@ -87,6 +90,25 @@ def density_fit(request: DensityFitRequest, tell: Sink, cancel: Cancel) -> Finis
     summary = {name: document[name] for name in ("log_likelihood", "seconds")}
     summary["picture"] = THUMBNAIL if request.picture else None
     return Finished("done", {"folder": str(request.out), "rows": len(table.values), **summary})
+
+
+def _check_flow(request: DensityFitRequest) -> None:
+    """
+    Raises:
+        RecordError: for settings of a flow that are out of range, or where there can be none.
+    """
+    for name in ("detail", "segments", "seconds", "seed"):
+        value = getattr(request, name)
+        if value is None:
+            continue
+        try:
+            FitSettings(**{name: value})
+        except OrbiflowError as error:
+            raise RecordError(str(error).replace(name, f"{{{name}}}", 1)) from error
+        if name in ("detail", "segments") and "flow" not in (request.parts or ("flow",)):
+            raise RecordError(
+                f"{{{name}}} is the flow's, and {{parts}} allows none: leave it out, or allow a flow"
+            )
 
 
 def estimator_of(request: DensityFitRequest, unit: str) -> DensityEstimator:

@@ -50,8 +50,11 @@ def density_plot(request: DensityPlotRequest, tell: Sink, cancel: Cancel) -> Fin
     settings = _settings(request, density.space, extra.get("columns"))
     points = None
     if request.data is not None:
-        columns = request.columns or same_columns(request.data, extra, tell)
-        table = read_data(request.data, columns, None, tell)
+        own = request.header
+        columns = request.columns or same_columns(request.data, extra, tell, has_header=own)
+        table = read_data(
+            request.data, columns, None, tell, has_header=own, drop_missing=request.drop_missing
+        )
         check_fits(request.data, table, density.space, extra, tell)
         points = table.values
 
@@ -101,6 +104,11 @@ def _settings(request: DensityPlotRequest, space: Space, columns: list[str] | No
         "format", "measure", "scale", "projection", "radius", "regions", "samples", "dots", "seed",
         "region_samples",
     )  # fmt: skip
+    if request.regions and space.dim != 2:
+        raise RecordError(
+            f"{{regions}} are drawn in two dimensions, this {space.name} has {space.dim}: `orbiflow "
+            "density region` finds their thresholds"
+        )
     samples_asked(request, request.regions or (), "region_samples")
     asked: dict[str, Any] = given(request, wanted)
     if request.width is not None:

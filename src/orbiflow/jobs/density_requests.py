@@ -74,6 +74,8 @@ class DensityFitRequest(Request):
     def check(self) -> None:
         columns_named(self.columns)
         _check_missing(self.drop_missing, self.missing)
+        if self.missing == "marginalise":
+            self._check_marginalised()
         unknown = [part for part in self.parts or () if part not in PARTS]
         if unknown or self.parts == ():
             raise RecordError(
@@ -83,6 +85,18 @@ class DensityFitRequest(Request):
             raise RecordError("{kernels} means a flow with kernels: give it or {parts}, not both")
         if self.group is not None and (self.kernels or self.parts == ("flow",)):
             raise RecordError("{group} is for choosing among {parts}: a flow alone has no choice")
+
+    def _check_marginalised(self) -> None:
+        if self.space != "torus":
+            raise RecordError(
+                f"{{missing}} marginalise is of angles on a torus: on the {self.space} no coordinate "
+                "is known without the other; leave out rows that lack one ({missing} drop)"
+            )
+        if self.kernels or self.parts == ("flow",):
+            raise RecordError(
+                "{missing} marginalise is of kernels and mixtures, as a flow cannot be fitted to rows "
+                "that lack angles: give other {parts}"
+            )
 
 
 @dataclass(frozen=True)
@@ -160,6 +174,7 @@ class DensityPlotRequest(Request):
     - `regions`: masses of the smallest regions that hold them, about which lines are drawn, by so many
       `region_samples`; None for 20,000, or more where a mass needs it.
     - `samples`: how many beside data or density, None for 3,000 beside data alone.
+    - `columns`, `header`, `drop_missing`: of the data, as for a fit.
     """
 
     KIND = "density-plot"
@@ -168,6 +183,8 @@ class DensityPlotRequest(Request):
     out: Path = Path("plots")
     data: Path | None = None
     columns: tuple[str, ...] | None = None
+    header: bool | None = None
+    drop_missing: bool = False
     coastlines: Path | None = None
     format: Literal["png", "pdf", "svg"] | None = None
     width: str | None = None
@@ -188,22 +205,33 @@ class DensityPlotRequest(Request):
             raise RecordError(f"{{samples}} must be from 1 to {MOST_DOTS}, got {self.samples}")
         if self.radius is not None and not 0 < self.radius <= 90:
             raise RecordError(f"{{radius}} must be above 0 and at most 90, got {self.radius:g}")
-        if any(not 0 < mass < 1 for mass in self.regions or ()):
+        if self.regions == () or any(not 0 < mass < 1 for mass in self.regions or ()):
             raise RecordError("{regions} must be masses between 0 and 1, such as 0.5,0.9")
+        if len(set(self.regions or ())) < len(self.regions or ()) or len(self.regions or ()) > 4:
+            raise RecordError("{regions} must be at most 4 different masses: as many lines differ")
         region_samples_in_range(self, "region_samples")
         if self.region_samples is not None and not self.regions:
             raise RecordError("{region_samples} are those of {regions}: give both, or neither")
+        if self.data is None:
+            for name, unset in (("columns", None), ("header", None), ("drop_missing", False)):
+                if getattr(self, name) != unset:
+                    raise RecordError(f"{{{name}}} is of {{data}}: give both, or neither")
 
 
 @dataclass(frozen=True)
 class PatchesRequest(Request):
-    """Turn image patches into angles on the Klein bottle; see `orbiflow density patches --help`."""
+    """Turn image patches into angles on the Klein bottle; see `orbiflow density patches --help`.
+
+    - `columns`, `header`, `drop_missing`: as for a fit.
+    """
 
     KIND = "density-patches"
 
     data: Path
     out: Path = Path("angles.csv")
     columns: tuple[str, ...] | None = None
+    header: bool | None = None
+    drop_missing: bool = False
     unit: Unit = "radians"
     farthest: float | None = None
 

@@ -153,7 +153,14 @@ def density_patches(request: PatchesRequest, tell: Sink, cancel: Cancel) -> Fini
         Cancelled: if it was told to stop; nothing is written.
     """
     check_place(request.out, request.data)
-    table = read_data(request.data, request.columns, None, tell)
+    table = read_data(
+        request.data,
+        request.columns,
+        None,
+        tell,
+        has_header=request.header,
+        drop_missing=request.drop_missing,
+    )
     if len(table.columns) not in PATCH_WIDTHS:
         raise OrbiflowError(
             f"{request.data}: a patch has 9 pixel values or 8 DCT coordinates, and there "

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import torch
@@ -28,6 +28,8 @@ from orbiflow.density.spaces.space import Space
 from orbiflow.errors import OrbiflowError
 
 MOST_PERMUTATIONS = 100_000
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -123,12 +125,10 @@ def compare_samples(
     whole(permutations, "permutations", 19, MOST_PERMUTATIONS)
     whole(resamples, "resamples", 100, MOST_RESAMPLES)
     level = number(level, "level", 0.5, 0.999)
-    own = (
-        space
-        if isinstance(space, Space)
-        else space_class(space).for_data(np.concatenate(tables), unit=unit, seed=seed)
+    own = space if isinstance(space, Space) else _space_of(space, names, tables, unit, seed)
+    points = torch.cat(
+        [_named(name, own.to_chart, table) for name, table in zip(names, tables, strict=True)]
     )
-    points = torch.cat([own.to_chart(table) for table in tables])
     first = np.arange(len(points)) < len(tables[0])
     members = Groups.of(_labels(groups, names, tables), len(points))
     members.require()
@@ -179,6 +179,28 @@ def _two(samples: Mapping[str, ArrayLike]) -> tuple[list[str], list[np.ndarray]]
     if not all(len(table) for table in tables):
         raise OrbiflowError("a data set has no rows")
     return list(samples), tables
+
+
+def _space_of(
+    space: str, names: list[str], tables: list[np.ndarray], unit: str, seed: int
+) -> Space:
+    """That suits both data sets."""
+    kind = space_class(space)
+    try:
+        return kind.for_data(np.concatenate(tables), unit=unit, seed=seed)
+    except OrbiflowError:
+        # a row by its number in both would be looked for in vain
+        for name, table in zip(names, tables, strict=True):
+            _named(name, lambda own: kind.for_data(own, unit=unit, seed=seed), table)
+        raise
+
+
+def _named(name: str, call: Callable[[np.ndarray], T], table: np.ndarray) -> T:
+    """What is called with a data set, whose errors say which one it is."""
+    try:
+        return call(table)
+    except OrbiflowError as error:
+        raise OrbiflowError(f"{name}: {error}") from error
 
 
 def _labels(

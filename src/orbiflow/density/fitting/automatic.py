@@ -225,7 +225,9 @@ def _families(
         )
     if not chosen and (space.dim > MOST_DIM or settings.parts != ("flow",)):
         raise OrbiflowError(
-            f"a density on this {space!r} cannot be made of {' and '.join(settings.parts)} alone"
+            f"a density on this {type(space).__name__} of {space.dim} dimensions cannot be made of "
+            f"{' and '.join(settings.parts)} alone: chains are for tori of two angles or more, a "
+            f"network for more than {MOST_DIM}, a flow for {MOST_DIM} at most"
         )
     return chosen
 
@@ -244,6 +246,17 @@ def _narrowest(space: Space, step: float | None) -> float:
 def _wants_flow(space: Space, folds: Folds, settings: AutomaticSettings) -> bool:
     enough = len(folds.rows) >= LEAST_FLOW_ROWS or settings.parts == ("flow",)
     return "flow" in settings.parts and space.dim <= MOST_DIM and enough
+
+
+def _untried_note(space: Space, folds: Folds, settings: AutomaticSettings) -> list[str]:
+    """What to say where a flow was meant, and not only one of all parts, and none was tried."""
+    meant = "flow" in settings.parts and (settings.flow is not None or settings.parts != PARTS)
+    if not meant or _wants_flow(space, folds, settings):
+        return []
+    return [
+        f"no flow was tried: of fewer than {LEAST_FLOW_ROWS} rows, here {len(folds.rows)}, none has "
+        "gained anything"
+    ]
 
 
 def _try_flow(
@@ -324,6 +337,7 @@ def _report(
             *notes,
             *weights_note(folds.rows),
             *chosen,
+            *_untried_note(density.space, folds, settings),
             *found.notes(settings.repeats),
             *budget.notes(),
             *steps_note(density, error),

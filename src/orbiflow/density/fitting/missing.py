@@ -74,7 +74,11 @@ def missing_notes(rows: Rows, empty: int) -> list[str]:
             "tried, as they need whole rows"
         )
     if empty:
-        notes.append(f"{empty} rows lack all angles and were left out")
+        notes.append(
+            "1 row lacks all angles and was left out"
+            if empty == 1
+            else f"{empty} rows lack all angles and were left out"
+        )
     return notes
 
 

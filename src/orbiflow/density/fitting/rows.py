@@ -12,6 +12,7 @@ from torch import Tensor
 
 from orbiflow.arguments import described
 from orbiflow.density.arguments import float_tensor
+from orbiflow.density.spaces.space import such_rows
 from orbiflow.errors import OrbiflowError
 
 
@@ -111,8 +112,8 @@ def weighed(points: Tensor, weights: Any, groups: Tensor | None = None) -> Rows:
     bad = torch.nonzero(~(own.isfinite() & (own >= 0)))[:, 0]
     if len(bad):
         raise OrbiflowError(
-            f"weights must be finite and at least 0; row {int(bad[0]) + 1} has {float(own[bad[0]]):g} "
-            f"({len(bad)} such rows)"
+            f"weights must be finite and at least 0; row {int(bad[0]) + 1} has {float(own[bad[0]]):g}"
+            f"{such_rows(len(bad))}"
         )
     if not bool((own > 0).any()):
         raise OrbiflowError("all weights are 0: no row is left to fit to")

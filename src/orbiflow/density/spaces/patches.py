@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from orbiflow.density.spaces.flat import whole_turn
-from orbiflow.density.spaces.space import checked_table
+from orbiflow.density.spaces.space import checked_table, such_rows
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry.isometry import Array
 
@@ -149,8 +149,8 @@ def _unit_coordinates(patches: ArrayLike) -> Array:
     flat = np.flatnonzero(length <= FLAT)
     if len(flat):
         raise OrbiflowError(
-            f"row {flat[0] + 1}: a patch without contrast has no place on the Klein bottle "
-            f"({len(flat)} such rows): remove them first"
+            f"row {flat[0] + 1}: a patch without contrast has no place on the Klein bottle"
+            f"{such_rows(len(flat))}: remove {'it' if len(flat) == 1 else 'them'} first"
         )
     return found / length[:, None]
 

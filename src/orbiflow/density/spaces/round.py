@@ -15,7 +15,7 @@ from torch import Tensor
 from orbiflow.arguments import is_a
 from orbiflow.density.arguments import check_kind
 from orbiflow.density.spaces import uniformization
-from orbiflow.density.spaces.space import Space, checked_table
+from orbiflow.density.spaces.space import Space, checked_table, such_rows
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import CrystallographicGroup, identification_group
 from orbiflow.symmetry.isometry import Array
@@ -72,8 +72,7 @@ def to_latlon(vectors: Array) -> Array:
 def _refuse(wrong: NDArray[np.bool_], message: Callable[[int], str]) -> None:
     rows = np.flatnonzero(wrong)
     if len(rows):
-        more = f" ({len(rows)} such rows)" if len(rows) > 1 else ""
-        raise OrbiflowError(f"row {rows[0] + 1}: {message(int(rows[0]))}{more}")
+        raise OrbiflowError(f"row {rows[0] + 1}: {message(int(rows[0]))}{such_rows(len(rows))}")
 
 
 class RoundSpace(Space):

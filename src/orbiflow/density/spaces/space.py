@@ -231,6 +231,15 @@ def rectangle(space: Space) -> Tensor:
     return torch.tensor(sides.copy())
 
 
+def such_rows(count: int) -> str:
+    """How many rows are as wrong as the one that a message names.
+
+    >>> such_rows(1), such_rows(3)
+    ('', ' (3 such rows)')
+    """
+    return f" ({count} such rows)" if count > 1 else ""
+
+
 def checked_table(data: ArrayLike, widths: tuple[int, ...], what: str) -> Array:
     """Data as a finite float64 array (N, k), k one of `widths`.
 
@@ -247,7 +256,7 @@ def checked_table(data: ArrayLike, widths: tuple[int, ...], what: str) -> Array:
     bad = np.flatnonzero(~np.isfinite(table).all(axis=1))
     if len(bad):
         raise OrbiflowError(
-            f"{what}: row {bad[0] + 1} has a missing or infinite value "
-            f"({len(bad)} such rows): remove them first"
+            f"{what}: row {bad[0] + 1} has a missing or infinite value{such_rows(len(bad))}: remove "
+            f"{'it' if len(bad) == 1 else 'them'} first"
         )
     return table

@@ -44,6 +44,10 @@ class Table:
         return replace(self, values=np.delete(self.values, column, axis=1), columns=names)
 
 
+class MissingCellsError(InputFileError):
+    """Cells that are empty, NaN or infinite in rows that must not lack any."""
+
+
 def choose(
     path: Path,
     names: Sequence[str],
@@ -62,7 +66,7 @@ def choose(
     if not picked or (width is not None and len(picked) != width):
         got = f"--columns names {len(picked)}" if columns is not None else f"it has {len(picked)}"
         raise InputFileError(
-            f"{path}: {'some' if width is None else width} column{'s' * (width != 1)} of numbers "
+            f"{path}: {'' if width is None else f'{width} '}column{'s' * (width != 1)} of numbers "
             f"must be taken and {got} (its columns: {listing(names)}); choose with --columns"
         )
     if columns is not None:
@@ -126,10 +130,10 @@ def check_finite(
         raise InputFileError(f"{path}: holds no rows of numbers; export it again")
     rows, at = np.nonzero(np.isinf(values) if missing else ~np.isfinite(values))
     if len(rows):
-        raise InputFileError(
+        raise MissingCellsError(
             f"{path}: {len(rows)} cell{'s' * (len(rows) > 1)} empty, NaN or infinite, the first in "
             f"{unit} {lines[rows[0]]}, column {quote(columns[int(at[0])])}; fill them in "
-            "or leave their rows out with --drop-missing (on tori --missing marginalise keeps them)"
+            "or leave their rows out with --drop-missing"
         )
 
 
@@ -142,7 +146,8 @@ def without_missing(
         raise InputFileError(f"{path}: every row lacks a value; choose others with --columns")
     left = lines[~whole].tolist()
     first = f", the first in {unit} {left[0]}" if left else ""
-    notes = [f"left out {len(left)} rows with missing values{first}"] if left else []
+    rows = f"{len(left)} row{'s' * (len(left) > 1)}"
+    notes = [f"left out {rows} with missing values{first}"] if left else []
     return values[whole], lines[whole], frozenset(left), notes
 
 

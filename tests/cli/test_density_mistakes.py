@@ -1,0 +1,142 @@
+"""Mistakes as users make them: each is said by the option's name, none ends in a traceback."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from orbiflow.density import DensityEstimator, density_to_bytes
+
+
+@pytest.fixture(name="folder", scope="module")
+def folder_fixture(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with tables, most of them wrong, and models of two and of three angles."""
+    folder = tmp_path_factory.mktemp("mistakes")
+    rng = np.random.default_rng(0)
+    angles = rng.vonmises([0.0, 1.0, 2.0], 4.0, (40, 3))
+    table(folder / "two.csv", "phi,psi", angles[:, :2])
+    table(folder / "other.csv", "phi,psi", angles[::-1, :2] + 0.01)
+    table(folder / "places.csv", "lat,lon", np.degrees(angles[:, :2]).clip(-80, 80))
+    table(folder / "beyond.csv", "lat,lon", np.full((30, 2), 95.0))
+    table(folder / "weights.csv", "phi,psi,w", np.column_stack([angles[:, :2], -np.eye(1, 40)[0]]))
+    gaps = angles[:, :2].copy()
+    gaps[7, 1] = np.nan
+    table(folder / "gaps.csv", "phi,psi", gaps)
+    table(folder / "nothing.csv", "phi,psi", np.full((12, 2), np.nan))
+    for dim in (2, 3):
+        fitted = DensityEstimator("torus", parts="mixture").fit(angles[:, :dim])
+        model = folder / f"model{dim}"
+        model.mkdir()
+        (model / "density.safetensors").write_bytes(
+            density_to_bytes(fitted.density_, columns=["phi", "psi", "chi"][:dim])
+        )
+    return folder
+
+
+def table(path: Path, header: str, values: np.ndarray) -> None:
+    np.savetxt(path, values, delimiter=",", header=header, comments="")
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (
+            "fit two.csv --space torus --parts kernels --detail 5",
+            "--detail is the flow's, and --parts",
+        ),
+        ("fit two.csv --space torus --segments 0", "--segments must be from 1 to 256, got 0"),
+        ("fit two.csv --space torus --seconds -1", "--seconds must be at least 0, got -1.0"),
+        (
+            "fit places.csv --space sphere --unit radians",
+            "--unit radians is of angles on the torus",
+        ),
+        (
+            "fit places.csv --space sphere --parts chains",
+            "no chains on this Sphere of 2 dimensions: ch",
+        ),
+        (
+            "fit gaps.csv --space klein-bottle --missing marginalise",
+            "--missing marginalise is of angles",
+        ),
+        ("fit gaps.csv --space torus --missing marginalise --kernels", "give other --parts"),
+        ("fit gaps.csv --space torus", "(on tori --missing marginalise keeps them)"),
+        (
+            "fit nothing.csv --space torus",
+            "nothing.csv: columns of numbers must be taken and it has 0",
+        ),
+        ("fit weights.csv --space torus --weights w", "at least 0; row 1 has -1\n"),
+        (
+            "cv gaps.csv --space torus --missing marginalise --parts flow",
+            "--missing marginalise is of k",
+        ),
+        ("plot -m model2 --columns phi,psi", "--columns is of --data: give both, or neither"),
+        ("plot -m model2 --drop-missing", "--drop-missing is of --data: give both, or neither"),
+        ("plot -m model2 --regions ,", "--regions must be masses between 0 and 1"),
+        ("plot -m model2 --regions 0.5,0.5", "--regions must be at most 4 different masses"),
+        ("plot -m model2 --regions .1,.2,.3,.4,.5", "--regions must be at most 4 different masses"),
+        ("plot -m model3 --regions 0.5", "--regions are drawn in two dimensions, this torus has 3"),
+        ("plot -m model2 --data gaps.csv", "leave their rows out with --drop-missing\n"),
+        ("compare -d two.csv -d two.csv --space torus", "--data names one file twice"),
+        (
+            "compare -d places.csv -d beyond.csv --space sphere",
+            "beyond: row 1: latitude 95 is beyond 90 degrees: are the columns lat, lon? (30",
+        ),
+        (
+            "compare -d two.csv -d gaps.csv --space torus",
+            "leave their rows out with --drop-missing\n",
+        ),
+    ],
+)
+def test_mistakes(words: str, message: str, folder: Path, orbiflow) -> None:
+    command, *options = (
+        str(folder / word) if (folder / word).exists() else word for word in words.split()
+    )
+    before = sorted(folder.rglob("*"))
+    out = () if command == "compare" else ("--out", folder / "out")
+    done = orbiflow("density", command, *options, *out)
+    assert done.status == 2, done.out
+    assert message in done.err
+    assert sorted(folder.rglob("*")) == before
+
+
+def test_rows_that_lack_a_value_can_be_left_out_of_pictures(
+    folder: Path, tmp_path: Path, orbiflow, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("orbiflow.figures.density_square._FINE_GRID", 40)
+    monkeypatch.setattr("orbiflow.figures.density_page._FINE_CELLS", 20)
+    plot = ("density", "plot", "-m", folder / "model2", "--out", tmp_path / "plots", "--data")
+    done = orbiflow(*plot, folder / "gaps.csv", "--drop-missing")
+    assert done.status == 0, done.err
+    assert "left out 1 row with missing values, the first in line 9" in done.out
+    bare = tmp_path / "bare.csv"
+    bare.write_text("".join((folder / "two.csv").read_text().splitlines(keepends=True)[1:]))
+    done = orbiflow(*plot, bare, "--no-header", "--columns", "1,2")
+    assert done.status == 0, done.err
+
+
+def test_patches_without_a_header_and_with_gaps(tmp_path: Path, orbiflow) -> None:
+    patches = np.random.default_rng(0).normal(size=(20, 9))
+    patches[3, 4] = np.nan
+    data, out = tmp_path / "patches.csv", tmp_path / "angles.csv"
+    np.savetxt(data, patches, delimiter=",")
+    turn = ("density", "patches", data, "--out", out)
+    assert "leave their rows out with --drop-missing\n" in orbiflow(*turn).err
+    done = orbiflow(*turn, "--drop-missing", "--no-header")
+    assert done.status == 0, done.err
+    assert len(out.read_text().splitlines()) == 20
+
+
+def test_a_flow_that_was_meant_and_not_tried_is_said(
+    tmp_path: Path, folder: Path, orbiflow
+) -> None:
+    fit = ("density", "fit", folder / "two.csv", "--space", "torus", "--out", tmp_path / "m")
+    said = "no flow was tried: of fewer than 300 rows, here 40, none has gained anything"
+    for options, told in (
+        (("--parts", "kernels,flow"), True),
+        (("--detail", 2), True),
+        (("--parts", "kernels"), False),
+        ((), False),
+    ):
+        done = orbiflow(*fit, *options)
+        assert done.status == 0, done.err
+        assert (said in done.out) == told, options
