@@ -52,7 +52,7 @@ def table(path: Path, header: str, values: np.ndarray) -> None:
         ),
         (
             "fit places.csv --space sphere --parts chains",
-            "no chains on this Sphere of 2 dimensions: ch",
+            "Sphere of 2 dimensions cannot be made of chains alone",
         ),
         (
             "fit gaps.csv --space klein-bottle --missing marginalise",
