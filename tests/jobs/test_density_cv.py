@@ -32,6 +32,7 @@ from orbiflow.jobs import DensityFoldRequest, Finished, ItemDone, Note, RecordEr
 from orbiflow.jobs.batch import work
 from orbiflow.jobs.density_cv import overview
 from orbiflow.jobs.density_cv_requests import setting_of
+from orbiflow.jobs.density_requests import PARTS
 from orbiflow.jobs.executors import local_processes
 from orbiflow.jobs.executors.parcel import carry_out
 
@@ -360,11 +361,11 @@ def test_mistakes_that_the_table_shows(
     assert not (tmp_path / "out").exists()
 
 
-@given(st.lists(st.sampled_from(["flow", "kernels", "mixture", "chains"]), min_size=1))
+@given(st.lists(st.sampled_from(PARTS), min_size=1))
 def test_a_setting_has_one_name_in_whatever_order(parts: list[str]) -> None:
     name, own = setting_of(parts, "parts")
     assert setting_of(parts[::-1], "parts") == (name, own)
-    assert (own is None) == (len(set(parts)) == 4)
+    assert (own is None) == (set(parts) == set(PARTS))
     assert own is None or set(own) == set(parts)
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from typing import NamedTuple
 
-from orbiflow.arguments import instance
 from orbiflow.errors import OrbiflowError
 
 
@@ -99,7 +98,11 @@ def palette(name: str | Palette) -> Palette:
     """
     if isinstance(name, Palette):
         return name
-    name = instance(name, str, "a palette", "a name or colours")
+    given: object = name
+    if not isinstance(
+        given, str
+    ):  # without the import of `arguments`, and torch: for commands' help
+        raise OrbiflowError(f"a palette must be a str, got {given!r}; a name or colours")
     if name in PALETTES:
         return PALETTES[name]
     if "," in name or "=" in name or _HEX.fullmatch(name):
