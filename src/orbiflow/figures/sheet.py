@@ -10,15 +10,13 @@ from threading import Lock
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from orbiflow.errors import OrbiflowError
+from orbiflow.units import COLUMNS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FigureFormat = Literal["png", "pdf", "svg"]
 FORMATS: tuple[FigureFormat, ...] = get_args(FigureFormat)
-
-COLUMNS = {"single": 85.0, "double": 180.0}
-"""Widths in mm of a journal's one and two columns, between those of the large publishers."""
 
 NARROWEST, WIDEST = 40.0, 1000.0
 """Of a figure in print, in mm: texts of a given size need room."""
