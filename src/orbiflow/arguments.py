@@ -132,15 +132,15 @@ def as_whole(value: Any, name: str, least: float | None = None, most: float | No
 
     >>> as_whole(0, "copies", 1)
     Traceback (most recent call last):
-    orbiflow.errors.SettingError: copies must be a whole number at least 1, got 0
+    orbiflow.errors.SettingError: copies must be at least 1, got 0
     """
     allowed = Range(least, most)
     try:
-        result = operator.index(value)
+        result = None if _is_boolean(value) else operator.index(value)
     except TypeError:
         result = None
-    if result is None or _is_boolean(value) or result not in allowed:
-        raise refusal(name, number_phrase(allowed, whole=True), value)
+    if result is None or result not in allowed:
+        raise refusal(name, number_wanted(allowed, result, whole=True), value)
     return result
 
 
@@ -161,20 +161,28 @@ def as_number(
     """
     allowed = Range(least, most, above, below)
     try:
-        result = math.nan if isinstance(value, str | bytes) else float(value)
+        given = not (isinstance(value, str | bytes) or _is_boolean(value))
+        result = float(value) if given else math.nan
     except (TypeError, ValueError, OverflowError):
         result = math.nan
-    if _is_boolean(value) or result not in allowed:
-        raise refusal(name, number_phrase(allowed), value)
+    if result not in allowed:
+        raise refusal(name, number_wanted(allowed, result), value)
     return result
 
 
 def as_path(value: Any, name: str) -> Path:
     """Return `value`, text or a path, as a `Path`."""
-    text: Any = os.fspath(value) if isinstance(value, str | os.PathLike) else None
-    if isinstance(text, str) and text and "\0" not in text:
-        return Path(text)
-    raise refusal(name, "a path", value)
+    text = path_text(value)
+    if text is None:
+        raise refusal(name, "a path", value)
+    return Path(text)
+
+
+def path_text(value: Any) -> str | None:
+    """Return the text of a path that a file can have, or None for anything else."""
+    # what a PathLike is made of, isinstance does not say
+    text: Any = cast(Any, os.fspath)(value) if is_a(value, str | os.PathLike) else None
+    return text if isinstance(text, str) and text and "\0" not in text else None
 
 
 def as_array(values: Any, name: str, shape: Shape, *, finite: bool = True) -> NDArray[np.float64]:
@@ -256,18 +264,23 @@ def described(value: Any) -> str:
     if _is_array(value) or _is_tensor(value):
         what = "an array" if _is_array(value) else "a tensor"
         return f"{what} of shape {tuple(value.shape)}"
-    if isinstance(value, list | tuple | dict | set):
-        many: Any = value
-        return f"a {type(many).__name__} of {len(many)}"
-    if value is None or isinstance(value, str | bytes | abstract.Number | os.PathLike):
-        plain: Any = os.fspath(value) if isinstance(value, os.PathLike) else value
-        return f"{getattr(plain, 'item', lambda: plain)()!a:.60}"
+    if is_a(value, list | tuple | dict | set):
+        return f"a {type(value).__name__} of {len(value)}"
+    given: Any = str(value) if is_a(value, Path) else value
+    if is_a(given, str | bytes | abstract.Number | None):
+        return f"{given.item() if hasattr(given, 'item') else given!a:.60}"
     return _with_article(type(value).__name__)
 
 
-def number_phrase(allowed: Range, *, whole: bool = False) -> str:
-    """Return what a number must be, in words."""
-    return " ".join(filter(None, ("a whole number" if whole else "a number", str(allowed))))
+def number_wanted(allowed: Range, number: float | None = None, *, whole: bool = False) -> str:
+    """Return what a value must be, in words: of a finite number, only the range.
+
+    >>> number_wanted(Range(above=0)), number_wanted(Range(above=0), -1.0)
+    ('a number above 0', 'above 0')
+    """
+    if isinstance(number, int) or (number is not None and math.isfinite(number)):
+        return str(allowed)
+    return f"a {'whole ' if whole else ''}number {allowed}".strip()
 
 
 def one_of(choices: Sequence[object]) -> str:

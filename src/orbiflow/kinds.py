@@ -8,17 +8,17 @@ JSON (`plain`), and describes itself in words and as JSON Schema. Annotations ma
 
 from __future__ import annotations
 
-import os
 import types
 import typing
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from itertools import repeat
 from numbers import Integral, Real
 from pathlib import Path
 from typing import Any, Literal, Union, cast
 
-from orbiflow.arguments import ANY, Range, meant, number_phrase, one_of
+from orbiflow.arguments import ANY, Range, described, meant, number_wanted, one_of, path_text
 from orbiflow.errors import OrbiflowError
 
 
@@ -56,12 +56,14 @@ class Refused(ValueError):
 
     - `reason`: What is wrong with it, as a sentence that begins with the value. Default: that it is
       not what is `wanted`.
+    - `wanted`: What it must be, where that is not all that its kind wants.
     - `hint`: What to do, added to the usual message.
     """
 
-    def __init__(self, reason: str = "", hint: str = "") -> None:
-        super().__init__(reason or hint)
+    def __init__(self, reason: str = "", *, wanted: str = "", hint: str = "") -> None:
+        super().__init__(reason or wanted or hint)
         self.reason = reason
+        self.wanted = wanted
         self.hint = hint
 
 
@@ -128,8 +130,8 @@ class PathKind(Kind):
         return "a path"
 
     def read(self, value: Any) -> Path:
-        text: Any = os.fspath(value) if isinstance(value, str | os.PathLike) else None
-        if not isinstance(text, str) or not text or "\0" in text:
+        text = path_text(value)
+        if text is None:
             raise Refused
         return Path(text)
 
@@ -177,7 +179,7 @@ class NumberKind(Kind):
 
     @property
     def wanted(self) -> str:
-        return number_phrase(self.allowed, whole=self.whole)
+        return number_wanted(self.allowed, whole=self.whole)
 
     @property
     def limits(self) -> str:
@@ -185,21 +187,24 @@ class NumberKind(Kind):
         return f"{limits} {self.unit}" if limits and self.unit else limits or self.unit
 
     def read(self, value: Any) -> float:
-        if isinstance(value, bool) or not isinstance(value, Integral if self.whole else Real):
+        abstract: type = Integral if self.whole else Real
+        if isinstance(value, bool) or not isinstance(value, abstract):
             raise Refused
+        given: Any = value
         try:
-            number = int(value) if self.whole else float(value)
+            number = int(given) if self.whole else float(given)
         except (OverflowError, ValueError):
             raise Refused from None
         if number not in self.allowed:
-            raise Refused
+            raise Refused(wanted=number_wanted(self.allowed, number, whole=self.whole))
         return number
 
     def parse(self, text: str) -> float:
         try:
-            return self.read(int(text) if self.whole else float(text))
+            number = int(text) if self.whole else float(text)
         except ValueError:
             raise Refused from None
+        return self.read(number)
 
     @property
     def schema(self) -> dict[str, Any]:
@@ -245,17 +250,16 @@ class ListKind(Kind):
         return f"each {limits}" if limits else ""
 
     def read(self, value: Any) -> tuple[Any, ...]:
-        return self._whole(self.item.read(part) for part in _sequence(value))
+        return self._whole(_entries(_sequence(value), repeat(self.item), _read))
 
     def parse(self, text: str) -> tuple[Any, ...]:
         parts = [text] if self.repeated else [part.strip() for part in text.split(",")]
-        return self._whole(self.item.parse(part) for part in parts if part)
+        return self._whole(_entries(list(filter(None, parts)), repeat(self.item), _parse))
 
-    def _whole(self, entries: Iterable[Any]) -> tuple[Any, ...]:
-        found = tuple(entries)
-        if not found and not self.may_be_empty:
+    def _whole(self, entries: tuple[Any, ...]) -> tuple[Any, ...]:
+        if not entries and not self.may_be_empty:
             raise Refused
-        return found
+        return entries
 
     def plain(self, value: Any) -> list[Any]:
         return [self.item.plain(part) for part in value]
@@ -283,16 +287,16 @@ class TupleKind(Kind):
         return f"each {limits}{self.unit and ' ' + self.unit}" if limits else self.unit
 
     def read(self, value: Any) -> tuple[Any, ...]:
-        return self._taken(_sequence(value), lambda item, part: item.read(part))
+        return self._taken(_sequence(value), _read)
 
     def parse(self, text: str) -> tuple[Any, ...]:
         parts = [part.strip() for part in text.split(",")]
-        return self._taken(parts, lambda item, part: item.parse(part))
+        return self._taken(parts, _parse)
 
     def _taken(self, parts: Sequence[Any], take: Callable[[Kind, Any], Any]) -> tuple[Any, ...]:
         if len(parts) != len(self.items):
             raise Refused
-        return tuple(take(item, part) for item, part in zip(self.items, parts, strict=True))
+        return _entries(parts, self.items, take)
 
     def plain(self, value: Any) -> list[Any]:
         return [item.plain(part) for item, part in zip(self.items, value, strict=True)]
@@ -481,6 +485,29 @@ def _plain_kind(annotation: Any, allowed: Range, unit: str, repeated: bool) -> K
             kind = replace(kind, may_be_empty=False)
         return OptionalKind(kind)
     raise TypeError(f"no setting can be annotated {annotation!r}")
+
+
+def _entries(
+    parts: Sequence[Any], kinds: Iterable[Kind], take: Callable[[Kind, Any], Any]
+) -> tuple[Any, ...]:
+    """What kinds take of the entries of a list; a refusal says which entry."""
+    taken: list[Any] = []
+    for part, kind in zip(parts, kinds, strict=False):
+        try:
+            taken.append(take(kind, part))
+        except Refused as error:
+            wrong = f"must be {error.wanted or kind.wanted}, got {described(part)}"
+            more = f"; {error.hint}" if error.hint else ""
+            raise Refused(f"entry {len(taken) + 1}: {error.reason or wrong + more}") from error
+    return tuple(taken)
+
+
+def _read(kind: Kind, value: Any) -> Any:
+    return kind.read(value)
+
+
+def _parse(kind: Kind, text: str) -> Any:
+    return kind.parse(text)
 
 
 def _sequence(value: object) -> Sequence[Any]:

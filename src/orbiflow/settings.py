@@ -43,7 +43,7 @@ import typing
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import MISSING, dataclass, field
 from functools import cache, cached_property
-from typing import Any, ClassVar, Self, dataclass_transform
+from typing import Any, ClassVar, Self, cast, dataclass_transform
 
 from orbiflow.arguments import Range, described, meant, one_of, placeholder, refusal
 from orbiflow.errors import SettingError, literal
@@ -111,7 +111,7 @@ class OnlyWith:
     """
 
     def __init__(self, *, because: str = "", **others: Any) -> None:
-        self.others = {
+        self.others: dict[str, tuple[Any, ...]] = {
             name: value if isinstance(value, tuple) else (value,) for name, value in others.items()
         }
         self.because = because
@@ -264,7 +264,8 @@ class Field:
         except Refused as error:
             if error.reason:
                 raise SettingError(f"{placeholder(self.name)}: {literal(error.reason)}") from error
-            raise refusal(self.name, self.kind.wanted, value, error.hint) from None
+            wanted = error.wanted or self.kind.wanted
+            raise refusal(self.name, wanted, value, error.hint) from None
 
     def parse(self, words: Sequence[str]) -> Any:
         """Return the value that the command line gives in one word, or several if it is repeated."""
@@ -290,7 +291,8 @@ class Settings:
         SettingError: If a setting is unknown, missing or not allowed.
     """
 
-    GROUP: ClassVar[str] = ""
+    default_group: ClassVar[str] = ""
+    """The heading in the help of fields without one of their own (of a class)."""
     fields_given: ClassVar[frozenset[str]] = frozenset()
     """The names of the fields that were given, rather than left at their defaults (of an object)."""
 
@@ -299,7 +301,7 @@ class Settings:
         taken = [name for name in vars(cls).get("__annotations__", {}) if hasattr(Settings, name)]
         if taken:
             raise TypeError(f"a field of {cls.__name__} cannot be called {taken[0]}")
-        cls.GROUP = group
+        cls.default_group = group
         dataclass(frozen=True, kw_only=True)(cls)
 
     def __new__(cls, *positional: Any, **given: Any) -> Self:
@@ -366,9 +368,13 @@ def fields_of(cls: type[Settings]) -> tuple[Field, ...]:
     hints = typing.get_type_hints(cls, include_extras=True)
     return tuple(
         make_field(
-            entry.name, hints[entry.name], entry.default, _doc_finder(cls, entry.name), cls.GROUP
+            entry.name,
+            hints[entry.name],
+            entry.default,
+            _doc_finder(cls, entry.name),
+            cls.default_group,
         )
-        for entry in dataclasses.fields(typing.cast(Any, cls))
+        for entry in dataclasses.fields(cast(Any, cls))
     )
 
 
@@ -453,8 +459,7 @@ def _word(value: Any) -> str:
     if isinstance(value, float):
         return f"{value:g}"
     if isinstance(value, list | tuple):
-        entries: Any = value
-        return ",".join(map(_word, entries))
+        return ",".join(map(_word, cast(Sequence[Any], value)))
     return "nothing" if value is None else str(value)
 
 

@@ -8,7 +8,7 @@ from contextlib import nullcontext
 from inspect import Parameter as Argument
 from inspect import Signature
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, cast
 
 from cyclopts import App, CoercionError, CycloptsError, Group, MissingArgumentError, Parameter
 from cyclopts.exceptions import RepeatArgumentError, UnusedCliTokensError
@@ -47,9 +47,9 @@ def run(words: Sequence[str]) -> int:
         except CycloptsError as error:
             raise _mistake(error, _operation(words)) from error
     except OrbiflowError as error:
-        operation = _operation(words)
-        is_setting = isinstance(error, SettingError) and operation
-        text = error.named(_namer(operation)) if is_setting else str(error)
+        text = str(error)
+        if isinstance(error, SettingError) and (operation := _operation(words)):
+            text = error.named(_namer(operation))
         errors.print(f"[bold red]error:[/] {escape(text)}", soft_wrap=True, highlight=False)
         return 2
     except (KeyboardInterrupt, Cancelled):
@@ -88,7 +88,7 @@ def app_for(words: Sequence[str]) -> App:
             group_parameters=OPTIONS,
         )
     if asked is None:
-        app.register_install_completion_command()
+        app.register_install_completion_command()  # pyright: ignore[reportUnknownMemberType]
     return app
 
 
@@ -155,7 +155,8 @@ def _hint(entry: Field) -> Any:
 def _value(entry: Field, word: Any) -> Any:
     if isinstance(word, bool):
         return word
-    return entry.parse([str(part) for part in word] if isinstance(word, list) else [str(word)])
+    words = cast(list[Any], word) if isinstance(word, list) else [word]
+    return entry.parse(list(map(str, words)))
 
 
 def _is_flag(entry: Field) -> bool:

@@ -283,7 +283,7 @@ def operation(
             cancel: Any = arguments.pop("cancel", None)
             return cast(R, made.run(arguments, on_event, cancel or Cancel()))
 
-        checked.operation = made  # pyright: ignore[reportFunctionMemberAccess]
+        checked.__dict__["operation"] = made
         return checked
 
     return decorate
