@@ -347,26 +347,6 @@ class EitherKind(Kind):
 
 
 @dataclass(frozen=True)
-class NothingKind(Kind):
-    """None, which JSON calls null and the command line cannot say."""
-
-    @property
-    def wanted(self) -> str:
-        return "nothing"
-
-    def read(self, value: Any) -> None:
-        if value is not None:
-            raise Refused
-
-    def parse(self, text: str) -> None:  # noqa: ARG002
-        raise Refused
-
-    @property
-    def schema(self) -> dict[str, Any]:
-        return {"type": "null"}
-
-
-@dataclass(frozen=True)
 class OptionalKind(Kind):
     """A value of a kind, or None."""
 
@@ -460,7 +440,7 @@ def _plain_kind(annotation: Any, allowed: Range, unit: str, repeated: bool) -> K
     if annotation in (int, float):
         return NumberKind(allowed, annotation is int, unit)
     simple: dict[Any, type[Kind]] = {
-        str: TextKind, Path: PathKind, bool: FlagKind, type(None): NothingKind
+        str: TextKind, Path: PathKind, bool: FlagKind
     }  # fmt: skip
     if annotation in simple:
         return simple[annotation]()

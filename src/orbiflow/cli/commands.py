@@ -67,6 +67,7 @@ def app_for(words: Sequence[str]) -> App:
         version=__version__,
         version_flags="--version",
         help_flags=["--help", "-h"],
+        help_format="plaintext",
         result_action="return_value",
         exit_on_error=False,
         print_error=False,
