@@ -21,7 +21,7 @@ ROOMS = [
     *("runtime", "symmetry", "fields", "flows", "drawing"),
     *(f"tiles.{room}" for room in TILES),
     *(f"density.{room}" for room in DENSITY),
-    *("tiles", "density", "loading", "jobs", "cli"),
+    *("tiles", "density", "loading", "jobs", "derived", "cli"),
 ]
 """Each room may import those before it; a wing's own files come after its rooms."""
 
@@ -126,7 +126,7 @@ def test_imports_go_through_doors() -> None:
     for found in ALL:
         here = dotted(found.file)
         own = (here if here in PACKAGES else here.rpartition(".")[0]).split(".")
-        if own[1:2] in (["jobs"], ["cli"]):
+        if own[1:2] in (["jobs"], ["cli"], ["derived"]):
             continue  # these rooms have no doors yet
         whole = f"{found.source}.{found.name}"
         parts = (whole if whole in MODULES else found.source).split(".")

@@ -20,8 +20,8 @@ from orbiflow.jobs import (
     Note,
     run,
 )
-from orbiflow.jobs.events import Written
 from orbiflow.runtime import Cancel
+from orbiflow.runtime.events import Written
 from orbiflow.tiles import Target
 
 
@@ -89,13 +89,13 @@ def png_that_says(width: int, height: int) -> bytes:
         (("--size", "0x100"), "a picture's side in pixels must be from 1 to 30000, got 0"),
         (("--size", "30000x30000"), "is too large; at most 100 megapixels are made"),
         (("--size", "999999999x2"), "must be from 1 to 30000"),
-        (("--size", "big"), "--size 'big' is no width and height"),
-        (("--size", "300.5x200"), "write two whole numbers, as 3000x2000"),
+        (("--size", "big"), "--size 'big' is not a width and a height"),
+        (("--size", "300.5x200"), "write two whole numbers, such as 3000x2000"),
         (("--tile-size", "0"), "--tile-size '0' must be above 0"),
         (("--tile-size", "1"), "tile_size must be from 8"),
         (("--tile-size", "9", "--size", "9000x9000"), "the most is 20000: choose larger tiles"),
         (("--palette", "neon"), "unknown palette 'neon'; there are delft"),
-        (("--outline", "thick"), "--outline 'thick' is no length"),
+        (("--outline", "thick"), "--outline 'thick' is not a length"),
         (("--eye", "5,5"), "the eye at 5,5 lies outside the silhouette, which reaches from"),
         (("--eye", "here"), "--eye 'here' is no place; write x,y or x,y,radius"),
         (("--eye", "nan,1"), "an eye's x must be"),

@@ -18,7 +18,7 @@ from orbiflow.jobs import (
     Finished,
     run,
 )
-from orbiflow.jobs.events import Written
+from orbiflow.runtime.events import Written
 from orbiflow.tiles.search.reports import group_json
 
 
@@ -124,7 +124,7 @@ MISTAKES: dict[str, tuple[list[str], str]] = {
     "no unit": (["--tile-size", "40"], "--tile-size '40' has no unit; write 40mm, 40cm or 40in"),
     "no unit of the area": (["--area", "300x200"], "--area '300x200' has no unit; write 300x200mm"),
     "zero": (["--tile-size", "0mm"], "--tile-size '0mm' must be above 0"),
-    "one side": (["--bed", "300mm"], "--bed '300mm' is no width and height"),
+    "one side": (["--bed", "300mm"], "--bed '300mm' is not a width and a height"),
     "small page": (["--area", "10x10mm"], "does not fit on the page of 10 x 10 mm: it needs"),
     "kerf of the skeleton": (["--for", "laser", "--kerf", "1mm"], "cannot be moved by half a kerf"),
     "wide kerf": (["--cut", "pieces", "--kerf", "5cm"], "wider than the piece's neck"),

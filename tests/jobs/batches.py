@@ -18,11 +18,11 @@ from orbiflow.jobs import (
     Finished,
     run,
 )
-from orbiflow.jobs.events import Failed
 from orbiflow.jobs.executors import Answer, Parcel
 from orbiflow.jobs.executors.parcel import carry_out
 from orbiflow.jobs.run import Sink
 from orbiflow.runtime import Cancel
+from orbiflow.runtime.events import Failed
 
 QUICK: dict[str, Any] = {
     "classes": ["IH4"],

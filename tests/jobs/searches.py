@@ -15,7 +15,7 @@ from orbiflow.jobs import (
     Started,
     TileFound,
 )
-from orbiflow.jobs.events import (
+from orbiflow.runtime.events import (
     ClassFailed,
     Failed,
     Written,
@@ -44,7 +44,7 @@ def boot_request(
 
 
 def check_order(events: list[Event], *classes: str) -> None:
-    """What the documentation of `orbiflow.jobs.events` promises."""
+    """What the documentation of `orbiflow.runtime.events` promises."""
     kinds = [type(event) for event in events]
     assert kinds[0] is Started
     assert kinds[-1] in (Finished, Failed)

@@ -17,9 +17,9 @@ from orbiflow.jobs import (
     RecordError,
     run,
 )
-from orbiflow.jobs.events import Written
 from orbiflow.jobs.requests import request_from_json
 from orbiflow.runtime import Cancel
+from orbiflow.runtime.events import Written
 
 
 @pytest.fixture(scope="module", name="folder")

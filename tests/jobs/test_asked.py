@@ -15,7 +15,7 @@ from orbiflow.jobs import (
     RecordError,
 )
 from orbiflow.jobs.asked import given, read_as
-from orbiflow.tiles import length
+from orbiflow.units import length
 
 
 def test_what_was_set_is_given_and_nothing_else() -> None:

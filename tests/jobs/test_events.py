@@ -20,7 +20,7 @@ from orbiflow.jobs import (
     Started,
     TileFound,
 )
-from orbiflow.jobs.events import (
+from orbiflow.runtime.events import (
     ClassFailed,
     Failed,
     Written,

@@ -23,7 +23,6 @@ from orbiflow.jobs import (
     Finished,
     Note,
 )
-from orbiflow.jobs.events import Failed
 from orbiflow.jobs.executors import (
     Answer,
     DaskCluster,
@@ -36,6 +35,7 @@ from orbiflow.jobs.executors import (
 )
 from orbiflow.jobs.executors.memory import VARIABLE, keeping_memory
 from orbiflow.runtime import Cancel
+from orbiflow.runtime.events import Failed
 
 DEADLY = EscherizeRequest(image=Path("any.png"))
 

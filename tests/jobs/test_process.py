@@ -17,8 +17,8 @@ from orbiflow.jobs import (
     Progress,
     TileFound,
 )
-from orbiflow.jobs.events import ClassFailed, Failed
 from orbiflow.jobs.process import start
+from orbiflow.runtime.events import ClassFailed, Failed
 
 
 def test_a_search_in_a_process(tmp_path: Path) -> None:

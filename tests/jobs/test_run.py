@@ -23,12 +23,12 @@ from orbiflow.jobs import (
     TileFound,
     run,
 )
-from orbiflow.jobs.events import (
+from orbiflow.runtime import Cancel
+from orbiflow.runtime.events import (
     ClassFailed,
     Failed,
     Written,
 )
-from orbiflow.runtime import Cancel
 from orbiflow.tiles.pages.tile_folder import TILE_FILES
 
 

@@ -35,6 +35,7 @@ from .sheet import FORMATS as FORMATS
 from .sheet import FigureFormat as FigureFormat
 from .sheet import Picture as Picture
 from .sheet import Sheet as Sheet
+from .sheet import column_width as column_width
 from .sheet import pdf_pages as pdf_pages
 from .web_page import CLOSING as CLOSING
 from .web_page import css as css

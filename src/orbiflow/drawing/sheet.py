@@ -10,15 +10,13 @@ from threading import Lock
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from orbiflow.errors import OrbiflowError
+from orbiflow.units import COLUMNS, length
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FigureFormat = Literal["png", "pdf", "svg"]
 FORMATS: tuple[FigureFormat, ...] = get_args(FigureFormat)
-
-COLUMNS = {"single": 85.0, "double": 180.0}
-"""Widths in mm of a journal's one and two columns, between those of the large publishers."""
 
 NARROWEST, WIDEST = 40.0, 1000.0
 """Of a figure in print, in mm: texts of a given size need room."""
@@ -199,3 +197,18 @@ def _plain_texts() -> Iterator[None]:
     }
     with _LOCK, rc_context(settings):
         yield
+
+
+def column_width(text: str) -> str | float:
+    """Return the width of a printed figure: a word of `orbiflow.units.COLUMNS`, or millimetres.
+
+    Raises:
+        OrbiflowError: As `orbiflow.units.length`, and for a width that no figure has.
+
+    >>> column_width("double"), column_width("8.5cm")
+    ('double', 85.0)
+    """
+    word = text.strip().lower()
+    width = word if word in COLUMNS else length(text)
+    Sheet.column(width)
+    return width

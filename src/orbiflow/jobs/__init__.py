@@ -20,22 +20,7 @@ from orbiflow.jobs.density_requests import (
     DensityScoreRequest,
     PatchesRequest,
 )
-from orbiflow.jobs.events import (
-    ClassFailed,
-    Event,
-    Failed,
-    Finished,
-    ItemDone,
-    Note,
-    Preview,
-    Progress,
-    Started,
-    TileFound,
-    Written,
-    event_from_json,
-)
 from orbiflow.jobs.process import Job, start
-from orbiflow.jobs.records import RecordError
 from orbiflow.jobs.request import Request
 from orbiflow.jobs.requests import request_from_json
 from orbiflow.jobs.run import Sink, run
@@ -45,7 +30,22 @@ from orbiflow.jobs.tile_requests import (
     EscherizeRequest,
     ExportRequest,
 )
-from orbiflow.runtime import Cancel
+from orbiflow.runtime import (
+    Cancel,
+    ClassFailed,
+    Event,
+    Failed,
+    Finished,
+    ItemDone,
+    Note,
+    Preview,
+    Progress,
+    RecordError,
+    Started,
+    TileFound,
+    Written,
+    event_from_json,
+)
 
 __all__ = [
     "AnimateRequest",

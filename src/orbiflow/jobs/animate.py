@@ -6,16 +6,17 @@ from pathlib import Path
 
 from orbiflow.drawing import palette
 from orbiflow.jobs.asked import given
-from orbiflow.jobs.events import (
+from orbiflow.jobs.place import check_place
+from orbiflow.jobs.run import Sink
+from orbiflow.jobs.tile_requests import AnimateRequest
+from orbiflow.runtime import (
+    Cancel,
     Finished,
     Note,
     Progress,
     Written,
+    write_atomic,
 )
-from orbiflow.jobs.place import check_place
-from orbiflow.jobs.run import Sink
-from orbiflow.jobs.tile_requests import AnimateRequest
-from orbiflow.runtime import Cancel, write_atomic
 from orbiflow.tiles import (
     AnimationSettings,
     animation,

@@ -6,29 +6,29 @@ from functools import partial
 from pathlib import Path
 
 from orbiflow.jobs.asked import given, read_as
-from orbiflow.jobs.events import (
+from orbiflow.jobs.place import check_place
+from orbiflow.jobs.run import Sink
+from orbiflow.jobs.tile_requests import ArtRequest
+from orbiflow.runtime import (
+    Cancel,
     Finished,
     Note,
     Progress,
+    RecordError,
     Written,
+    write_atomic,
 )
-from orbiflow.jobs.place import check_place
-from orbiflow.jobs.records import RecordError
-from orbiflow.jobs.run import Sink
-from orbiflow.jobs.tile_requests import ArtRequest
-from orbiflow.runtime import Cancel, write_atomic
 from orbiflow.tiles import (
     ArtSettings,
     ArtTile,
     Artwork,
     artwork,
-    pixel_size,
-    pixels,
     read_art_tile,
     read_over,
     require_certified,
     write_artwork,
 )
+from orbiflow.units import pixel_size, pixels
 
 
 def art(request: ArtRequest, tell: Sink, cancel: Cancel) -> Finished:

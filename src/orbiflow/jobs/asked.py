@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterable
 from typing import Any, TypeVar
 
 from orbiflow.errors import OrbiflowError
-from orbiflow.jobs.records import RecordError
 from orbiflow.jobs.request import Request
+from orbiflow.runtime import RecordError
 
 Value = TypeVar("Value")
 

@@ -17,14 +17,14 @@ from collections import deque
 from typing import TextIO
 
 from orbiflow.errors import OrbiflowError
-from orbiflow.jobs.events import (
+from orbiflow.jobs.requests import request_from_json
+from orbiflow.jobs.run import run
+from orbiflow.runtime import (
+    Cancel,
     Event,
     Failed,
     Finished,
 )
-from orbiflow.jobs.requests import request_from_json
-from orbiflow.jobs.run import run
-from orbiflow.runtime import Cancel
 
 
 class _Listening(Cancel):

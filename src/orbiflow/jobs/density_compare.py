@@ -33,17 +33,15 @@ from orbiflow.jobs.density_data import (
     unit_of,
 )
 from orbiflow.jobs.density_models import check_fits, model_at
-from orbiflow.jobs.events import (
-    Finished,
-    Note,
-    Progress,
-    Written,
-)
 from orbiflow.jobs.place import check_place
-from orbiflow.jobs.records import RecordError
 from orbiflow.jobs.run import Sink
 from orbiflow.runtime import (
     Cancel,
+    Finished,
+    Note,
+    Progress,
+    RecordError,
+    Written,
     one_thread,
     write_atomic,
 )

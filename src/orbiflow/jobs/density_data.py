@@ -22,9 +22,8 @@ from orbiflow.density import (
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.jobs.density_columns import check_order
 from orbiflow.jobs.density_requests import Unit
-from orbiflow.jobs.events import Note
-from orbiflow.jobs.records import RecordError
 from orbiflow.jobs.run import Sink
+from orbiflow.runtime import Note, RecordError
 
 
 def read_data(

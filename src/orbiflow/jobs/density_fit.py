@@ -30,18 +30,16 @@ from orbiflow.jobs.density_data import unit_of
 from orbiflow.jobs.density_folder import written_files
 from orbiflow.jobs.density_groups import read_beside_groups
 from orbiflow.jobs.density_requests import DensityFitRequest
-from orbiflow.jobs.events import (
-    Finished,
-    Note,
-    Progress,
-    Written,
-)
 from orbiflow.jobs.place import check_folder
-from orbiflow.jobs.records import RecordError
 from orbiflow.jobs.run import Sink
 from orbiflow.runtime import (
     Cancel,
+    Finished,
+    Note,
+    Progress,
+    RecordError,
     ResultFolder,
+    Written,
     one_thread,
     write_atomic,
 )

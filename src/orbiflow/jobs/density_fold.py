@@ -28,15 +28,13 @@ from orbiflow.jobs.density_fit import (
     plain_report,
     told_of,
 )
-from orbiflow.jobs.events import (
-    Finished,
-    Note,
-    Written,
-)
 from orbiflow.jobs.run import Sink
 from orbiflow.runtime import (
     Cancel,
+    Finished,
+    Note,
     ResultFolder,
+    Written,
     one_thread,
     write_atomic,
 )

@@ -18,9 +18,9 @@ from orbiflow.density import (
     read_density,
 )
 from orbiflow.errors import InputFileError
-from orbiflow.jobs.events import Note
 from orbiflow.jobs.run import Sink
 from orbiflow.jobs.wording import counted
+from orbiflow.runtime import Note
 
 FEW_ROWS = 10
 """Fewer may all be within 2 pi degrees without a word."""

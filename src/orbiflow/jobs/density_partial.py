@@ -30,18 +30,16 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.jobs.density_folder import written_files
 from orbiflow.jobs.density_models import model_at, unit_warning
 from orbiflow.jobs.density_requests import DensityConditionalRequest, DensityMarginalRequest
-from orbiflow.jobs.events import (
-    Finished,
-    Note,
-    Progress,
-    Written,
-)
 from orbiflow.jobs.place import check_folder
-from orbiflow.jobs.records import RecordError
 from orbiflow.jobs.run import Sink
 from orbiflow.runtime import (
     Cancel,
+    Finished,
+    Note,
+    Progress,
+    RecordError,
     ResultFolder,
+    Written,
     one_thread,
     write_atomic,
 )

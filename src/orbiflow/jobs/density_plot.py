@@ -16,6 +16,7 @@ from orbiflow.density import (
     plot_density,
     read_coastlines,
 )
+from orbiflow.drawing import column_width
 from orbiflow.jobs.asked import (
     given,
     read_as,
@@ -24,17 +25,17 @@ from orbiflow.jobs.asked import (
 from orbiflow.jobs.density_data import read_data, same_columns
 from orbiflow.jobs.density_models import check_fits, model_at
 from orbiflow.jobs.density_requests import DensityPlotRequest
-from orbiflow.jobs.events import (
+from orbiflow.jobs.place import check_place, keep_apart
+from orbiflow.jobs.run import Sink
+from orbiflow.runtime import (
+    Cancel,
     Finished,
     Note,
     Progress,
+    RecordError,
     Written,
+    one_thread,
 )
-from orbiflow.jobs.place import check_place, keep_apart
-from orbiflow.jobs.records import RecordError
-from orbiflow.jobs.run import Sink
-from orbiflow.runtime import Cancel, one_thread
-from orbiflow.tiles import column_width
 
 
 @one_thread()

@@ -18,12 +18,6 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.jobs.asked import samples_asked
 from orbiflow.jobs.density_compare_requests import DensityRegionRequest
 from orbiflow.jobs.density_models import model_at
-from orbiflow.jobs.events import (
-    Finished,
-    Note,
-    Progress,
-    Written,
-)
 from orbiflow.jobs.place import check_place
 from orbiflow.jobs.run import Sink
 from orbiflow.jobs.wording import (
@@ -33,6 +27,10 @@ from orbiflow.jobs.wording import (
 )
 from orbiflow.runtime import (
     Cancel,
+    Finished,
+    Note,
+    Progress,
+    Written,
     one_thread,
     write_atomic,
 )

@@ -18,9 +18,8 @@ from orbiflow.density import (
     log_density_gradient,
 )
 from orbiflow.jobs.density_requests import DensityScoreRequest
-from orbiflow.jobs.events import Note, Progress
 from orbiflow.jobs.run import Sink
-from orbiflow.runtime import Cancel
+from orbiflow.runtime import Cancel, Note, Progress
 
 BLOCK, BLOCK_GRADIENT = 2**18, 2**16
 """Rows at a time: many cost less each, few leave room and tell how far it is."""

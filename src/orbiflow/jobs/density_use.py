@@ -37,17 +37,15 @@ from orbiflow.jobs.density_requests import (
     PatchesRequest,
 )
 from orbiflow.jobs.density_scores import evaluated
-from orbiflow.jobs.events import (
-    Finished,
-    Note,
-    Progress,
-    Written,
-)
 from orbiflow.jobs.place import check_place
 from orbiflow.jobs.run import Sink
 from orbiflow.jobs.wording import counted
 from orbiflow.runtime import (
     Cancel,
+    Finished,
+    Note,
+    Progress,
+    Written,
     one_thread,
     write_atomic,
 )

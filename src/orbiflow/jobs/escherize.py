@@ -9,21 +9,22 @@ from pathlib import Path
 from typing import Any
 
 from orbiflow.jobs.asked import given
-from orbiflow.jobs.events import (
+from orbiflow.jobs.place import check_folder
+from orbiflow.jobs.run import Sink
+from orbiflow.jobs.tile_requests import EscherizeRequest
+from orbiflow.runtime import (
+    Cancel,
     ClassFailed,
     Finished,
     Note,
     Preview,
     Progress,
+    RecordError,
+    ResultFolder,
     State,
     TileFound,
     Written,
 )
-from orbiflow.jobs.place import check_folder
-from orbiflow.jobs.records import RecordError
-from orbiflow.jobs.run import Sink
-from orbiflow.jobs.tile_requests import EscherizeRequest
-from orbiflow.runtime import Cancel, ResultFolder
 from orbiflow.tiles import (
     CLASSES,
     FIELD_FILES,

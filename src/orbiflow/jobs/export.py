@@ -8,29 +8,28 @@ from pathlib import Path
 from typing import Any
 
 from orbiflow.jobs.asked import given, read_as
-from orbiflow.jobs.events import (
+from orbiflow.jobs.place import check_place
+from orbiflow.jobs.run import Sink
+from orbiflow.jobs.tile_requests import ExportRequest
+from orbiflow.runtime import (
+    Cancel,
     Finished,
     Note,
     Progress,
+    RecordError,
     Written,
+    write_atomic,
 )
-from orbiflow.jobs.place import check_place
-from orbiflow.jobs.records import RecordError
-from orbiflow.jobs.run import Sink
-from orbiflow.jobs.tile_requests import ExportRequest
-from orbiflow.runtime import Cancel, write_atomic
 from orbiflow.tiles import (
     FORMATS,
     Exported,
     ExportSettings,
-    length,
-    page_size,
     read_result,
     scenes,
     sheet_names,
-    size,
     write_scene,
 )
+from orbiflow.units import length, page_size, size
 
 LENGTHS = ("tile_size", "tolerance", "warn_neck")
 LENGTHS_OR_ZERO = ("kerf", "clearance", "spacing")

@@ -12,13 +12,13 @@ from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 
-from orbiflow.jobs.events import (
+from orbiflow.jobs.request import Request
+from orbiflow.runtime import (
     Event,
     Failed,
     Finished,
     event_from_json,
 )
-from orbiflow.jobs.request import Request
 
 
 def start(request: Request) -> Job:

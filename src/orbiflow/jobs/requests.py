@@ -17,7 +17,6 @@ from orbiflow.jobs.density_requests import (
     DensityScoreRequest,
     PatchesRequest,
 )
-from orbiflow.jobs.records import RecordError, kind_of
 from orbiflow.jobs.request import SCHEMA_VERSION, Request
 from orbiflow.jobs.tile_requests import (
     AnimateRequest,
@@ -25,7 +24,7 @@ from orbiflow.jobs.tile_requests import (
     EscherizeRequest,
     ExportRequest,
 )
-from orbiflow.runtime import is_object
+from orbiflow.runtime import RecordError, is_object, kind_of
 
 REQUESTS: dict[str, type[Request]] = {
     kind.KIND: kind

@@ -7,15 +7,16 @@ from importlib import import_module
 from typing import Any
 
 from orbiflow.errors import OrbiflowError
-from orbiflow.jobs.events import (
+from orbiflow.jobs.request import Request
+from orbiflow.jobs.requests import REQUESTS
+from orbiflow.runtime import (
+    Cancel,
+    Cancelled,
     Event,
     Failed,
     Finished,
     Started,
 )
-from orbiflow.jobs.request import Request
-from orbiflow.jobs.requests import REQUESTS
-from orbiflow.runtime import Cancel, Cancelled
 
 Sink = Callable[[Event], None]
 
@@ -46,8 +47,8 @@ def run(request: Request, sink: Sink | None = None, cancel: Cancel | None = None
 
     Args:
         request: of one of the kinds in `REQUESTS`.
-        sink: called in this thread with every event, in the order that `orbiflow.jobs.events` states.
-            What it raises ends the job and comes out of this function.
+        sink: called in this thread with every event, in the order that
+            `orbiflow.runtime.events` states. What it raises ends the job and comes out of this function.
         cancel: ends the job early; a search keeps what it has found, others write nothing.
 
     Returns:

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from orbiflow.jobs.records import RecordError
 from orbiflow.jobs.request import Request, at_least_one
+from orbiflow.runtime import RecordError
 
 
 @dataclass(frozen=True)

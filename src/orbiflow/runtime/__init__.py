@@ -1,4 +1,4 @@
-"""Running work: events, cancelling, worker processes, and files that are written whole."""
+"""Running work: operations, events, cancelling, worker processes, and files that are written whole."""
 
 import lazy_loader
 

@@ -10,12 +10,6 @@ from .art.settings import ArtSettings as ArtSettings
 from .art.source import ArtTile as ArtTile
 from .art.source import read_art_tile as read_art_tile
 from .exporting.curves import Curve as Curve
-from .exporting.lengths import column_width as column_width
-from .exporting.lengths import length as length
-from .exporting.lengths import page_size as page_size
-from .exporting.lengths import pixel_size as pixel_size
-from .exporting.lengths import pixels as pixels
-from .exporting.lengths import size as size
 from .exporting.result_file import RESULT as RESULT
 from .exporting.result_file import ExportTile as ExportTile
 from .exporting.result_file import folder_names as folder_names

@@ -9,8 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles import length, size
-from orbiflow.tiles.exporting.lengths import MILLIMETRES
+from orbiflow.units import MILLIMETRES, length, size
 
 
 @given(st.floats(1e-3, 1e3), st.sampled_from(list(MILLIMETRES)))
@@ -30,16 +29,16 @@ def test_points_are_those_of_an_inch() -> None:
     ("text", "message"),
     [
         ("40", "'40' has no unit; write 40mm, 40cm or 40in"),
-        ("40px", "'px' is no unit that is known here; there are mm, cm, in, pt"),
-        ("mm", "'mm' is no length; write a number and its unit, such as 40mm"),
-        ("", "is no length"),
+        ("40px", "unknown unit 'px'; use one of mm, cm, in, pt"),
+        ("mm", "'mm' is not a length; write a number and its unit, such as 40mm"),
+        ("", "is not a length"),
         ("-3mm", "must be above 0"),
         ("0mm", "must be above 0"),
         ("0", "has no unit"),
         ("1e9mm", "longer than 100 m"),
         ("1e999mm", "longer than 100 m"),
-        ("nanmm", "is no length"),
-        ("40mm cm", "is no length"),
+        ("nanmm", "is not a length"),
+        ("40mm cm", "is not a length"),
     ],
 )
 def test_no_lengths(text: str, message: str) -> None:
@@ -57,10 +56,10 @@ def test_zero_where_it_is_one() -> None:
     ("text", "message"),
     [
         ("300x200", "has no unit; write 300x200mm"),
-        ("300mm", "no width and height; write both and their unit, such as 300x200mm"),
-        ("300x200x10mm", "no width and height"),
+        ("300mm", "not a width and a height; write both and their unit, such as 300x200mm"),
+        ("300x200x10mm", "not a width and a height"),
         ("0x200mm", "above 0"),
-        ("300x200ft", "'ft' is no unit"),
+        ("300x200ft", "unknown unit 'ft'"),
     ],
 )
 def test_no_sizes(text: str, message: str) -> None:

@@ -178,8 +178,8 @@ def test_a_polygon_with_vertices_of_its_own(seed: int, count: int) -> None:
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 TWO = np.array([[0, 1, 2], [0, 2, 3]])
 BAD: dict[str, tuple[Any, Any, Any, str]] = {
-    "shape": (SQUARE[:, :1], SQUARE, TWO, "rest: expected shape"),
-    "count": (SQUARE, SQUARE[:3], TWO, r"images: expected shape \(4, 2\)"),
+    "shape": (SQUARE[:, :1], SQUARE, TWO, "rest must be .*shape"),
+    "count": (SQUARE, SQUARE[:3], TWO, r"images must be .*shape \(4, 2\)"),
     "not finite": (SQUARE, SQUARE * np.nan, TWO, "finite"),
     "fractions": (SQUARE, SQUARE, TWO + 0.5, "whole numbers"),
     "pairs": (SQUARE, SQUARE, TWO[:, :2], "whole numbers of shape"),

@@ -160,7 +160,7 @@ BAD_BENDINGS: dict[str, tuple[Callable[[], bytes], str]] = {
     "rest missing": (with_bending(REST, None), "the model's bending.rest is missing"),
     "images missing": (with_bending(IMAGES, None), "the model's bending.images is missing"),
     "triangles missing": (with_bending(TRIANGLES, None), "bending.triangles is missing"),
-    "too many points": (with_bending(REST, np.zeros((100_001, 2))), "images: expected shape"),
+    "too many points": (with_bending(REST, np.zeros((100_001, 2))), "images must be .*shape"),
     "too many triangles": (
         with_bending(TRIANGLES, np.zeros((200_001, 3), dtype=np.int64)),
         "1 to 200000 triangles, got 4 and 200001",
@@ -180,7 +180,7 @@ BAD_BENDINGS: dict[str, tuple[Callable[[], bytes], str]] = {
         "images: 1 triangles are flat or turned over",
     ),
     "rest NaN": (with_bending(REST, np.full((4, 2), np.nan)), "finite"),
-    "rest in 3-D": (with_bending(REST, np.zeros((4, 3))), "rest: expected shape"),
+    "rest in 3-D": (with_bending(REST, np.zeros((4, 3))), "rest must be .*shape"),
 }
 
 
@@ -264,7 +264,7 @@ BAD_FILES: dict[str, tuple[Callable[[], bytes], str]] = {
     "frequency other": (with_settings(max_frequency=3), "should have shape"),
     "segments huge": (with_settings(segments=10**9), "say 1000000000 segments"),
     "segments two": (with_settings(segments=2), "say 2 segments, its arrays hold 1"),
-    "steps huge": (with_settings(steps=10**12), "whole number from 1 to 1000000"),
+    "steps huge": (with_settings(steps=10**12), "from 1 to 1000000"),
     "steps true": (with_settings(steps=True), "whole number from 1 to 1000000, got True"),
     "method": (with_settings(method="rk99"), "rk99"),
     "smoothness NaN": (with_settings(smoothness=float("nan")), "smoothness from 0 to 100"),

@@ -66,7 +66,7 @@ def test_each_connected_part_is_one() -> None:
         ([(300, 300, -5)], "the radius of a pin must be positive, got -5"),
         ([(300,)], "a pin is x,y or x,y,radius, got 1 numbers"),
         ([(1, 2, 3, 4)], "a pin is x,y or x,y,radius, got 4 numbers"),
-        ([(np.nan, 2)], "a pin: every number must be finite"),
+        ([(np.nan, 2)], "a pin.*finite"),
         ([], "no pin was given"),
         (
             [(450, 450, 5000)],

@@ -21,9 +21,8 @@ from orbiflow.jobs.batch_requests import (
     DensityBatchRequest,
     ManyRequest,
 )
-from orbiflow.jobs.events import Finished
 from orbiflow.jobs.run import Sink
-from orbiflow.runtime import Cancel
+from orbiflow.runtime import Cancel, Finished
 
 
 def batch(request: BatchRequest, tell: Sink, cancel: Cancel) -> Finished:

@@ -15,8 +15,9 @@ from types import TracebackType
 from typing import Any, Literal, Self
 
 from orbiflow.errors import OutputError
-from orbiflow.jobs.records import Record, RecordError
 from orbiflow.runtime import (
+    Record,
+    RecordError,
     is_object,
     stays_inside,
     write_atomic,

@@ -15,14 +15,6 @@ from orbiflow.jobs.batch.inputs import code_of
 from orbiflow.jobs.batch.items import Item
 from orbiflow.jobs.batch.journal import Entry
 from orbiflow.jobs.batch.kind import Kind
-from orbiflow.jobs.events import (
-    Failed,
-    Finished,
-    ItemDone,
-    Note,
-    Progress,
-    State,
-)
 from orbiflow.jobs.executors import (
     Answer,
     DaskCluster,
@@ -31,7 +23,15 @@ from orbiflow.jobs.executors import (
     Parcel,
 )
 from orbiflow.jobs.run import Sink
-from orbiflow.runtime import Cancel
+from orbiflow.runtime import (
+    Cancel,
+    Failed,
+    Finished,
+    ItemDone,
+    Note,
+    Progress,
+    State,
+)
 
 MOST_NAMED = 5
 """Items that a note names."""

@@ -26,8 +26,8 @@ from orbiflow.jobs.density_data import unit_of
 from orbiflow.jobs.density_fit import WIDTH
 from orbiflow.jobs.density_groups import read_beside_groups
 from orbiflow.jobs.density_requests import Unit
-from orbiflow.jobs.events import Note
 from orbiflow.jobs.run import Sink
+from orbiflow.runtime import Note
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,10 +23,9 @@ from orbiflow.jobs.density_cv.splits import (
 )
 from orbiflow.jobs.density_cv_requests import DensityCvRequest
 from orbiflow.jobs.density_fold import written_files
-from orbiflow.jobs.events import Finished, Note
 from orbiflow.jobs.place import keep_apart, keep_inputs
 from orbiflow.jobs.run import Sink
-from orbiflow.runtime import Cancel, one_thread
+from orbiflow.runtime import Cancel, Finished, Note, one_thread
 
 
 def _figures(summary: Summary) -> dict[str, Any]:

@@ -20,7 +20,6 @@ from typing import Any, Self, TypeAlias
 
 from orbiflow import __version__
 from orbiflow.errors import OrbiflowError
-from orbiflow.jobs.events import Note
 from orbiflow.jobs.executors.memory import keeping_memory
 from orbiflow.jobs.executors.parcel import (
     Answer,
@@ -28,7 +27,7 @@ from orbiflow.jobs.executors.parcel import (
     carry_out,
 )
 from orbiflow.jobs.run import Sink
-from orbiflow.runtime import Cancel
+from orbiflow.runtime import Cancel, Note
 
 Client: TypeAlias = Any
 Future: TypeAlias = Any

@@ -9,14 +9,13 @@ from importlib import import_module
 from types import TracebackType
 from typing import Any, Self
 
-from orbiflow.jobs.events import Note
 from orbiflow.jobs.executors.parcel import (
     Answer,
     Parcel,
     carry_out,
 )
 from orbiflow.jobs.run import Sink
-from orbiflow.runtime import Cancel
+from orbiflow.runtime import Cancel, Note
 
 TRIES = 3
 """Processes that may die of one parcel."""

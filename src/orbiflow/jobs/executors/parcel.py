@@ -12,19 +12,17 @@ from typing import Any
 
 from orbiflow import __version__
 from orbiflow.errors import OrbiflowError
-from orbiflow.jobs.events import (
+from orbiflow.jobs.request import Request
+from orbiflow.jobs.requests import request_from_json
+from orbiflow.jobs.run import run
+from orbiflow.runtime import (
+    Cancel,
     Event,
     Failed,
     Finished,
     Progress,
     Written,
     event_from_json,
-)
-from orbiflow.jobs.request import Request
-from orbiflow.jobs.requests import request_from_json
-from orbiflow.jobs.run import run
-from orbiflow.runtime import (
-    Cancel,
     is_list,
     is_object,
     stays_inside,

@@ -17,8 +17,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from orbiflow.jobs.records import Record, kind_of
 from orbiflow.runtime import is_object
+from orbiflow.runtime.records import Record, kind_of
 
 
 class Event(Record):
