@@ -16,15 +16,15 @@ import numpy as np
 import torch
 from PIL import Image
 
-from orbiflow.export.art import (
+from orbiflow.tiles import (
     ArtSettings,
     ArtTile,
     artwork,
     read_art_tile,
     render_artwork,
 )
-from orbiflow.export.art.picture import Picture
-from orbiflow.export.art.writing import png_of
+from orbiflow.tiles.art.pictures import Picture
+from orbiflow.tiles.art.scene import png_of
 
 
 def main() -> None:

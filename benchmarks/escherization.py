@@ -18,9 +18,13 @@ import numpy as np
 import torch
 from common import DATA, GOALS, goal, needed, published
 
-from orbiflow.escher import DescentSettings, TileResult, escherize
-from orbiflow.silhouette import Target
-from orbiflow.tilings import CLASSES
+from orbiflow.tiles import (
+    CLASSES,
+    DescentSettings,
+    Target,
+    TileResult,
+    escherize,
+)
 
 DISTORTED = {"octpus_94": "octpus", "penguin_60": "penguin2", "squirrel1_60": "squirrel"}
 

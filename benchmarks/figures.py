@@ -13,14 +13,18 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from orbiflow.escher import BendingSettings, escherize
-from orbiflow.export.folder import overlay
-from orbiflow.export.gallery import write_gallery
-from orbiflow.export.overview import overview_png
-from orbiflow.export.svg import tile_svg, tiling_svg
-from orbiflow.figures.tilings import tiling_png
-from orbiflow.silhouette import Target
-from orbiflow.tilings import colouring
+from orbiflow.tiles import (
+    BendingSettings,
+    Target,
+    colouring,
+    escherize,
+    overview_png,
+    tile_svg,
+    tiling_png,
+    tiling_svg,
+    write_gallery,
+)
+from orbiflow.tiles.pages.tile_folder import overlay
 
 TURTLE = Path(__file__).parents[1] / "examples" / "silhouettes" / "turtle.png"
 

@@ -14,9 +14,14 @@ from pathlib import Path
 
 from common import BUNDLED
 
-from orbiflow.escher import ClassFailure, OccupancySettings, TileResult, escherize
-from orbiflow.silhouette import Target
-from orbiflow.tilings import CLASSES
+from orbiflow.tiles import (
+    CLASSES,
+    ClassFailure,
+    OccupancySettings,
+    Target,
+    TileResult,
+    escherize,
+)
 
 IMAGES = [
     BUNDLED / n for n in ("squirrel.dat", "nagata/bat_60.dat", "turtle.png", "night-monkey.png")

@@ -16,11 +16,20 @@ import numpy as np
 import torch
 from common import goal
 
-from orbiflow.escher import DescentSettings, TileResult, escherize
-from orbiflow.figures.canvas import blank_figure, fill_rings, plane_axes, png_bytes
-from orbiflow.files import write_atomic
-from orbiflow.silhouette import Target
-from orbiflow.tilings.window import Window
+from orbiflow.arrays import Window
+from orbiflow.drawing import (
+    blank_figure,
+    fill_rings,
+    plane_axes,
+    png_bytes,
+)
+from orbiflow.runtime import write_atomic
+from orbiflow.tiles import (
+    DescentSettings,
+    Target,
+    TileResult,
+    escherize,
+)
 
 BEST = {
     "bat_60": ("bat", "IH6"),

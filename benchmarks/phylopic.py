@@ -16,10 +16,15 @@ import torch
 from common import DATA, needed
 from PIL import Image, ImageDraw, ImageFont
 
-from orbiflow.escher import DescentSettings, TileResult, escherize
-from orbiflow.figures.tilings import overlay_png, tiling_png
-from orbiflow.silhouette import Target
-from orbiflow.tilings import CLASSES
+from orbiflow.tiles import (
+    CLASSES,
+    DescentSettings,
+    Target,
+    TileResult,
+    escherize,
+    overlay_png,
+    tiling_png,
+)
 
 PANEL = 420  # pixels
 

@@ -9,13 +9,9 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageDraw
 
-from orbiflow.escher.carried import CarriedTile
-from orbiflow.escher.report import group_json
-from orbiflow.escher.storage import SavedModel
-from orbiflow.export.art.picture import Picture
-from orbiflow.export.art.source import ArtTile
-from orbiflow.export.result_file import ExportTile
-from orbiflow.silhouette.frame import Frame
+from orbiflow.tiles import ArtTile, CarriedTile, ExportTile, Frame, SavedModel
+from orbiflow.tiles.art.pictures import Picture
+from orbiflow.tiles.search.reports import group_json
 from outlines import animal, bent_squirrel, flowless
 
 EYE = (210.0, 190.0)

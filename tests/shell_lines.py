@@ -171,8 +171,9 @@ def _refusal_by_pip(words: Sequence[str]) -> Refusal | None:
 def _refusal_by_script(words: Sequence[str]) -> Refusal | None:
     """Look for a script of the repository, and let a Python script read its options."""
     name, *rest = words
-    if name in ("-m", "-c"):
-        return None
+    if name == "-m":
+        module = ROOT / rest[0]  # a program of the repository, or of another package
+        return _refusal_by_argparse(module, rest[1:]) if module.is_dir() else None
     if "NAME" in name:  # one that stands for many
         return None
     if not (ROOT / name).is_file():
@@ -181,7 +182,7 @@ def _refusal_by_script(words: Sequence[str]) -> Refusal | None:
 
 
 def _refusal_by_argparse(script: Path, words: Sequence[str]) -> Refusal | None:
-    """Run a script until it has read its options, and no further."""
+    """Run a script, or the main module of a folder, until it has read its options."""
 
     class Accepted(BaseException):
         """The script would now begin its work."""
@@ -191,8 +192,8 @@ def _refusal_by_argparse(script: Path, words: Sequence[str]) -> Refusal | None:
 
     read = argparse.ArgumentParser.parse_args
 
-    def read_only(parser: argparse.ArgumentParser) -> None:
-        read(parser)
+    def read_only(parser: argparse.ArgumentParser, given: Sequence[str] | None = None) -> None:
+        read(parser, given)
         raise Accepted
 
     def refuse(_parser: argparse.ArgumentParser, message: str) -> None:
@@ -205,7 +206,10 @@ def _refusal_by_argparse(script: Path, words: Sequence[str]) -> Refusal | None:
         patch.setattr(argparse.ArgumentParser, "parse_args", read_only)
         patch.setattr(argparse.ArgumentParser, "error", refuse)
         try:
-            runpy.run_path(str(script), run_name="__main__")
+            if script.is_dir():
+                runpy.run_module(script.name, run_name="__main__")
+            else:
+                runpy.run_path(str(script), run_name="__main__")
         except Accepted:
             return None
         except Refused as error:

@@ -7,8 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-from orbiflow.escher import BendingSettings, TileResult, escherize_class
-from orbiflow.silhouette import Target
+from orbiflow.tiles import (
+    BendingSettings,
+    Target,
+    TileResult,
+    escherize_class,
+)
 
 README_PATH = Path(__file__).parents[1] / "README.md"
 README = README_PATH.read_text(encoding="utf-8")

@@ -43,6 +43,7 @@ def test_there_are_lines_to_try() -> None:
         ("python benchmarks/nothing.py", "benchmarks/nothing.py"),
         ("python benchmarks/escherization.py --effort most", "--effort"),
         ("python benchmarks/ablations.py --fast", "--fast"),
+        ("python -m reproduction --quick", "--quick"),
         ("pip install '.[everything]'", "everything"),
         ("orbiflo escherize turtle.png", "orbiflo"),
     ],

@@ -13,10 +13,16 @@ import pytest
 from PIL import Image
 
 from artworks import EYE, size_of, squirrel, write_run
-from orbiflow.cancel import Cancel
-from orbiflow.figures.palette import PALETTES
-from orbiflow.jobs import ArtRequest, Finished, Note, Written, run
-from orbiflow.silhouette import Target
+from orbiflow.drawing import PALETTES
+from orbiflow.jobs import (
+    ArtRequest,
+    Finished,
+    Note,
+    run,
+)
+from orbiflow.jobs.events import Written
+from orbiflow.runtime import Cancel
+from orbiflow.tiles import Target
 
 
 @pytest.fixture(name="result", scope="module")

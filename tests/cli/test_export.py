@@ -13,8 +13,13 @@ import pypdfium2
 import pytest
 
 from exported import tile_of
-from orbiflow.escher.report import group_json
-from orbiflow.jobs import ExportRequest, Finished, Written, run
+from orbiflow.jobs import (
+    ExportRequest,
+    Finished,
+    run,
+)
+from orbiflow.jobs.events import Written
+from orbiflow.tiles.search.reports import group_json
 
 
 def entry(name: str) -> dict[str, Any]:

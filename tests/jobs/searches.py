@@ -6,16 +6,18 @@ import json
 from pathlib import Path
 
 from orbiflow.jobs import (
-    ClassFailed,
     EscherizeRequest,
     Event,
-    Failed,
     Finished,
     Note,
     Preview,
     Progress,
     Started,
     TileFound,
+)
+from orbiflow.jobs.events import (
+    ClassFailed,
+    Failed,
     Written,
 )
 

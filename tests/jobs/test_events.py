@@ -10,9 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from orbiflow.jobs import (
-    ClassFailed,
     Event,
-    Failed,
     Finished,
     ItemDone,
     Note,
@@ -21,6 +19,10 @@ from orbiflow.jobs import (
     RecordError,
     Started,
     TileFound,
+)
+from orbiflow.jobs.events import (
+    ClassFailed,
+    Failed,
     Written,
     event_from_json,
 )

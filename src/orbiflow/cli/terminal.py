@@ -10,11 +10,20 @@ from rich.progress import Progress as Bar
 from rich.table import Table
 
 from orbiflow.cli.console import errors, output
-from orbiflow.jobs import Event, Finished, ItemDone, Note, Preview, Progress, Started, TileFound
+from orbiflow.jobs import (
+    Event,
+    Finished,
+    ItemDone,
+    Note,
+    Preview,
+    Progress,
+    Started,
+    TileFound,
+)
 
 INTERRUPTED = "interrupted"
 BATCHES = ("batch", "density-batch", "density-cv")
-FORKING = ("escherize", "paper", *BATCHES)
+FORKING = ("escherize", *BATCHES)
 """Jobs that start processes."""
 
 

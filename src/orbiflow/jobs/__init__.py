@@ -8,7 +8,6 @@ tell the same events. Importing this is quick: numerical libraries come with the
 True
 """
 
-from orbiflow.cancel import Cancel
 from orbiflow.jobs.batch_requests import BatchRequest, DensityBatchRequest
 from orbiflow.jobs.density_compare_requests import DensityCompareRequest, DensityRegionRequest
 from orbiflow.jobs.density_cv_requests import DensityCvRequest, DensityFoldRequest
@@ -45,8 +44,8 @@ from orbiflow.jobs.tile_requests import (
     ArtRequest,
     EscherizeRequest,
     ExportRequest,
-    PaperRequest,
 )
+from orbiflow.runtime import Cancel
 
 __all__ = [
     "AnimateRequest",
@@ -73,7 +72,6 @@ __all__ = [
     "ItemDone",
     "Job",
     "Note",
-    "PaperRequest",
     "PatchesRequest",
     "Preview",
     "Progress",

@@ -5,21 +5,30 @@ from __future__ import annotations
 from functools import partial
 from pathlib import Path
 
-from orbiflow.cancel import Cancel
-from orbiflow.export.art.making import Artwork, artwork
-from orbiflow.export.art.over import read_over
-from orbiflow.export.art.settings import ArtSettings
-from orbiflow.export.art.source import ArtTile, read_art_tile
-from orbiflow.export.art.writing import write_artwork
-from orbiflow.export.exporting import require_certified
-from orbiflow.export.lengths import pixel_size, pixels
-from orbiflow.files import write_atomic
 from orbiflow.jobs.asked import given, read_as
-from orbiflow.jobs.events import Finished, Note, Progress, Written
+from orbiflow.jobs.events import (
+    Finished,
+    Note,
+    Progress,
+    Written,
+)
 from orbiflow.jobs.place import check_place
 from orbiflow.jobs.records import RecordError
 from orbiflow.jobs.run import Sink
 from orbiflow.jobs.tile_requests import ArtRequest
+from orbiflow.runtime import Cancel, write_atomic
+from orbiflow.tiles import (
+    ArtSettings,
+    ArtTile,
+    Artwork,
+    artwork,
+    pixel_size,
+    pixels,
+    read_art_tile,
+    read_over,
+    require_certified,
+    write_artwork,
+)
 
 
 def art(request: ArtRequest, tell: Sink, cancel: Cancel) -> Finished:

@@ -13,7 +13,11 @@ from orbiflow.jobs.density_requests import (
     region_samples_in_range,
 )
 from orbiflow.jobs.records import RecordError
-from orbiflow.jobs.request import Request, ends_in, in_range
+from orbiflow.jobs.request import (
+    Request,
+    ends_in,
+    in_range,
+)
 
 
 @dataclass(frozen=True)

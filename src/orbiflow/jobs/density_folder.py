@@ -5,8 +5,13 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from orbiflow.export.density_figures import MODEL
-from orbiflow.export.density_plots import PICTURES, REPORT, TABLE, THUMBNAIL
+from orbiflow.density import (
+    MODEL,
+    PICTURES,
+    REPORT,
+    TABLE,
+    THUMBNAIL,
+)
 
 
 def written_files(folder: Path) -> set[str]:

@@ -8,23 +8,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from orbiflow.cancel import Cancel
-from orbiflow.escher import (
-    BendingSettings,
-    BothSettings,
-    ClassFailure,
-    DescentSettings,
-    OccupancySettings,
-    TileResult,
-    search,
-)
-from orbiflow.escher.methods import Settings
-from orbiflow.escher.report import report
-from orbiflow.export.folder import FIELD_FILES, figure_files
-from orbiflow.export.gallery import OVERVIEW, written_files
-from orbiflow.export.measures import is_poor
-from orbiflow.export.run_folder import fill_run
-from orbiflow.folders import ResultFolder
 from orbiflow.jobs.asked import given
 from orbiflow.jobs.events import (
     ClassFailed,
@@ -40,8 +23,29 @@ from orbiflow.jobs.place import check_folder
 from orbiflow.jobs.records import RecordError
 from orbiflow.jobs.run import Sink
 from orbiflow.jobs.tile_requests import EscherizeRequest
-from orbiflow.silhouette import Emphasis, Pins, Target
-from orbiflow.tilings import CLASSES, isohedral_class
+from orbiflow.runtime import Cancel, ResultFolder
+from orbiflow.tiles import (
+    CLASSES,
+    FIELD_FILES,
+    OVERVIEW,
+    BendingSettings,
+    BothSettings,
+    ClassFailure,
+    DescentSettings,
+    Emphasis,
+    OccupancySettings,
+    Pins,
+    Settings,
+    Target,
+    TileResult,
+    figure_files,
+    fill_run,
+    is_poor,
+    isohedral_class,
+    report,
+    written_files,
+)
+from orbiflow.tiles.search import searching as search
 
 POOR = (
     "even the first tile hardly looks like it; another pose, fewer or thicker limbs, all nine classes "

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from orbiflow.jobs.records import Record, kind_of
-from orbiflow.json_values import is_object
+from orbiflow.runtime import is_object
 
 
 class Event(Record):

@@ -5,12 +5,17 @@ from __future__ import annotations
 import os
 from pathlib import Path, PurePosixPath
 
+from orbiflow.density import MODEL
 from orbiflow.errors import OutputError
-from orbiflow.export.density_figures import MODEL
-from orbiflow.export.gallery import OVERVIEW, RESULT
-from orbiflow.export.gallery import written_files as files_of_a_search
-from orbiflow.folders import LITTER
 from orbiflow.jobs.density_folder import written_files as files_of_a_density
+from orbiflow.runtime import LITTER
+from orbiflow.tiles import (
+    OVERVIEW,
+    RESULT,
+)
+from orbiflow.tiles import (
+    written_files as files_of_a_search,
+)
 
 
 def check_place(out: Path, *reads: Path | None) -> None:

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any, ClassVar, Literal, Self, TypeGuard, Union, cast
 
 from orbiflow.errors import OrbiflowError
-from orbiflow.json_values import is_object
+from orbiflow.runtime import is_object
 
 
 class RecordError(OrbiflowError):

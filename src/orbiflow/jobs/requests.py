@@ -24,9 +24,8 @@ from orbiflow.jobs.tile_requests import (
     ArtRequest,
     EscherizeRequest,
     ExportRequest,
-    PaperRequest,
 )
-from orbiflow.json_values import is_object
+from orbiflow.runtime import is_object
 
 REQUESTS: dict[str, type[Request]] = {
     kind.KIND: kind
@@ -44,7 +43,6 @@ REQUESTS: dict[str, type[Request]] = {
         DensityCompareRequest,
         DensityRegionRequest,
         PatchesRequest,
-        PaperRequest,
         BatchRequest,
         DensityBatchRequest,
         DensityCvRequest,

@@ -6,11 +6,16 @@ from collections.abc import Callable
 from importlib import import_module
 from typing import Any
 
-from orbiflow.cancel import Cancel, Cancelled
 from orbiflow.errors import OrbiflowError
-from orbiflow.jobs.events import Event, Failed, Finished, Started
+from orbiflow.jobs.events import (
+    Event,
+    Failed,
+    Finished,
+    Started,
+)
 from orbiflow.jobs.request import Request
 from orbiflow.jobs.requests import REQUESTS
+from orbiflow.runtime import Cancel, Cancelled
 
 Sink = Callable[[Event], None]
 
@@ -29,7 +34,6 @@ _MODULES = {
     "density-compare": "density_compare",
     "density-region": "density_region",
     "density-patches": "density_use",
-    "paper": "paper",
     "batch": "batch",
     "density-batch": "batch",
     "density-cv": "density_cv",

@@ -1,0 +1,16 @@
+from .cancel import Cancel as Cancel
+from .cancel import Cancelled as Cancelled
+from .files import LITTER as LITTER
+from .files import ResultFolder as ResultFolder
+from .files import is_list as is_list
+from .files import is_object as is_object
+from .files import make_folder as make_folder
+from .files import stays_inside as stays_inside
+from .files import write_atomic as write_atomic
+from .files import write_set as write_set
+from .processes import process_context as process_context
+from .processes import work as work
+from .tensor_files import read_tensors as read_tensors
+from .tensor_files import tensor_bytes as tensor_bytes
+from .threads import one_blas_thread as one_blas_thread
+from .threads import one_thread as one_thread
