@@ -206,10 +206,8 @@ def _refusal_by_argparse(script: Path, words: Sequence[str]) -> Refusal | None:
         patch.setattr(argparse.ArgumentParser, "parse_args", read_only)
         patch.setattr(argparse.ArgumentParser, "error", refuse)
         try:
-            if script.is_dir():
-                runpy.run_module(script.name, run_name="__main__")
-            else:
-                runpy.run_path(str(script), run_name="__main__")
+            main = script / "__main__.py" if script.is_dir() else script
+            runpy.run_path(str(main), run_name="__main__")
         except Accepted:
             return None
         except Refused as error:
