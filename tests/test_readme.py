@@ -30,6 +30,25 @@ def test_the_symmetric_field_snippet_runs():
     assert "log_det" in run(snippet)
 
 
+def test_the_first_snippet_draws_a_certified_tile(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "examples").symlink_to(README_PATH.parent / "examples")
+    run(SNIPPETS[0])
+    assert capsys.readouterr().out.endswith("True\n")
+    assert (tmp_path / "turtles.png").stat().st_size > 1000
+
+
+def test_the_first_screen_is_short():
+    first = README.split("\n## ")[0]
+    assert first.index("![") < first.index("make demo")
+    shell = re.findall(r"```sh\n(.*?)```", first, flags=re.DOTALL)
+    lengths = [
+        len(re.findall(r"^\S", block, flags=re.MULTILINE)) for block in [*shell, SNIPPETS[0]]
+    ]
+    assert lengths == [2, 5, 5]
+    assert len(first.splitlines()) < 45
+
+
 def test_the_model_snippet_maps_there_and_back(tmp_path, monkeypatch):
     (snippet,) = [s for s in SNIPPETS if "load_saved" in s]
     folder = tmp_path / "out" / "turtle" / "IH4"
