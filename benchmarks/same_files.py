@@ -157,8 +157,7 @@ def compare_values(a: Any, b: Any, where: str, found: Finding) -> None:
 
 def compare_dicts(a: dict[str, Any], b: dict[str, Any], where: str, found: Finding) -> None:
     keys = found.renamed.keys
-    was = {keys.get(key, key): value for key, value in a.items()}
-    was.pop(None, None)
+    was = {name: value for key, value in a.items() if (name := keys.get(key, key))}
     now = {key: value for key, value in b.items() if key not in found.renamed.added or key in was}
     for key in [*was, *(key for key in now if key not in was)]:
         if key in IGNORED:
@@ -214,8 +213,8 @@ def compare_safetensors(one: Path, two: Path, where: str, found: Finding) -> Non
             loaded.append((arrays, header))
     (was, head), (now, header) = loaded
     compare_values(head, header, f"{where}:header", found)
-    renamed = ((found.renamed.keys.get(name, name), array) for name, array in was.items())
-    names = {name: array for name, array in renamed if name}
+    keys = found.renamed.keys
+    names = {new: array for name, array in was.items() if (new := keys.get(name, name))}
     if names.keys() != now.keys():
         found.same(sorted(names), sorted(now), f"{where}: arrays")
     for name in names.keys() & now.keys():
@@ -320,7 +319,7 @@ def dxf_shapes(path: Path) -> list[Shape]:
                 values += np.ravel(np.array(value)).tolist()  # a number, or a Vec3
         for name in ("vertices_in_wcs", "control_points", "fit_points", "knots"):
             points = getattr(entity, name, None)
-            points = points() if callable(points) else points
+            points = cast(Any, points() if callable(points) else points)
             values += [float(x) for point in points or () for x in np.ravel(np.array(point))]
         if entity.dxftype() == "LWPOLYLINE":
             values += np.ravel(np.array(entity.get_points())).tolist()
