@@ -58,29 +58,45 @@ DONE = ".done.json"
 def main() -> int:
     options = parsed()
     cases = chosen(options.only, slow=options.slow)
-    with tempfile.TemporaryDirectory(prefix="orbiflow-same-") as scratch:
-        cache = (options.cache or Path(scratch) / "cache").resolve()
-        out = (options.keep or Path(scratch) / "present").resolve()
-        before = lambda: checkout(options.before, Path(scratch) / "before")  # noqa: E731
-        for name in HEAVY:
-            importlib.import_module(name)
-        needed = with_needs(cases, old=True)
-        spent_before = run_before(needed, cache, before, options.jobs)
-        shutil.rmtree(out, ignore_errors=True)
-        out.mkdir(parents=True)
-        shutil.copytree(cache / "inputs", out / "inputs")
-        (out / "old").symlink_to(cache)
-        spent = run_cases(
-            with_needs(cases, old=False), out, options.present.resolve(), PRESENT, options.jobs
-        )
-        print(
-            f"processor time: before {spent_before:.0f} s (what the cache lacked), "
-            f"present {spent:.0f} s"
-        )
-        tolerances = Tolerances(options.tolerance)
-        return (
-            1 if compare_cases(cases, cache, out, PRESENT, tolerances, every=options.every) else 0
-        )
+    for name in HEAVY:
+        importlib.import_module(name)
+    scratch = Path(tempfile.mkdtemp(prefix="orbiflow-same-"))
+    owner = os.getpid()
+    try:
+        return 1 if differences(cases, options, scratch) else 0
+    finally:
+        if os.getpid() == owner:  # children are forked from within
+            leave(scratch)
+
+
+def differences(cases: list[Case], options: argparse.Namespace, scratch: Path) -> int:
+    """Run the cases with both trees, print the table and return how many of its lines differ."""
+    cache = (options.cache or scratch / "cache").resolve()
+    out = emptied((options.keep or scratch / "present").resolve())
+    spent_before = run_before(
+        with_needs(cases, old=True),
+        cache,
+        lambda: checkout(options.before, scratch / "before"),
+        options.jobs,
+    )
+    shutil.copytree(cache / "inputs", out / "inputs")
+    (out / "old").symlink_to(cache)
+    needed = with_needs(cases, old=False)
+    spent = run_cases(needed, out, options.present.resolve(), PRESENT, options.jobs)
+    print(
+        f"processor time: before {spent_before:.0f} s (what the cache lacked), present {spent:.0f} s"
+    )
+    tolerances = Tolerances(options.tolerance)
+    return compare_cases(cases, cache, out, PRESENT, tolerances, every=options.every)
+
+
+def emptied(folder: Path) -> Path:
+    """Return a new folder in the place of an earlier run's, and refuse to remove anything else."""
+    if folder.exists() and any(folder.iterdir()) and not (folder / "old").is_symlink():
+        raise SystemExit(f"--keep {folder} holds other files: name a new folder")
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    return folder
 
 
 def parsed() -> argparse.Namespace:
@@ -135,16 +151,22 @@ def with_needs(cases: Iterable[Case], *, old: bool) -> list[Case]:
     return [case for case in corpus() if case.name in wanted]
 
 
+GIT = ("git", "-C", str(ROOT), "worktree")
+
+
 def checkout(given: Path | None, folder: Path) -> Path:
-    """Return a checkout of the version before: the one given, or a new one that ends with the run."""
+    """Return a checkout of the version before: the one given, or a new one in `folder`."""
     if given:
         return given.resolve()
-    git = ("git", "-C", str(ROOT), "worktree")
-    subprocess.run([*git, "add", "--detach", str(folder), COMMIT], check=True, capture_output=True)
-    leave = [*git, "remove", "--force", str(folder)]
-    owner = os.getpid()  # children are forked from this process, and end as it does
-    atexit.register(lambda: os.getpid() == owner and subprocess.run(leave, check=False))
+    subprocess.run([*GIT, "add", "--detach", str(folder), COMMIT], check=True, capture_output=True)
     return folder
+
+
+def leave(scratch: Path) -> None:
+    """Remove what the run has made for itself."""
+    if (scratch / "before").exists():
+        subprocess.run([*GIT, "remove", "--force", str(scratch / "before")], check=False)
+    shutil.rmtree(scratch)
 
 
 def run_before(cases: list[Case], cache: Path, tree: Callable[[], Path], jobs: int) -> float:
