@@ -331,7 +331,7 @@ def others() -> list[Case]:
         "export ../search-likeness/run --dpi 0 --out a.png",
         "export ../nowhere --out a.svg",
         "art ../search-likeness/run --eye 1 --out a.png",
-        "art ../search-likeness/run --strokes hatch --out a.png",
+        "art ../search-likeness/run --size 0x0 --out a.png",
         "animate ../search-likeness/run --fps 0 --out a.gif",
         f"escherize {IN}/nothing.png",
         f"escherize {IN}/squirrel.dat --classes IH8",
