@@ -135,7 +135,7 @@ def compare_json(one: Path, two: Path, where: str, found: Finding) -> None:
 
 
 def compare_records(one: Path, two: Path, where: str, found: Finding) -> None:
-    """Compare what a batch wrote of each item, in any order; how it tells that one is done is its own."""
+    """Compare what a batch wrote of each item, in any order, but not how it knows an item again."""
     read = [[json.loads(line) for line in path.read_text().splitlines()] for path in (one, two)]
     for records in read:
         records.sort(key=lambda record: str(record.get("name")))
