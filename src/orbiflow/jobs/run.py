@@ -48,7 +48,7 @@ def run(request: Request, sink: Sink | None = None, cancel: Cancel | None = None
     Args:
         request: of one of the kinds in `REQUESTS`.
         sink: called in this thread with every event, in the order that
-            `orbiflow.runtime.events` states. What it raises ends the job and comes out of this function.
+            `orbiflow.runtime.events` states. What it raises ends the job.
         cancel: ends the job early; a search keeps what it has found, others write nothing.
 
     Returns:
