@@ -31,7 +31,7 @@ def like(
     flat = replace(tile, polygon=tile.polygon * (np.exp(stretch), np.exp(-stretch)))
     return replace(
         one,
-        normal_tile=flat,
+        normal=flat,
         deformation=deformation,
         metrics=replace(one.metrics, iou=iou),
         objective=objective,
