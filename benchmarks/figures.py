@@ -16,6 +16,7 @@ from pathlib import Path
 from orbiflow.tiles import (
     BendingSettings,
     Target,
+    TileMap,
     colouring,
     escherize,
     overview_png,
@@ -47,7 +48,7 @@ def main() -> None:
     row("tiling.svg", lambda: [tiling_svg(r.tile, y_down=y_down, colours=c) for r, c in both])
     row("tiling.png", lambda: [tiling_png(r.tile, y_down=y_down, colours=c) for r, c in both])
     row("overlay.png", lambda: [overlay(r, target) for r in results])
-    row("model", lambda: [r.model.to_bytes() for r in results])
+    row("model", lambda: [(r.map or TileMap()).to_bytes() for r in results])
     row("overview.png", lambda: overview_png(results, target, colours))
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder)

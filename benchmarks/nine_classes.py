@@ -17,9 +17,9 @@ from common import BUNDLED
 from orbiflow.tiles import (
     CLASSES,
     ClassFailure,
+    EscherTile,
     OccupancySettings,
     Target,
-    TileResult,
     escherize,
 )
 
@@ -28,7 +28,7 @@ IMAGES = [
 ]
 
 
-def row(outcome: TileResult | ClassFailure) -> str:
+def row(outcome: EscherTile | ClassFailure) -> str:
     """One line of the table."""
     if isinstance(outcome, ClassFailure):
         return f"{outcome.name:6} failed: {outcome.reason}"

@@ -26,8 +26,8 @@ from orbiflow.drawing import (
 from orbiflow.runtime import write_atomic
 from orbiflow.tiles import (
     DescentSettings,
+    EscherTile,
     Target,
-    TileResult,
     escherize,
 )
 
@@ -48,7 +48,7 @@ COLUMNS = 3
 PANEL, CAPTION, LEGEND, MARGIN = (500, 360), 52, 52, 20  # pixels
 TILE, GOAL, INK = "#8ab6d9", "#c0480a", "#1a1a1a"
 
-Found = tuple[str, Target, TileResult]
+Found = tuple[str, Target, EscherTile]
 
 
 def fitted(file: str, effort: str, seed: int) -> Found:

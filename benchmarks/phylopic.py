@@ -19,8 +19,8 @@ from PIL import Image, ImageDraw, ImageFont
 from orbiflow.tiles import (
     CLASSES,
     DescentSettings,
+    EscherTile,
     Target,
-    TileResult,
     escherize,
     overlay_png,
     tiling_png,
@@ -29,7 +29,7 @@ from orbiflow.tiles import (
 PANEL = 420  # pixels
 
 
-def sheet(found: list[tuple[str, Target, TileResult]]) -> Image.Image:
+def sheet(found: list[tuple[str, Target, EscherTile]]) -> Image.Image:
     """Each silhouette under its best tile, and the tiling."""
     columns = 4
     rows = -(-len(found) // columns)
@@ -62,7 +62,7 @@ def main() -> None:
     files = sorted(folder.glob("*.png"))[: 2 if options.quick else None]
     settings = DescentSettings.for_effort("fast" if options.quick else options.effort)
     print("silhouette         vertices class     IoU   Dice  recog  certified  failed seconds")
-    found: list[tuple[str, Target, TileResult]] = []
+    found: list[tuple[str, Target, EscherTile]] = []
     for path in files:
         target = Target.read(path)
         begin = time.perf_counter()

@@ -15,7 +15,7 @@ from orbiflow.drawing import (
 )
 from orbiflow.tiles import (
     CLASSES,
-    TileResult,
+    EscherTile,
     placed_field,
 )
 from reproduction.animal_fits import OMEGA, animal_work
@@ -79,7 +79,7 @@ def _draw(canvas: Canvas, extent: Extent, values: list[Any]) -> Findings:
             "tile; black: a lattice cell; signs: rotation centres; dashed: glide lines.",
             part=part,
         )
-    good = {name: one for name, one in outcomes.items() if isinstance(one, TileResult)}
+    good = {name: one for name, one in outcomes.items() if isinstance(one, EscherTile)}
     symmetry = {name: _symmetry_error(one) for name, one in good.items()}
     rows = tuple(_row(name, one, symmetry.get(name)) for name, one in outcomes.items())
     worst = max(symmetry.values(), default=float("inf"))
@@ -127,7 +127,7 @@ def _draw_row(figure: Figure, row: int, outcome: Any, outline: Array) -> None:
         weight="bold",
         color=INK,
     )
-    if not isinstance(outcome, TileResult):
+    if not isinstance(outcome, EscherTile):
         figure.text(
             0.5, middle, f"no certified tile: {outcome.reason}", ha="center", fontsize=0.8 * size
         )
@@ -140,7 +140,7 @@ def _draw_row(figure: Figure, row: int, outcome: Any, outline: Array) -> None:
     high = 1.75
     window = around(tile.center, high * aspect, high)
     draw_tiling(panel(figure, boxes[1], window), tile, window)
-    field = placed_field(outcome.model.restore())
+    field = placed_field(outcome.model())
     ring = np.concatenate([tile.polygon, tile.polygon[:1]])
     for box in boxes[2:]:
         axes = panel(figure, box, window)
@@ -158,12 +158,12 @@ def _draw_row(figure: Figure, row: int, outcome: Any, outline: Array) -> None:
         mark_symmetry(axes, tile.group, window, size=0.075, halo=halo)
 
 
-def _symmetry_error(result: TileResult) -> float:
-    return equivariance_error(placed_field(result.model.restore()), result.normal_tile.group)
+def _symmetry_error(result: EscherTile) -> float:
+    return equivariance_error(placed_field(result.model()), result.normal_tile.group)
 
 
 def _row(name: str, outcome: Any, error: float | None) -> tuple[str, ...]:
-    if not isinstance(outcome, TileResult):
+    if not isinstance(outcome, EscherTile):
         return name, "–", "–", "–", outcome.reason
     certificate = outcome.certificate
     return (

@@ -5,8 +5,8 @@ from __future__ import annotations
 from orbiflow.tiles import (
     CLASSES,
     ClassFailure,
+    EscherTile,
     OccupancySettings,
-    TileResult,
     escherize_class,
 )
 from reproduction.exhibit import Work
@@ -17,7 +17,7 @@ OMEGA = 5
 """The paper's maximum frequency for its figure of one animal."""
 
 
-def animal_tile(name: str, omega: int, affine: int, iterations: int) -> TileResult | ClassFailure:
+def animal_tile(name: str, omega: int, affine: int, iterations: int) -> EscherTile | ClassFailure:
     """The tile of one class: affine phase, then the flow of one stationary field, occupancy loss."""
     settings = OccupancySettings(
         max_frequency=omega, affine_iterations=affine, iterations=iterations

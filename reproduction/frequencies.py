@@ -11,7 +11,7 @@ import shapely
 
 from orbiflow.drawing import fill_rings
 from orbiflow.fields import FourierField
-from orbiflow.tiles import CLASSES, TileResult
+from orbiflow.tiles import CLASSES, EscherTile
 from reproduction.animal_fits import animal_work
 from reproduction.canvas import Canvas
 from reproduction.drawing import (
@@ -54,7 +54,7 @@ def _draw(canvas: Canvas, extent: Extent, values: list[Any]) -> Findings:
     for row, omega in enumerate(omegas):
         for column, name in enumerate(names):
             outcome, box = table[omega, name], _box(row, column, len(omegas), height)
-            rings = [outcome.normal_tile.polygon] if isinstance(outcome, TileResult) else []
+            rings = [outcome.normal_tile.polygon] if isinstance(outcome, EscherTile) else []
             view = window_of([outline, *rings], box[2] / (box[3] * height), margin=0.04)
             axes = panel(figure, box, view)
             fill_rings(axes, rings, TILE, EDGE, 0.7)
@@ -125,11 +125,11 @@ def _label(figure: Figure, names: Sequence[str], omegas: Sequence[int], height: 
 
 
 def _iou(outcome: Any) -> float:
-    return outcome.metrics.iou if isinstance(outcome, TileResult) else float("nan")
+    return outcome.metrics.iou if isinstance(outcome, EscherTile) else float("nan")
 
 
 def _length(outcome: Any) -> float:
-    if not isinstance(outcome, TileResult):
+    if not isinstance(outcome, EscherTile):
         return float("nan")
     polygon = shapely.Polygon(outcome.normal_tile.polygon)
     return polygon.length / polygon.area**0.5
@@ -137,7 +137,7 @@ def _length(outcome: Any) -> float:
 
 def _straightness(outcome: Any, name: str) -> float:
     """How far a tile is from the polygon through its corners."""
-    if not isinstance(outcome, TileResult):
+    if not isinstance(outcome, EscherTile):
         return 0.0
     tile = outcome.normal_tile
     corners = shapely.LinearRing(tile.polygon[list(tile.corners)])

@@ -10,8 +10,8 @@ from orbiflow.tiles import (
     CLASSES,
     BendingSettings,
     DescentSettings,
+    EscherTile,
     Target,
-    TileResult,
     escherize_class,
 )
 from reproduction.exhibit import Work
@@ -83,13 +83,13 @@ def goal_work(extent: Extent, objective: Objective) -> list[Work]:
 
 def _tiles(
     target: Target, objective: Objective, effort: str, classes: Sequence[str]
-) -> list[TileResult]:
+) -> list[EscherTile]:
     """Certified tiles, best first."""
     kind = BendingSettings if objective == "likeness" else DescentSettings
     outcomes = [escherize_class(target, name, kind.for_effort(effort)) for name in classes]
-    found = [one for one in outcomes if isinstance(one, TileResult)]
+    found = [one for one in outcomes if isinstance(one, EscherTile)]
     return sorted(found, key=lambda one: -_rank(one, objective))
 
 
-def _rank(result: TileResult, objective: Objective) -> float:
+def _rank(result: EscherTile, objective: Objective) -> float:
     return result.score if objective == "likeness" else result.metrics.iou

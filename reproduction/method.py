@@ -13,9 +13,9 @@ from orbiflow.drawing import fill_rings
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles import (
     CLASSES,
+    EscherTile,
     OccupancySamples,
     TileModel,
-    TileResult,
     occupancy_loss,
 )
 from reproduction.animal_fits import OMEGA, animal_work
@@ -78,9 +78,9 @@ def _needs(extent: Extent) -> list[Work]:
 
 def _draw(canvas: Canvas, _extent: Extent, values: list[Any]) -> Findings:
     result = values[0]
-    if not isinstance(result, TileResult):
+    if not isinstance(result, EscherTile):
         raise OrbiflowError(f"{CLASS} gave no certified tile: {result.reason}")
-    pulled = Pulled(result.model.restore())
+    pulled = Pulled(result.model())
     outline, ring = animal().normal, result.normal_tile.polygon
     figure = canvas.figure(HEIGHT)
     boxes = [grid_box(0, k, 1, 4, title=0.12, gap=0.01) for k in range(4)]

@@ -167,7 +167,7 @@ REFUSED: list[tuple[Call, Any, str]] = [
     (Model.joined, [MODEL, OTHER], r"\['IH4', 'IH7'\]"),
     (extract_tile, "IH4", "the model must be a TileModel, got 'IH4'"),
     (extract_tile, PAIR, "take one candidate first: this model holds 2"),
-    (tiles.SavedModel.of, "IH4", "must be a TileModel"),
+    (tiles.as_map, "IH4", "must be a TileModel"),
     (tiles.load_model, 3, "the model's file must be a path, got 3"),
     (lambda t: tiles.fit_descent(t, KIND, FAST), BOOT, "must be a Target, got a list of 7"),
     (lambda s: tiles.fit_descent(TARGET, KIND, s), "fast", "must be a DescentSettings"),

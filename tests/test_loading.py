@@ -16,14 +16,24 @@ from orbiflow.errors import (
     CertificationError,
     InputFileError,
     OrbiflowError,
+    OutputError,
 )
 from orbiflow.jobs import (
     DensityFitRequest,
     EscherizeRequest,
     run,
 )
-from orbiflow.loading import LoadedRun, LoadedTile
-from orbiflow.tiles import ExportSettings, export
+from orbiflow.loading import LoadedRun
+from orbiflow.tiles import (
+    AnimationSettings,
+    ArtSettings,
+    EscherTile,
+    ExportSettings,
+    TileMap,
+    export,
+    read_document,
+)
+from orbiflow.tiles.result_file import tile_json
 
 TURTLE = Path(__file__).parents[1] / "examples" / "silhouettes" / "turtle.png"
 
@@ -72,12 +82,13 @@ def test_a_run_and_its_tiles(folders: Path, tmp_path: Path) -> None:
     assert len(found) == 2
     assert [tile.rank for tile in found] == [1, 2]
     tile = orbiflow.load(folders / "turtle" / "IH6")
-    assert isinstance(tile, LoadedTile)
+    assert isinstance(tile, EscherTile)
     assert tile.isohedral_class == "IH6"
-    assert tile.certificate is not None
     assert tile.certificate.valid
-    assert tile.entry is not None
-    assert np.array_equal(tile.tile.polygon, np.array(tile.entry["polygon"])[:-1])
+    _, document = read_document(folders / "turtle")
+    entry = next(entry for entry in document["tiles"] if entry["class"] == "IH6")
+    assert np.array_equal(tile.tile.polygon, np.array(entry["polygon"])[:-1])
+    assert json.loads(json.dumps(tile_json(tile))) == entry
     assert np.array_equal(tile.tile.polygon, found["IH6"].tile.polygon)
     assert found[found["IH6"].rank or 0].name == found["IH6"].name
     assert tile.bending is not None
@@ -93,6 +104,38 @@ def test_a_run_and_its_tiles(folders: Path, tmp_path: Path) -> None:
     assert isinstance(by_file, LoadedRun)
 
 
+def test_a_tile_that_is_saved_is_loaded_the_same(folders: Path, tmp_path: Path) -> None:
+    found = orbiflow.load(folders / "turtle" / "IH6")
+    assert isinstance(found, EscherTile)
+    again = orbiflow.load(found.save(tmp_path / "saved"))
+    assert isinstance(again, LoadedRun)
+    assert tile_json(again.best) == tile_json(found)
+    assert again.best.name == found.name
+    points = np.array([[90.0, 100.0], [120.0, 80.0]])
+    assert np.array_equal(again.best.forward(points), found.forward(points))
+    orbiflow.save(again, tmp_path / "saved")
+    orbiflow.save([found.changed(map_source=None)], tmp_path / "saved")
+    bare = EscherTile.load(tmp_path / "saved")
+    assert bare.map is None
+    plain = EscherTile(bare.tile)
+    assert np.isnan(plain.score)
+    orbiflow.save(plain, tmp_path / "plain")
+    assert np.isnan(EscherTile.load(tmp_path / "plain").metrics.iou)
+    with pytest.raises(OutputError, match="holds"):
+        found.save(folders / "turtle")
+
+
+def test_a_tile_does_its_own_work(folders: Path, tmp_path: Path) -> None:
+    tile = orbiflow.load(folders / "turtle" / "IH6")
+    assert isinstance(tile, EscherTile)
+    assert tile.export(tmp_path / "a.svg").files == (tmp_path / "a.svg",)
+    assert tile.draw(width_px=60).startswith(b"\x89PNG")
+    assert tile.draw_art(tmp_path / "a.png", ArtSettings(size=(90, 60))).is_file()
+    small = AnimationSettings(seconds=0.5, fps=4, size=64)
+    assert tile.animate(tmp_path / "a.gif", small).is_file()
+    assert tile.model().isohedral_class.name == "IH6"
+
+
 def test_a_tile_that_does_not_tile(folders: Path, tmp_path: Path) -> None:
     folder = tmp_path / "turtle"
     shutil.copytree(folders / "turtle", folder)
@@ -105,12 +148,11 @@ def test_a_tile_that_does_not_tile(folders: Path, tmp_path: Path) -> None:
             orbiflow.load(path)
     found = orbiflow.load(folder, uncertified=True)
     assert isinstance(found, LoadedRun)
-    assert found.best.certificate is not None
     assert not found.best.certificate.valid
     (folder / name / "model.safetensors").unlink()
     bare = orbiflow.load(folder, uncertified=True)
     assert isinstance(bare, LoadedRun)
-    assert bare.best.saved is None
+    assert bare.best.map is None
     assert bare.best.bending is None
 
 
@@ -130,7 +172,7 @@ def test_folders_that_cannot_be_loaded(folders: Path, tmp_path: Path) -> None:
     assert isinstance(orbiflow.load(both / "density.safetensors"), DensityEstimator)
     alone = tmp_path / "IH4"
     shutil.copytree(folders / "turtle" / "IH4", alone)
-    refuse(alone, "load_saved")
+    assert isinstance(orbiflow.load(alone), TileMap)
     damaged = tmp_path / "damaged"
     shutil.copytree(folders / "density", damaged)
     for text in ("{", "[]", '{"report": 3, "settings": {}}', '{"report": {}, "settings": 1}'):

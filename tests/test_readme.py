@@ -9,8 +9,8 @@ import numpy as np
 
 from orbiflow.tiles import (
     BendingSettings,
+    EscherTile,
     Target,
-    TileResult,
     escherize_class,
 )
 
@@ -50,14 +50,13 @@ def test_the_first_screen_is_short():
 
 
 def test_the_model_snippet_maps_there_and_back(tmp_path, monkeypatch):
-    (snippet,) = [s for s in SNIPPETS if "load_saved" in s]
-    folder = tmp_path / "out" / "turtle" / "IH4"
-    folder.mkdir(parents=True)
+    (snippet,) = [s for s in SNIPPETS if "tile.forward" in s]
     target = Target.read(README_PATH.parent / "examples" / "silhouettes" / "turtle.png")
     small = BendingSettings(placements=20, held=4, finalists=1, rounds=4)
     found = escherize_class(target, "IH4", small)
-    assert isinstance(found, TileResult)
-    (folder / "model.safetensors").write_bytes(found.model.to_bytes())
+    assert isinstance(found, EscherTile)
+    (tmp_path / "out").mkdir()
+    found.save(tmp_path / "out" / "turtle")
     monkeypatch.chdir(tmp_path)
     names = run(snippet)
     np.testing.assert_allclose(np.asarray(names["back"]), np.asarray(names["eye"]), atol=1e-8)

@@ -13,7 +13,8 @@ import pytest
 
 HOME = Path(__file__).parents[1] / "src" / "orbiflow"
 
-TILES = ["geometry", "tilings", "silhouette", "likeness", "search", "pictures", "exporting"]
+TILES = ["geometry", "tilings", "silhouette", "likeness", "tile_map", "tile", "result_file"]
+TILES += ["search", "pictures", "exporting"]
 TILES += ["art", "motion", "pages"]
 DENSITY = ["arguments", "spaces", "models", "storage", "inference", "gradients", "fitting"]
 DENSITY += ["estimator", "comparing", "regions", "tables", "pictures"]
@@ -27,6 +28,12 @@ ROOMS = [
 
 EXCEPTIONS: dict[str, str] = {}
 """Imports that may go past a door, `file: module`, each with its reason."""
+
+
+OPENS_LATER_ROOMS = {
+    "orbiflow.tiles.tile": "a tile's methods are thin: each imports, when called, what does the work"
+}
+"""Files whose functions may import from later rooms, each with its reason."""
 
 
 class Import(NamedTuple):
@@ -96,6 +103,8 @@ def test_a_room_imports_only_rooms_before_it(name: str) -> None:
     allowed = {"", *ROOMS[: ROOMS.index(name) + 1]} if name else {""}
     for found in ALL:
         own = dotted(found.file)
+        if own in OPENS_LATER_ROOMS and not found.at_start:
+            continue
         if room(own) == name and own not in ("orbiflow", "orbiflow.__main__"):
             assert room(found.module) in allowed, str(found)
 

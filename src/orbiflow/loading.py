@@ -1,12 +1,12 @@
-"""What a command left in a folder, as the objects that Python made it of."""
+"""What was saved, loaded again: `load` finds out what a folder or file holds."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, TypeAlias, cast
 
 from orbiflow.arguments import path as as_path
 from orbiflow.density import (
@@ -24,79 +24,40 @@ from orbiflow.errors import (
 from orbiflow.runtime import is_list
 from orbiflow.tiles import (
     RESULT,
-    Bending,
-    Certificate,
-    ExportTile,
-    Frame,
-    SavedModel,
-    certify,
+    TILE_MODEL,
+    EscherTile,
+    TileMap,
     folder_names,
-    load_saved,
     read_document,
     read_result,
+    save_tiles,
 )
 
-TILE_MODEL = "model.safetensors"
 MOST_BYTES = 64 * 2**20
-"""Of a report."""
-
-
-@dataclass(frozen=True, eq=False)
-class LoadedTile(ExportTile):
-    """A tile of a run, for whatever takes a tile: `export`, `draw_art`, `animate`.
-
-    Beside `tile` (the polygon with its group, in the input's coordinates), `y_down`, `name`, `rank` and
-    `model`:
-
-    - `certificate`: computed anew from the polygon and the group alone.
-    - `entry`: what result.json says of it.
-    - `saved`: the map as it is on disk, None if its file is not there.
-    """
-
-    certificate: Certificate | None = None
-    entry: dict[str, Any] | None = None
-    saved: SavedModel | None = None
-
-    @property
-    def isohedral_class(self) -> str:
-        """Such as "IH4"."""
-        return self.tile.isohedral_class
-
-    @property
-    def bending(self) -> Bending | None:
-        """The map from the silhouette, in normal form; None of a tile for overlap."""
-        return None if self.saved is None else self.saved.bending
-
-    @property
-    def frame(self) -> Frame | None:
-        """Where the map's own coordinates lie in the input."""
-        return None if self.saved is None else self.saved.frame
+"""The largest report that is read."""
 
 
 @dataclass(frozen=True, eq=False)
 class LoadedRun:
-    """The folder of `orbiflow escherize`.
-
-    - `folder`: it. `tiles`: best first. `document`: result.json.
-    """
+    """The folder of `orbiflow escherize`: its tiles, best first, and its result.json."""
 
     folder: Path
-    tiles: tuple[LoadedTile, ...]
+    tiles: tuple[EscherTile, ...]
     document: dict[str, Any]
 
     @property
-    def best(self) -> LoadedTile:
-        """The first."""
+    def best(self) -> EscherTile:
+        """The best tile."""
         return self.tiles[0]
 
     def __len__(self) -> int:
         return len(self.tiles)
 
-    def __iter__(self) -> Iterator[LoadedTile]:
+    def __iter__(self) -> Iterator[EscherTile]:
         return iter(self.tiles)
 
-    def __getitem__(self, which: str | int) -> LoadedTile:
-        """By class, such as "IH4" (its best tile), or by rank from 1.
+    def __getitem__(self, which: str | int) -> EscherTile:
+        """Return a tile by class, such as "IH4" (its best tile), or by rank from 1.
 
         Raises:
             OrbiflowError: if there is no such tile.
@@ -110,24 +71,28 @@ class LoadedRun:
         )
 
 
-def load(
-    folder: str | Path, *, uncertified: bool = False
-) -> DensityEstimator | LoadedRun | LoadedTile:
-    """What a command left in a folder.
+Loaded: TypeAlias = DensityEstimator | LoadedRun | EscherTile | TileMap
 
-    - of `orbiflow density fit`: the fitted `DensityEstimator`, with `report_` and `feature_names_in_`;
-    - of `orbiflow escherize`: a `LoadedRun`, whose tiles are certified anew;
-    - of one of its tiles, such as `out/turtle/IH4`: the `LoadedTile`.
+
+def load(path: str | Path, *, uncertified: bool = False) -> Loaded:
+    """Return what was saved in a folder or file.
+
+    - a folder of `orbiflow density fit`, or its density.safetensors: the fitted `DensityEstimator`,
+      with `report_` and `feature_names_in_`;
+    - a folder of `orbiflow escherize`, or its result.json: a `LoadedRun`, whose tiles are certified
+      anew;
+    - the folder of one of its tiles, such as `out/turtle/IH4`: the `EscherTile`;
+    - a tile's model.safetensors without the run around it: its maps, a `TileMap`.
 
     Args:
-        folder: or the file in it that counts: density.safetensors, result.json.
-        uncertified: give tiles that do not tile, too; `certificate` says what is wrong.
+        path: The folder or file.
+        uncertified: Return tiles that do not tile, too; their `certificate` says what is wrong.
 
     Raises:
-        InputFileError: if there is no such folder, it holds neither or both, or a damaged file.
+        InputFileError: if nothing is there, a folder holds neither or both, or a file is damaged.
         CertificationError: for a tile that does not tile, unless it may be uncertified.
     """
-    path = as_path(folder, "the folder")
+    path = as_path(path, "the folder")
     if path.is_dir():
         has = {name: (path / name).is_file() for name in (MODEL, RESULT, TILE_MODEL)}
     elif path.is_file():
@@ -152,6 +117,19 @@ def load(
     if found == [RESULT]:
         return _run(path, uncertified)
     return _tile_folder(path if path.is_dir() else path.parent, uncertified)
+
+
+def save(what: EscherTile | Sequence[EscherTile] | LoadedRun, path: str | Path) -> Path:
+    """Save tiles so that `load` returns them again.
+
+    Args:
+        what: A tile, or tiles of one search, best first.
+        path: The folder to write.
+
+    Raises:
+        OutputError: if the folder holds anything else, or cannot be written.
+    """
+    return save_tiles([what] if isinstance(what, EscherTile) else list(what), path)
 
 
 def _estimator(path: Path) -> DensityEstimator:
@@ -200,17 +178,14 @@ def _run(path: Path, uncertified: bool) -> LoadedRun:
     entries = document["tiles"]
     if not is_list(entries) or not entries:
         raise InputFileError(f"{file}: the run found no tile")
-    tiles = [_tile(file, document, rank, uncertified) for rank in range(1, len(entries) + 1)]
+    tiles = [_tile(file, rank, uncertified) for rank in range(1, len(entries) + 1)]
     return LoadedRun(file.parent, tuple(tiles), document)
 
 
-def _tile_folder(folder: Path, uncertified: bool) -> LoadedTile:
+def _tile_folder(folder: Path, uncertified: bool) -> EscherTile | TileMap:
     result = folder.resolve().parent / RESULT
     if not result.is_file():
-        raise InputFileError(
-            f"{folder} holds a tile's map, and the {RESULT} with its polygon is not beside the folder: "
-            f"load_saved({str(folder / TILE_MODEL)!r}) reads the map alone"
-        )
+        return TileMap.read(folder / TILE_MODEL)
     file, document = read_document(result)
     try:
         names = folder_names([str(entry["class"]) for entry in document["tiles"]])
@@ -219,26 +194,14 @@ def _tile_folder(folder: Path, uncertified: bool) -> LoadedTile:
     name = folder.resolve().name
     if name not in names:
         raise InputFileError(f"{file} tells of {', '.join(names)}, not of {name}")
-    return _tile(file, document, names.index(name) + 1, uncertified)
+    return _tile(file, names.index(name) + 1, uncertified)
 
 
-def _tile(file: Path, document: dict[str, Any], rank: int, uncertified: bool) -> LoadedTile:
-    plain = read_result(file, rank)
-    certificate = certify(plain.tile)
-    if not certificate.valid and not uncertified:
+def _tile(file: Path, rank: int, uncertified: bool) -> EscherTile:
+    tile = read_result(file, rank)
+    if not tile.certificate.valid and not uncertified:
         raise CertificationError(
-            f"{file}: tile {rank}, {plain.name}, does not tile the plane: "
-            f"{'; '.join(certificate.reasons)}; load(..., uncertified=True) gives it all the same"
+            f"{file}: tile {rank}, {tile.name}, does not tile the plane: "
+            f"{'; '.join(tile.certificate.reasons)}; load(..., uncertified=True) gives it all the same"
         )
-    there = plain.model is not None and plain.model.is_file()
-    saved = load_saved(plain.model) if there and plain.model is not None else None
-    return LoadedTile(
-        plain.tile,
-        plain.y_down,
-        plain.name,
-        plain.rank,
-        plain.model,
-        certificate,
-        document["tiles"][rank - 1],
-        saved,
-    )
+    return tile

@@ -19,7 +19,7 @@ from orbiflow.jobs import (
     run,
 )
 from orbiflow.runtime.events import Written
-from orbiflow.tiles.search.reports import group_json
+from orbiflow.tiles.result_file import group_json
 
 
 def entry(name: str) -> dict[str, Any]:

@@ -16,7 +16,7 @@ from orbiflow.density import (
 )
 from orbiflow.fields import symmetrize
 from orbiflow.symmetry import identification_group, rotation_matrix
-from orbiflow.tiles import CLASSES, Target, TileResult, compare
+from orbiflow.tiles import CLASSES, EscherTile, Target, compare
 from reproduction.animal_fits import animal_tile
 from reproduction.classes import (
     constrained_angles,
@@ -213,8 +213,8 @@ def test_a_fitted_density_goes_there_and_back() -> None:
 
 def test_the_flow_brings_samples_to_their_side() -> None:
     result = animal_tile("IH4", 3, 20, 25)
-    assert isinstance(result, TileResult)
-    pulled = Pulled(result.model.restore())
+    assert isinstance(result, EscherTile)
+    pulled = Pulled(result.model())
     assert pulled.wrong(pulled.full).mean() < pulled.wrong(pulled.affine).mean()
     assert pulled.losses[1] < pulled.losses[0]
 

@@ -20,12 +20,12 @@ from orbiflow.runtime import (
 )
 from orbiflow.tiles import (
     ArtSettings,
-    ArtTile,
     Artwork,
+    EscherTile,
     artwork,
-    read_art_tile,
     read_over,
-    require_certified,
+    read_result,
+    with_map,
     write_artwork,
 )
 from orbiflow.units import pixel_size, pixels
@@ -43,9 +43,11 @@ def art(request: ArtRequest, tell: Sink, cancel: Cancel) -> Finished:
         Cancelled: if it was told to stop; nothing is written.
     """
     settings = _settings(request)
-    tile = read_art_tile(request.result, request.tile)
-    require_certified(tile.given, force=request.force)
-    out = request.out or Path(f"{tile.given.name}.png")
+    tile = with_map(read_result(request.result, request.tile))
+    tile.require_certified(
+        force=request.force, otherwise="so it is not exported; --force exports it, marked so"
+    )
+    out = request.out or Path(f"{tile.name}.png")
     check_place(out, request.result, request.picture)
     tell(Progress(0.0, "laying out"))
     made = _prepared(request, tile, settings)
@@ -70,7 +72,7 @@ def art(request: ArtRequest, tell: Sink, cancel: Cancel) -> Finished:
     return Finished("done", summary)
 
 
-def _prepared(request: ArtRequest, tile: ArtTile, settings: ArtSettings) -> Artwork:
+def _prepared(request: ArtRequest, tile: EscherTile, settings: ArtSettings) -> Artwork:
     if request.picture is None:
         return artwork(tile, settings)
     tile.require_map()

@@ -37,6 +37,7 @@ from .records import Record as Record
 from .records import RecordError as RecordError
 from .records import field_names as field_names
 from .records import kind_of as kind_of
+from .tensor_files import read_arrays as read_arrays
 from .tensor_files import read_tensors as read_tensors
 from .tensor_files import tensor_bytes as tensor_bytes
 from .threads import one_blas_thread as one_blas_thread

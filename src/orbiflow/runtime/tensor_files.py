@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from safetensors import SafetensorError
-from safetensors.torch import load, save
-from torch import Tensor
 
 from orbiflow.arguments import path as as_path
+from orbiflow.arrays import Array
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.runtime.files import is_object
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+Values = TypeVar("Values")
 
 MAX_BYTES, MAX_HEADER = 256 * 2**20, 2**20
 KEY = "orbiflow"
@@ -28,6 +32,8 @@ def tensor_bytes(
     Raises:
         OrbiflowError: for a header that is not JSON, or more than a file may hold.
     """
+    from safetensors.torch import save
+
     try:
         text = json.dumps(header, allow_nan=False)
     except (TypeError, ValueError) as error:
@@ -45,15 +51,38 @@ def tensor_bytes(
 def read_tensors(
     path: str | Path, what: str, *, key: str = KEY, max_bytes: int = MAX_BYTES
 ) -> tuple[dict[str, Any], dict[str, Tensor]]:
-    """Header and tensors of a file; `what` it is to hold, such as "a flow", is for messages.
+    """Return the header and the tensors of a file.
 
     Args:
-        key: under which the header stands.
-        max_bytes: of the file, checked before it is read.
+        path: The file.
+        what: What it is to hold, such as "a flow", for messages.
+        key: The name under which the header stands.
+        max_bytes: The largest size of the file, checked before it is read.
 
     Raises:
         InputFileError: if the file is missing, too large, damaged or of another kind.
     """
+    from safetensors.torch import load
+
+    return _read(path, what, key, max_bytes, load)
+
+
+def read_arrays(
+    path: str | Path, what: str, *, key: str = KEY, max_bytes: int = MAX_BYTES
+) -> tuple[dict[str, Any], dict[str, Array]]:
+    """Return the header of a file and its tensors as NumPy arrays; as `read_tensors`."""
+    from safetensors.numpy import load
+
+    return _read(path, what, key, max_bytes, load)
+
+
+def _read(
+    path: str | Path,
+    what: str,
+    key: str,
+    max_bytes: int,
+    load: Callable[[bytes], dict[str, Values]],
+) -> tuple[dict[str, Any], dict[str, Values]]:
     path = as_path(path, "the file")
     try:
         size = path.stat().st_size

@@ -29,13 +29,14 @@ from orbiflow.tiles import (
     write_dxf,
     write_pdf,
 )
+from orbiflow.tiles.art.source import covered_area, silhouette_outline
 from orbiflow.tiles.exporting import INK, Part
 
 PAGE = ArtSettings(size=(300, 200), tile_size=130, outline=0.0, samples=4)
 
 
 def svg_of(name: str, body: str, folder: Path) -> Path:
-    low, high = squirrel(name).covered[:2]
+    low, high = covered_area(squirrel(name))[:2]
     left, top, width, height = *low, *(high - low)
     path = folder / "drawing.svg"
     path.write_text(
@@ -134,10 +135,10 @@ def test_engraving_keeps_to_the_tile_and_off_the_eye(strokes) -> None:
     ink = art.motif.parts[0]
     assert ink.style.fill == INK
     assert len(ink.curves) > 20
-    inside = shapely.Polygon(tile.carried.tile.polygon).buffer(tile.outline.max() * 0.004)
+    inside = shapely.Polygon(tile.tile.polygon).buffer(silhouette_outline(tile).max() * 0.004)
     for curve in ink.curves:
         assert inside.contains(shapely.MultiPoint(curve.pieces[:, 0]))
-    middle = tile.carried.forward(np.array(EYE))
+    middle = tile.forward(np.array(EYE))
     points = np.concatenate([curve.pieces[:, 0] for curve in ink.curves])
     eye = np.concatenate([curve.pieces[:, 0] for curve in art.motif.parts[1].curves])
     radius = np.hypot(*(eye - middle).T)
@@ -216,7 +217,7 @@ def test_long_lines_bend_with_the_tile(name: str, tmp_path: Path) -> None:
     assert over.drawing is not None
     (part,) = over.drawing.parts
     (curve,) = part.curves
-    ends = tile.carried.forward(np.array([[300.0, 250.0], [700.0, 250.0]]))
+    ends = tile.forward(np.array([[300.0, 250.0], [700.0, 250.0]]))
     np.testing.assert_allclose([curve.start, curve.end], ends, atol=1e-9)
     assert len(curve.pieces) > 40
 

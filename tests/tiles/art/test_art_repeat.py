@@ -28,7 +28,7 @@ def test_two_by_two_is_the_same_plane(name: str, how) -> None:
     settings = ArtSettings(repeat=True, tile_size=60, colour=how, tolerance=0.05)
     art = artwork(tile, settings, picture=None if how == "one" else checkerboard(tile))
     cell = render_artwork(art)
-    twice = render_on(art, laid(art.page, tile.given, settings, 2, 2))
+    twice = render_on(art, laid(art.page, tile, settings, 2, 2))
     apart = np.abs(np.tile(cell, (2, 2, 1)).astype(int) - twice)
     assert apart.max() <= 1
 

@@ -15,33 +15,35 @@ from orbiflow.tiles import (
     CLASSES,
     ArtSettings,
     artwork,
-    read_art_tile,
+    read_result,
     signed_area,
+    with_map,
 )
+from orbiflow.tiles.art.source import covered_area, silhouette_outline
 from orbiflow.tiles.search import matched
 from outlines import FOLDER, animal, bent_squirrel, disc, star
 
 
 def test_the_map_of_a_run(tmp_path: Path) -> None:
-    tile = read_art_tile(write_run(tmp_path / "run", "IH6"), "IH6")
-    assert tile.given.name == "squirrel-IH6"
+    tile = with_map(read_result(write_run(tmp_path / "run", "IH6"), "IH6"))
+    assert tile.name == "squirrel-IH6"
     assert tile.notes == ()
-    there = squirrel("IH6").carried.forward(np.array(EYE))
-    np.testing.assert_allclose(tile.carried.forward(np.array(EYE)), there, atol=1e-9)
+    there = squirrel("IH6").forward(np.array(EYE))
+    np.testing.assert_allclose(tile.forward(np.array(EYE)), there, atol=1e-9)
     # the outline is the silhouette's, as fine as it was bent
     outline = animal("squirrel.dat").outline
-    np.testing.assert_allclose(tile.outline.min(axis=0), outline.min(axis=0), atol=4)
-    np.testing.assert_allclose(tile.covered.high, outline.max(axis=0), atol=4)
+    np.testing.assert_allclose(silhouette_outline(tile).min(axis=0), outline.min(axis=0), atol=4)
+    np.testing.assert_allclose(covered_area(tile).high, outline.max(axis=0), atol=4)
 
 
 def test_without_a_map_outlines_are_matched(tmp_path: Path) -> None:
     run = write_run(tmp_path / "run", "IH6", model=False)
-    tile = read_art_tile(run)
+    tile = with_map(run)
     assert "its outline was matched" in tile.notes[0]
-    moved = tile.carried.forward(np.array(EYE))
-    known = squirrel("IH6").carried.forward(np.array(EYE))
+    moved = tile.forward(np.array(EYE))
+    known = squirrel("IH6").forward(np.array(EYE))
     # the bent head and the matched one are near each other
-    assert np.hypot(*(moved - known)) < 0.15 * np.sqrt(abs(tile.given.tile.signed_area))
+    assert np.hypot(*(moved - known)) < 0.15 * np.sqrt(abs(tile.tile.signed_area))
     assert artwork(tile, ArtSettings(size=(60, 40), eyes=(EYE,))).motif.parts
 
 
@@ -50,14 +52,14 @@ def test_without_a_map_or_silhouette_there_is_one_sentence(tmp_path: Path) -> No
     document = json.loads((run / "result.json").read_text())
     document["input"]["source"] = "gone.dat"
     (run / "result.json").write_text(json.dumps(document))
-    tile = read_art_tile(run)
+    tile = with_map(run)
     assert artwork(tile, ArtSettings(size=(60, 40), engrave="hatch")).motif.parts
     with pytest.raises(OrbiflowError, match=r"its silhouette gone\.dat is not there"):
         artwork(tile, ArtSettings(size=(60, 40), eyes=(EYE,)))
     document["input"]["source"] = str(FOLDER / "nagata" / "bat_60.dat")
     (run / "result.json").write_text(json.dumps(document))
     with pytest.raises(OrbiflowError, match="is not the silhouette that it was"):
-        read_art_tile(run).require_map()
+        with_map(run).require_map()
 
 
 def test_a_model_of_another_tile_is_refused(tmp_path: Path) -> None:
@@ -65,7 +67,7 @@ def test_a_model_of_another_tile_is_refused(tmp_path: Path) -> None:
     other = write_run(tmp_path / "other", "IH4")
     shutil.copy(other / "IH4" / "model.safetensors", run / "IH6" / "model.safetensors")
     with pytest.raises(InputFileError, match="belongs to another tile"):
-        read_art_tile(run)
+        with_map(run)
 
 
 @pytest.mark.parametrize("name", CLASSES)

@@ -24,6 +24,7 @@ from orbiflow.tiles.art.raster import (
     runs,
     triangle_sides,
 )
+from orbiflow.tiles.art.source import covered_area, silhouette_outline
 from orbiflow.tiles.silhouette import triangulate
 
 PAGE = ArtSettings(size=(240, 160), tile_size=95, outline=0.0)
@@ -80,7 +81,7 @@ def test_a_checkerboard_is_carried(name: str) -> None:
     group = art.page.tile.group
     linear = group.linear_parts[art.page.copies.cosets[copy]]
     own = np.einsum("mji,mj->mi", linear, own - art.page.copies.translations[copy])
-    from_here = tile.carried.inverse(own)
+    from_here = tile.inverse(own)
     share = (from_here - board.covered.low) / (board.covered.high - board.covered.low)
     x, y = share.T * np.array(board.image.size)[:, None] - 0.5
     longer = max(board.image.size)
@@ -99,7 +100,7 @@ def test_every_copy_has_its_eye_mirrored_or_not(name: str) -> None:
     tile = squirrel(name)
     art = artwork(tile, settings(size=(480, 320)), picture=face(tile))
     made = render_artwork(art).astype(int)
-    eye = tile.carried.forward(np.array(EYE))[None]
+    eye = tile.forward(np.array(EYE))[None]
     places = art.page.copies.images(eye)[:, 0] @ art.page.linear.T + art.page.offset
     shown = ((places > 4) & (places < (476, 316))).all(axis=1)
     assert shown.sum() >= 4
@@ -117,7 +118,7 @@ def test_the_map_onto_the_raster_has_no_fold() -> None:
     tile = squirrel("IH6")
     art = artwork(tile, PAGE, picture=flat(tile, "white"))
     grid = raster_grid(art)
-    places = _places(tile.carried, grid)
+    places = _places(tile, grid)
     whole = np.asarray(binary_erosion(grid.inside(art.page.tile.polygon), iterations=2), dtype=bool)
     down, right = np.diff(places, axis=0)[:, :-1], np.diff(places, axis=1)[:-1]
     turn = right[..., 0] * down[..., 1] - right[..., 1] * down[..., 0]
@@ -144,9 +145,9 @@ def test_the_fringe_of_a_cut_out_does_not_show() -> None:
     tile = squirrel("IH4")
     width, height = size_of(tile)
     shape = shapely.affinity.affine_transform(
-        shapely.Polygon(tile.outline), [1, 0, 0, 1, *-tile.covered.low]
+        shapely.Polygon(silhouette_outline(tile)), [1, 0, 0, 1, *-covered_area(tile).low]
     )
-    scale = width / (tile.covered.high - tile.covered.low)[0]
+    scale = width / np.ptp(covered_area(tile)[:2], axis=0)[0]
     rows, columns = np.indices((height, width)) + 0.5
     inside = shapely.contains_xy(shape, columns / scale, rows / scale)
     alpha = Image.fromarray((inside * 255).astype(np.uint8))

@@ -21,19 +21,20 @@ from orbiflow.errors import (
 from orbiflow.tiles import (
     AnimationSettings,
     ArtSettings,
-    ArtTile,
     BendingSettings,
+    EscherTile,
     ExportSettings,
     Tile,
-    TileResult,
     animate,
     artwork,
     draw_art,
     escherize_class,
     export,
     read_result,
+    with_map,
 )
 from orbiflow.tiles import write_run as write_folder
+from orbiflow.tiles.art.source import covered_area
 from outlines import animal
 
 SMALL = ArtSettings(size=(90, 60), tile_size=40.0)
@@ -41,23 +42,23 @@ BARE = BendingSettings(placements=20, held=4, finalists=1, rounds=4)
 
 
 @pytest.fixture(scope="module")
-def found() -> TileResult:
+def found() -> EscherTile:
     result = escherize_class(animal("squirrel.dat"), "IH4", BARE)
-    assert isinstance(result, TileResult)
+    assert isinstance(result, EscherTile)
     return result
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory, found: TileResult) -> Path:
+def folder(tmp_path_factory: pytest.TempPathFactory, found: EscherTile) -> Path:
     target = animal("squirrel.dat")
     return write_folder([found], target, tmp_path_factory.mktemp("runs") / "squirrel", BARE)
 
 
-def sources(folder: Path, found: TileResult) -> list[Any]:
+def sources(folder: Path, found: EscherTile) -> list[Any]:
     return [folder, str(folder), folder / "result.json", read_result(folder), found]
 
 
-def test_a_folder_that_was_written_is_a_run_s(folder: Path, found: TileResult) -> None:
+def test_a_folder_that_was_written_is_a_run_s(folder: Path, found: EscherTile) -> None:
     document = json.loads((folder / "result.json").read_text())
     assert [tile["class"] for tile in document["tiles"]] == ["IH4"]
     assert document["settings"]["placements"] == 20
@@ -66,7 +67,7 @@ def test_a_folder_that_was_written_is_a_run_s(folder: Path, found: TileResult) -
 
 
 def test_a_run_takes_the_place_of_an_earlier_one_and_of_nothing_else(
-    tmp_path: Path, found: TileResult
+    tmp_path: Path, found: EscherTile
 ) -> None:
     target, out = animal("squirrel.dat"), tmp_path / "out"
     for figures in (True, False):
@@ -80,7 +81,7 @@ def test_a_run_takes_the_place_of_an_earlier_one_and_of_nothing_else(
 
 
 def test_everything_that_holds_a_tile_is_exported_alike(
-    tmp_path: Path, folder: Path, found: TileResult
+    tmp_path: Path, folder: Path, found: EscherTile
 ) -> None:
     settings = ExportSettings(tile_size=30, area=(90, 60))
     files = [
@@ -93,7 +94,7 @@ def test_everything_that_holds_a_tile_is_exported_alike(
 
 
 def test_everything_with_a_map_is_drawn_alike(
-    tmp_path: Path, folder: Path, found: TileResult
+    tmp_path: Path, folder: Path, found: EscherTile
 ) -> None:
     settings = ArtSettings(size=(90, 60), tile_size=40.0, eyes=((210.0, 190.0),))
     drawn = [
@@ -106,7 +107,7 @@ def test_everything_with_a_map_is_drawn_alike(
 
 @pytest.mark.parametrize("ending", ["svg", "pdf", "dxf", "png", "json"])
 def test_the_ending_decides_an_export_s_format(
-    ending: str, tmp_path: Path, found: TileResult
+    ending: str, tmp_path: Path, found: EscherTile
 ) -> None:
     starts = {"svg": b"<?xml", "pdf": b"%PDF", "dxf": b"  0\n", "png": b"\x89PNG", "json": b"{"}
     settings = ExportSettings(tile_size=30, area=(90, 60), dpi=50)
@@ -116,14 +117,14 @@ def test_the_ending_decides_an_export_s_format(
     assert plain.files[0].read_bytes().startswith(b"{")
 
 
-def test_the_ending_decides_an_animation_s_format(tmp_path: Path, found: TileResult) -> None:
+def test_the_ending_decides_an_animation_s_format(tmp_path: Path, found: EscherTile) -> None:
     settings = AnimationSettings(seconds=0.5, fps=4, size=64)
     assert animate(found, tmp_path / "a.svg", settings).read_text().lstrip().startswith("<")
     assert animate(found, tmp_path / "a.gif", settings).read_bytes().startswith(b"GIF")
 
 
 def test_an_ending_of_no_format_is_refused_unless_settings_say_it(
-    tmp_path: Path, found: TileResult
+    tmp_path: Path, found: EscherTile
 ) -> None:
     out = tmp_path / "a.xyz"
     with pytest.raises(
@@ -137,24 +138,24 @@ def test_an_ending_of_no_format_is_refused_unless_settings_say_it(
 
 
 def test_a_tile_without_a_map_needs_the_target_for_pictures(tmp_path: Path) -> None:
-    target, tile = animal("squirrel.dat"), squirrel("IH4").given.tile
+    target, tile = animal("squirrel.dat"), squirrel("IH4").tile
     plain = Tile(tile.polygon, tile.group, "IH4")
     assert draw_art(plain, tmp_path / "plain.svg", SMALL).is_file()
     seen = ArtSettings(size=(90, 60), eyes=((210.0, 190.0),))
     with pytest.raises(OrbiflowError, match="give the search's target as well"):
         draw_art(plain, tmp_path / "eye.png", seen)
     assert draw_art(plain, tmp_path / "eye.png", seen, target=target).is_file()
-    assert ArtTile.of(plain, target).notes
+    assert with_map(plain, target).notes
 
 
 def test_a_rank_of_a_folder_keeps_its_map(tmp_path: Path) -> None:
     run = write_run(tmp_path / "run", "IH5")
-    assert ArtTile.of(read_result(run, "IH5")).carried.bending is not None
+    assert with_map(read_result(run, "IH5")).bending is not None
 
 
-def test_a_picture_goes_through_the_map(tmp_path: Path, found: TileResult) -> None:
-    tile = ArtTile.of(found)
-    size = tuple(int(side) for side in np.rint(tile.covered.high - tile.covered.low))
+def test_a_picture_goes_through_the_map(tmp_path: Path, found: EscherTile) -> None:
+    covered = covered_area(found)
+    size = tuple(int(side) for side in np.rint(covered.high - covered.low))
     painted = tmp_path / "painted.png"
     Image.new("RGB", (size[0], size[1]), "#ff0000").save(painted)
     settings = ArtSettings(size=(90, 60), tile_size=40.0, outline=0.0)
@@ -163,7 +164,7 @@ def test_a_picture_goes_through_the_map(tmp_path: Path, found: TileResult) -> No
     assert (pixels == (255, 0, 0)).all()
 
 
-def test_mistakes_are_said_before_anything_is_written(tmp_path: Path, found: TileResult) -> None:
+def test_mistakes_are_said_before_anything_is_written(tmp_path: Path, found: EscherTile) -> None:
     out = tmp_path / "a.gif"
     with pytest.raises(OrbiflowError, match=r"written to a \.png or \.svg, got 'a\.gif'"):
         draw_art(found, out)
@@ -178,7 +179,7 @@ def test_mistakes_are_said_before_anything_is_written(tmp_path: Path, found: Til
     assert draw_art(bad, tmp_path / "a.png", SMALL, force=True).is_file()
 
 
-def test_a_notebook_shows_exports_and_artwork(tmp_path: Path, found: TileResult) -> None:
+def test_a_notebook_shows_exports_and_artwork(tmp_path: Path, found: EscherTile) -> None:
     done = export(found, tmp_path / "a.svg", ExportSettings(tile_size=30, area=(90, 60)))
     assert Image.open(io.BytesIO(done._repr_png_())).size == (600, 400)
     assert Image.open(io.BytesIO(artwork(found, SMALL)._repr_png_())).size == (90, 60)

@@ -16,8 +16,8 @@ from hypothesis import strategies as st
 from exported import dxf_lines, polygons, svg_lines, tile_of, tiles
 from orbiflow.tiles import (
     CLASSES,
+    EscherTile,
     ExportSettings,
-    ExportTile,
     Tile,
     colouring,
     scenes,
@@ -29,7 +29,7 @@ INKSCAPE = "{http://www.inkscape.org/namespaces/inkscape}"
 SVG = "{http://www.w3.org/2000/svg}"
 
 
-def text_of(tile: Tile | ExportTile, **options) -> str:
+def text_of(tile: Tile | EscherTile, **options) -> str:
     chosen = ExportSettings(**options)
     found, _ = scenes(tile, chosen)
     content = write_scene(found[0], chosen)
@@ -109,7 +109,7 @@ def test_one_symbol_and_a_short_line_a_tile_in_layers() -> None:
 def test_the_picture_is_the_way_up_that_the_input_has() -> None:
     tile = tile_of("IH4")
     for y_down in (False, True):
-        text = text_of(ExportTile(tile, y_down=y_down), area=(60.0, 60.0))
+        text = text_of(EscherTile(tile, y_down=y_down), area=(60.0, 60.0))
         (line, *_) = [x for x in svg_lines(text) if x.layer != "paper"]
         scale = 40 / longer_side(tile.polygon)
         flip = np.array([1.0, 1.0 if y_down else -1.0])

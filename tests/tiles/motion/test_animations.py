@@ -21,10 +21,9 @@ from orbiflow.errors import CertificationError, OrbiflowError
 from orbiflow.tiles import (
     AnimationSettings,
     BendingSettings,
-    ExportTile,
+    EscherTile,
     Target,
     Tile,
-    TileResult,
     animate,
     animation,
     escherize_class,
@@ -46,10 +45,10 @@ SMALL = {"seconds": 1.0, "fps": 10.0, "size": 120}
 
 
 @pytest.fixture(scope="module", name="bent")
-def bent_fixture() -> TileResult:
+def bent_fixture() -> EscherTile:
     small = BendingSettings(placements=20, held=4, finalists=1, rounds=4)
     found = escherize_class(Target.from_polygon(BOOT, y_down=True), "IH4", small)
-    assert isinstance(found, TileResult)
+    assert isinstance(found, EscherTile)
     return found
 
 
@@ -81,7 +80,7 @@ def test_progress_is_there_and_back(time: float) -> None:
 
 
 @pytest.mark.parametrize("kind", ["morph", "bend", "grow"])
-def test_a_gif(bent: TileResult, kind, tmp_path: Path) -> None:
+def test_a_gif(bent: EscherTile, kind, tmp_path: Path) -> None:
     out = animate(bent, tmp_path / "a.gif", AnimationSettings(kind=kind, **SMALL))
     with Image.open(out) as image:
         assert image.size == (120, 80)
@@ -100,7 +99,7 @@ def numbers(text: str | None) -> list[float]:
 
 
 @pytest.mark.parametrize("kind", ["morph", "bend", "grow"])
-def test_an_svg(bent: TileResult, kind) -> None:
+def test_an_svg(bent: EscherTile, kind) -> None:
     text = animation(bent, AnimationSettings(format="svg", kind=kind))
     assert isinstance(text, str)
     assert "prefers-reduced-motion: reduce" in text
@@ -146,8 +145,8 @@ def test_colours_of_neighbours_differ_throughout(name: str) -> None:
         assert beside > len(shown)
 
 
-def test_a_silhouette_bends_from_rest_to_tile(bent: TileResult) -> None:
-    bending = bent.model.bending
+def test_a_silhouette_bends_from_rest_to_tile(bent: EscherTile) -> None:
+    bending = bent.bending
     assert bending is not None
     way = BendingWay(bending)
     assert np.abs(way.at(0.0) - bending.rest[way.ring]).max() < 1e-9
@@ -160,14 +159,14 @@ def test_a_silhouette_bends_from_rest_to_tile(bent: TileResult) -> None:
     assert whole.grown(1.0).min() == 1
 
 
-def test_what_cannot_be_animated_says_why(bent: TileResult, monkeypatch) -> None:
+def test_what_cannot_be_animated_says_why(bent: EscherTile, monkeypatch) -> None:
     plain = Tile(bent.tile.polygon, bent.tile.group)
     with pytest.raises(OrbiflowError, match="class is not known"):
         animation(plain, AnimationSettings(**SMALL))
     with pytest.raises(
         OrbiflowError, match="no bent silhouette: only tiles of a search for likeness"
     ):
-        animation(ExportTile(bent.tile), AnimationSettings(kind="bend", **SMALL))
+        animation(EscherTile(bent.tile), AnimationSettings(kind="bend", **SMALL))
     crossed = Tile(0.9 * bent.tile.polygon, bent.tile.group, "IH4")
     with pytest.raises(CertificationError, match=r"is not certified .* --force animates it"):
         animation(crossed, AnimationSettings(**SMALL))
@@ -201,7 +200,7 @@ for last; do :; done
 
 
 def test_an_mp4_is_what_ffmpeg_makes_of_all_frames(
-    bent: TileResult, tmp_path: Path, monkeypatch
+    bent: EscherTile, tmp_path: Path, monkeypatch
 ) -> None:
     fake = tmp_path / "bin" / "ffmpeg"
     fake.parent.mkdir()

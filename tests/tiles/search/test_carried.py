@@ -12,9 +12,10 @@ from hypothesis import strategies as st
 
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles import CLASSES, Bending, CarriedTile, Frame, signed_area
-from orbiflow.tiles.search.carried import MAX_POINTS, onto_polygon
+from orbiflow.tiles import CLASSES, Bending, EscherTile, Frame, TileMap, signed_area
+from orbiflow.tiles.search.bent_map import map_of_bent, onto_polygon
 from orbiflow.tiles.silhouette import triangulate, unfolded
+from orbiflow.tiles.silhouette.bending import MAX_POINTS
 from orbiflow.tiles.silhouette.unfolding import folded
 from outlines import BentTile, animal, bent_squirrel, disc
 from strategies import seeds
@@ -24,7 +25,7 @@ CASES = [*((name, False) for name in CLASSES), ("IH4", True), ("IH21", True)]
 
 def bending(name: str, mirrored: bool = False) -> tuple[BentTile, Bending]:
     case = bent_squirrel(name, mirrored)
-    return case, Bending.from_bent(case.bent, case.factor, case.shift, case.tile)
+    return case, map_of_bent(case.bent, case.factor, case.shift, case.tile)
 
 
 def outline(case: BentTile) -> Array:
@@ -123,9 +124,11 @@ def test_sent_between_processes() -> None:
 def test_in_the_input_s_coordinates() -> None:
     case = bent_squirrel("IH4")
     frame = animal("squirrel.dat").frame
-    carried = CarriedTile.from_bent(case.bent, case.factor, case.shift, case.tile, frame)
-    assert carried.bending is not None
-    assert carried.notes == ()
+    placed = case.tile.transformed(frame.linear, frame.offset)
+    bending = map_of_bent(case.bent, case.factor, case.shift, case.tile)
+    carried = EscherTile(placed, map_source=TileMap(frame=frame, bending=bending))
+    assert carried.map is not None
+    assert carried.map.ends_on(placed)
     points = frame.to_input(points_in(outline(case), 100))
     images = carried.forward(points)
     assert shapely.contains_xy(shapely.Polygon(carried.tile.polygon), *images.T).all()
@@ -138,12 +141,11 @@ def test_no_map_says_why() -> None:
     case = bent_squirrel("IH4")
     crossed = case.tile.polygon[::-1]  # against the outline's sense: nothing can follow
     tile = type(case.tile)(crossed, case.tile.group, case.tile.isohedral_class, case.tile.corners)
-    frame = Frame(np.eye(2), np.zeros(2))
-    carried = CarriedTile.from_bent(case.bent, case.factor, case.shift, tile, frame)
-    assert carried.bending is None
-    with pytest.raises(OrbiflowError, match="without folds"):
-        carried.forward([0.0, 0.0])
-    assert "too thin" in carried.notes[0]
+    with pytest.raises(OrbiflowError, match=r"too thin.*without folds|without folds.*too thin"):
+        map_of_bent(case.bent, case.factor, case.shift, tile)
+    bare = EscherTile(tile, map_source=TileMap(frame=Frame(np.eye(2), np.zeros(2))))
+    with pytest.raises(OrbiflowError, match="left no map"):
+        bare.forward([0.0, 0.0])
 
 
 @given(seeds, st.integers(3, 40))

@@ -9,13 +9,14 @@ from orbiflow.tiles import (
     ClassFailure,
     DescentSettings,
     OccupancySettings,
-    SavedModel,
     Settings,
     Target,
     TileModel,
+    as_map,
+    as_model,
     certify,
     escherize_class,
-    load_saved,
+    load_model,
 )
 from orbiflow.tiles.search.boundary import extract_tile
 
@@ -42,8 +43,9 @@ def test_a_fit_of_pose_and_lattice_is_certified(name: str, method: str, tmp_path
     assert result.certificate.valid
     assert result.metrics.iou > 0.3
     path = tmp_path / "model.safetensors"
-    path.write_bytes(result.model.to_bytes())
-    model = load_saved(path).restore()
+    assert result.map is not None
+    path.write_bytes(result.map.to_bytes())
+    model = load_model(path)
     assert model.max_frequency == 0
     # a constant field moves all points alike
     points = torch.rand(1, 9, 2, dtype=torch.float64)
@@ -58,5 +60,5 @@ def test_a_model_without_waves(name: str) -> None:
     assert (model.inverse(model(points)) - points).abs().max() < 1e-12
     tile, fine = extract_tile(model)
     assert certify(tile).valid
-    again = SavedModel.of(fine).restore()
+    again = as_model(as_map(fine))
     assert np.array_equal(extract_tile(again)[0].polygon, tile.polygon)

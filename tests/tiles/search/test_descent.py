@@ -14,9 +14,11 @@ from orbiflow.tiles import (
     DescentSettings,
     Event,
     OccupancySettings,
-    SavedModel,
     SoftTarget,
     Target,
+    TileMap,
+    as_map,
+    as_model,
     certify,
     escherize,
     escherize_class,
@@ -127,8 +129,8 @@ def test_a_fit_certifies_and_survives_storage(name: str) -> None:
     assert certificate.edge_mismatch < 1e-12
     assert iou(tile.polygon, TARGET.normal) > 0.75
     assert found.starts >= 1
-    saved = SavedModel.of(fine)
-    again = extract_tile(saved.restore())[0]
+    saved = as_map(fine)
+    again = extract_tile(as_model(saved))[0]
     assert np.allclose(again.polygon, tile.polygon, atol=1e-12)
 
 
@@ -141,7 +143,7 @@ def test_the_inverse_of_the_flow_takes_the_tile_back() -> None:
 
 
 def test_broken_prototiles_are_refused() -> None:
-    saved = SavedModel.of(fit_descent(TARGET, isohedral_class("IH4"), QUICK).model.take([0]))
+    saved = as_map(fit_descent(TARGET, isohedral_class("IH4"), QUICK).model.take([0]))
     outline, corners = saved.arrays["prototile.outline"], saved.arrays["prototile.corners"]
     broken = {
         "shape": {"prototile.outline": outline[:, :1]},
@@ -151,7 +153,7 @@ def test_broken_prototiles_are_refused() -> None:
     }
     for word, arrays in broken.items():
         with pytest.raises(OrbiflowError, match=word):
-            SavedModel(saved.settings, {**saved.arrays, **arrays}).restore()
+            as_model(TileMap(saved.settings, {**saved.arrays, **arrays}))
 
 
 def test_the_same_seed_gives_the_same_tile() -> None:

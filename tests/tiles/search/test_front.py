@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from orbiflow.tiles import CLASSES, BendingSettings, TileResult
+from orbiflow.tiles import CLASSES, BendingSettings, EscherTile
 from orbiflow.tiles.search.bending_fit import fit_bending
 from orbiflow.tiles.search.co_deformation import hands
 from orbiflow.tiles.search.front import behind, deformation, front_list, measured
@@ -18,27 +18,27 @@ HANDS = hands(SQUIRREL, QUICK)
 
 
 @pytest.fixture(scope="module", name="bent")
-def bent_fixture() -> list[TileResult]:
+def bent_fixture() -> list[EscherTile]:
     fit = fit_bending(SQUIRREL, CLASSES["IH4"], QUICK, HANDS)
     return best_tiles(SQUIRREL, fit)
 
 
 def like(
-    one: TileResult, stretch: float, deformation: float | None, iou: float, objective: str
-) -> TileResult:
+    one: EscherTile, stretch: float, deformation: float | None, iou: float, objective: str
+) -> EscherTile:
     """The same tile made flat, so that no two with different stretches are alike."""
     tile = one.normal_tile
     flat = replace(tile, polygon=tile.polygon * (np.exp(stretch), np.exp(-stretch)))
     return replace(
         one,
-        normal_tile=flat,
+        normal=flat,
         deformation=deformation,
         metrics=replace(one.metrics, iou=iou),
         objective=objective,
     )
 
 
-def test_the_front_and_what_is_near_it(bent: list[TileResult]) -> None:
+def test_the_front_and_what_is_near_it(bent: list[EscherTile]) -> None:
     values = [
         (0.0, 0.20, 0.70, "likeness"),  # on the front
         (0.2, 0.10, 0.60, "likeness"),  # least deformation
@@ -57,7 +57,7 @@ def test_the_front_and_what_is_near_it(bent: list[TileResult]) -> None:
     ]
 
 
-def test_of_two_alike_one_is_left(bent: list[TileResult]) -> None:
+def test_of_two_alike_one_is_left(bent: list[EscherTile]) -> None:
     values = [(0.0, 0.20, 0.70, "likeness"), (0.02, 0.19, 0.69, "likeness")]
     values += [(0.5, 0.10, 0.50, "likeness"), (0.52, 0.50, 0.9, "overlap")]
     chosen = front_list([like(bent[0], *value) for value in values])
@@ -65,7 +65,7 @@ def test_of_two_alike_one_is_left(bent: list[TileResult]) -> None:
     assert [r.deformation for r in chosen] == [0.20, 0.10]
 
 
-def test_never_more_than_twelve(bent: list[TileResult]) -> None:
+def test_never_more_than_twelve(bent: list[EscherTile]) -> None:
     many = [like(bent[0], 0.15 * k, 0.1 + 0.01 * k, 0.5 + 0.01 * k, "likeness") for k in range(20)]
     chosen = front_list(many)
     assert len(chosen) == 12
@@ -74,13 +74,13 @@ def test_never_more_than_twelve(bent: list[TileResult]) -> None:
     assert chosen[-1].deformation == many[-1].deformation
 
 
-def test_the_first_of_each_search_is_listed(bent: list[TileResult]) -> None:
+def test_the_first_of_each_search_is_listed(bent: list[EscherTile]) -> None:
     values = [(0.0, 0.9, 0.5, "likeness"), (0.3, 0.1, 0.9, "likeness"), (0.6, 0.8, 0.4, "overlap")]
     chosen = front_list([like(bent[0], *value) for value in values])
     assert [r.front for r in chosen] == [False, True, False]
 
 
-def test_forced_tiles_without_a_deformation_come_last(bent: list[TileResult]) -> None:
+def test_forced_tiles_without_a_deformation_come_last(bent: list[EscherTile]) -> None:
     odd = like(bent[0], 0.0, None, 0.5, "overlap")
     chosen = front_list([like(bent[0], 0.0, 0.3, 0.6, "likeness"), odd])
     assert [r.front for r in chosen] == [True, False]
@@ -104,7 +104,7 @@ def test_behind_counts_from_the_nearest_that_is_better() -> None:
     assert len(behind(np.zeros(0), np.zeros(0))) == 0
 
 
-def test_the_measure_finds_what_the_search_found(bent: list[TileResult]) -> None:
+def test_the_measure_finds_what_the_search_found(bent: list[EscherTile]) -> None:
     """From the polygon alone, without the correspondence that the search knows."""
     for result in bent:
         assert result.deformation is not None

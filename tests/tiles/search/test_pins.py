@@ -9,8 +9,8 @@ from orbiflow.tiles import (
     BendingSettings,
     DescentSettings,
     Emphasis,
+    EscherTile,
     Pins,
-    TileResult,
     escherize,
 )
 from outlines import animal
@@ -21,7 +21,7 @@ QUICK = BendingSettings(placements=80, held=12, finalists=2, rounds=12, multiple
 CLASSES = ["IH4", "IH5"]
 
 
-def head_misfit(result: TileResult, pins: Pins) -> tuple[float, float]:
+def head_misfit(result: EscherTile, pins: Pins) -> tuple[float, float]:
     """How far the head's outline is from similar to what it was, and its turn in radians."""
     assert result.rest is not None
     assert result.bent is not None
@@ -33,16 +33,16 @@ def head_misfit(result: TileResult, pins: Pins) -> tuple[float, float]:
 
 
 @pytest.fixture(scope="module", name="free")
-def free_fixture() -> list[TileResult]:
+def free_fixture() -> list[EscherTile]:
     return escherize(SQUIRREL, CLASSES, QUICK)[0]
 
 
 @pytest.fixture(scope="module", name="pinned")
-def pinned_fixture() -> list[TileResult]:
+def pinned_fixture() -> list[EscherTile]:
     return escherize(SQUIRREL, CLASSES, QUICK, pins=Pins.at(SQUIRREL, [HEAD]))[0]
 
 
-def test_a_pinned_head_keeps_its_shape(free: list[TileResult], pinned: list[TileResult]) -> None:
+def test_a_pinned_head_keeps_its_shape(free: list[EscherTile], pinned: list[EscherTile]) -> None:
     pins = Pins.at(SQUIRREL, [HEAD])
     assert len(free) == len(pinned) == 2
     for result in pinned:
@@ -55,7 +55,7 @@ def test_a_pinned_head_keeps_its_shape(free: list[TileResult], pinned: list[Tile
     assert {result.pinned for result in free} == {None}
 
 
-def test_the_tile_itself_has_the_head(pinned: list[TileResult]) -> None:
+def test_the_tile_itself_has_the_head(pinned: list[EscherTile]) -> None:
     """Not only the bent silhouette: the certified polygon holds a copy of the pinned outline."""
     pins = Pins.at(SQUIRREL, [HEAD])
     for result in pinned:

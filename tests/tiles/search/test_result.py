@@ -9,9 +9,9 @@ import shapely
 import torch
 
 from orbiflow.errors import CertificationError
-from orbiflow.tiles import CLASSES, Fit, Target, TileModel, TileResult, certify, load_saved
+from orbiflow.tiles import CLASSES, EscherTile, Fit, Target, TileMap, TileModel, as_model, certify
+from orbiflow.tiles.result_file import tile_json
 from orbiflow.tiles.search.boundary import DENSE
-from orbiflow.tiles.search.reports import tile_json
 from orbiflow.tiles.search.result import best_tiles
 from strategies import random_tensor
 
@@ -20,7 +20,7 @@ KIND = CLASSES["IH21"]
 
 def best_tile(
     target: Target, model: TileModel, *, starts: int, seconds: float, force: bool = False
-) -> TileResult:
+) -> EscherTile:
     fit = Fit(model, starts, 0, model.size)
     return best_tiles(target, fit, seconds=seconds, force=force)[0]
 
@@ -99,11 +99,12 @@ def test_a_file_alone_places_the_tile_in_the_input(name: str, y_down: bool, tmp_
     result = best_tile(target, model, starts=1, seconds=0.0)
     polygon = np.array(tile_json(result)["polygon"])[:-1]
     path = tmp_path / "model.safetensors"
-    path.write_bytes(result.model.to_bytes())
+    assert result.map is not None
+    path.write_bytes(result.map.to_bytes())
 
-    saved = load_saved(path)
+    saved = TileMap.read(path)
     assert saved.frame is not None
-    loaded = saved.restore()
+    loaded = as_model(saved)
     pieces = 2 * -(-DENSE[0] // (2 * len(kind.template())))
     with torch.no_grad():
         curve = saved.frame.to_input(loaded(loaded.boundary(pieces)))[0].numpy()

@@ -17,11 +17,11 @@ from orbiflow.tiles import (
     BothSettings,
     ClassFailure,
     DescentSettings,
+    EscherTile,
     Event,
     OccupancySettings,
     Target,
     TileModel,
-    TileResult,
     escherize,
     escherize_class,
     isohedral_class,
@@ -57,7 +57,7 @@ def test_the_same_tiles_whatever_the_number_of_workers() -> None:
         shares = [event.share for event in own]
         assert shares == sorted(shares)
         assert shares[-1] == 1.0
-        assert isinstance(own[-1].outcome, TileResult)
+        assert isinstance(own[-1].outcome, EscherTile)
         assert all(event.outcome is None and math.isfinite(event.loss) for event in own[:-1])
     elsewhere, none = escherize(TARGET, ["IH28", "IH4"], QUICK, workers=2)
     assert none == []
@@ -65,12 +65,12 @@ def test_the_same_tiles_whatever_the_number_of_workers() -> None:
         assert one.name == other.name
         assert np.array_equal(one.tile.polygon, other.tile.polygon)
         assert one.metrics == other.metrics
-        assert one.model.settings == other.model.settings
+        assert (one.map and one.map.settings) == (other.map and other.map.settings)
 
 
 def test_every_seed_that_settings_take_can_be_searched_with() -> None:
     own = replace(QUICK, seed=2**32 - 1, iterations=1, affine_iterations=1, turns=1, points=20)
-    assert isinstance(escherize_class(TARGET, "IH21", own), TileResult)
+    assert isinstance(escherize_class(TARGET, "IH21", own), EscherTile)
 
 
 def test_the_number_of_threads_is_put_back() -> None:
@@ -251,7 +251,7 @@ def test_of_both_objectives_one_may_fail() -> None:
     assert isinstance(alone, ClassFailure)
     overlap = DescentSettings.for_effort("fast")
     both = escherize_class(bar, "IH7", BothSettings(likeness, overlap))
-    assert isinstance(both, TileResult)
+    assert isinstance(both, EscherTile)
     assert {tile.objective for tile in both.family()} == {"overlap"}
     assert all(tile.deformation is not None for tile in both.family())
 
@@ -270,7 +270,7 @@ def test_both_objectives_give_a_short_list_likeness_first() -> None:
         scores = [r.score for r in results if r.objective == kind]
         assert scores == sorted(scores, reverse=True)
     found = [
-        tile for e in events if isinstance(e.outcome, TileResult) for tile in e.outcome.family()
+        tile for e in events if isinstance(e.outcome, EscherTile) for tile in e.outcome.family()
     ]
     assert len(found) >= len(results)
     places = [(r.deformation or 0.0, r.metrics.iou) for r in found]
@@ -309,7 +309,7 @@ def test_more_effort_never_scores_less() -> None:
         for effort in ("fast", "normal"):
             settings = BendingSettings.for_effort(effort)
             tile = escherize_class(SQUIRREL, "IH5", settings, per_class=per_class)
-            assert isinstance(tile, TileResult)
+            assert isinstance(tile, EscherTile)
             scores.append(tile.score)
         assert scores[1] >= scores[0]
 

@@ -18,18 +18,15 @@ from orbiflow.tiles import (
     CLASSES,
     Bending,
     Frame,
-    SavedModel,
+    TileMap,
     TileModel,
+    as_map,
+    as_model,
     certify,
     load_model,
-    load_saved,
 )
 from orbiflow.tiles.search.boundary import extract_tile
-from orbiflow.tiles.search.storage import (
-    BENDING,
-    FORMAT,
-    MAX_BYTES,
-)
+from orbiflow.tiles.tile_map import BENDING, FORMAT, MAX_BYTES
 from strategies import seeds
 
 
@@ -67,14 +64,14 @@ def assert_same(one: TileModel, other: TileModel) -> None:
 @given(st.sampled_from(list(CLASSES)), seeds, st.integers(1, 3))
 def test_round_trip(name: str, seed: int, segments: int) -> None:
     model = candidate(name, seed, segments)
-    assert_same(model, SavedModel.of(model).restore())
+    assert_same(model, as_model(as_map(model)))
 
 
 @pytest.mark.parametrize("name", CLASSES)
 def test_round_trip_through_a_file(name: str, tmp_path: Path) -> None:
     model = candidate(name, 7, 2)
     path = tmp_path / "model.safetensors"
-    path.write_bytes(SavedModel.of(model).to_bytes())
+    path.write_bytes(as_map(model).to_bytes())
     loaded = load_model(path)
     assert_same(model, loaded)
 
@@ -82,7 +79,7 @@ def test_round_trip_through_a_file(name: str, tmp_path: Path) -> None:
 def test_a_restored_model_gives_the_same_polygon(tmp_path: Path) -> None:
     tile, fine = extract_tile(candidate("IH6", 3))
     path = tmp_path / "model.safetensors"
-    path.write_bytes(SavedModel.of(fine).to_bytes())
+    path.write_bytes(as_map(fine).to_bytes())
     again, _ = extract_tile(load_model(str(path)))
     assert np.array_equal(tile.polygon, again.polygon)
     assert np.array_equal(tile.group.lattice, again.group.lattice)
@@ -94,7 +91,7 @@ OLD = Path(__file__).parent / "data" / "tile-1"
 def test_a_file_of_version_0_1_is_read_as_it_was() -> None:
     path = OLD.with_suffix(".safetensors")
     expected = json.loads(OLD.with_suffix(".json").read_text())
-    assert load_saved(path).frame is None
+    assert TileMap.read(path).frame is None
     model = load_model(path)
     with torch.no_grad():
         images = model(torch.tensor(expected["points"], dtype=torch.float64)[None])[0].numpy()
@@ -107,13 +104,13 @@ def test_a_file_of_version_0_1_is_read_as_it_was() -> None:
 def test_the_frame_is_kept_bit_for_bit(tmp_path: Path) -> None:
     frame = Frame(np.diag([0.1, -0.1]), np.array([1 / 3, 1e7]), "image", (640, 480))
     path = tmp_path / "model.safetensors"
-    saved = SavedModel.of(candidate("IH4"), frame)
+    saved = as_map(candidate("IH4"), frame)
     path.write_bytes(saved.to_bytes())
-    loaded = load_saved(path)
+    loaded = TileMap.read(path)
     assert loaded.frame is not None
     assert loaded.frame.as_dict() == frame.as_dict()
     assert loaded.settings == saved.settings
-    assert_same(loaded.restore(), saved.restore())
+    assert_same(as_model(loaded), as_model(saved))
 
 
 def two_triangles() -> Bending:
@@ -125,21 +122,21 @@ def two_triangles() -> Bending:
 def test_the_bending_is_kept_bit_for_bit(tmp_path: Path) -> None:
     path = tmp_path / "model.safetensors"
     bending = two_triangles()
-    saved = SavedModel.of(candidate("IH4"), bending=bending)
+    saved = as_map(candidate("IH4"), bending=bending)
     path.write_bytes(saved.to_bytes())
-    for again in (load_saved(path), pickle.loads(pickle.dumps(saved))):
+    for again in (TileMap.read(path), pickle.loads(pickle.dumps(saved))):
         assert again.bending is not None
         for name in ("rest", "images", "triangles"):
             assert np.array_equal(getattr(again.bending, name), getattr(bending, name))
         assert set(again.arrays) == set(saved.arrays)
-        assert_same(again.restore(), saved.restore())
+        assert_same(as_model(again), as_model(saved))
 
 
 def test_files_without_a_bending_have_none(tmp_path: Path) -> None:
     path = tmp_path / "model.safetensors"
     path.write_bytes(good())
-    assert load_saved(path).bending is None
-    assert load_saved(OLD.with_suffix(".safetensors")).bending is None
+    assert TileMap.read(path).bending is None
+    assert TileMap.read(OLD.with_suffix(".safetensors")).bending is None
 
 
 def with_bending(name: str, array: np.ndarray | None) -> Callable[[], bytes]:
@@ -147,10 +144,10 @@ def with_bending(name: str, array: np.ndarray | None) -> Callable[[], bytes]:
     arrays = dict(zip(BENDING, (bending.rest, bending.images, bending.triangles), strict=True))
 
     def make() -> bytes:
-        saved = SavedModel.of(candidate("IH4"))
+        saved = as_map(candidate("IH4"))
         own = {**arrays, name: array}
         stored = {key: np.array(value) for key, value in own.items() if value is not None}
-        return SavedModel(saved.settings, {**saved.arrays, **stored}).to_bytes()
+        return TileMap(saved.settings, {**saved.arrays, **stored}).to_bytes()
 
     return make
 
@@ -190,35 +187,35 @@ def test_bad_bendings_are_refused(case: str, tmp_path: Path) -> None:
     path = tmp_path / "model.safetensors"
     path.write_bytes(make())
     with pytest.raises(InputFileError, match=message) as caught:
-        load_saved(path)
+        TileMap.read(path)
     assert str(path) in str(caught.value)
 
 
 def test_single_precision_is_widened() -> None:
     model = candidate("IH5").float()
-    restored = SavedModel.of(model).restore()
+    restored = as_model(as_map(model))
     assert restored.angle.dtype == torch.float64
     assert torch.equal(restored.angle.float(), model.angle)
 
 
 def test_a_stack_is_refused() -> None:
     with pytest.raises(OrbiflowError, match="take one candidate first: this model holds 2"):
-        SavedModel.of(candidate("IH4", size=2))
+        as_map(candidate("IH4", size=2))
 
 
 def with_settings(**changes: Any) -> Callable[[], bytes]:
     def make() -> bytes:
-        saved = SavedModel.of(candidate("IH4"))
-        return SavedModel({**saved.settings, **changes}, saved.arrays).to_bytes()
+        saved = as_map(candidate("IH4"))
+        return TileMap({**saved.settings, **changes}, saved.arrays).to_bytes()
 
     return make
 
 
 def with_array(name: str, array: np.ndarray | None) -> Callable[[], bytes]:
     def make() -> bytes:
-        saved = SavedModel.of(candidate("IH4"))
+        saved = as_map(candidate("IH4"))
         arrays = {key: value for key, value in saved.arrays.items() if key != name}
-        return SavedModel(
+        return TileMap(
             saved.settings, arrays if array is None else {**arrays, name: array}
         ).to_bytes()
 
@@ -227,14 +224,14 @@ def with_array(name: str, array: np.ndarray | None) -> Callable[[], bytes]:
 
 def with_metadata(metadata: dict[str, str] | None) -> Callable[[], bytes]:
     def make() -> bytes:
-        arrays = SavedModel.of(candidate("IH4")).arrays
+        arrays = as_map(candidate("IH4")).arrays
         return save({name: np.array(a) for name, a in arrays.items()}, metadata=metadata)
 
     return make
 
 
 def good() -> bytes:
-    return SavedModel.of(candidate("IH4")).to_bytes()
+    return as_map(candidate("IH4")).to_bytes()
 
 
 FIELD = "flow.segments.0.parameters_"
@@ -328,6 +325,6 @@ def test_a_damaged_file_never_gives_anything_but_an_error(
 
 
 def test_settings_are_plain_json() -> None:
-    saved = SavedModel.of(candidate("IH2", 5))
+    saved = as_map(candidate("IH2", 5))
     assert json.loads(json.dumps(saved.settings)) == saved.settings
     assert all(array.dtype == np.float64 for array in saved.arrays.values())

@@ -7,5 +7,4 @@ from .scene import art_scene as art_scene
 from .scene import draw_art as draw_art
 from .scene import write_artwork as write_artwork
 from .settings import ArtSettings as ArtSettings
-from .source import ArtTile as ArtTile
-from .source import read_art_tile as read_art_tile
+from .source import with_map as with_map

@@ -16,7 +16,7 @@ from orbiflow.arrays import Array
 from orbiflow.errors import InputFileError
 from orbiflow.tiles.art.pictures import Picture, read_picture
 from orbiflow.tiles.art.raster import Grid, Paint
-from orbiflow.tiles.art.source import ArtTile
+from orbiflow.tiles.art.source import covered_area
 from orbiflow.tiles.exporting import (
     INK,
     Curve,
@@ -40,6 +40,7 @@ from orbiflow.tiles.silhouette import (
     read_bytes,
     read_head,
 )
+from orbiflow.tiles.tile import EscherTile
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -63,7 +64,7 @@ class TooFar(Exception):
     """A path reaches beyond `FARTHEST`."""
 
 
-def read_drawing(path: Path, tile: ArtTile) -> tuple[Motif, tuple[str, ...]]:
+def read_drawing(path: Path, tile: EscherTile) -> tuple[Motif, tuple[str, ...]]:
     """The drawing in an SVG file, carried onto the tile, in its units; and notes.
 
     Fills and strokes are kept, gradients become one colour; texts, pictures and clips are left out.
@@ -80,7 +81,7 @@ def read_drawing(path: Path, tile: ArtTile) -> tuple[Motif, tuple[str, ...]]:
     drawing = Drawing(path, parse_xml(path, read_bytes(path, MAX_BYTES)))
     drawing.collect()
     linear, offset = _onto(path, drawing, tile)
-    size = float(np.sqrt(abs(tile.carried.tile.signed_area)))
+    size = float(np.sqrt(abs(tile.tile.signed_area)))
     carry = _Carry(tile, linear, offset, size)
     parts: list[Part] = []
     for shape in drawing.shapes:
@@ -101,9 +102,9 @@ def read_drawing(path: Path, tile: ArtTile) -> tuple[Motif, tuple[str, ...]]:
     return Motif(tuple(parts)), notes
 
 
-def _onto(path: Path, drawing: Drawing, tile: ArtTile) -> tuple[Array, Array]:
+def _onto(path: Path, drawing: Drawing, tile: EscherTile) -> tuple[Array, Array]:
     """From the drawing's user units to the silhouette's coordinates."""
-    covered = tile.covered
+    covered = covered_area(tile)
     if drawing.box is None:
         return np.eye(2), np.zeros(2)
     low, high = np.array(drawing.box[:2]), np.array(drawing.box[2:])
@@ -114,16 +115,16 @@ def _onto(path: Path, drawing: Drawing, tile: ArtTile) -> tuple[Array, Array]:
             f"{there[0]:.6g} x {there[1]:.6g}; a drawing covers all of that and must have its aspect "
             "within 1 %, so draw over a copy of it"
         )
-    flip = np.array([1.0, 1.0 if tile.given.y_down else -1.0])
+    flip = np.array([1.0, 1.0 if tile.y_down else -1.0])
     scale = there / own * flip
-    start = covered.low if tile.given.y_down else np.array([covered.low[0], covered.high[1]])
+    start = covered.low if tile.y_down else np.array([covered.low[0], covered.high[1]])
     return np.diag(scale), start - scale * low
 
 
 class _Carry:
     """From the drawing to the tile, point by point."""
 
-    def __init__(self, tile: ArtTile, linear: Array, offset: Array, size: float) -> None:
+    def __init__(self, tile: EscherTile, linear: Array, offset: Array, size: float) -> None:
         self.tile, self.linear, self.offset, self.size = tile, linear, offset, size
         self.scale = float(np.sqrt(abs(np.linalg.det(linear))))
         self.tolerance = FLATNESS * size / self.scale
@@ -144,7 +145,7 @@ class _Carry:
         self.count += len(fine)
         if self.count > MOST_CARRIED:
             raise TooManyPoints
-        return self.tile.carried.forward(fine[:-1] if closed else fine)
+        return self.tile.forward(fine[:-1] if closed else fine)
 
 
 def _parts(shape: DrawnShape, drawing: Drawing, carry: _Carry) -> list[Part]:
@@ -249,7 +250,7 @@ class Over(NamedTuple):
     notes: tuple[str, ...] = ()
 
 
-def read_over(path: str | Path, tile: ArtTile) -> Over:
+def read_over(path: str | Path, tile: EscherTile) -> Over:
     """The picture or drawing in a file, by its content.
 
     Raises:

@@ -15,7 +15,7 @@ from orbiflow.drawing import Palette
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.art.raster import Grid
 from orbiflow.tiles.art.settings import Strokes
-from orbiflow.tiles.art.source import ArtTile
+from orbiflow.tiles.art.source import silhouette_outline
 from orbiflow.tiles.exporting import (
     INK,
     Curve,
@@ -29,6 +29,7 @@ from orbiflow.tiles.geometry import (
     resampled,
     signed_area,
 )
+from orbiflow.tiles.tile import EscherTile
 
 FINE = 420.0
 """Cells of the raster along the square root of the area."""
@@ -143,7 +144,9 @@ class Eye(NamedTuple):
     parts: tuple[Part, ...]
 
 
-def eyes(tile: ArtTile, given: tuple[tuple[float, ...], ...], palette: Palette) -> tuple[Eye, ...]:
+def eyes(
+    tile: EscherTile, given: tuple[tuple[float, ...], ...], palette: Palette
+) -> tuple[Eye, ...]:
     """Eyes where the silhouette has them, carried onto the tile, round.
 
     Args:
@@ -157,28 +160,28 @@ def eyes(tile: ArtTile, given: tuple[tuple[float, ...], ...], palette: Palette) 
     return tuple(_eye(tile, eye, palette) for eye in given)
 
 
-def _eye(tile: ArtTile, given: tuple[float, ...], palette: Palette) -> Eye:
+def _eye(tile: EscherTile, given: tuple[float, ...], palette: Palette) -> Eye:
     x, y = given[:2]
-    outline = shapely.Polygon(tile.outline)
+    outline = shapely.Polygon(silhouette_outline(tile))
     if not outline.contains(shapely.Point(x, y)):
         left, top, right, bottom = outline.bounds
         raise OrbiflowError(
             f"the eye at {x:g},{y:g} lies outside the silhouette, which reaches from "
             f"{left:.4g},{top:.4g} to {right:.4g},{bottom:.4g}"
         )
-    polygon = shapely.Polygon(tile.carried.tile.polygon)
+    polygon = shapely.Polygon(tile.tile.polygon)
     size = float(np.sqrt(polygon.area))
     here = np.array([x, y])
-    middle = tile.carried.forward(here)
+    middle = tile.forward(here)
     room = 0.75 * float(polygon.exterior.distance(shapely.Point(middle)))
     reach = 0.5 * USUAL_EYE * size
     around = reach * np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]])
-    moved = tile.carried.forward(here + around) - middle
+    moved = tile.forward(here + around) - middle
     # which way it looks, and how much larger things are there
     factor = complex(best_similarity(complex_points(around), complex_points(moved)))
     radius = USUAL_EYE * size if len(given) < 3 else given[2] * abs(factor)
     radius = min(radius, room)
-    up = -1.0 if tile.given.y_down else 1.0
+    up = -1.0 if tile.y_down else 1.0
     glint = np.array([-0.3, 0.35 * up])
     turn = factor / abs(factor)
     spot = complex(*glint) * turn
@@ -200,11 +203,11 @@ def _circle(middle: Array, radius: float) -> Curve:
     return Curve.polyline(ring, closed=True)
 
 
-def engraved(tile: ArtTile, strokes: Strokes, around: tuple[Eye, ...] = ()) -> tuple[Part, ...]:
+def engraved(tile: EscherTile, strokes: Strokes, around: tuple[Eye, ...] = ()) -> tuple[Part, ...]:
     """Lines of one kind in ink, thin where it is deep or light, that keep clear of the eyes."""
-    polygon = tile.carried.tile.polygon
-    size = float(np.sqrt(abs(tile.carried.tile.signed_area)))
-    flip = np.array([1.0, 1.0 if tile.given.y_down else -1.0])
+    polygon = tile.tile.polygon
+    size = float(np.sqrt(abs(tile.tile.signed_area)))
+    flip = np.array([1.0, 1.0 if tile.y_down else -1.0])
     body = Body(polygon * flip / size)
     rings = {"hatch": _hatch, "echoes": _echoes, "feathers": _feathers}[strokes](body)
     rings = [ring * flip * size for ring in rings]

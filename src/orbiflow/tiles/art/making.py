@@ -19,14 +19,14 @@ from orbiflow.tiles.art.raster import (
     render_page,
 )
 from orbiflow.tiles.art.settings import ArtSettings
-from orbiflow.tiles.art.source import ArtTile
+from orbiflow.tiles.art.source import with_map
 from orbiflow.tiles.exporting import (
     Curve,
     Motif,
     Part,
     Style,
-    TileSource,
 )
+from orbiflow.tiles.tile import EscherTile, TileSource
 
 FINER = 1.5
 """Texels of the tile's raster a pixel."""
@@ -47,7 +47,7 @@ class Artwork:
     - `notes`: what the user should know.
     """
 
-    tile: ArtTile
+    tile: EscherTile
     settings: ArtSettings
     page: ArtPage
     picture: Picture | None
@@ -68,7 +68,7 @@ class Artwork:
 
 
 def artwork(
-    tile: ArtTile | TileSource,
+    tile: TileSource,
     settings: ArtSettings | None = None,
     *,
     picture: Picture | None = None,
@@ -78,7 +78,7 @@ def artwork(
     """Prepare a picture of a tiling with something on its tiles.
 
     Args:
-        tile: in memory, or a run's folder; see `ArtTile.of`.
+        tile: in memory, or a run's folder; see `with_map`.
         settings: see `ArtSettings`.
         picture: colours over the silhouette, see `read_picture`.
         drawing: carried already; `read_over` gives either, and `notes`.
@@ -87,10 +87,10 @@ def artwork(
         OrbiflowError: for a picture or an eye where there is no map of the silhouette, an eye outside
             it, too many tiles, and where no rectangle repeats.
     """
-    settings, tile = settings or ArtSettings(), ArtTile.of(tile)
+    settings, tile = settings or ArtSettings(), with_map(tile)
     if picture is not None or drawing is not None or settings.eyes:
         tile.require_map()
-    page = art_page(tile.given, settings)
+    page = art_page(tile, settings)
     parts: tuple[Part, ...] = () if drawing is None else drawing.parts
     around = eyes(tile, settings.eyes, palette(settings.palette))
     if settings.engrave is not None:

@@ -11,7 +11,8 @@ from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.art.repeat import rectangle
 from orbiflow.tiles.art.settings import ArtSettings, check_size
-from orbiflow.tiles.exporting import ExportTile, longer_side
+from orbiflow.tiles.exporting import longer_side
+from orbiflow.tiles.tile import EscherTile
 from orbiflow.tiles.tilings import (
     Copies,
     Tile,
@@ -83,7 +84,7 @@ class _Colours:
         return copies.cosets if self.how == "aspect" else self.own.colours(copies)
 
 
-def art_page(given: ExportTile, settings: ArtSettings) -> ArtPage:
+def art_page(given: EscherTile, settings: ArtSettings) -> ArtPage:
     """Put the tile on a page of the settings' size, the way up it has; or make the repeating cell.
 
     Raises:
@@ -113,7 +114,7 @@ def art_page(given: ExportTile, settings: ArtSettings) -> ArtPage:
 
 
 def laid(
-    page: ArtPage, given: ExportTile, settings: ArtSettings, across: int, down: int
+    page: ArtPage, given: EscherTile, settings: ArtSettings, across: int, down: int
 ) -> ArtPage:
     """A page that shows a repeating cell's plane over `across` x `down` cells, made anew."""
     colours = _Colours(given.tile, settings.colour)

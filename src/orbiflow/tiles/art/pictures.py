@@ -18,13 +18,13 @@ from orbiflow.tiles.art.raster import (
     runs,
     triangle_sides,
 )
-from orbiflow.tiles.art.source import ArtTile, Covered
-from orbiflow.tiles.search import CarriedTile
+from orbiflow.tiles.art.source import Covered, covered_area, silhouette_outline
 from orbiflow.tiles.silhouette import (
     deep_channel,
     open_image,
     upright,
 )
+from orbiflow.tiles.tile import EscherTile
 
 SAME_ASPECT = 0.01
 """Relative difference up to which two aspect ratios are one."""
@@ -67,7 +67,7 @@ class Picture:
         return Picture(small.convert("RGBA"), self.covered, self.notes)
 
 
-def read_picture(path: Path, tile: ArtTile) -> Picture:
+def read_picture(path: Path, tile: EscherTile) -> Picture:
     """The picture in a file.
 
     Raises:
@@ -75,7 +75,7 @@ def read_picture(path: Path, tile: ArtTile) -> Picture:
             a picture of another aspect than the silhouette's.
     """
     image, notes = open_image(path, _decode)
-    covered = tile.covered
+    covered = covered_area(tile)
     wide, high = covered.high - covered.low
     width, height = image.size
     if abs(width * high / (height * wide) - 1) > SAME_ASPECT:
@@ -101,18 +101,18 @@ def _decode(path: Path, image: Image.Image) -> tuple[Image.Image, tuple[str, ...
     return turned.convert("RGBA"), tuple(notes)
 
 
-def carried_picture(picture: Picture, tile: ArtTile, grid: Grid) -> tuple[Array, Array]:
+def carried_picture(picture: Picture, tile: EscherTile, grid: Grid) -> tuple[Array, Array]:
     """The picture on the tile's raster; its colours go on a little beyond the outline.
 
     Returns:
         Colours (height, width, 3) times their opacity, and the opacity (height, width).
     """
     small = picture.reduced(1 / grid.density)
-    places = _places(tile.carried, grid)
+    places = _places(tile, grid)
     at = torch.from_numpy((small.covered.shares(places) * 2 - 1).astype(np.float32))
     straight = np.asarray(small.image, dtype=np.float32) / 255
     straight[..., :3] *= straight[..., 3:]
-    straight = _spread(straight, small.covered.shares(tile.outline) * small.image.size)
+    straight = _spread(straight, small.covered.shares(silhouette_outline(tile)) * small.image.size)
     values = torch.from_numpy(np.ascontiguousarray(straight.transpose(2, 0, 1)))[None]
     found = torch.nn.functional.grid_sample(
         values, at[None], mode="bilinear", padding_mode="border", align_corners=False
@@ -144,14 +144,12 @@ def _spread(colours: Array, outline: Array) -> Array:
     return colours[rows, columns]
 
 
-def _places(carried: CarriedTile, grid: Grid) -> Array:
+def _places(tile: EscherTile, grid: Grid) -> Array:
     """(height, width, 2) where in the silhouette's coordinates each texel comes from.
 
     Texels outside the tile come from anywhere: they are painted from inside.
     """
-    bending = carried.bending
-    assert bending is not None
-    frame = carried.frame
+    bending, frame = tile.require_map()
     images = grid.texels(frame.to_input(bending.images))
     rest = frame.to_input(bending.rest)
     triangles = bending.triangles

@@ -22,7 +22,7 @@ from orbiflow.tiles.art.making import (
     render_artwork,
 )
 from orbiflow.tiles.art.settings import ArtSettings
-from orbiflow.tiles.art.source import ArtTile
+from orbiflow.tiles.art.source import with_map
 from orbiflow.tiles.exporting import (
     INCH,
     Box,
@@ -32,13 +32,12 @@ from orbiflow.tiles.exporting import (
     Raster,
     Scene,
     Style,
-    TileSource,
     Uses,
     rectangle,
-    require_certified,
     write_svg,
 )
 from orbiflow.tiles.silhouette import Target
+from orbiflow.tiles.tile import TileSource
 
 TILE, MOTIF = "tile", "motif"
 
@@ -90,7 +89,7 @@ def art_scene(art: Artwork) -> Scene:
         tuple(layers),
         symbols,
         window=box,
-        title=art.tile.given.name,
+        title=art.tile.name,
         notes=notes,
         motifs=motifs if drawn else {},
     )
@@ -127,7 +126,7 @@ def write_artwork(art: Artwork, ending: str, *, cancel: Cancel | None = None) ->
 
 
 def draw_art(
-    tile: ArtTile | TileSource,
+    tile: TileSource,
     out: str | Path,
     settings: ArtSettings | None = None,
     *,
@@ -138,7 +137,7 @@ def draw_art(
     """Write a picture of a tiling with something on its tiles.
 
     Args:
-        tile: in memory, or a run's folder; see `ArtTile.of`.
+        tile: in memory, or a run's folder; see `with_map`.
         out: the file, .png or .svg.
         settings: see `ArtSettings`.
         picture: file of a picture or drawing over the silhouette.
@@ -154,8 +153,10 @@ def draw_art(
     out = as_path(out, "the file to draw to")
     if out.suffix.lower() not in (".png", ".svg"):
         raise OrbiflowError(f"artwork is written to a .png or .svg, got {out.name!r}")
-    source = ArtTile.of(tile, target)
-    require_certified(source.given, force=force)
+    source = with_map(tile, target)
+    source.require_certified(
+        force=force, otherwise="so it is not exported; --force exports it, marked so"
+    )
     over = Over() if picture is None else read_over(picture, source)
     made = artwork(source, settings, picture=over.picture, drawing=over.drawing, notes=over.notes)
     return write_atomic(out, write_artwork(made, out.suffix))

@@ -1,11 +1,5 @@
 from .curves import Curve as Curve
 from .layouts import longer_side as longer_side
-from .result_file import RESULT as RESULT
-from .result_file import ExportTile as ExportTile
-from .result_file import TileSource as TileSource
-from .result_file import folder_names as folder_names
-from .result_file import read_document as read_document
-from .result_file import read_result as read_result
 from .scene import INK as INK
 from .scene import Box as Box
 from .scene import Layer as Layer
@@ -28,6 +22,5 @@ from .writers import write_pdf as write_pdf
 from .writers import write_png as write_png
 from .writing import Exported as Exported
 from .writing import export as export
-from .writing import require_certified as require_certified
 from .writing import scenes as scenes
 from .writing import write_scene as write_scene

@@ -10,14 +10,12 @@ from orbiflow import __version__
 from orbiflow.arguments import path as as_path
 from orbiflow.drawing import palette
 from orbiflow.errors import (
-    CertificationError,
     OrbiflowError,
     OutputError,
 )
 from orbiflow.runtime import write_atomic
 from orbiflow.tiles.exporting.layouts import Layout, layout
 from orbiflow.tiles.exporting.pieces import pieces_scenes, place_on
-from orbiflow.tiles.exporting.result_file import ExportTile, TileSource
 from orbiflow.tiles.exporting.scene import Scene
 from orbiflow.tiles.exporting.settings import FORMATS, ExportSettings
 from orbiflow.tiles.exporting.sheets import calibrated, split
@@ -30,11 +28,8 @@ from orbiflow.tiles.exporting.writers import (
     write_png,
 )
 from orbiflow.tiles.likeness import narrowest_neck
-from orbiflow.tiles.tilings import (
-    Certificate,
-    certify,
-    colouring,
-)
+from orbiflow.tiles.tile import EscherTile, TileSource
+from orbiflow.tiles.tilings import Certificate, colouring
 
 VISIBLE = 0.05
 """Width in mm of a line that one sees on a screen."""
@@ -116,8 +111,10 @@ def scenes(
     Raises:
         As `export`.
     """
-    given = ExportTile.of(tile)
-    certificate = require_certified(given, force=force)
+    given = EscherTile.of(tile)
+    certificate = given.require_certified(
+        force=force, otherwise="so it is not exported; --force exports it, marked so"
+    )
     placed = layout(given.tile, settings, y_down=given.y_down)
     notes = (*placed.notes, *_neck_notes(placed), *_colour_notes(given, settings))
     made = [_described(scene, given, settings, certificate) for scene in _made(placed, settings)]
@@ -128,21 +125,6 @@ def scenes(
     return made, notes
 
 
-def require_certified(given: ExportTile, *, force: bool) -> Certificate:
-    """The tile's certificate.
-
-    Raises:
-        CertificationError: if it is not valid and `force` is not set.
-    """
-    certificate = certify(given.tile)
-    if not certificate.valid and not force:
-        raise CertificationError(
-            f"{given.name} is not certified ({'; '.join(certificate.reasons)}), so it is not "
-            "exported; --force exports it, marked so"
-        )
-    return certificate
-
-
 def _made(placed: Layout, settings: ExportSettings) -> list[Scene]:
     if settings.cut == "pieces":
         return pieces_scenes(placed, fine=settings.format not in ("dxf", "json"))
@@ -151,7 +133,7 @@ def _made(placed: Layout, settings: ExportSettings) -> list[Scene]:
 
 
 def _described(
-    scene: Scene, given: ExportTile, settings: ExportSettings, certificate: Certificate
+    scene: Scene, given: EscherTile, settings: ExportSettings, certificate: Certificate
 ) -> Scene:
     tile = given.tile
     title, notes = given.name, [*scene.notes]
@@ -177,7 +159,7 @@ def _described(
     return replace(scene, title=title, notes=tuple(notes), facts=facts)
 
 
-def _colour_notes(given: ExportTile, settings: ExportSettings) -> tuple[str, ...]:
+def _colour_notes(given: EscherTile, settings: ExportSettings) -> tuple[str, ...]:
     if settings.cut == "none":
         return palette(settings.palette).shortage(colouring(given.tile).count)
     width = settings.stroke_width

@@ -16,12 +16,10 @@ from orbiflow.arguments import (
 )
 from orbiflow.drawing import DEFAULT_PALETTE, palette
 from orbiflow.errors import (
-    CertificationError,
     OrbiflowError,
     OutputError,
 )
 from orbiflow.runtime import write_atomic
-from orbiflow.tiles.exporting import ExportTile, TileSource
 from orbiflow.tiles.motion.kinds import (
     KINDS,
     Kind,
@@ -37,12 +35,7 @@ from orbiflow.tiles.motion.writers import (
     write_motion_svg,
     write_mp4,
 )
-from orbiflow.tiles.search import (
-    SavedModel,
-    TileResult,
-    load_saved,
-)
-from orbiflow.tiles.tilings import Tile, certify
+from orbiflow.tiles.tile import EscherTile, TileSource
 
 Format = Literal["gif", "mp4", "svg"]
 FORMATS: tuple[Format, ...] = ("gif", "mp4", "svg")
@@ -146,14 +139,9 @@ def animation(
     settings = settings or AnimationSettings()
     if settings.format == "mp4":
         require_ffmpeg()  # before the work
-    given, colours = ExportTile.of(tile), palette(settings.palette)
-    certificate = certify(given.tile)
-    if not certificate.valid and not force:
-        raise CertificationError(
-            f"{given.name} is not certified ({'; '.join(certificate.reasons)}), so it is not "
-            "animated; --force animates it"
-        )
-    made = motion(given if isinstance(tile, str | Path) else tile, settings)
+    given, colours = EscherTile.of(tile), palette(settings.palette)
+    given.require_certified(force=force, otherwise="so it is not animated; --force animates it")
+    made = motion(given, settings)
     told(0.0)
     loop = frames(settings.seconds, settings.fps)
     match settings.format:
@@ -167,26 +155,17 @@ def animation(
             return write_mp4(made, colours, loop, settings.fps, told)
 
 
-def motion(tile: ExportTile | TileResult | Tile, settings: AnimationSettings) -> Motion:
-    """What moves, before it is a file.
+def motion(tile: EscherTile, settings: AnimationSettings) -> Motion:
+    """Return what moves, before it is a file.
 
     Raises:
-        OrbiflowError: if the tile has not what the kind needs.
+        OrbiflowError: if the tile lacks what the kind needs.
     """
-    given = ExportTile.of(tile)
     match settings.kind:
         case "morph":
             steady = settings.format == "svg"
-            return morph(given.tile, settings.size, y_down=given.y_down, steady=steady)
+            return morph(tile.tile, settings.size, y_down=tile.y_down, steady=steady)
         case "grow":
-            return grow(given.tile, settings.size, y_down=given.y_down)
+            return grow(tile.tile, settings.size, y_down=tile.y_down)
         case "bend":
-            return bend(given.tile, _saved(tile), settings.size, y_down=given.y_down)
-
-
-def _saved(tile: ExportTile | TileResult | Tile) -> SavedModel | None:
-    if isinstance(tile, TileResult):
-        return tile.model
-    if isinstance(tile, ExportTile) and tile.model is not None and tile.model.is_file():
-        return load_saved(tile.model)
-    return None
+            return bend(tile, settings.size)

@@ -17,7 +17,8 @@ from orbiflow.tiles.pictures import (
     BendingWay,
     default_window,
 )
-from orbiflow.tiles.search import OwnFrame, SavedModel
+from orbiflow.tiles.search import OwnFrame
+from orbiflow.tiles.tile import EscherTile
 from orbiflow.tiles.tilings import (
     Copies,
     Tile,
@@ -181,23 +182,23 @@ def grow(tile: Tile, width: int, *, y_down: bool = False) -> Motion:
     )
 
 
-def bend(tile: Tile, saved: SavedModel | None, width: int, *, y_down: bool = False) -> Motion:
+def bend(given: EscherTile, width: int) -> Motion:
     """The silhouette, bending into the tile, and then the tiling growing around it.
 
     Args:
-        tile: in the input's coordinates.
-        saved: its map, of a search for likeness.
-        width, y_down: as for `morph`.
+        given: a tile of a search for likeness, with its map.
+        width: of the picture, in pixels.
 
     Raises:
-        OrbiflowError: if the map is not there: the silhouette did not bend to this tile.
+        OrbiflowError: if there is no map: the silhouette did not bend to this tile.
     """
-    if saved is None or saved.bending is None or saved.frame is None:
+    tile, bending, frame = given.tile, given.bending, given.frame
+    if bending is None or frame is None:
         raise OrbiflowError(
             "this tile has no bent silhouette: only tiles of a search for likeness have one, in the "
             "model.safetensors of their folder; choose kind morph or grow"
         )
-    page, way, frame = Page(tile, width, y_down), BendingWay(saved.bending), saved.frame
+    page, way = Page(tile, width, given.y_down), BendingWay(bending)
     places, colours = _still_places(tile, page)
 
     def outline(progress: float) -> Array:

@@ -18,8 +18,9 @@ from orbiflow.drawing import (
 )
 from orbiflow.tiles.pages.overview import measures
 from orbiflow.tiles.pages.tile_folder import TILE_FILES
-from orbiflow.tiles.search import ClassFailure, TileResult
+from orbiflow.tiles.search import ClassFailure
 from orbiflow.tiles.silhouette import Target
+from orbiflow.tiles.tile import EscherTile
 
 CHOICES = {
     "tile.svg": "the tile (SVG)",
@@ -36,7 +37,7 @@ CHOICES = {
 
 
 def index_page(
-    results: Sequence[TileResult],
+    results: Sequence[EscherTile],
     target: Target,
     folders: Sequence[str],
     *,
@@ -102,7 +103,7 @@ def _silhouette(name: str, target: Target) -> str:
     )
 
 
-def _contents(results: Sequence[TileResult], folders: Sequence[str]) -> str:
+def _contents(results: Sequence[EscherTile], folders: Sequence[str]) -> str:
     links = "".join(
         f'<li><a href="#{folder}">{k + 1}. {html.escape(folder)} ({html.escape(r.group_name)})</a>'
         "</li>\n"
@@ -111,7 +112,7 @@ def _contents(results: Sequence[TileResult], folders: Sequence[str]) -> str:
     return f'<nav aria-label="Tiles">\n<ol>\n{links}</ol>\n</nav>\n'
 
 
-def _article(result: TileResult, folder: str, rank: int, name: str, extra: tuple[str, ...]) -> str:
+def _article(result: EscherTile, folder: str, rank: int, name: str, extra: tuple[str, ...]) -> str:
     rows = "".join(
         f"<div><dt>{html.escape(m.name)}</dt><dd><b>{html.escape(m.value)}</b> "
         f"{html.escape(m.words)}<small>{html.escape(m.meaning)}</small></dd></div>\n"
@@ -139,7 +140,7 @@ def _article(result: TileResult, folder: str, rank: int, name: str, extra: tuple
 """
 
 
-def _group_and_aim(result: TileResult) -> str:
+def _group_and_aim(result: EscherTile) -> str:
     group = f"wallpaper group {html.escape(result.group_name)}"
     if result.front is None:
         return group
@@ -147,7 +148,7 @@ def _group_and_aim(result: TileResult) -> str:
     return f"{group}, found for {result.objective}: {rest}"
 
 
-def _proof(result: TileResult) -> str:
+def _proof(result: EscherTile) -> str:
     certificate = result.certificate
     if not certificate.valid:
         reasons = html.escape("; ".join(certificate.reasons))
@@ -165,24 +166,26 @@ def _figure(kind: str, href: str, alt: str, caption: str, size: str = "") -> str
     )
 
 
-def _tiling(result: TileResult, folder: str, name: str) -> str:
+def _tiling(result: EscherTile, folder: str, name: str) -> str:
     alt = f"A tiling of class {result.name}: the plane covered by copies of a tile like {name}"
     size = ' width="1600" height="1067"'
     return _figure("tiling", f"{folder}/tiling.png", alt, "The tiling.", size)
 
 
-def _comparison(result: TileResult, folder: str, name: str) -> str:
+def _comparison(result: EscherTile, folder: str, name: str) -> str:
     if result.bent is None:
         alt = f"The tile of {result.name} laid over {name}: what is missing and what is added"
         caption = "The tile over the silhouette: grey in both, orange missing, blue added."
     else:
-        alt = f"The silhouette {name}, and what it was bent to, the tile of {result.name}"
+        alt = (
+            f"The silhouette {name}, and what it was bent to, the tile of {result.isohedral_class}"
+        )
         caption = "The silhouette as it was, dashed, and bent: from blue, still, to red, moved far."
     return _figure("overlay", f"{folder}/overlay.png", alt, caption)
 
 
-def _tile(result: TileResult, folder: str, name: str) -> str:
-    alt = f"The tile of {result.name} like {name}, alone"
+def _tile(result: EscherTile, folder: str, name: str) -> str:
+    alt = f"The tile of {result.isohedral_class} like {name}, alone"
     return _figure("tile", f"{folder}/tile.svg", alt, "The tile alone.")
 
 

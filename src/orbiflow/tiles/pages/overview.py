@@ -20,8 +20,9 @@ from orbiflow.tiles.pictures import (
     overlay_raster,
     tiling_raster,
 )
-from orbiflow.tiles.search import ClassFailure, TileResult
+from orbiflow.tiles.search import ClassFailure
 from orbiflow.tiles.silhouette import Target
+from orbiflow.tiles.tile import EscherTile
 from orbiflow.tiles.tilings import Colouring
 
 
@@ -34,7 +35,7 @@ class Measure(NamedTuple):
     meaning: str
 
 
-def measures(result: TileResult) -> list[Measure]:
+def measures(result: EscherTile) -> list[Measure]:
     """Of a tile, what counts most first; those that were not taken are left out."""
     found = [_score(result)]
     if result.deformation is not None:
@@ -92,12 +93,12 @@ POOR_MATCH, POOR_LIKENESS = 0.4, 0.2
 """Scores up to which a tile is called poor, after a search for overlap and for likeness."""
 
 
-def is_poor(result: TileResult) -> bool:
+def is_poor(result: EscherTile) -> bool:
     """Whether nobody would know the silhouette in it."""
     return result.score <= (POOR_MATCH if result.fidelity is None else POOR_LIKENESS)
 
 
-def _score(result: TileResult) -> Measure:
+def _score(result: EscherTile) -> Measure:
     if result.fidelity is None:
         words = _word(
             -result.score,
@@ -145,7 +146,7 @@ class _Place(NamedTuple):
 
 
 def overview_png(
-    results: Sequence[TileResult],
+    results: Sequence[EscherTile],
     target: Target,
     colours: Sequence[Colouring] | None = None,
     *,
@@ -185,7 +186,7 @@ def overview_png(
     return buffer.getvalue()
 
 
-def verdict(result: TileResult) -> str:
+def verdict(result: EscherTile) -> str:
     """How far a tile is from its silhouette, in a few words.
 
     After a search for likeness what bending cost; else how well the silhouette is recognised.
@@ -221,10 +222,10 @@ def _below(place: _Place) -> int:
     return place.top + round(place.width / 1.5) + 14
 
 
-def _write_words(pen: ImageDraw.ImageDraw, result: TileResult, place: _Place, rank: int) -> None:
+def _write_words(pen: ImageDraw.ImageDraw, result: EscherTile, place: _Place, rank: int) -> None:
     below = _below(place)
     left = place.left + _THUMB + 22
-    name = f"{rank}.  {result.name}  ({result.group_name})"
+    name = f"{rank}.  {result.isohedral_class}  ({result.group_name})"
     pen.text((left, below + 34), name, INK, font(_NAME), anchor="ls")
     pen.text((left, below + 76), verdict(result), INK, font(_WORDS), anchor="ls")
     valid = result.certificate.valid
@@ -236,7 +237,7 @@ def _write_words(pen: ImageDraw.ImageDraw, result: TileResult, place: _Place, ra
     pen.text((left, below + 114), words, colour, font(_WORDS), anchor="ls")
 
 
-def _small(result: TileResult, target: Target) -> Raster:
+def _small(result: EscherTile, target: Target) -> Raster:
     """A tile and its silhouette, without a legend."""
     tile, y_down = result.tile, target.y_down
     if result.bent is None or result.rest is None:

@@ -17,7 +17,6 @@ from orbiflow.runtime import (
     work,
     write_atomic,
 )
-from orbiflow.tiles.exporting import RESULT, folder_names
 from orbiflow.tiles.pages.index import index_page
 from orbiflow.tiles.pages.overview import overview_png
 from orbiflow.tiles.pages.tile_folder import (
@@ -27,21 +26,22 @@ from orbiflow.tiles.pages.tile_folder import (
     write_tile_folder,
 )
 from orbiflow.tiles.pictures import FrontPoint, front_png
+from orbiflow.tiles.result_file import RESULT, folder_names
 from orbiflow.tiles.search import (
     BendingSettings,
     ClassFailure,
     Settings,
-    TileResult,
     report,
 )
 from orbiflow.tiles.silhouette import Target
+from orbiflow.tiles.tile import EscherTile
 from orbiflow.tiles.tilings import Colouring, colouring
 
 OVERVIEW, INDEX, FRONT = "overview.png", "index.html", "front.png"
 
 
 def write_gallery(
-    results: Sequence[TileResult],
+    results: Sequence[EscherTile],
     target: Target,
     out: Path,
     *,
@@ -63,7 +63,7 @@ def write_gallery(
     Raises:
         OutputError: if a file cannot be written.
     """
-    names = folder_names([result.name for result in results])
+    names = folder_names([result.isohedral_class for result in results])
     folders = [out / name for name in names]
     colours = [colouring(result.tile) for result in results]
     draw = functools.partial(_draw, results, target, folders, colours, figures)
@@ -81,7 +81,7 @@ def write_gallery(
 
 
 def write_front(
-    results: Sequence[TileResult], found: Iterable[TileResult], target: Target, out: Path
+    results: Sequence[EscherTile], found: Iterable[EscherTile], target: Target, out: Path
 ) -> None:
     """Write `front.png`: a list's tiles among all that were found, by deformation and overlap.
 
@@ -95,7 +95,7 @@ def write_front(
             result.deformation,
             result.metrics.iou,
             result.tile.polygon,
-            result.name,
+            result.isohedral_class,
             result.objective,
             id(result.tile) in listed,
             bool(result.front),
@@ -108,7 +108,7 @@ def write_front(
 
 
 def _draw(
-    results: Sequence[TileResult],
+    results: Sequence[EscherTile],
     target: Target,
     folders: Sequence[Path],
     colours: Sequence[Colouring],
@@ -142,7 +142,7 @@ def written_files(folder: Path) -> set[str]:
 
 
 def write_run(
-    results: Sequence[TileResult],
+    results: Sequence[EscherTile],
     target: Target,
     out: str | Path,
     settings: Settings | None = None,
@@ -182,10 +182,10 @@ def write_run(
 def fill_run(
     folder: Path,
     document: dict[str, Any],
-    results: Sequence[TileResult],
+    results: Sequence[EscherTile],
     target: Target,
     *,
-    found: Sequence[TileResult] = (),
+    found: Sequence[EscherTile] = (),
     failures: Sequence[ClassFailure] = (),
     figures: bool = False,
     workers: int = 1,

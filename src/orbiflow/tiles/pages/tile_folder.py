@@ -21,8 +21,9 @@ from orbiflow.tiles.pictures import (
     tiling_picture,
     tiling_png,
 )
-from orbiflow.tiles.search import TileResult
 from orbiflow.tiles.silhouette import Target
+from orbiflow.tiles.tile import EscherTile
+from orbiflow.tiles.tile_map import TileMap
 from orbiflow.tiles.tilings import Colouring, colouring
 
 TILE_FILES = ("tile.svg", "tiling.svg", "tiling.png", "overlay.png", "model.safetensors")
@@ -34,10 +35,10 @@ FIGURE_FILES = ("tiling.pdf", "overlay.pdf", *FIELD_FILES)
 field of the flow where there is one."""
 
 
-def overlay(result: TileResult, target: Target, *, label: str = "", width_px: int = 1200) -> bytes:
+def overlay(result: EscherTile, target: Target, *, label: str = "", width_px: int = 1200) -> bytes:
     """PNG of a tile and its silhouette: how it bent, or what is missing and added."""
     y_down = target.y_down
-    label = label or result.name
+    label = label or result.isohedral_class
     if result.bent is None or result.rest is None:
         return overlay_png(
             result.tile, target.outline, y_down=y_down, label=label, width_px=width_px
@@ -48,13 +49,13 @@ def overlay(result: TileResult, target: Target, *, label: str = "", width_px: in
     )
 
 
-def figure_files(result: TileResult) -> tuple[str, ...]:
+def figure_files(result: EscherTile) -> tuple[str, ...]:
     """Which of the `FIGURE_FILES` there are: no flow moves a tile that the silhouette bent to."""
     likeness = result.objective == "likeness"
     return tuple(file for file in FIGURE_FILES if not (likeness and file in FIELD_FILES))
 
 
-def _overlay_picture(result: TileResult, target: Target) -> Picture:
+def _overlay_picture(result: EscherTile, target: Target) -> Picture:
     """The picture of `overlay` for print."""
     y_down = target.y_down
     if result.bent is None or result.rest is None:
@@ -62,13 +63,17 @@ def _overlay_picture(result: TileResult, target: Target) -> Picture:
     return bending_picture(result.tile, result.rest, result.bent, y_down=y_down)
 
 
-def _field_picture(result: TileResult, sheet: Sheet) -> Picture:
-    field = placed_field(result.model.restore())
+def _field_picture(result: EscherTile, sheet: Sheet) -> Picture:
+    field = placed_field(result.model())
     return field_picture(field, result.normal_tile.group, result.normal_tile, sheet=sheet)
 
 
+def _map(result: EscherTile) -> TileMap:
+    return result.map or TileMap()
+
+
 def write_tile_folder(
-    result: TileResult,
+    result: EscherTile,
     target: Target,
     folder: Path,
     *,
@@ -87,10 +92,10 @@ def write_tile_folder(
     make_folder(folder)
     y_down = target.y_down
     colours = colours or colouring(result.tile)
-    title = f"{target.source.rsplit('/', 1)[-1]}, {result.name} ({result.group_name})"
+    title = f"{target.source.rsplit('/', 1)[-1]}, {result.isohedral_class} ({result.group_name})"
     if not result.certificate.valid:
         title += ", NOT CERTIFIED"
-    label = f"{result.name} ({result.group_name})"
+    label = f"{result.isohedral_class} ({result.group_name})"
     contents: dict[str, Callable[[], str | bytes]] = {
         "tile.svg": lambda: tile_svg(result.tile, y_down=y_down, title=title),
         "tiling.svg": lambda: tiling_svg(result.tile, y_down=y_down, title=title, colours=colours),
@@ -100,7 +105,7 @@ def write_tile_folder(
         "overlay.pdf": lambda: _overlay_picture(result, target).file(),
         "field.png": lambda: _field_picture(result, Sheet.screen(1200)).file(),
         "field.pdf": lambda: _field_picture(result, Sheet.column()).file(),
-        "model.safetensors": result.model.to_bytes,
+        "model.safetensors": lambda: _map(result).to_bytes(),
     }
     names = (*TILE_FILES, *(figure_files(result) if figures else ()))
     return [write_atomic(folder / name, contents[name]()) for name in names]

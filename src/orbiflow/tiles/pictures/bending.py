@@ -23,7 +23,7 @@ from orbiflow.drawing import (
     vector_picture,
 )
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles.search import Bending
+from orbiflow.tiles.silhouette import Bending
 from orbiflow.tiles.tilings import Tile
 
 TILE, GHOST, ARROW = "#d7dee6", "#9a8c7a", "#b0413e"

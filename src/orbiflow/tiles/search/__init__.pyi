@@ -1,5 +1,3 @@
-from .carried import Bending as Bending
-from .carried import CarriedTile as CarriedTile
 from .descent_fit import fit_descent as fit_descent
 from .fit import Fit as Fit
 from .matching import matched as matched
@@ -13,7 +11,6 @@ from .occupancy import occupancy_loss as occupancy_loss
 from .own_frame import OwnFrame as OwnFrame
 from .reports import report as report
 from .result import ClassFailure as ClassFailure
-from .result import TileResult as TileResult
 from .searching import Event as Event
 from .searching import escherize as escherize
 from .searching import escherize_class as escherize_class
@@ -21,6 +18,6 @@ from .settings import BendingSettings as BendingSettings
 from .settings import DescentSettings as DescentSettings
 from .steps import certified_tiles as certified_tiles
 from .steps import fit_tile as fit_tile
-from .storage import SavedModel as SavedModel
+from .storage import as_map as as_map
+from .storage import as_model as as_model
 from .storage import load_model as load_model
-from .storage import load_saved as load_saved

@@ -88,7 +88,7 @@ def extract_tile(model: TileModel, *, force: bool = False) -> tuple[Tile, TileMo
         CertificationError: if no sampling gives a simple polygon: the candidate has folded. With
             `force`, only if coordinates are not finite.
     """
-    instance(model, TileModel, "the model", "SavedModel.restore and the fits give one")
+    instance(model, TileModel, "the model", "load_model and the fits give one")
     model.require_single()
     kind = model.isohedral_class
     model = model.take([0]).double()

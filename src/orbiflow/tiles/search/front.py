@@ -7,7 +7,6 @@ one of them better.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -15,7 +14,7 @@ from orbiflow.arrays import Array
 from orbiflow.tiles.geometry import orient
 from orbiflow.tiles.likeness import laid_on, mutual_iou
 from orbiflow.tiles.search.co_deformation import Hand
-from orbiflow.tiles.search.result import TileResult
+from orbiflow.tiles.tile import EscherTile
 
 MOST = 12
 """Tiles in the list."""
@@ -30,7 +29,7 @@ WORTH = 0.2
 """IoU that is worth as much as all of the deformation, behind the front."""
 
 
-def front_list(results: Sequence[TileResult]) -> list[TileResult]:
+def front_list(results: Sequence[EscherTile]) -> list[EscherTile]:
     """At most twelve tiles: those on the front, no two of them alike, then some behind it.
 
     The tile of least deformation and that of largest IoU are chosen first, then the others on the
@@ -65,7 +64,7 @@ def front_list(results: Sequence[TileResult]) -> list[TileResult]:
             chosen.append(k)
     kept = sorted([measured[k] for k in chosen] + odd[: MOST - len(chosen)])
     on_front = {measured[k] for k in chosen if late[k] == 0}
-    return [replace(results[k], front=k in on_front) for k in kept]
+    return [results[k].changed(front=k in on_front) for k in kept]
 
 
 def behind(cost: Array, overlap: Array) -> Array:
@@ -104,10 +103,10 @@ def deformation(hand: Hand, ring: Array) -> float:
     return float(body.cost(z[:, None])[0])
 
 
-def measured(result: TileResult, hand: Hand) -> TileResult:
+def measured(result: EscherTile, hand: Hand) -> EscherTile:
     """A tile with its deformation, the least that is known; without one if it crosses itself."""
     if not result.certificate.simple:
         return result
     found = deformation(hand, result.normal_tile.polygon)
     known = result.deformation
-    return replace(result, deformation=found if known is None else min(found, known))
+    return result.changed(deformation=found if known is None else min(found, known))

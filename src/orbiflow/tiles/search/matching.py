@@ -13,8 +13,8 @@ from orbiflow.tiles.geometry import (
     orient,
     points_along,
 )
-from orbiflow.tiles.search.carried import Bending
 from orbiflow.tiles.silhouette import (
+    Bending,
     Mesh,
     triangulate,
     unfolded,

@@ -12,76 +12,24 @@ import shapely
 import torch
 
 from orbiflow import __version__
-from orbiflow.arrays import Array
-from orbiflow.symmetry import CrystallographicGroup
+from orbiflow.tiles.result_file import SCHEMA_VERSION, tile_json
 from orbiflow.tiles.search.methods import (
     Settings,
     method_name,
     objective_name,
 )
-from orbiflow.tiles.search.result import ClassFailure, TileResult
+from orbiflow.tiles.search.result import ClassFailure
 from orbiflow.tiles.silhouette import (
     Emphasis,
     Pins,
     Target,
 )
-
-SCHEMA_VERSION = 1
-
-
-def group_json(group: CrystallographicGroup) -> dict[str, Any]:
-    """Lattice (basis vectors as columns) and coset representatives as nested lists."""
-    return {
-        "name": group.name,
-        "lattice": group.lattice.tolist(),
-        "cosets": [
-            {"linear": g.linear.tolist(), "translation": g.translation.tolist()}
-            for g in group.cosets
-        ],
-    }
-
-
-def tile_json(result: TileResult) -> dict[str, Any]:
-    """One entry of `tiles`: polygon and group in the input's own coordinates."""
-    return {
-        "class": result.name,
-        "score": result.score,
-        "objective": result.objective,
-        "front": result.front,
-        "metrics": {
-            **result.metrics.as_dict(),
-            "deformation": result.deformation,
-            "bent_iou": result.bent_iou,
-            "pinned": result.pinned,
-            "fidelity": None if result.fidelity is None else asdict(result.fidelity),
-        },
-        "recognisability": result.recognisability.as_dict(),
-        "certificate": result.certificate.as_dict(),
-        "polygon": _closed(result.tile.polygon),
-        "bent": None if result.bent is None else _closed(result.bent),
-        "thinnest": _thinnest(result),
-        "corners": list(result.tile.corners),
-        "group": group_json(result.tile.group),
-        "starts": result.starts,
-        "dropped": result.dropped,
-        "seconds": round(result.seconds, 3),
-    }
-
-
-def _closed(ring: Array) -> list[list[float]]:
-    return np.concatenate([ring, ring[:1]]).tolist()
-
-
-def _thinnest(result: TileResult) -> dict[str, Any] | None:
-    found = result.thinnest
-    if found is None:
-        return None
-    return {"width": found.width, "share": found.share, "ends": found.ends.tolist()}
+from orbiflow.tiles.tile import EscherTile
 
 
 def report(
     target: Target,
-    results: Sequence[TileResult],
+    results: Sequence[EscherTile],
     failures: Sequence[ClassFailure],
     settings: Settings,
     *,
@@ -113,7 +61,7 @@ def report(
         },
         "timings": {
             "wall_seconds": round(seconds, 3),
-            "core_seconds": round(sum({r.name: r.seconds for r in results}.values()), 3),
+            "core_seconds": round(sum({r.isohedral_class: r.seconds for r in results}.values()), 3),
             "workers": workers,
         },
         "input": target.report(),

@@ -46,7 +46,6 @@ from orbiflow.tiles.search.methods import (
 from orbiflow.tiles.search.occupancy import OccupancySettings
 from orbiflow.tiles.search.result import (
     ClassFailure,
-    TileResult,
     best_tiles,
 )
 from orbiflow.tiles.search.settings import BendingSettings, DescentSettings
@@ -56,6 +55,7 @@ from orbiflow.tiles.silhouette import (
     Pins,
     Target,
 )
+from orbiflow.tiles.tile import EscherTile
 from orbiflow.tiles.tilings import (
     CLASSES,
     IsohedralClass,
@@ -72,7 +72,7 @@ ClassName = str | int | IsohedralClass
 """What `isohedral_class` takes."""
 
 Watcher = Callable[["Event"], None]
-Outcome = TileResult | ClassFailure
+Outcome = EscherTile | ClassFailure
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ class Event:
     share: float
     loss: float
     outcome: Outcome | None = None
-    preview: TileResult | None = None
+    preview: EscherTile | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,7 +137,7 @@ def escherize(
     force: bool = False,
     watch: Watcher | None = None,
     cancel: Cancel | None = None,
-) -> tuple[list[TileResult], list[ClassFailure]]:
+) -> tuple[list[EscherTile], list[ClassFailure]]:
     """Fit a tile of each class to the target.
 
     Args:
@@ -159,7 +159,7 @@ def escherize(
             before each step of every fit.
 
     Returns:
-        Certified tiles, best first (`TileResult.score`), and the classes that gave none. Of
+        Certified tiles, best first (`EscherTile.score`), and the classes that gave none. Of
         `BothSettings` at most twelve tiles in all, those for likeness first: see `front_list`. The
         same seed gives the same tiles, whatever the number of workers. If it was cancelled: what was
         found by then, and the other classes as failures with the reason `INTERRUPTED`.
@@ -231,7 +231,7 @@ class _Teller:
         self.watch = watch or _ignore
         self.shares: dict[str, float] = {}
         self.outcomes: dict[str, Outcome] = {}
-        self.preview: TileResult | None = None
+        self.preview: EscherTile | None = None
 
     def tell(self, event: Event) -> None:
         share = max(event.share, self.shares.get(event.name, 0.0))
@@ -248,13 +248,13 @@ class _Teller:
                 failure = ClassFailure(name, INTERRUPTED)
                 self.tell(Event(name, self.shares.get(name, 0.0), float("nan"), failure))
 
-    def sorted(self, names: Sequence[str]) -> tuple[list[TileResult], list[ClassFailure]]:
+    def sorted(self, names: Sequence[str]) -> tuple[list[EscherTile], list[ClassFailure]]:
         """Tiles, best first, and failures; ties in the order in which classes were asked for.
 
         Those of a search for likeness come before those for overlap: their scores are of two kinds.
         """
         failures = [o for o in self.outcomes.values() if isinstance(o, ClassFailure)]
-        best = [o for o in self.outcomes.values() if isinstance(o, TileResult)]
+        best = [o for o in self.outcomes.values() if isinstance(o, EscherTile)]
         if self.preview and ClassFailure(self.preview.name, INTERRUPTED) in failures:
             best.append(self.preview)
         results = [tile for first in best for tile in first.family()]
@@ -265,7 +265,7 @@ class _Teller:
 def _work_on(task: Task, name: str, watch: Watcher, cancel: Cancel) -> Outcome:
     kind = isohedral_class(name)
     begin = time.perf_counter()
-    chosen: list[TileResult] = []
+    chosen: list[EscherTile] = []
     reasons: list[str] = []
     done = 0.0
     for share, settings in parts(task.settings):
@@ -277,8 +277,8 @@ def _work_on(task: Task, name: str, watch: Watcher, cancel: Cancel) -> Outcome:
     if not chosen:
         return ClassFailure(kind.name, "; ".join(dict.fromkeys(reasons)))
     seconds = time.perf_counter() - begin
-    best, *others = (replace(tile, seconds=seconds) for tile in chosen)
-    return replace(best, others=tuple(others))
+    best, *others = (tile.changed(seconds=seconds) for tile in chosen)
+    return best.changed(others=tuple(others))
 
 
 def _chosen_tiles(
@@ -289,7 +289,7 @@ def _chosen_tiles(
     cancel: Cancel,
     done: float,
     share: float,
-) -> list[TileResult]:
+) -> list[EscherTile]:
     """The tiles of one fit that are shown, best first; `done` of the class's work was done before."""
     both = isinstance(task.settings, BothSettings)
     count = max(CANDIDATES, task.per_class) if both else task.per_class
@@ -319,7 +319,7 @@ def _min_neck(task: Task, settings: OneSettings) -> float:
     return 0.0 if isinstance(settings, OccupancySettings) else settings.min_neck
 
 
-def _without_twins(tiles: Sequence[TileResult], count: int) -> list[int]:
+def _without_twins(tiles: Sequence[EscherTile], count: int) -> list[int]:
     if count == 1 or len(tiles) == 1:
         return [0]
     sound = [k for k, tile in enumerate(tiles) if tile.certificate.simple]

@@ -23,7 +23,7 @@ from orbiflow.tiles.search.methods import (
     shared_hands,
 )
 from orbiflow.tiles.search.model import TileModel
-from orbiflow.tiles.search.result import TileResult, best_tiles
+from orbiflow.tiles.search.result import best_tiles
 from orbiflow.tiles.search.settings import BendingSettings
 from orbiflow.tiles.search.starts import outline_starts
 from orbiflow.tiles.silhouette import (
@@ -31,6 +31,7 @@ from orbiflow.tiles.silhouette import (
     Pins,
     Target,
 )
+from orbiflow.tiles.tile import EscherTile
 from orbiflow.tiles.tilings import IsohedralClass, isohedral_class
 
 _HOW = "Target.read, Target.from_mask and Target.from_polygon make one"
@@ -96,7 +97,7 @@ def fit_tile(
 
 def certified_tiles(
     target: Target, found: Fit | TileModel, *, force: bool = False, min_neck: float = 0.0
-) -> list[TileResult]:
+) -> list[EscherTile]:
     """Polygons of what was fitted, each proved to tile the plane, best first.
 
     Args:
@@ -144,7 +145,7 @@ def quick_bent_tile(
     pins: Pins | None = None,
     *,
     cancel: Cancel | None = None,
-) -> TileResult | None:
+) -> EscherTile | None:
     """The silhouette bent in haste into the first of the preferred classes among `names`, certified.
 
     None if no such tile is simple.
@@ -163,7 +164,7 @@ def quick_bent_tile(
 
 def quick_tile(
     target: Target, names: Sequence[str], *, cancel: Cancel | None = None
-) -> TileResult | None:
+) -> EscherTile | None:
     """The nearest tile of the first of the preferred classes among `names`, certified.
 
     None if no nearest tile is simple.

@@ -1,3 +1,4 @@
+from .bending import Bending as Bending
 from .emphasis import Emphasis as Emphasis
 from .frame import Frame as Frame
 from .mesh import Locator as Locator
