@@ -44,7 +44,7 @@ class Terminal:
         """Show an event."""
         match event:
             case Started():
-                self.job = event.job
+                self.job = event.operation
             case Progress():
                 if self.bar is None:
                     self.bar = _Bar(search=self.job == "escherize", forks=self.job in FORKING)

@@ -90,6 +90,7 @@ from .regions.levels import DensityRegion as DensityRegion
 from .regions.levels import highest_density_region as highest_density_region
 from .regions.levels import samples_for as samples_for
 from .regions.levels import told_masses as told_masses
+from .run_folder import written_files as written_files
 from .spaces.catalogue import SPACES as SPACES
 from .spaces.catalogue import make_space as make_space
 from .spaces.catalogue import space_class as space_class

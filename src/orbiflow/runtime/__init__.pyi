@@ -31,6 +31,10 @@ from .operations import call_from_json as call_from_json
 from .operations import find as find
 from .operations import ignore as ignore
 from .operations import operation as operation
+from .places import check_inputs_kept as check_inputs_kept
+from .places import check_output_file as check_output_file
+from .places import check_output_folder as check_output_folder
+from .places import check_outside_runs as check_outside_runs
 from .processes import process_context as process_context
 from .processes import work as work
 from .records import Record as Record
