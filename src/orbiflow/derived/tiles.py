@@ -79,12 +79,12 @@ def export(
     from orbiflow.jobs.place import check_place
     from orbiflow.runtime import write_atomic
     from orbiflow.tiles.exporting import writing as exporting
-    from orbiflow.tiles.exporting.result_file import read_result
+    from orbiflow.tiles import EscherTile
     from orbiflow.tiles.exporting.settings import ExportSettings as Drawn
 
     values = asdict(settings)
     drawn = Drawn(**{field.name: values[field.name] for field in fields(Drawn)})
-    found = read_result(result, tile)
+    found = EscherTile.load(result, tile)
     out = out or Path(f"{found.name}.{settings.format}")
     check_place(out, result)
     on_event(Progress(0.0, "laying out"))
