@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import re
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ import numpy as np
 import pytest
 import shapely
 
+from cli.conftest import call_main
 from orbiflow.density import DensityEstimator, density_to_bytes
 
 KERNELS = ("--parts", "mixture")
@@ -33,24 +35,28 @@ def angles(seed: int, rows: int = 120, kappa: float = 6.0) -> np.ndarray:
     return np.degrees(np.random.default_rng(seed).vonmises([0.5, -1.0], kappa, (rows, 2)))
 
 
-@pytest.fixture(name="folder")
-def folder_fixture(tmp_path: Path, orbiflow: Any) -> Path:
+@pytest.fixture(name="made", scope="module")
+def made_fixture(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Two models of phi, psi, one good and one that has the columns the other way round."""
-    write(tmp_path / "good.csv", "phi,psi", angles(0))
-    write(tmp_path / "poor.csv", "psi,phi", angles(1, kappa=0.5)[:, ::-1])
+    made = tmp_path_factory.mktemp("made")
+    write(made / "good.csv", "phi,psi", angles(0))
+    write(made / "poor.csv", "psi,phi", angles(1, kappa=0.5)[:, ::-1])
     write(
-        tmp_path / "held.csv",
+        made / "held.csv",
         "name,psi,phi",
         angles(2)[:, ::-1],
         [f"p{k % 30}" for k in range(120)],
     )
     for name in ("good", "poor"):
-        done = orbiflow(
-            "density", "fit", tmp_path / f"{name}.csv", "--space", "torus", "--unit", "degrees",
-            *KERNELS, "--out", tmp_path / name,
-        )  # fmt: skip
-        assert done.status == 0, done.err
-    return tmp_path
+        fit = ("density", "fit", made / f"{name}.csv", "--space", "torus", "--unit", "degrees")
+        assert call_main(lambda: ("", ""), *fit, *KERNELS, "--out", made / name).status == 0
+    return made
+
+
+@pytest.fixture(name="folder")
+def folder_fixture(made: Path, tmp_path: Path) -> Path:
+    """A copy of `made` to work in."""
+    return shutil.copytree(made, tmp_path, dirs_exist_ok=True)
 
 
 def test_models_are_compared_by_the_names_of_their_columns(folder: Path, orbiflow: Any) -> None:

@@ -84,9 +84,10 @@ def near(density: SymmetricDensity, seed: int, count: int = 40) -> torch.Tensor:
     return torch.cat([even, density.sample(count, generator)])
 
 
-@settings(max_examples=16)  # every operation passes through Python
-@given(SEEDS, st.integers(0, 7))
-def test_elsewhere_all_is_the_same(seed: int, kind: int) -> None:
+@pytest.mark.parametrize("kind", range(8))
+def test_elsewhere_all_is_the_same(kind: int) -> None:
+    """One of each kind: every operation passes through Python, which is slow."""
+    seed = 1000 + kind
     density = blend(SPACES[kind], seed) if kind < 4 else others(seed)[kind - 4]
     points = near(density, seed)
     expected = density.log_prob(points)

@@ -96,7 +96,7 @@ def test_derivatives_of_the_sum_against_numerical_ones(dim: int) -> None:
 @pytest.mark.parametrize("dim", [1, 2, 3])
 def test_second_derivatives_of_the_sum_against_numerical_ones(dim: int) -> None:
     torch.manual_seed(dim)
-    table = torch.randn(dim, *(6, 8, 5)[:dim], dtype=torch.float64, requires_grad=True)
+    table = torch.randn(dim, *(4, 5, 4)[:dim], dtype=torch.float64, requires_grad=True)
     u = (20 * torch.rand(dim, 3, dtype=torch.float64) - 5).requires_grad_()
     rates = (1.5, 0.7, 2.0)[:dim]
     assert torch.autograd.gradgradcheck(lambda t, x: spline_sum(padded(t), x), (table, u))

@@ -78,8 +78,8 @@ def export(
 
     from orbiflow.jobs.place import check_place
     from orbiflow.runtime import write_atomic
-    from orbiflow.tiles.exporting import writing as exporting
     from orbiflow.tiles import EscherTile
+    from orbiflow.tiles.exporting import writing as exporting
     from orbiflow.tiles.exporting.settings import ExportSettings as Drawn
 
     values = asdict(settings)

@@ -13,7 +13,7 @@ from orbiflow.tiles.search.result import best_tiles
 from outlines import animal
 
 SQUIRREL = animal("squirrel.dat")
-QUICK = BendingSettings(placements=60, held=10, finalists=2, rounds=10, multiples=(4,))
+QUICK = BendingSettings(placements=60, held=10, starts=4, finalists=2, rounds=10, multiples=(4,))
 HANDS = hands(SQUIRREL, QUICK)
 
 

@@ -1,5 +1,7 @@
 """Searches for likeness with parts that must not bend."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import shapely
@@ -17,7 +19,7 @@ from outlines import animal
 
 SQUIRREL = animal("squirrel.dat")
 HEAD = (230, 190, 140)
-QUICK = BendingSettings(placements=80, held=12, finalists=2, rounds=12, multiples=(4,))
+QUICK = BendingSettings(placements=80, held=12, starts=4, finalists=2, rounds=12, multiples=(4,))
 CLASSES = ["IH4", "IH5"]
 
 
@@ -83,7 +85,7 @@ def test_a_head_that_would_turn_does_not(name: str) -> None:
     turns = []
     for keep in (False, True):
         pins = Pins.at(SQUIRREL, [HEAD], keep_angle=keep)
-        (result,) = escherize(SQUIRREL, [name], QUICK, pins=pins)[0]
+        (result,) = escherize(SQUIRREL, [name], replace(QUICK, starts=12), pins=pins)[0]
         turns.append(abs(head_misfit(result, pins)[1]))
     assert turns[0] > np.radians(5)
     assert turns[0] > 2 * turns[1]
@@ -111,6 +113,6 @@ def test_emphasis_of_any_strength_can_be_searched_with(
         mask[3:] = 0
     low, high = target.normal.min(axis=0), target.normal.max(axis=0)
     emphasis = Emphasis(mask, (*low.tolist(), *high.tolist()), strength)
-    hasty = BendingSettings(placements=30, held=6, finalists=2, rounds=6, multiples=(4,))
+    hasty = BendingSettings(placements=30, held=4, starts=1, finalists=1, rounds=6, multiples=(4,))
     results, _ = escherize(target, ["IH4"], hasty, emphasis=emphasis)
     assert all(result.certificate.valid for result in results)

@@ -35,6 +35,9 @@ BOOT = [[0, 0], [3, 0], [3.4, 1.2], [2.2, 1.5], [2.0, 2.8], [0.8, 2.5], [-0.3, 1
 QUICK = OccupancySettings(
     max_frequency=3, turns=3, finalists=2, iterations=15, affine_iterations=20, points=200
 )
+BRIEF = DescentSettings.for_effort(
+    "fast", stages=((6, 2), (6, 1)), polish=5, projected=100, measured=30
+)
 TARGET = Target.from_polygon(BOOT, y_down=True)
 SQUIRREL = animal("squirrel.dat")
 
@@ -249,16 +252,15 @@ def test_of_both_objectives_one_may_fail() -> None:
     likeness = BendingSettings(placements=20, held=4, starts=1, finalists=1, rounds=4)
     alone = escherize_class(bar, "IH7", likeness)
     assert isinstance(alone, ClassFailure)
-    overlap = DescentSettings.for_effort("fast")
-    both = escherize_class(bar, "IH7", BothSettings(likeness, overlap))
+    both = escherize_class(bar, "IH7", BothSettings(likeness, BRIEF))
     assert isinstance(both, EscherTile)
     assert {tile.objective for tile in both.family()} == {"overlap"}
     assert all(tile.deformation is not None for tile in both.family())
 
 
 def test_both_objectives_give_a_short_list_likeness_first() -> None:
-    likeness = BendingSettings(placements=40, held=8, finalists=3, rounds=6)
-    settings = BothSettings(likeness, DescentSettings.for_effort("fast"))
+    likeness = BendingSettings(placements=40, held=8, starts=4, finalists=3, rounds=6)
+    settings = BothSettings(likeness, BRIEF)
     events: list[Event] = []
     results, failures = escherize(SQUIRREL, ["IH4", "IH6"], settings, watch=events.append)
     assert not failures
@@ -287,8 +289,8 @@ def test_both_objectives_give_a_short_list_likeness_first() -> None:
 @pytest.mark.parametrize(
     "settings",
     [
-        BendingSettings(placements=80, held=20, finalists=8, rounds=6, multiples=(4,)),
-        DescentSettings.for_effort("fast"),
+        BendingSettings(placements=80, held=20, starts=8, finalists=8, rounds=6, multiples=(4,)),
+        BRIEF,
     ],
     ids=["likeness", "overlap"],
 )
