@@ -173,7 +173,7 @@ def test_what_cannot_be_chosen_is_refused() -> None:
         AutomaticSettings(repeats="noise")
     with pytest.raises(OrbiflowError, match=r"Sphere.* cannot be made of chains alone"):
         fit_automatic(make_space("sphere"), smooth("sphere"), AutomaticSettings(parts=("chains",)))
-    with pytest.raises(OrbiflowError, match="a flow stands alone"):
+    with pytest.raises(OrbiflowError, match="a flow has 3 dimensions at most"):
         DensityEstimator("torus", parts="flow,chains").fit(
             np.zeros((50, 5)) + np.arange(50)[:, None]
         )

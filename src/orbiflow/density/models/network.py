@@ -135,7 +135,7 @@ class VonMisesNetwork(Density, kind="network"):
         if not len(points):
             return points.new_zeros(0)
         factors = self._leading_to(axes)
-        hidden = [axes[-1] for axes, _ in factors if axes[-1] not in axes]
+        hidden = [own[-1] for own, _ in factors if own[-1] not in axes]
         count = DRAWS if hidden else 1
         draws = torch.quasirandom.SobolEngine(
             max(1, 2 * len(hidden)), scramble=True, seed=seed
