@@ -18,7 +18,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from orbiflow.density import AdaptiveKernels, BlendedDensity, RoundSpace, VonMisesChains, midpoints
+from orbiflow.density import AdaptiveKernels, Mixture, RoundSpace, VonMisesChains, midpoints
 from orbiflow.density.models import SCALES, waves
 
 GRID = 256
@@ -39,25 +39,26 @@ class Integral(NamedTuple):
 
 
 @torch.no_grad()
-def integral(density: BlendedDensity) -> Integral:
+def integral(density: Mixture) -> Integral:
     """Of a density on a space of two dimensions, or on a torus of more angles without a flow."""
     if density.space.dim == 2:
         return _by_grid(density)
-    shares = density.shares.tolist()
-    if shares[0]:
-        raise ValueError("a flow of many angles is not integrated")
-    found = [(shares[1], _mean(density.kernels)), (shares[2], (1.0, 0.0))]
-    if density.chains is not None:
-        found.append((shares[3], _chains(density.chains)))
+    ways = {"kernels": _mean, "chains": _chains, "uniform": lambda _: (1.0, 0.0)}
+    found = [
+        (weight, ways[part.kind](part))  # a flow or a network of many angles is not integrated
+        for weight, part in zip(density.weights.tolist(), density.components, strict=True)
+    ]
     value = sum(share * mean for share, (mean, _) in found)
     return Integral(value, max(worst for _, (_, worst) in found))
 
 
-def _by_grid(density: BlendedDensity) -> Integral:
-    kernels, share = density.kernels, float(density.shares[1])
+def _by_grid(density: Mixture) -> Integral:
+    part = density.kernel_part
+    assert part is not None
+    share, kernels = part
     narrow = (kernels.concentrations > BROAD).any(dim=1)
     points = midpoints(density.space, GRID)
-    values = density.log_prob_without_kernels(points).exp()
+    values = _chart_values(density, density.log_density_without_kernels(points))
     fine, worst = 0.0, 0.0
     if not bool(narrow.all()):
         weight = share * float(kernels.weights[~narrow].sum())
@@ -66,6 +67,13 @@ def _by_grid(density: BlendedDensity) -> Integral:
         mean, worst = _mean(_part(kernels, narrow))
         fine = share * float(kernels.weights[narrow].sum()) * mean
     return Integral(float(values.mean()) + fine, worst)
+
+
+def _chart_values(density: Mixture, logs: torch.Tensor) -> torch.Tensor:
+    """Densities per area of the square at the grid's points, from `Density.log_density`."""
+    if density.space.is_round:
+        logs = logs + density.space.log_area(midpoints(density.space, GRID))
+    return logs.exp()
 
 
 def _part(kernels: AdaptiveKernels, chosen: torch.Tensor) -> AdaptiveKernels:

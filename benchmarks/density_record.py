@@ -30,7 +30,7 @@ from density_limits import neighbour_entropy, with_narrow
 from density_momentum import excess, mass
 from numpy.typing import NDArray
 
-from orbiflow.density import BlendedDensity, DensityEstimator
+from orbiflow.density import DensityEstimator, Mixture
 
 SETS = (*EARTH, *TORI, "rna")
 PUBLISHED_NAME = {"quakes": "earthquake"}
@@ -81,7 +81,7 @@ def row(job: tuple[str, int, bool]) -> Row:
     estimator, train, test = fitted(*job)
     known = set(map(bytes, train))
     density = estimator.density_
-    assert isinstance(density, BlendedDensity)
+    assert isinstance(density, Mixture)
     return Row(
         -estimator.score(test),
         float(np.mean([bytes(place) in known for place in test])),

@@ -13,6 +13,7 @@ the exact one at the density's own points. --parts: of the density, such as kern
 from __future__ import annotations
 
 import argparse
+import math
 import time
 from collections.abc import Callable
 from typing import NamedTuple
@@ -22,9 +23,9 @@ import torch
 from numpy.typing import NDArray
 
 from orbiflow.density import (
-    BlendedDensity,
+    Density,
     DensityEstimator,
-    SymmetricDensity,
+    Mixture,
     TabulatedDensity,
     log_density_gradient,
 )
@@ -67,9 +68,11 @@ def timed(function: Callable[[], torch.Tensor], points: int) -> tuple[torch.Tens
     return found, Speed(time.process_time() - begin, points)
 
 
-def dense(density: BlendedDensity, points: torch.Tensor) -> torch.Tensor:
+def dense(density: Mixture, points: torch.Tensor) -> torch.Tensor:
     """Log density (N,), all kernels at all points, as the formula says."""
-    space, kernels = density.space, density.kernels
+    space, part = density.space, density.kernel_part
+    assert part is not None
+    weight, kernels = part
     rows, offsets = kernel_rows(space, space.features(kernels.centers)[0], kernels.concentrations)
     rows, offsets = rows.mT.contiguous(), offsets + kernels.weights.log()
     block = max(1, BLOCK_ENTRIES // len(offsets))
@@ -77,10 +80,15 @@ def dense(density: BlendedDensity, points: torch.Tensor) -> torch.Tensor:
         torch.stack([log_sum_exp(torch.addmm(offsets, end, rows)) for end in ends]).logsumexp(dim=0)
         for ends in space.features(points).split(block, dim=1)
     ]
-    own = torch.cat(parts) + density.shares[1].log()
-    if space.is_round:
-        own = own + space.log_area(points)
-    return torch.logaddexp(own, density.log_prob_without_kernels(points))
+    own = torch.cat(parts) + math.log(weight)
+    both = torch.logaddexp(own, density.log_density_without_kernels(points))
+    return both + space.log_area(points) if space.is_round else both
+
+
+def kernel_count(density: Mixture) -> int:
+    """How many kernels there are."""
+    part = density.kernel_part
+    return 0 if part is None else len(part[1].weights)
 
 
 def line(space: str, rows: int, points: int, parts: str) -> str:
@@ -91,7 +99,7 @@ def line(space: str, rows: int, points: int, parts: str) -> str:
     estimator = DensityEstimator(name, parts=parts).fit(data)
     fit = time.process_time() - begin
     density = estimator.density_
-    assert isinstance(density, BlendedDensity)
+    assert isinstance(density, Mixture)
     generator = torch.Generator().manual_seed(0)
     drawn = density.sample((points,), generator)
     some = drawn[:DENSE]
@@ -106,12 +114,12 @@ def line(space: str, rows: int, points: int, parts: str) -> str:
     if density.space.dim == 2:
         shown = tabulated(density, drawn, exact)
     return (
-        f"{space:18}{rows:8,}{fit:9.1f}{len(density.kernels.weights):10,}{of_exact}{of_slope}"
+        f"{space:18}{rows:8,}{fit:9.1f}{kernel_count(density):10,}{of_exact}{of_slope}"
         f"{of_dense}{off:10.1e}{shown}"
     )
 
 
-def tabulated(density: SymmetricDensity, drawn: torch.Tensor, exact: torch.Tensor) -> str:
+def tabulated(density: Density, drawn: torch.Tensor, exact: torch.Tensor) -> str:
     """Columns of the table's speed and error."""
     table = TabulatedDensity(density)
     with torch.no_grad():

@@ -23,9 +23,9 @@ from density_unoriented_data import AXES, KLEIN, known, load
 from density_unoriented_kde import Kernel, UnorientedKernelDensity, tuned
 
 from orbiflow.density import (
-    BlendedDensity,
+    Density,
     DensityEstimator,
-    SymmetricDensity,
+    Mixture,
 )
 
 QUERIES, KERNEL_QUERIES = 100_000, 5_000
@@ -68,8 +68,10 @@ def run(name: str, data: Data, seed: int, seconds: float, detail: int) -> Outcom
     flow_fit = time.perf_counter() - begin
     truth = known(name)
     mixture = estimator.density_
-    assert isinstance(mixture, BlendedDensity)
-    flow = mixture.flow_density
+    assert isinstance(mixture, Mixture)
+    part = mixture.flow_part
+    assert part is not None
+    flow = part[1]
     with torch.no_grad():
         alone = flow.log_prob(estimator.space_.to_chart(test), measure="natural")
     return Outcome(
@@ -85,7 +87,7 @@ def run(name: str, data: Data, seed: int, seconds: float, detail: int) -> Outcom
     )
 
 
-def timed(axes: bool, flow: SymmetricDensity, kde: UnorientedKernelDensity) -> tuple[float, float]:
+def timed(axes: bool, flow: Density, kde: UnorientedKernelDensity) -> tuple[float, float]:
     """Seconds for `QUERIES` points, uniform on the surface, of the flow and of the kernel density."""
     rng = np.random.default_rng(0)
     queries = rng.uniform(0, 2 * np.pi, (QUERIES, 2))

@@ -11,7 +11,7 @@ from orbiflow.arrays import Array
 from orbiflow.density import (
     COLOURS,
     SPACES,
-    SymmetricDensity,
+    Density,
     density_on_grid,
     draw_cells,
     make_space,
@@ -58,7 +58,7 @@ ROUND = ("sphere", "projective-plane")
 _HALF_WINDOW = (-0.5, -0.5, 1.5, 1.5)
 
 
-def square_values(density: SymmetricDensity, count: int) -> Array:
+def square_values(density: Density, count: int) -> Array:
     """(count, count) density per area of the canonical square at midpoints of an even grid, x first."""
     t = (torch.arange(count, dtype=torch.float64) + 0.5) / count
     return density_on_grid(density, t, t, "square")

@@ -9,8 +9,8 @@ from typing import NamedTuple
 import torch
 
 from orbiflow.density import (
+    Density,
     FitSettings,
-    SymmetricDensity,
     density_to_bytes,
     fit_density,
     kl_by_quadrature,
@@ -44,7 +44,7 @@ class Fitted(NamedTuple):
     kl: float
     mass: float
 
-    def density(self) -> SymmetricDensity:
+    def density(self) -> Density:
         """The density again."""
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "density.safetensors"
@@ -62,7 +62,9 @@ def fitted(
     density, report = fit_density(there, samples, settings)
     places = midpoints(there, grid)
     with torch.no_grad():
-        values = density.with_steps(2 * density.flow.steps).log_prob(places)
+        part = density.flow_part
+        assert part is not None
+        values = part[1].with_steps(2 * part[1].flow.steps).log_prob(places)
     kl = kl_by_quadrature(weighted(target, there, places, measure), values)
     return Fitted(space, target, measure, density_to_bytes(density), kl, float(report.mass or 0.0))
 

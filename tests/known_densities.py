@@ -11,27 +11,23 @@ from numpy.typing import ArrayLike
 
 from orbiflow.density import (
     AdaptiveKernels,
-    BlendedDensity,
+    Mixture,
     Space,
-    UniformBase,
+    UniformDensity,
 )
-from orbiflow.fields import SplineField
-from orbiflow.flows import Flow
 
 FLOOR = 1e-9
 
 
 def kernels_about(
     space: Space, centers: ArrayLike, concentrations: Sequence[float], weights: Sequence[float]
-) -> BlendedDensity:
+) -> Mixture:
     """Kernels about data (N, k), of equal widths along the axes, on next to no floor."""
     width = 1 if space.is_round else space.dim
     kappa = torch.tensor(concentrations, dtype=torch.float64)[:, None].expand(-1, width)
     share = torch.tensor(weights, dtype=torch.float64)
     parts = AdaptiveKernels(space, space.to_chart(centers), kappa.contiguous(), share / share.sum())
-    shares = torch.tensor([0.0, 1 - FLOOR, FLOOR], dtype=torch.float64)
-    still = Flow([SplineField(space.group, 1)], steps=1, warn=False)
-    return BlendedDensity(space, still, UniformBase(space), parts, shares)
+    return Mixture([parts, UniformDensity(space)], [1 - FLOOR, FLOOR])
 
 
 def cap_height(mass: float, kappa: float) -> float:

@@ -2,7 +2,7 @@ __version__: str
 __all__: list[str]
 
 from .density.estimator import DensityEstimator as DensityEstimator
-from .density.storage.files import read_density as read_density
+from .density.models.files import read_density as read_density
 from .fields.fourier import FourierField as FourierField
 from .fields.symmetrization import symmetrize as symmetrize
 from .flows.flow import Flow as Flow

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orbiflow.density import BlendedDensity, DensityEstimator
+from orbiflow.density import DensityEstimator, Mixture
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 
@@ -117,16 +117,17 @@ def test_the_integral_is_seen_from_values(module, dim: int, monkeypatch) -> None
     rows = rng.vonmises(rng.uniform(-3, 3, (3, dim))[rng.integers(3, size=200)], 20.0)
     rows[:40] = rows[40:80]  # so that there are narrow kernels
     density = DensityEstimator("torus", parts="kernels,mixture,chains", seed=0).fit(rows).density_
-    assert isinstance(density, BlendedDensity)
+    assert isinstance(density, Mixture)
     found = integral(density)
     assert found.value == pytest.approx(1, abs=1e-4)
     assert found.worst < 1e-6
     # and it would be seen if a constant were wrong
-    for part, share, method in ((density.kernels, 1, "log_prob"), (density.chains, 3, "joint")):
-        if part is None or float(density.shares[share]) < 0.01:
+    for part, weight in zip(density.components, density.weights.tolist(), strict=True):
+        if part.kind == "uniform" or weight < 0.01:
             continue
+        method = "joint" if part.kind == "chains" else "log_density"
         right = getattr(type(part), method)
         with monkeypatch.context() as patched:
-            patched.setattr(type(part), method, lambda self, x, own=right: own(self, x) + 0.1)
-            off = 0.1 * float(density.shares[share])
+            patched.setattr(type(part), method, lambda self, *x, own=right: own(self, *x) + 0.1)
+            off = 0.1 * weight
             assert integral(density).value - found.value == pytest.approx(off, rel=0.1)

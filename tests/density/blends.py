@@ -7,14 +7,17 @@ import torch
 
 from orbiflow.density import (
     AdaptiveKernels,
-    BlendedDensity,
+    Density,
     Factor,
+    FlowDensity,
+    Mixture,
+    Space,
     Torus,
-    UniformBase,
+    UniformDensity,
     VonMisesChains,
     VonMisesNetwork,
 )
-from orbiflow.density.models import SCALES, chained, still_flow
+from orbiflow.density.models import SCALES, chained, identity_flow
 from orbiflow.fields import SplineField
 from orbiflow.flows import Flow
 
@@ -52,12 +55,43 @@ def random_kernels(rng: np.random.Generator, space: Torus, count: int = 4) -> Ad
     )
 
 
+def blended(
+    space: Space,
+    flow: Flow,
+    base: Density,
+    kernels: AdaptiveKernels,
+    weights: torch.Tensor,
+    *,
+    chains: VonMisesChains | None = None,
+    network: VonMisesNetwork | None = None,
+) -> Mixture:
+    """A mixture of these, of a uniform floor, and of chains and a network; of no weight: none."""
+    parts = [FlowDensity(space, flow, base), kernels, UniformDensity(space), chains, network]
+    there = [part for part in parts if part is not None]
+    kept = [(part, w) for part, w in zip(there, weights.tolist(), strict=True) if w > 0]
+    return Mixture([part for part, _ in kept], [w for _, w in kept])
+
+
+def flow_of(density: Density) -> FlowDensity:
+    """The density of its flow."""
+    part = density.flow_part
+    assert part is not None
+    return part[1]
+
+
+def kernels_of(density: Density) -> AdaptiveKernels:
+    """The kernels that it contains."""
+    part = density.kernel_part
+    assert part is not None
+    return part[1]
+
+
 def random_blend(
     seed: int, dim: int, *, chains: bool = True, flow: bool = False, network: bool = False
-) -> BlendedDensity:
+) -> Mixture:
     rng = np.random.default_rng(seed)
     space = Torus(dim, unit="degrees")
-    moving = still_flow(space)
+    moving = identity_flow(space)
     if flow:
         field = SplineField(space.group, 2)
         with torch.no_grad():
@@ -69,10 +103,10 @@ def random_blend(
     if not flow:
         shares[0] = 0
         shares = shares / shares.sum()
-    return BlendedDensity(
+    return blended(
         space,
         moving,
-        UniformBase(space),
+        UniformDensity(space),
         random_kernels(rng, space),
         shares,
         chains=random_chains(rng, space) if chains else None,

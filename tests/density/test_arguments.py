@@ -9,22 +9,21 @@ import torch
 
 from orbiflow.density import (
     AdaptiveKernels,
-    BlendedDensity,
+    AutomaticSettings,
     DensityEstimator,
     FitSettings,
-    NeuralSettings,
+    FlowDensity,
+    Mixture,
     Sphere,
-    SymmetricDensity,
     TabulatedDensity,
     Torus,
-    UniformBase,
-    VonMisesBase,
+    UniformDensity,
     VonMisesChains,
+    VonMisesDensity,
     blend_kernels,
     clear_rotation,
     density_to_bytes,
     fit_density,
-    fit_neural,
     kl_by_quadrature,
     make_space,
     midpoints,
@@ -38,11 +37,11 @@ SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")
 torus, sphere = Torus(2), Sphere()
 
 
-def a_density(space: Any = torus, dtype: torch.dtype = torch.float64) -> SymmetricDensity:
+def a_density(space: Any = torus, dtype: torch.dtype = torch.float64) -> FlowDensity:
     field = SplineField(space.group, 2, dtype=dtype)
     with torch.no_grad():
         field.parameters_.normal_(std=0.02)
-    return SymmetricDensity(space, Flow([field], steps=2, warn=False))
+    return FlowDensity(space, Flow([field], steps=2, warn=False))
 
 
 POINTS = torch.rand(30, 2, dtype=torch.float64)
@@ -51,13 +50,13 @@ QUICK: Any = {"detail": 1, "segments": 1, "iterations": 1}
 
 WRONG: dict[str, tuple[Callable[[], Any], str]] = {
     "a name for a space": (
-        lambda: SymmetricDensity("torus", Flow(lambda x: x)),  # type: ignore[arg-type]
+        lambda: FlowDensity("torus", Flow(lambda x: x)),  # type: ignore[arg-type]
         "space must be an? Space, got 'torus'; see `make_space`",
     ),
-    "no flow": (lambda: SymmetricDensity(torus, None), "flow must be an? Flow"),  # type: ignore[arg-type]
+    "no flow": (lambda: FlowDensity(torus, None), "flow must be an? Flow"),  # type: ignore[arg-type]
     "no base": (
-        lambda: SymmetricDensity(torus, Flow(lambda x: x), "uniform"),  # type: ignore[arg-type]
-        "base must be an? Base",
+        lambda: FlowDensity(torus, Flow(lambda x: x), "uniform"),  # type: ignore[arg-type]
+        "base must be an? Density",
     ),
     "three columns": (lambda: a_density().log_prob(torch.rand(5, 3)), r"got .*\(5, 3\)"),
     "a number": (lambda: a_density().log_prob(torch.tensor(0.5)), r"got .*\(\)"),
@@ -74,10 +73,10 @@ WRONG: dict[str, tuple[Callable[[], Any], str]] = {
     "sample less": (lambda: a_density().sample(-1), "a number or shape of samples"),
     "midpoints": (lambda: midpoints(torus, 2.5), "resolution must be a whole number"),  # type: ignore[arg-type]
     "kl": (lambda: kl_by_quadrature(torch.ones(3), torch.ones(4)), r"\(3,\) and \(4,\)"),
-    "a table of nothing": (lambda: TabulatedDensity("x"), "a SymmetricDensity"),  # type: ignore[arg-type]
+    "a table of nothing": (lambda: TabulatedDensity("x"), "a Density"),  # type: ignore[arg-type]
     "a table's size": (lambda: TabulatedDensity(a_density(), 64.5), "resolution must be"),  # type: ignore[arg-type]
-    "a base's space": (lambda: UniformBase("sphere"), "space must be an? Space"),  # type: ignore[arg-type]
-    "concentration": (lambda: VonMisesBase(torus, "1"), "concentration must be positive"),  # type: ignore[arg-type]
+    "a base's space": (lambda: UniformDensity("sphere"), "space must be an? Space"),  # type: ignore[arg-type]
+    "concentration": (lambda: VonMisesDensity(torus, "1"), "concentration must be positive"),  # type: ignore[arg-type]
     "kernels": (
         lambda: AdaptiveKernels(torus, "a", torch.ones(1), torch.ones(1)),  # type: ignore[arg-type]
         "centers must be real numbers",
@@ -94,13 +93,13 @@ WRONG: dict[str, tuple[Callable[[], Any], str]] = {
         lambda: VonMisesChains(torus, [0.0], HALVES, HALVES),  # type: ignore[arg-type]
         "log_weights has shape",
     ),
-    "a blend of nothing": (
-        lambda: BlendedDensity(torus, a_density().flow, None, None, torch.ones(3) / 3),  # type: ignore[arg-type]
-        "kernels must be an? AdaptiveKernels",
+    "a mixture of nothing": (
+        lambda: Mixture([a_density(), None], [0.5, 0.5]),  # type: ignore[list-item]
+        "components must be an? Density",
     ),
     "blend_kernels": (
         lambda: blend_kernels("density", POINTS, POINTS),  # type: ignore[arg-type]
-        "density must be an? SymmetricDensity",
+        "density must be an? Density",
     ),
     "blend_kernels' points": (
         lambda: blend_kernels(a_density(), POINTS, POINTS[:, :1]),
@@ -115,12 +114,10 @@ WRONG: dict[str, tuple[Callable[[], Any], str]] = {
         "settings must be an? FitSettings",
     ),
     "fit: other settings": (
-        lambda: fit_density(sphere, POINTS, NeuralSettings()),  # type: ignore[arg-type]
+        lambda: fit_density(sphere, POINTS, AutomaticSettings()),  # type: ignore[arg-type]
         "settings must be an? FitSettings",
     ),
-    "fit: four angles": (lambda: fit_density(Torus(4), torch.rand(30, 4)), "call `fit_neural`"),
-    "neural: a name": (lambda: fit_neural("torus", POINTS), "space must be an? Space"),  # type: ignore[arg-type]
-    "neural: columns": (lambda: fit_neural(torus, torch.rand(30, 3)), r"\(N, 2\), got .*\(30, 3\)"),
+    "fit: four angles": (lambda: fit_density(Torus(4), torch.rand(30, 4)), "3 dimensions at most"),
     "detail": (lambda: FitSettings(detail=2.5), "detail must be a whole number from 1 to 64"),  # type: ignore[arg-type]
     "detail text": (lambda: FitSettings(detail="8"), "detail must be a whole number"),  # type: ignore[arg-type]
     "seed": (lambda: FitSettings(seed=None), "seed must be a whole number"),  # type: ignore[arg-type]
@@ -128,7 +125,6 @@ WRONG: dict[str, tuple[Callable[[], Any], str]] = {
     "weights": (lambda: FitSettings(roughness=("a",)), "each weight of roughness"),  # type: ignore[arg-type]
     "validation": (lambda: FitSettings(validation="a"), "validation must be .*below 1"),  # type: ignore[arg-type]
     "base": (lambda: FitSettings(base=["uniform"]), "base must be"),  # type: ignore[arg-type]
-    "width": (lambda: NeuralSettings(width=3.5), "width must be a whole number"),  # type: ignore[arg-type]
     "dim": (lambda: Torus("2"), "dim must be a whole number from 1 to 64"),  # type: ignore[arg-type]
     "unit": (lambda: Torus(2, unit=None), "unit must be one of"),  # type: ignore[arg-type]
     "form": (lambda: Sphere(form=["latlon"]), "form must be one of"),  # type: ignore[arg-type]
@@ -138,7 +134,7 @@ WRONG: dict[str, tuple[Callable[[], Any], str]] = {
     "from_chart": (lambda: torus.from_chart(torch.rand(3, 3)), r"got .*\(3, 3\)"),
     "from_chart, round": (lambda: sphere.from_chart(torch.rand(3, 1)), r"got .*\(3, 1\)"),
     "project": (lambda: sphere.project(torch.rand(3, 5)), r"got .*\(3, 5\)"),
-    "to bytes": (lambda: density_to_bytes("density"), "the density is a str"),  # type: ignore[arg-type]
+    "to bytes": (lambda: density_to_bytes("density"), "density must be an? Density"),  # type: ignore[arg-type]
     "read": (lambda: read_density(3), "the file must be a path, got 3"),  # type: ignore[arg-type]
     "estimator": (lambda: DensityEstimator(3).fit(POINTS), "unknown space 3"),  # type: ignore[arg-type]
     "estimator's data": (lambda: DensityEstimator().fit(["a"]), "shape"),

@@ -11,11 +11,8 @@ from hypothesis import strategies as st
 
 from orbiflow.density import (
     FitSettings,
-    NeuralSettings,
-    SymmetricDensity,
-    Torus,
+    FlowDensity,
     fit_density,
-    fit_neural,
     make_space,
 )
 from orbiflow.density.fitting.budget import Budget, Spent
@@ -120,7 +117,7 @@ def test_every_last_iterate_is_scored(iterations: int) -> None:
     points = cluster("torus").float()
     space = make_space("torus")
     fields = [SplineField(space.group, 2, smoothness=2.0, dtype=torch.float32)]
-    density = SymmetricDensity(space, Flow(fields, steps=2, warn=False))
+    density = FlowDensity(space, Flow(fields, steps=2, warn=False))
     before = fields[0].parameters_.detach().clone()
     done = refine(density, points, points, iterations=iterations)
     assert len(done.validation) == 1 + math.ceil(iterations / EVERY)
@@ -132,23 +129,7 @@ def test_every_last_iterate_is_scored(iterations: int) -> None:
 
 def test_no_iteration_changes_nothing() -> None:
     space = make_space("torus")
-    density = SymmetricDensity(space, Flow([SplineField(space.group, 2)]))
+    density = FlowDensity(space, Flow([SplineField(space.group, 2)]))
     done = refine(density, cluster("torus"), cluster("torus"), iterations=0)
     assert (done.best, len(done.validation)) == (0, 1)
     assert not bool(next(iter(density.flow.parameters())).any())
-
-
-@pytest.mark.parametrize("looks", [1, 3, 10, 25, 40])
-def test_a_neural_fit_says_when_the_limit_struck(looks: int, striking_after) -> None:
-    clock = striking_after(looks)
-    angles = np.random.default_rng(0).vonmises([0, 1, 2, 3], 5.0, (100, 4))
-    space = Torus(4)
-    options = NeuralSettings(components=2, members=2, width=8, depth=1, seconds=2.0)
-    density, report = fit_neural(space, space.to_chart(angles), options)
-    said = "stopped by the limit of 2 s: another run may differ" in report.notes
-    assert said == (clock.asked > looks)
-    assert report.integration_error < 1e-3
-    if looks < 10:  # no iteration of the flow
-        at = space.to_chart(angles[:5])
-        assert torch.equal(density.flow(at), at)
-        assert any("left at the identity" in note for note in report.notes)

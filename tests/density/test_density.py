@@ -1,4 +1,4 @@
-"""SymmetricDensity: normalised, invariant, continuous over the seams, sampled as it says."""
+"""Density: normalised, invariant, continuous over the seams, sampled as it says."""
 
 import math
 
@@ -11,13 +11,14 @@ from hypothesis import strategies as st
 
 from orbiflow.density import (
     MEASURES,
+    Density,
+    FlowDensity,
     KleinBottle,
     ProjectivePlane,
     Sphere,
-    SymmetricDensity,
     Torus,
-    UniformBase,
-    VonMisesBase,
+    UniformDensity,
+    VonMisesDensity,
     kl_by_quadrature,
     midpoints,
 )
@@ -30,7 +31,7 @@ every = pytest.mark.parametrize("space", SPACES, ids=lambda s: s.name)
 seeds = st.integers(0, 2**32 - 1)
 
 
-def make(space, seed: int = 0, *, base=UniformBase, segments: int = 2, strength: float = 0.1):
+def make(space, seed: int = 0, *, base=UniformDensity, segments: int = 2, strength: float = 0.1):
     fields = []
     for k in range(segments):
         field = FourierField(space.group, 3, smoothness=1.0)
@@ -38,7 +39,7 @@ def make(space, seed: int = 0, *, base=UniformBase, segments: int = 2, strength:
         noise = torch.randn(field.size, generator=generator, dtype=torch.float64)
         field.parameters_.data.copy_(strength * noise / noise.norm())  # of rms `strength` at most
         fields.append(field)
-    return SymmetricDensity(space, Flow(fields, steps=6, warn=False), base(space))
+    return FlowDensity(space, Flow(fields, steps=6, warn=False), base(space))
 
 
 def square(seed: int, count: int = 40, dim: int = 2) -> torch.Tensor:
@@ -46,12 +47,12 @@ def square(seed: int, count: int = 40, dim: int = 2) -> torch.Tensor:
 
 
 @torch.no_grad()
-def on_a_plain_grid(density: SymmetricDensity) -> float:
+def on_a_plain_grid(density: Density) -> float:
     return float(density.log_prob(midpoints(density.space, 400)).exp().mean())
 
 
 @every
-@pytest.mark.parametrize("base", [UniformBase, VonMisesBase])
+@pytest.mark.parametrize("base", [UniformDensity, VonMisesDensity])
 @settings(max_examples=5)
 @given(seed=seeds)
 def test_it_integrates_to_one(space, base, seed: int) -> None:
@@ -109,7 +110,7 @@ def test_to_base_and_back(space, seed: int) -> None:
 
 
 @every
-@pytest.mark.parametrize("base", [UniformBase, VonMisesBase])
+@pytest.mark.parametrize("base", [UniformDensity, VonMisesDensity])
 def test_samples_follow_the_density(space, base) -> None:
     density = make(space, 7, base=base, strength=0.12)
     count, cells = 40_000, 8
@@ -129,7 +130,7 @@ def test_samples_follow_the_density(space, base) -> None:
 @settings(max_examples=5)
 @given(seed=seeds, concentration=st.floats(0.1, 8.0))
 def test_the_von_mises_base_is_symmetric_and_normalised(space, seed, concentration) -> None:
-    base, points = VonMisesBase(space, concentration), square(seed)
+    base, points = VonMisesDensity(space, concentration), square(seed)
     images = space.group.images(points)
     assert torch.allclose(base.log_prob(images), base.log_prob(points).expand(len(images), -1))
     mass = base.log_prob(midpoints(space, 200)).exp().mean()
@@ -139,7 +140,7 @@ def test_the_von_mises_base_is_symmetric_and_normalised(space, seed, concentrati
 def test_of_the_torus_the_von_mises_base_is_the_papers() -> None:
     points = square(0)
     expected = scipy.stats.vonmises.logpdf(2 * math.pi * (points.numpy() - 0.5), 1.0).sum(axis=1)
-    found = VonMisesBase(Torus(2)).log_prob(points).numpy()
+    found = VonMisesDensity(Torus(2)).log_prob(points).numpy()
     assert np.allclose(found, expected + 2 * math.log(2 * math.pi))
 
 
@@ -154,7 +155,7 @@ def test_any_network_serves_as_a_field() -> None:
     space = Torus(3)
     field = neural_field(space.group, hidden=(8,), seed=1)
     torch.nn.init.normal_(list(field.parameters())[-2], std=0.05)
-    density = SymmetricDensity(space, Flow(field, steps=4))
+    density = FlowDensity(space, Flow(field, steps=4))
     points = square(0, 20, 3)
     start, log_det = (t.detach() for t in density.flow.inverse_and_log_det(points))
     assert torch.allclose(density.log_prob(points).detach(), log_det)
@@ -182,7 +183,7 @@ def test_entropy_is_the_mean_of_minus_log_prob(space, measure: str | None) -> No
 
 
 def test_entropy_and_divergence() -> None:
-    flat = SymmetricDensity(Sphere(), make(Sphere(), 0, strength=0.0).flow)
+    flat = FlowDensity(Sphere(), make(Sphere(), 0, strength=0.0).flow)
     generator = torch.Generator().manual_seed(0)
     natural = flat.entropy(100, measure="natural", generator=generator)
     assert float(natural) == pytest.approx(math.log(4 * math.pi))
@@ -199,7 +200,7 @@ def test_large_batches_are_the_same_in_blocks(monkeypatch) -> None:
     density, points = make(KleinBottle()), square(0, 60).reshape(3, 20, 2)
     with torch.no_grad():
         whole = density.log_prob(points)
-        monkeypatch.setattr("orbiflow.density.models.symmetric.BLOCK", 7)
+        monkeypatch.setattr("orbiflow.density.models.flow.BLOCK", 7)
         assert torch.allclose(density.log_prob(points), whole)
         draws = [density.sample((4, 5), torch.Generator().manual_seed(3)) for _ in range(2)]
     assert torch.equal(*draws)
@@ -210,7 +211,7 @@ def test_what_is_refused() -> None:
     with pytest.raises(OrbiflowError, match=r"expected points \(..., 2\), got \(5, 3\)"):
         make(Torus(2)).log_prob(torch.zeros(5, 3))
     with pytest.raises(OrbiflowError, match="a grid needs two dimensions"):
-        SymmetricDensity(Torus(3), Flow(lambda x: 0 * x)).mass()
+        FlowDensity(Torus(3), Flow(lambda x: 0 * x)).mass()
     for wrong in (0.0, -1.0, math.nan, math.inf):
         with pytest.raises(OrbiflowError, match="concentration must be positive"):
-            VonMisesBase(Torus(2), wrong)
+            VonMisesDensity(Torus(2), wrong)

@@ -5,15 +5,16 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from density.blends import blended, flow_of
 from orbiflow.density import (
     MEASURES,
     AdaptiveKernels,
-    BlendedDensity,
+    Density,
+    FlowDensity,
     Space,
-    SymmetricDensity,
     TabulatedDensity,
-    UniformBase,
-    VonMisesBase,
+    UniformDensity,
+    VonMisesDensity,
     make_space,
 )
 from orbiflow.fields import FourierField
@@ -24,14 +25,14 @@ SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")
 KINDS = ("uniform", "von-mises", "blended", "tabulated")
 
 
-def density_of(kind: str, space: Space, seed: int) -> SymmetricDensity | TabulatedDensity:
+def density_of(kind: str, space: Space, seed: int) -> Density | TabulatedDensity:
     torch.manual_seed(seed % 2**31)
     flow = Flow(random_field(space.group, 2, seed, rms=0.05), steps=4, warn=False)
-    base = VonMisesBase(space) if kind == "von-mises" else UniformBase(space)
+    base = VonMisesDensity(space) if kind == "von-mises" else UniformDensity(space)
     if kind == "tabulated":
-        return TabulatedDensity(SymmetricDensity(space, flow), 16)
+        return TabulatedDensity(FlowDensity(space, flow), 16)
     if kind != "blended":
-        return SymmetricDensity(space, flow, base)
+        return FlowDensity(space, flow, base)
     width = 1 if space.is_round else 2
     kernels = AdaptiveKernels(
         space,
@@ -39,7 +40,7 @@ def density_of(kind: str, space: Space, seed: int) -> SymmetricDensity | Tabulat
         2 + 20 * torch.rand(5, width, dtype=torch.float64),
         torch.full((5,), 0.2),
     )
-    return BlendedDensity(space, flow, base, kernels, torch.tensor([0.2, 0.7, 0.1]))
+    return blended(space, flow, base, kernels, torch.tensor([0.2, 0.7, 0.1]))
 
 
 @pytest.mark.parametrize("name", SPACES)
@@ -74,7 +75,7 @@ def test_parameters_have_gradients_beside_those_of_the_points() -> None:
     space = make_space("sphere")
     density = density_of("blended", space, 0)
     points = torch.rand(5, 2, dtype=torch.float64, requires_grad=True)
-    field = next(iter(density.flow.segments))  # type: ignore[union-attr]
+    field = next(iter(flow_of(density).flow.segments))  # type: ignore[arg-type]
     assert isinstance(field, FourierField)
     wanted = (points, field.parameters_)
     grads = torch.autograd.grad(density.log_prob(points).sum(), wanted)

@@ -7,11 +7,13 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from density.blends import kernels_of
 from orbiflow.density import (
     AdaptiveKernels,
-    BlendedDensity,
     FitSettings,
-    SymmetricDensity,
+    FlowDensity,
+    Mixture,
+    UniformDensity,
     blend_kernels,
     density_to_bytes,
     fit_density,
@@ -85,19 +87,21 @@ def test_samples_follow_the_density(name: str) -> None:
 def test_a_mixture_beats_both_parts_on_clusters(name: str, tmp_path) -> None:
     space, points = make_space(name), clustered(name)
     train, held, test = points[:400], points[400:500], points[500:]
-    flow = SymmetricDensity(space, Flow([SplineField(space.group, 2)], steps=1))
+    flow = FlowDensity(space, Flow([SplineField(space.group, 2)], steps=1))
     mixed = blend_kernels(flow, train, held)
-    scores = [float(part.log_prob(test).mean().detach()) for part in (mixed, flow, mixed.kernels)]
+    scores = [
+        float(part.log_prob(test).mean().detach()) for part in (mixed, flow, kernels_of(mixed))
+    ]
     assert scores[0] > scores[1] + 1
     assert scores[0] > scores[2] - 0.05
     assert mixed.mass() == pytest.approx(1, abs=1e-3)
-    assert float(mixed.shares[2]) >= 0.99 * FLOOR
+    assert mixed.weight_of_kind["uniform"] >= 0.99 * FLOOR
     again = mixed.sample((300,), torch.Generator().manual_seed(1))
     assert torch.equal(again, mixed.sample((300,), torch.Generator().manual_seed(1)))
     path = tmp_path / "mixed.safetensors"
     path.write_bytes(density_to_bytes(mixed))
     back, _ = read_density(path)
-    assert isinstance(back, BlendedDensity)
+    assert isinstance(back, Mixture)
     with torch.no_grad():
         assert torch.equal(back.log_prob(test), mixed.log_prob(test))
 
@@ -105,10 +109,11 @@ def test_a_mixture_beats_both_parts_on_clusters(name: str, tmp_path) -> None:
 def test_a_fit_with_kernels_says_its_shares() -> None:
     settings_ = FitSettings(detail=2, segments=2, iterations=5, kernels=True)
     density, report = fit_density(make_space("torus"), clustered("torus"), settings_)
-    assert isinstance(density, BlendedDensity)
-    assert report.shares is not None
-    assert sum(report.shares) == pytest.approx(1)
-    assert any("blend" in note for note in report.notes)
+    assert isinstance(density, Mixture)
+    assert report.weights is not None
+    assert report.weights == density.weight_of_kind
+    assert sum(report.weights.values()) == pytest.approx(1)
+    assert any("mixture" in note for note in report.notes)
 
 
 @given(seeds)
@@ -130,11 +135,5 @@ def test_kernels_of_wrong_shape_are_refused() -> None:
         AdaptiveKernels(space, torch.rand(4, 2), torch.ones(4, 2), one)
     with pytest.raises(OrbiflowError, match="positive widths"):
         AdaptiveKernels(space, torch.rand(4, 2), -torch.ones(4, 1), one)
-    with pytest.raises(OrbiflowError, match="proportions"):
-        BlendedDensity(
-            space,
-            Flow([SplineField(space.group, 1)]),
-            None,  # type: ignore[arg-type]
-            kernels("sphere", 0),
-            torch.ones(3),
-        )
+    with pytest.raises(OrbiflowError, match="weights must be 2 positive numbers"):
+        Mixture([kernels("sphere", 0), UniformDensity(space)], torch.ones(2))

@@ -7,10 +7,9 @@ import pytest
 import torch
 
 from orbiflow.density import (
-    BlendedDensity,
     DensityEstimator,
+    Mixture,
     Torus,
-    VonMisesChains,
     density_to_bytes,
     read_density,
 )
@@ -28,8 +27,8 @@ def data(count: int = 400) -> np.ndarray:
 def test_five_angles(tmp_path: Path) -> None:
     points = data()
     estimator = DensityEstimator("torus", unit="degrees", evaluations=20).fit(points[:300])
-    assert isinstance(estimator.density_, BlendedDensity)
-    assert isinstance(estimator.density_.chains, VonMisesChains)
+    assert isinstance(estimator.density_, Mixture)
+    assert "chains" in estimator.density_.weight_of_kind
     assert estimator.score(points[300:]) > -5 * np.log(360) + 3
     assert estimator.sample(7, random_state=1).shape == (7, 5)
     path = tmp_path / "density.safetensors"

@@ -13,14 +13,14 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from density.blends import even_grid, random_blend, random_chains, random_network
+from density.blends import even_grid, kernels_of, random_blend, random_chains, random_network
 from orbiflow.density import (
     AdaptiveKernels,
-    BlendedDensity,
     DensityEstimator,
     Factor,
+    Mixture,
     Torus,
-    UniformBase,
+    UniformDensity,
     VonMisesChains,
     VonMisesNetwork,
     conditional,
@@ -35,13 +35,7 @@ from orbiflow.density.fitting.network import (
     network_shapes,
 )
 from orbiflow.density.fitting.rows import Rows
-from orbiflow.density.inference.network import draws_anew, network_at
-from orbiflow.density.models import averaged_networks, log_conditional
-from orbiflow.density.storage.components import (
-    network_from_header,
-    network_header,
-    network_tensors,
-)
+from orbiflow.density.models import Split, averaged_networks, log_conditional
 from orbiflow.errors import OrbiflowError
 
 seeds = st.integers(0, 2**31)
@@ -114,7 +108,7 @@ def test_samples_are_of_the_density(seed: int) -> None:
 @few
 def test_a_file_gives_it_back(seed: int, dim: int) -> None:
     network, points = network_of(seed, dim), at_random(seed, 9, dim)
-    again = network_from_header(network_header(network), network_tensors(network), Torus(dim))
+    again = VonMisesNetwork.from_header(Torus(dim), network.header(), network.tensors())
     assert torch.equal(again.log_prob(points), network.log_prob(points))
 
 
@@ -154,9 +148,7 @@ BROKEN: dict[str, Callable[[dict[str, Any]], dict[str, Any]]] = {
 def test_damaged_headers_are_refused(case: str) -> None:
     network = network_of(0, 3)
     with pytest.raises(OrbiflowError):
-        network_from_header(
-            BROKEN[case](network_header(network)), network_tensors(network), Torus(3)
-        )
+        VonMisesNetwork.from_header(Torus(3), BROKEN[case](network.header()), network.tensors())
 
 
 def test_what_is_no_network_is_refused() -> None:
@@ -196,7 +188,7 @@ def test_some_angles_without_hidden_parents_are_exact(
     whole = torch.zeros(5, len(grid), dim, dtype=torch.float64)
     whole[..., seen], whole[..., hidden] = points[:, None], grid
     expected = network.log_prob(whole).exp().mean(dim=1).log()
-    assert torch.allclose(network_at(network, points, seen), expected, atol=1e-6)
+    assert torch.allclose(network.log_marginal(points, seen), expected, atol=1e-6)
 
 
 @given(seeds, st.integers(2, 3), st.data())
@@ -209,9 +201,9 @@ def test_hidden_parents_are_integrated_by_draws(seed: int, dim: int, data: st.Da
     whole = torch.zeros(5, 256, dim, dtype=torch.float64)
     whole[..., seen], whole[..., hidden] = points[:, None], even_grid(256, 1)
     expected = network.log_prob(whole).exp().mean(dim=1).log()
-    found = torch.stack([network_at(network, points, list(seen), seed=k) for k in range(4)])
+    found = torch.stack([network.log_marginal(points, list(seen), seed=k) for k in range(4)])
     assert float((found.exp().mean(dim=0).log() - expected).abs().max()) < 0.1
-    assert torch.equal(found[0], network_at(network, points, list(seen), seed=0))
+    assert torch.equal(found[0], network.log_marginal(points, list(seen), seed=0))
 
 
 def test_conditional_and_marginal_say_how_far_they_are_off() -> None:
@@ -235,20 +227,13 @@ def test_what_cannot_be_had_well_is_refused() -> None:
         Torus(1), weights, means[:, :1, [0, 1, 3]] * 0, torch.full((1, 1), 0.1).double()
     )
     factors = [Factor((0,), first), *(Factor((k, k + 1), link) for k in range(3))]
-    blend = random_blend(0, 4, chains=False, network=True)
-    sharp = BlendedDensity(
-        torus,
-        blend.flow,
-        UniformBase(torus),
-        AdaptiveKernels(
-            torus, blend.kernels.centers, blend.kernels.concentrations, blend.kernels.weights
-        ),
-        torch.tensor([0.0, 0.01, 0.01, 0.98]),
-        network=VonMisesNetwork(torus, factors),
-    )
-    assert draws_anew(sharp.parts["network"], [0, 3], [0, 3])  # type: ignore[arg-type]
-    assert not draws_anew(sharp.parts["network"], [0, 3], [3])  # type: ignore[arg-type]
-    with pytest.raises(OrbiflowError, match=r"within [\d.]+ nats .*keep one angle"):
+    kernels = kernels_of(random_blend(0, 4, chains=False, network=True))
+    own = AdaptiveKernels(torus, kernels.centers, kernels.concentrations, kernels.weights)
+    network = VonMisesNetwork(torus, factors)
+    sharp = Mixture([own, UniformDensity(torus), network], [0.01, 0.01, 0.98])
+    assert network.is_costly(Split(4, (0, 3)))
+    assert not network.is_costly(Split(4, (3,), (0,), (0.5,)))
+    with pytest.raises(OrbiflowError, match=r"better than [\d.]+ nats .*keep one angle"):
         marginal(sharp, [0, 3])
     assert marginal(sharp, 3).error < 0.05
 

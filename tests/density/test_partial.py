@@ -11,10 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from density.blends import even_grid, random_blend
+from density.blends import even_grid, kernels_of, random_blend
 from orbiflow.density import (
-    BlendedDensity,
-    SymmetricDensity,
+    Density,
+    FlowDensity,
+    Mixture,
     Torus,
     conditional,
     density_to_bytes,
@@ -23,7 +24,7 @@ from orbiflow.density import (
     marginal,
     read_density,
 )
-from orbiflow.density.models import still_flow
+from orbiflow.density.models import identity_flow
 from orbiflow.errors import OrbiflowError
 
 seeds = st.integers(0, 2**31)
@@ -32,7 +33,7 @@ GRID = {2: 256, 3: 64}
 """Points an angle that resolve what `random_blend` makes."""
 
 
-def integrated(density: SymmetricDensity, points: torch.Tensor, kept: list[int]) -> torch.Tensor:
+def integrated(density: Density, points: torch.Tensor, kept: list[int]) -> torch.Tensor:
     """Log of the joint density integrated over the angles that are not kept, at points (N, r)."""
     d = density.space.dim
     hidden = [axis for axis in range(d) if axis not in kept]
@@ -108,8 +109,8 @@ def test_many_angles_without_tables(seed: int, data: st.DataObject) -> None:
     product = found.log_prob(points[:, left]) + marginal(density, known).log_prob(points[:, known])
     # a part keeps a share of 1e-9 where what is known leaves it less, and adds as much of its density
     own = points[:, left]
-    assert isinstance(found, BlendedDensity)
-    added = (found.kernels.log_prob(own) - found.log_prob(own)).exp()
+    assert isinstance(found, Mixture)
+    added = (kernels_of(found).log_prob(own) - found.log_prob(own)).exp()
     added = added + (-found.log_prob(own)).exp()
     assert ((product - density.log_prob(points)).abs() < 1e-9 * (1 + 2 * added)).all()
     assert found.error == 0
@@ -164,7 +165,7 @@ def test_what_comes_out_is_saved(tmp_path) -> None:
 @pytest.mark.parametrize("name", ["sphere", "projective-plane", "klein-bottle"])
 def test_other_spaces_are_refused(name: str) -> None:
     space = make_space(name)
-    density = SymmetricDensity(space, still_flow(space))
+    density = FlowDensity(space, identity_flow(space))
     for call in (lambda: marginal(density, 0), lambda: conditional(density, {0: 0.5})):
         with pytest.raises(OrbiflowError, match=f"on a torus; on the {name}"):
             call()

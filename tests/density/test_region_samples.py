@@ -8,18 +8,18 @@ import torch
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from density.blends import blended
 from orbiflow.density import (
     AdaptiveKernels,
-    BlendedDensity,
     DensityLevels,
     PlotSettings,
-    UniformBase,
+    UniformDensity,
     highest_density_region,
     make_space,
     samples_for,
     told_masses,
 )
-from orbiflow.density.models import still_flow
+from orbiflow.density.models import identity_flow
 from orbiflow.density.regions.levels import (
     GOOD,
     LEAST,
@@ -75,7 +75,7 @@ def test_far_out_the_mass_and_the_interval_are_right() -> None:
         torch.ones(1).double(),
     )
     shares = torch.tensor([0.0, 0.999, 0.001]).double()
-    density = BlendedDensity(space, still_flow(space), UniformBase(space), kernels, shares)
+    density = blended(space, identity_flow(space), UniformDensity(space), kernels, shares)
     region = highest_density_region(density, 0.9995)  # half of what lies about in the uniform floor
     fresh = DensityLevels(density, samples=1_000_000, seed=1).log_probs
     outside = float(np.mean(fresh < region.log_prob))

@@ -10,6 +10,7 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from density.blends import flow_of
 from orbiflow.density import (
     DensityEstimator,
     density_to_bytes,
@@ -138,7 +139,7 @@ def test_a_flow_descends_on_the_weighted_likelihood() -> None:
     estimator = DensityEstimator("torus", parts="flow", detail=2, segments=2, iterations=3)
     density = estimator.fit(points.numpy() * 2 * math.pi, sample_weight=weights.numpy()).density_
     both = [
-        Objective(density, part, own, kinetic=0.0, roughness=1e-3)
+        Objective(flow_of(density), part, own, kinetic=0.0, roughness=1e-3)
         for part, own in ((points, weights / weights.sum()), (rows, None))
     ]
     (loss, slope), (expected, also) = (one(one.get()) for one in both)

@@ -6,17 +6,17 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from density.blends import blended
 from orbiflow.density import (
     AdaptiveKernels,
-    BlendedDensity,
+    Density,
     DensityEstimator,
     KleinBottle,
     ProjectivePlane,
     Space,
     Sphere,
-    SymmetricDensity,
     Torus,
-    UniformBase,
+    UniformDensity,
     log_density_gradient,
 )
 from orbiflow.errors import OrbiflowError
@@ -37,7 +37,7 @@ SPACES: dict[str, Space] = {
 }
 
 
-def density_on(space: Space, seed: int, share: float) -> SymmetricDensity:
+def density_on(space: Space, seed: int, share: float) -> Density:
     """A flow of one field, kernels and a floor."""
     torch.manual_seed(seed)
     # of waves: a spline's divergence has kinks, where numerical derivatives are off
@@ -50,7 +50,7 @@ def density_on(space: Space, seed: int, share: float) -> SymmetricDensity:
         torch.softmax(torch.randn(6, dtype=torch.float64), dim=0),
     )
     shares = torch.tensor([share, 0.7 - share, 0.3])
-    return BlendedDensity(space, flow, UniformBase(space), kernels, shares)
+    return blended(space, flow, UniformDensity(space), kernels, shares)
 
 
 def data_on(space: Space, seed: int) -> np.ndarray:
@@ -74,7 +74,7 @@ def data_on(space: Space, seed: int) -> np.ndarray:
     )
 
 
-def log_density(density: SymmetricDensity, data: np.ndarray) -> np.ndarray:
+def log_density(density: Density, data: np.ndarray) -> np.ndarray:
     """In natural measure."""
     if density.space.is_round and data.shape[1] == 3:
         data = data / np.linalg.norm(data, axis=1, keepdims=True)

@@ -9,17 +9,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from orbiflow.density import (
+    AdaptiveKernels,
     AutomaticSettings,
-    UniformBase,
+    UniformDensity,
     VonMisesChains,
     fit_automatic,
     make_space,
     midpoints,
 )
 from orbiflow.density.fitting import group_numbers
-from orbiflow.density.fitting.assembly import mixed
 from orbiflow.density.fitting.folds import FOLDS, folds_of, repeats_of
-from orbiflow.density.fitting.kernels import joined, kernel_estimates
+from orbiflow.density.fitting.kernels import kernel_estimates
 from orbiflow.density.fitting.mixtures import fit_mixture
 from orbiflow.density.fitting.rows import Rows
 from orbiflow.density.fitting.weights import (
@@ -137,7 +137,7 @@ def test_kernel_estimates_are_normalised(name: str) -> None:
     for part in found.values():
         assert float(part.log_prob(grid).exp().mean()) == pytest.approx(1, abs=5e-3)
     parts = [found["repeated"], *found.values()][:2]
-    both = joined(parts, torch.tensor([1.0, 3.0]))
+    both = AdaptiveKernels.joined(parts, torch.tensor([1.0, 3.0]))
     expected = 0.25 * parts[0].log_prob(grid).exp() + 0.75 * parts[1].log_prob(grid).exp()
     assert torch.allclose(both.log_prob(grid).exp(), expected)
     alone = kernel_estimates(space, torch.cat([points, points[:5]]), repeats=False)
@@ -150,7 +150,7 @@ def test_mixtures_of_chains_are_mixed() -> None:
         weights = torch.full((1, 3), -math.log(3), dtype=torch.float64)
         means, kappa = torch.zeros(1, 2, 5), torch.full((1, 2), k)
         parts.append(VonMisesChains(space, weights, means, kappa))
-    both, at = mixed(parts, torch.tensor([0.2, 0.8])), midpoints(space, 5)
+    both, at = VonMisesChains.joined(parts, torch.tensor([0.2, 0.8])), midpoints(space, 5)
     expected = 0.2 * parts[0].log_prob(at).exp() + 0.8 * parts[1].log_prob(at).exp()
     assert torch.allclose(both.log_prob(at).exp(), expected, atol=1e-7)
 
@@ -192,9 +192,9 @@ def test_repeats_are_told_from_rounding() -> None:
 
 def test_the_floor_is_uniform() -> None:
     space = make_space("sphere")
-    assert float(UniformBase(space).log_prob(midpoints(space, 90)).exp().mean()) == pytest.approx(
-        1, abs=1e-3
-    )
+    assert float(
+        UniformDensity(space).log_prob(midpoints(space, 90)).exp().mean()
+    ) == pytest.approx(1, abs=1e-3)
 
 
 @given(seeds, st.integers(2, 40), st.integers(60, 300))

@@ -3,10 +3,10 @@
 import pytest
 import torch
 
+from density.blends import blended
 from orbiflow.density import (
     AdaptiveKernels,
-    BlendedDensity,
-    SymmetricDensity,
+    FlowDensity,
     TabulatedDensity,
     Torus,
     make_space,
@@ -18,14 +18,14 @@ from orbiflow.flows import Flow
 SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")
 
 
-def some_density(name: str) -> SymmetricDensity:
+def some_density(name: str) -> FlowDensity:
     """A flow of one random field."""
     torch.manual_seed(4)
     space = make_space(name)
     field = SplineField(space.group, 3, smoothness=2.0)
     with torch.no_grad():
         field.parameters_.normal_(std=0.05 if name == "torus" else 0.15)
-    return SymmetricDensity(space, Flow([field], steps=4))
+    return FlowDensity(space, Flow([field], steps=4))
 
 
 @pytest.mark.parametrize("name", SPACES)
@@ -64,7 +64,7 @@ def test_kernels_narrower_than_a_cell_are_kept_apart(name: str) -> None:
         space, torch.rand(200, 2, dtype=torch.float64), kappa, torch.full((200,), 1 / 200)
     )
     shares = torch.tensor([0.3, 0.6, 0.1])
-    density = BlendedDensity(space, plain.flow, plain.base, kernels, shares)
+    density = blended(space, plain.flow, plain.base, kernels, shares)
     table = TabulatedDensity(density, 128)
     assert table.error < 5e-3
     points = density.sample((1000,), torch.Generator().manual_seed(1))
@@ -82,4 +82,4 @@ def test_bad_requests() -> None:
         TabulatedDensity(some_density("torus"), 4)
     space = Torus(3)
     with pytest.raises(OrbiflowError, match="two dimensions"):
-        TabulatedDensity(SymmetricDensity(space, Flow([SplineField(space.group, 1)])))
+        TabulatedDensity(FlowDensity(space, Flow([SplineField(space.group, 1)])))

@@ -17,12 +17,13 @@ from PIL import Image
 
 from bent_tiles import bent_tile
 from orbiflow.density import (
+    Density,
+    FlowDensity,
     KleinBottle,
-    NeuralFlow,
     ProjectivePlane,
     Sphere,
-    SymmetricDensity,
     Torus,
+    UniformDensity,
     corner_picture,
     density_picture,
     flow_picture,
@@ -36,7 +37,7 @@ from orbiflow.drawing import (
 )
 from orbiflow.drawing.sheet import NARROWEST
 from orbiflow.errors import OrbiflowError
-from orbiflow.fields import FourierField, NeuralTorusField
+from orbiflow.fields import FourierField
 from orbiflow.flows import Flow
 from orbiflow.tiles import (
     bending_picture,
@@ -58,10 +59,10 @@ def _coarse(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("orbiflow.drawing.fields._SAMPLES", 40)
 
 
-def example(space: Any) -> SymmetricDensity:
+def example(space: Any) -> Density:
     field = FourierField(space.group, 2, dtype=torch.float64)
     field.parameters_.data.normal_(0, 0.02, generator=torch.Generator().manual_seed(3))
-    return SymmetricDensity(space, Flow([field], steps=2))
+    return FlowDensity(space, Flow([field], steps=2))
 
 
 def points(count: int, dim: int = 2) -> torch.Tensor:
@@ -69,7 +70,7 @@ def points(count: int, dim: int = 2) -> torch.Tensor:
 
 
 def corner(dim: int, sheet: Sheet) -> Picture:
-    density = SymmetricDensity(Torus(dim), NeuralFlow(NeuralTorusField(dim, width=4)))
+    density = UniformDensity(Torus(dim))
     names = [f"a long name {k}" for k in range(dim)]
     return corner_picture(density, points(40, dim), points(30, dim), names=names, sheet=sheet)
 

@@ -23,7 +23,6 @@ from orbiflow.errors import (
 )
 from orbiflow.fields import (
     FourierField,
-    NeuralTorusField,
     SplineField,
     neural_field,
     symmetrize,
@@ -84,16 +83,11 @@ def some_field(kind: str, group: CrystallographicGroup, seed: int, dtype: torch.
         return filled(
             neural_field(group, hidden=(4, 3), max_frequency=1 + seed % 2, dtype=dtype), seed
         )
-    if kind == "torus network":
-        sizes = {"width": 1 + seed % 7, "depth": 1 + seed % 3, "waves": 1 + seed % 2}
-        return filled(NeuralTorusField(group.dim, **sizes, dtype=dtype), seed)
     field = FourierField(group, seed % 3, smoothness=seed % 4 / 2, dtype=dtype)
     return symmetrize(filled(field, seed), group) if kind == "symmetrized" else filled(field, seed)
 
 
-kinds = st.lists(
-    st.sampled_from(["fourier", "network", "torus network", "symmetrized"]), min_size=1, max_size=3
-)
+kinds = st.lists(st.sampled_from(["fourier", "network", "symmetrized"]), min_size=1, max_size=3)
 
 
 @one_folder
@@ -208,7 +202,6 @@ def good(tmp_path: Path) -> tuple[dict[str, Any], dict[str, Tensor]]:
     fields = [
         filled(FourierField(group, 2), 1),
         filled(neural_field(group, hidden=(4,)), 2),
-        filled(NeuralTorusField(2, width=3, depth=1), 3),
     ]
     data = save_flow(Flow(fields, steps=2), tmp_path / "good").read_bytes()
     length = int.from_bytes(data[:8], "little")

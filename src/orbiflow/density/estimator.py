@@ -21,12 +21,10 @@ from orbiflow.density.fitting import (
     AutomaticSettings,
     FitReport,
     FitSettings,
-    NeuralSettings,
     Progress,
     check_missing,
     fit_automatic,
     fit_density,
-    fit_neural,
     flow_settings,
     mean_of,
     weighed,
@@ -40,7 +38,7 @@ from orbiflow.density.inference import (
     log_prob_observed,
     marginal,
 )
-from orbiflow.density.models import MOST_DIM, SymmetricDensity
+from orbiflow.density.models import MOST_DIM, Density
 from orbiflow.density.spaces import Space, space_class
 from orbiflow.errors import OrbiflowError
 
@@ -116,14 +114,11 @@ def seed_of(random_state: RandomState) -> int:
     )
 
 
-ONLY_SPLINES = (
+OF_FLOWS = (
     "detail", "segments", "smoothness", "ridge", "roughness", "kinetic", "iterations", "base",
-    "kernels",
+    "evaluations", "validation",
 )  # fmt: skip
-"""Parameters without a meaning for neural flows."""
-
-OF_FLOWS = (*ONLY_SPLINES[:-1], "evaluations", "validation")
-"""Parameters of a flow, alone or beside other parts."""
+"""Parameters of a flow, alone or beside other components."""
 
 AUTO = "auto"
 
@@ -150,10 +145,9 @@ class DensityEstimator(Parameters):
         seconds: of training at most; then the fit depends on the machine.
         seed: of all that is drawn.
 
-    On tori of four or more angles a flow is neural and stands alone ("flow", see `fit_neural`), and
-    parameters of flows of splines must be left at their defaults.
+    On tori of four or more angles there is no flow, and its parameters must be left at their defaults.
 
-    After `fit`: `space_`, `density_` (a `SymmetricDensity`), `report_` (a `FitReport`),
+    After `fit`: `space_`, `density_` (a `Density`), `report_` (a `FitReport`),
     `n_features_in_`, and `feature_names_in_` where the data, a data frame, name their columns.
 
     >>> rng = np.random.default_rng(0)
@@ -232,10 +226,10 @@ class DensityEstimator(Parameters):
         data = np.asarray(X)
         self.space_ = self._space_for(data)
         points = self._chart(data)
-        self.density_: SymmetricDensity
+        self.density_: Density
         self.report_: FitReport
         if self.space_.dim > MOST_DIM:
-            self._refuse_settings_of_splines()
+            self._refuse_settings_of_flows()
         whole = self.kernels or chosen == ("flow",)
         if whole and self.missing != "refuse":
             raise OrbiflowError(
@@ -260,23 +254,10 @@ class DensityEstimator(Parameters):
                 self.space_, points, settings, weights=sample_weight, groups=groups,
                 progress=progress,
             )  # fmt: skip
-        elif self.space_.dim <= MOST_DIM:
+        else:
             found = fit_density(
                 self.space_, points, alone, weights=sample_weight, progress=progress
             )
-        else:
-            if sample_weight is not None:
-                raise OrbiflowError(
-                    "neural flows take no weights of rows: leave them out, or fit other parts, "
-                    "parts='kernels,mixture,chains' (--parts kernels,mixture,chains)"
-                )
-            many = NeuralSettings(
-                refinement=min(NeuralSettings.refinement, self.evaluations),
-                validation=self.validation,
-                seconds=self.seconds,
-                seed=self.seed,
-            )
-            found = fit_neural(self.space_, points, many, progress=progress)
         self.density_, self.report_ = found
         self.n_features_in_ = int(data.shape[1])
         names = getattr(X, "columns", None)
@@ -324,7 +305,7 @@ class DensityEstimator(Parameters):
     @classmethod
     def fitted(
         cls,
-        density: SymmetricDensity,
+        density: Density,
         report: FitReport | None = None,
         columns: Sequence[str] | None = None,
         **params: Any,
@@ -340,7 +321,7 @@ class DensityEstimator(Parameters):
         Raises:
             OrbiflowError: for what is no density, or a parameter that there is not.
         """
-        check_kind(density, SymmetricDensity, "density")
+        check_kind(density, Density, "density")
         made = cls(density.space).set_params(**params)
         made.space_, made.density_ = density.space, density
         if report is not None:
@@ -425,13 +406,12 @@ class DensityEstimator(Parameters):
             return None
         return replace(flow_settings(self.space_, rows, self.seed), seconds=math.inf, **given)
 
-    def _refuse_settings_of_splines(self) -> None:
-        set_ = list(self._changed(ONLY_SPLINES))
-        if set_:
+    def _refuse_settings_of_flows(self) -> None:
+        given = list(self._changed((*OF_FLOWS, "kernels")))
+        if given:
             raise OrbiflowError(
-                f"{', '.join(set_)} would have no effect on a torus of {self.space_.dim} angles, where "
-                f"the flow is neural: leave {'it' if len(set_) == 1 else 'them'} out, or call "
-                "`fit_neural` with `NeuralSettings`"
+                f"{', '.join(given)} would have no effect on a torus of {self.space_.dim} angles, "
+                f"where there is no flow: leave {'it' if len(given) == 1 else 'them'} out"
             )
 
     def _chart(self, data: np.ndarray) -> torch.Tensor:
@@ -443,12 +423,12 @@ class DensityEstimator(Parameters):
     def _column_names(self) -> list[str]:
         return [str(name) for name in getattr(self, "feature_names_in_", self.space_.columns)]
 
-    def _of(self, density: SymmetricDensity, names: list[str]) -> DensityEstimator:
+    def _of(self, density: Density, names: list[str]) -> DensityEstimator:
         """A fitted estimator of a density that was derived."""
         params = {name: v for name, v in self.get_params().items() if name != "space"}
         return DensityEstimator.fitted(density, columns=names, **params)
 
-    def _fitted(self) -> SymmetricDensity:
+    def _fitted(self) -> Density:
         if not hasattr(self, "density_"):
             raise OrbiflowError("this estimator is not fitted yet: call fit first")
         return self.density_

@@ -9,7 +9,7 @@ from torch import Tensor
 
 from orbiflow.arrays import Array
 from orbiflow.density.arguments import check_kind
-from orbiflow.density.models import SymmetricDensity
+from orbiflow.density.models import Density
 from orbiflow.runtime import one_thread
 
 BLOCK = 16_384
@@ -17,7 +17,7 @@ BLOCK = 16_384
 
 
 @one_thread()
-def log_density_gradient(density: SymmetricDensity, data: ArrayLike) -> tuple[Array, Array]:
+def log_density_gradient(density: Density, data: ArrayLike) -> tuple[Array, Array]:
     """Log densities (N,) in natural measure at data (N, k), and their gradients (N, k).
 
     In the coordinates and units that the data have: in nats per radian, degree or turn of each angle,
@@ -37,7 +37,7 @@ def log_density_gradient(density: SymmetricDensity, data: ArrayLike) -> tuple[Ar
     >>> np.sign(slopes[:, 0]).tolist()
     [1.0, -1.0]
     """
-    space = check_kind(density, SymmetricDensity, "density").space
+    space = check_kind(density, Density, "density").space
     points = space.cover(data)
     values: list[Tensor] = []
     slopes: list[Tensor] = []

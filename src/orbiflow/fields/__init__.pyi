@@ -22,11 +22,4 @@ from .symmetrization import periodic_operator as periodic_operator
 from .symmetrization import rotation_operator as rotation_operator
 from .symmetrization import symmetrize as symmetrize
 from .symmetrization import transflection_operator as transflection_operator
-from .torus_network import MAX_DEPTH as MAX_DEPTH
-from .torus_network import MAX_DIM as MAX_DIM
-from .torus_network import MAX_WAVES as MAX_WAVES
-from .torus_network import MAX_WIDTH as MAX_WIDTH
-from .torus_network import NeuralTorusField as NeuralTorusField
-from .torus_network import speed as speed
-from .torus_network import way as way
 from .transforms import transformed as transformed

@@ -20,13 +20,8 @@ from orbiflow.arguments import (
 )
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.fields import (
-    MAX_DEPTH,
-    MAX_DIM,
-    MAX_WAVES,
-    MAX_WIDTH,
     FourierField,
     InvariantField,
-    NeuralTorusField,
     PeriodicFeatures,
     SplineField,
     Symmetrized,
@@ -83,9 +78,6 @@ class Writer:
                 "periodic": field.periodic,
                 "field": inner,
             }
-        if kind is NeuralTorusField:
-            sizes = {name: getattr(field, name) for name in ("dim", "width", "depth", "waves")}
-            return {"kind": "torus-network", **sizes, "dtype": _dtype(field.last.weight)}
         if is_perceptron(field):
             features, *layers = field
             linear = [layer for layer in layers if isinstance(layer, nn.Linear)]
@@ -141,7 +133,9 @@ class Reader:
             inner = self.field(header["field"], f"{place}.field", nesting + 1)
             return Symmetrized(inner, self._group(header), periodic=bool(header["periodic"]))
         if kind == "torus-network":
-            return self._torus_network(header, place)
+            raise OrbiflowError(
+                f"{place} is a NeuralTorusField, which orbiflow no longer has: use orbiflow 0.1"
+            )
         if kind == "perceptron":
             return self._perceptron(header, place)
         if kind == "own":
@@ -186,17 +180,6 @@ class Reader:
             wide = features.size if i == 0 else sizes[i - 1]
             layers += [nn.Linear(wide, size, dtype=DTYPES[header["dtype"]]), nn.Tanh()]
         return nn.Sequential(*layers[:-1])
-
-    def _torus_network(self, header: Mapping[str, Any], place: str) -> NeuralTorusField:
-        most = {"dim": MAX_DIM, "width": MAX_WIDTH, "depth": MAX_DEPTH, "waves": MAX_WAVES}
-        sizes: dict[str, Any] = {
-            name: whole(header[name], name, 1, bound) for name, bound in most.items()
-        }
-        with torch.device("meta"):  # where shapes cost nothing
-            expected = NeuralTorusField(**sizes).state_dict()
-        for name, tensor in expected.items():
-            self._check(f"{place}.{name}", tuple(tensor.shape))
-        return NeuralTorusField(**sizes, dtype=DTYPES[header["dtype"]])
 
     def _own(self, name: str, place: str) -> Any:
         make = self.makers.get(place) or self.makers.get(name)

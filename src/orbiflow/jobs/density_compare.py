@@ -14,9 +14,9 @@ import numpy as np
 
 from orbiflow.density import (
     DataComparison,
+    Density,
     ModelComparison,
     RowSketch,
-    SymmetricDensity,
     Table,
     column_names,
     compare_samples,
@@ -217,9 +217,7 @@ def _common_columns(request: DensityCompareRequest) -> tuple[str, ...] | None:
     return tuple(name for name in shared if name.casefold() != group)
 
 
-def _seen(
-    name: str, density: SymmetricDensity, extra: dict[str, Any], values: np.ndarray
-) -> list[str]:
+def _seen(name: str, density: Density, extra: dict[str, Any], values: np.ndarray) -> list[str]:
     """Whether a model knows the rows."""
     if not extra.get("fitted_rows"):
         return [

@@ -12,8 +12,8 @@ import numpy as np
 from orbiflow.arrays import Array
 from orbiflow.density import (
     MODEL,
+    Density,
     Space,
-    SymmetricDensity,
     Table,
     read_density,
 )
@@ -29,7 +29,7 @@ DIRECTIONS = (2, 3)
 """Columns of directions: latitude and longitude, or a vector."""
 
 
-def model_at(path: Path) -> tuple[SymmetricDensity, dict[str, Any]]:
+def model_at(path: Path) -> tuple[Density, dict[str, Any]]:
     """The density in a file or in the folder of a fit, and what was saved with it.
 
     Raises:

@@ -14,7 +14,7 @@ from orbiflow.density import (
     MODEL,
     REPORT,
     TABLE,
-    SymmetricDensity,
+    Density,
     Torus,
     axes_named,
     conditional,
@@ -130,7 +130,7 @@ def density_conditional(request: DensityConditionalRequest, tell: Sink, cancel: 
     return _written(found, own, said, folder, request.out, tell, cancel)
 
 
-def _names(density: SymmetricDensity, extra: dict[str, Any]) -> list[str]:
+def _names(density: Density, extra: dict[str, Any]) -> list[str]:
     """The columns of a model."""
     names = [str(name) for name in extra.get("columns") or ()]
     return names if len(names) == density.space.dim else list(density.space.columns)
@@ -162,7 +162,7 @@ def _pair(text: str) -> tuple[str, float]:
 
 
 def _written(
-    density: SymmetricDensity,
+    density: Density,
     names: list[str],
     said: dict[str, Any],
     folder: ResultFolder,
@@ -198,7 +198,7 @@ def _written(
     return Finished("done", {**summary, "error": density.error})
 
 
-def _words(density: SymmetricDensity, names: list[str], out: Path) -> str:
+def _words(density: Density, names: list[str], out: Path) -> str:
     exact = "in closed form"
     if density.error:
         exact = f"its logarithm right within {density.error:.1e} nats (root mean square)"
@@ -207,7 +207,7 @@ def _words(density: SymmetricDensity, names: list[str], out: Path) -> str:
     return f"the density of {', '.join(names)}, {per}{power}, {exact}; written to {out}"
 
 
-def _table(density: SymmetricDensity) -> Array:
+def _table(density: Density) -> Array:
     """Angles from minus half a turn on, and the density (N, d + 1) in their unit."""
     space = density.space
     if not isinstance(space, Torus):
@@ -219,7 +219,7 @@ def _table(density: SymmetricDensity) -> Array:
     return np.column_stack([data, logs.exp().numpy()])
 
 
-def _picture(density: SymmetricDensity, names: list[str]) -> bytes:
+def _picture(density: Density, names: list[str]) -> bytes:
     if density.space.dim == 2:
         return density_picture(density, names=names, scale="auto").file()
     drawn = density.sample((DRAWN,), torch.Generator().manual_seed(0))

@@ -12,7 +12,7 @@ from torch import Tensor
 from orbiflow.arrays import Array
 from orbiflow.density import (
     CHECKED,
-    SymmetricDensity,
+    Density,
     Table,
     TabulatedDensity,
     log_density_gradient,
@@ -26,7 +26,7 @@ BLOCK, BLOCK_GRADIENT = 2**18, 2**16
 
 
 def evaluated(
-    density: SymmetricDensity,
+    density: Density,
     table: Table,
     points: Tensor,
     log_prob: Callable[..., Tensor],
@@ -41,7 +41,7 @@ def evaluated(
         log_prob: of a density and points; a table's own is taken where that was asked for.
     """
     size = BLOCK_GRADIENT if request.gradient else BLOCK
-    source: SymmetricDensity | TabulatedDensity = density
+    source: Density | TabulatedDensity = density
     if request.table:
         source = _tabulated(density, tell)
         log_prob = TabulatedDensity.log_prob
@@ -62,7 +62,7 @@ def evaluated(
     return added
 
 
-def _tabulated(density: SymmetricDensity, tell: Sink) -> TabulatedDensity:
+def _tabulated(density: Density, tell: Sink) -> TabulatedDensity:
     """The density's table, its error told."""
     tell(Progress(0.0, "making a table"))
     made = TabulatedDensity(density)

@@ -12,16 +12,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
 
+from density.blends import blended
 from orbiflow.density import (
     AdaptiveKernels,
-    BlendedDensity,
-    UniformBase,
+    Mixture,
+    UniformDensity,
     density_page,
     density_picture,
     make_space,
     map_picture,
 )
-from orbiflow.density.models import still_flow
+from orbiflow.density.models import identity_flow
 from orbiflow.density.pictures.dots import COVER, roomy
 from orbiflow.drawing import Picture, Sheet
 
@@ -56,7 +57,7 @@ def test_few_dots(count: int) -> None:
     assert (widths > 0).all()
 
 
-def peaked(name: str) -> BlendedDensity:
+def peaked(name: str) -> Mixture:
     """One narrow peak on an even floor."""
     space = make_space(name)
     kernels = AdaptiveKernels(
@@ -66,7 +67,7 @@ def peaked(name: str) -> BlendedDensity:
         torch.ones(1).double(),
     )
     shares = torch.tensor([0.0, 0.9, 0.1]).double()
-    return BlendedDensity(space, still_flow(space), UniformBase(space), kernels, shares)
+    return blended(space, identity_flow(space), UniformDensity(space), kernels, shares)
 
 
 def pixels(picture: Picture) -> np.ndarray:

@@ -14,15 +14,16 @@ import pytest
 import torch
 from PIL import Image
 
+from density.blends import blended
 from orbiflow.density import (
     AdaptiveKernels,
-    BlendedDensity,
+    FlowDensity,
+    Mixture,
     ProjectivePlane,
     RoundSpace,
     Sphere,
-    SymmetricDensity,
     Torus,
-    UniformBase,
+    UniformDensity,
     map_picture,
     map_samples_picture,
 )
@@ -51,7 +52,7 @@ def _coarse(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("orbiflow.density.pictures.values._COARSE", 24)
 
 
-def peaked(space: RoundSpace, at: tuple[float, float], kappa: float) -> BlendedDensity:
+def peaked(space: RoundSpace, at: tuple[float, float], kappa: float) -> Mixture:
     flow = Flow([FourierField(space.group, 1, dtype=torch.float64)], steps=1)
     kernels = AdaptiveKernels(
         space,
@@ -60,7 +61,7 @@ def peaked(space: RoundSpace, at: tuple[float, float], kappa: float) -> BlendedD
         torch.ones(1, dtype=torch.float64),
     )
     shares = torch.tensor([0.0, 0.99, 0.01], dtype=torch.float64)
-    return BlendedDensity(space, flow, UniformBase(space), kernels, shares)
+    return blended(space, flow, UniformDensity(space), kernels, shares)
 
 
 def points(count: int) -> torch.Tensor:
@@ -91,11 +92,8 @@ def test_kernels_are_summed_as_finely_as_a_picture_needs(
     )
     kappa = torch.tensor(10 ** rng.uniform(0, 4, (count, 1)))
     weights = torch.full((count,), 1 / count, dtype=torch.float64)
-    simple = peaked(space, (0, 0), 3.0)
-    density = BlendedDensity(
-        space, simple.flow, simple.base, AdaptiveKernels(space, centers, kappa, weights),
-        simple.shares,
-    )  # fmt: skip
+    kernels = AdaptiveKernels(space, centers, kappa, weights)
+    density = Mixture([kernels, UniformDensity(space)], [0.99, 0.01])
     found = density_on_map(density, points(300), "natural", 1e-9)
     np.testing.assert_allclose(found, density_at(density, points(300), "natural"), rtol=1e-4)
 
@@ -191,6 +189,6 @@ def test_coastlines_are_drawn_and_cut() -> None:
 
 def test_maps_of_other_spaces_are_refused() -> None:
     space = Torus(2)
-    density = SymmetricDensity(space, Flow([FourierField(space.group, 1)], steps=1))
+    density = FlowDensity(space, Flow([FourierField(space.group, 1)], steps=1))
     with pytest.raises(OrbiflowError, match="maps are of the sphere"):
         map_picture(density)

@@ -13,11 +13,13 @@ import torch
 from orbiflow.density import (
     MODEL,
     PICTURES,
+    Density,
     DensityEstimator,
+    FlowDensity,
     PlotSettings,
     Sphere,
-    SymmetricDensity,
     Torus,
+    UniformDensity,
     density_to_bytes,
     plot_density,
 )
@@ -39,11 +41,11 @@ def _coarse(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("orbiflow.density.pictures.choice.SAMPLES", 50)
 
 
-def example(space: Any = None) -> SymmetricDensity:
+def example(space: Any = None) -> Density:
     space = space or Torus(2)
     field = FourierField(space.group, 1, dtype=torch.float64)
     field.parameters_.data.normal_(0, 0.02, generator=torch.Generator().manual_seed(3))
-    return SymmetricDensity(space, Flow([field], steps=1))
+    return FlowDensity(space, Flow([field], steps=1))
 
 
 def names(folder: Path) -> set[str]:
@@ -145,7 +147,7 @@ def test_what_does_not_fit_the_density_is_refused_before_anything_is_written(
         (Torus(2), PlotSettings(radius=20), "radius belongs to maps"),
     ):
         density = example() if space.dim == 2 and space.is_torus else None
-        density = density or SymmetricDensity(space, example().flow)
+        density = density or UniformDensity(space)
         with pytest.raises(OrbiflowError, match=message):
             plot_density(density, out, settings)
     with pytest.raises(OrbiflowError):

@@ -10,20 +10,22 @@ import torch
 from matplotlib.contour import QuadContourSet
 from matplotlib.path import Path as MapPath
 
+from density.blends import blended
 from orbiflow.density import (
     AdaptiveKernels,
-    BlendedDensity,
+    Density,
     DensityLevels,
+    FlowDensity,
+    Mixture,
     PlotSettings,
-    SymmetricDensity,
-    UniformBase,
+    UniformDensity,
     density_picture,
     make_space,
     map_picture,
     plot_density,
     to_vectors,
 )
-from orbiflow.density.models import still_flow
+from orbiflow.density.models import identity_flow
 from orbiflow.density.pictures.axes import view_of
 from orbiflow.density.pictures.projections import EqualEarth
 from orbiflow.density.pictures.regions import RegionLine
@@ -33,7 +35,7 @@ SPACES = ("torus", "klein-bottle", "sphere", "projective-plane")
 MEASURES = ("natural", "square", "uniform")
 
 
-def broad(name: str) -> BlendedDensity:
+def broad(name: str) -> Mixture:
     """Some broad kernels."""
     space, rng = make_space(name), np.random.default_rng(5)
     kernels = AdaptiveKernels(
@@ -43,10 +45,10 @@ def broad(name: str) -> BlendedDensity:
         torch.full((4,), 0.25).double(),
     )
     shares = torch.tensor([0.0, 0.8, 0.2]).double()
-    return BlendedDensity(space, still_flow(space), UniformBase(space), kernels, shares)
+    return blended(space, identity_flow(space), UniformDensity(space), kernels, shares)
 
 
-def lines_of(density: BlendedDensity) -> list[RegionLine]:
+def lines_of(density: Mixture) -> list[RegionLine]:
     levels = DensityLevels(density, samples=4000)
     return [RegionLine(mass, levels.highest(mass).log_prob) for mass in (0.9, 0.5)]
 
@@ -93,7 +95,7 @@ def test_lines_on_a_map(measure: str) -> None:
 def test_logarithms_are_for_lines_alone(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     called: list[int] = []
 
-    def counted(_: SymmetricDensity, values: np.ndarray, *_rest: object) -> np.ndarray:
+    def counted(_: Density, values: np.ndarray, *_rest: object) -> np.ndarray:
         called.append(len(values))
         return np.log(values)
 
@@ -119,6 +121,6 @@ def test_masses_that_cannot_be_drawn(tmp_path: Any) -> None:
         with pytest.raises(OrbiflowError, match=said):
             PlotSettings(regions=masses)
     space = make_space("torus", dim=3)
-    flat = SymmetricDensity(space, still_flow(space))
+    flat = FlowDensity(space, identity_flow(space))
     with pytest.raises(OrbiflowError, match="regions are drawn in two dimensions"):
         plot_density(flat, tmp_path / "out", PlotSettings(regions=(0.5,)))

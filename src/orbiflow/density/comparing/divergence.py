@@ -19,7 +19,7 @@ from orbiflow.density.fitting import (
     Progress,
     fit_automatic,
 )
-from orbiflow.density.models import BlendedDensity
+from orbiflow.density.models import Mixture
 from orbiflow.density.spaces import Space
 from orbiflow.errors import OrbiflowError
 
@@ -149,7 +149,7 @@ def _trust(own: Array, weights: Array) -> float:
     return float(found.x)
 
 
-def _fit(space: Space, train: Tensor, seed: int) -> BlendedDensity:
+def _fit(space: Space, train: Tensor, seed: int) -> Mixture:
     try:
         return fit_automatic(space, train, AutomaticSettings(parts=PARTS, seed=seed))[0]
     except OrbiflowError as error:

@@ -21,7 +21,7 @@ from orbiflow.arrays import Array
 from orbiflow.density.arguments import check_kind
 from orbiflow.density.comparing.resampling import Groups, resampled_sums
 from orbiflow.density.estimator import DensityEstimator
-from orbiflow.density.models import SymmetricDensity
+from orbiflow.density.models import Density
 from orbiflow.density.spaces import Space
 from orbiflow.errors import OrbiflowError
 
@@ -265,7 +265,7 @@ BLOCK = 65_536
 
 
 def compare_models(
-    models: Mapping[str, SymmetricDensity | DensityEstimator],
+    models: Mapping[str, Density | DensityEstimator],
     data: ArrayLike,
     *,
     groups: ArrayLike | None = None,
@@ -291,9 +291,7 @@ def compare_models(
     return compare_scores(scores, groups=groups, resamples=resamples, level=level, seed=seed)
 
 
-def density_of(
-    model: SymmetricDensity | DensityEstimator, name: str = "the model"
-) -> SymmetricDensity:
+def density_of(model: Density | DensityEstimator, name: str = "the model") -> Density:
     """The density of a fitted estimator, or itself.
 
     Raises:
@@ -304,7 +302,7 @@ def density_of(
         if density is None:
             raise OrbiflowError(f"{name} is not fitted yet: call fit first")
         return density
-    return check_kind(model, SymmetricDensity, name, "or a fitted DensityEstimator")
+    return check_kind(model, Density, name, "or a fitted DensityEstimator")
 
 
 def require_one_space(spaces: Mapping[str, Space]) -> None:
@@ -327,7 +325,7 @@ def require_one_space(spaces: Mapping[str, Space]) -> None:
 
 
 def scores_of(
-    density: SymmetricDensity, data: ArrayLike, told: Callable[[float], None] = lambda _: None
+    density: Density, data: ArrayLike, told: Callable[[float], None] = lambda _: None
 ) -> Array:
     """Log densities (N,) at data (N, k), in natural measure; `told` the share of rows done."""
     points = density.space.to_chart(data)

@@ -1,15 +1,11 @@
 from .automatic import PARTS as PARTS
 from .automatic import AutomaticSettings as AutomaticSettings
 from .automatic import fit_automatic as fit_automatic
-from .chains import ChainsFit as ChainsFit
-from .chains import fit_chains as fit_chains
 from .flow import fit_density as fit_density
 from .flow_trial import flow_settings as flow_settings
 from .folds import lightest_folds as lightest_folds
 from .kernels import blend_kernels as blend_kernels
 from .likelihood import Refinement as Refinement
-from .neural import NeuralSettings as NeuralSettings
-from .neural import fit_neural as fit_neural
 from .report import FitReport as FitReport
 from .report import Progress as Progress
 from .rows import check_missing as check_missing

@@ -47,6 +47,7 @@ from orbiflow.density.fitting.report import (
     FitReport,
     PartEvidence,
     Progress,
+    mass_with,
     mean_nll,
     own_points,
     steps_note,
@@ -68,14 +69,13 @@ from orbiflow.density.fitting.rows import (
 from orbiflow.density.fitting.settings import FitSettings
 from orbiflow.density.fitting.weights import stacked, supported_weights
 from orbiflow.density.inference import at_observed
-from orbiflow.density.models import MOST_DIM, BlendedDensity
+from orbiflow.density.models import MOST_DIM, Mixture
 from orbiflow.density.spaces import (
     Space,
     Torus,
     whole_turn,
 )
 from orbiflow.errors import OrbiflowError
-from orbiflow.typed_torch import listed
 
 PARTS = ("flow", "kernels", "mixture", "chains", "network")
 """What a density may be made of, beside its uniform floor."""
@@ -140,7 +140,7 @@ def fit_automatic(
     weights: Any = None,
     groups: ArrayLike | None = None,
     progress: Progress | None = None,
-) -> tuple[BlendedDensity, FitReport]:
+) -> tuple[Mixture, FitReport]:
     """Fit what suits the data best: a mixture of densities with weights by rows held out.
 
     Kernel estimates of many widths, mixtures and von Mises chains of many sizes and, of many angles, a
@@ -222,11 +222,11 @@ def _rows(
 
 def _families(
     space: Space, folds: Folds, settings: AutomaticSettings, found: Repeats
-) -> list[Family]:
+) -> list[Family[Any]]:
     rounding = settings.repeats == "rounding"
     narrowest = _narrowest(space, found.step) if rounding else NARROWEST
     starts = max(1, round(MEMBERS / folds.used)) if space.dim > MOST_DIM else 1
-    families: list[Family] = [
+    families: list[Family[Any]] = [
         KernelFamily(space, narrowest, repeats=not rounding),
         MixtureFamily(space, settings.seed, narrowest),
     ]
@@ -238,8 +238,8 @@ def _families(
     beside = "flow" in settings.parts and settings.parts not in (PARTS, ("flow",))
     if beside and space.dim > MOST_DIM:
         raise OrbiflowError(
-            f"on a torus of {space.dim} angles a flow stands alone: leave it out of the parts, or all "
-            "others"
+            f"a flow has {MOST_DIM} dimensions at most, this {space.name} has {space.dim}: leave it "
+            "out of the parts"
         )
     if not chosen and (space.dim > MOST_DIM or settings.parts != ("flow",)):
         raise OrbiflowError(
@@ -307,7 +307,7 @@ def _shrunk(parts: list[PartEvidence], flow: float) -> list[PartEvidence]:
 
 
 def _report(
-    density: BlendedDensity,
+    density: Mixture,
     folds: Folds,
     candidates: Candidates,
     weights: Tensor,
@@ -332,7 +332,7 @@ def _report(
     some = folds.rows[:SCORED]
     mass = None
     if density.space.dim == 2:
-        mass = density.mass_with(flow.mass) if flow and flow.mass is not None else 1.0
+        mass = mass_with(tried.share, flow.mass) if flow and flow.mass is not None else 1.0
     return FitReport(
         points=len(folds.rows),
         duplicates=found.rows,
@@ -344,10 +344,10 @@ def _report(
         else mean_nll(density, some.points, some.weights),
         validation_nll=-held,
         stages=flow.stages if flow else (),
-        steps=density.flow.steps,
+        steps=flow.steps if flow else 1,
         mass=mass,
         integration_error=error,
-        shares=tuple(listed(density.shares)),
+        weights=density.weight_of_kind,
         parts=parts,
         repeats=found,
         effective=None if folds.rows.weights is None else effective_rows(folds.rows.weights),
@@ -358,6 +358,6 @@ def _report(
             *_untried_note(density.space, folds, settings),
             *found.notes(settings.repeats),
             *budget.notes(),
-            *steps_note(density, error),
+            *steps_note(flow.steps if flow else 1, error),
         ),
     )

@@ -1,27 +1,22 @@
-"""Fitting a mixture of von Mises chains: EM with a prior, size by validation, averaged starts."""
+"""Fitting a mixture of von Mises chains by EM with a prior."""
 
 from __future__ import annotations
 
 import math
-import time
-from collections.abc import Callable
-from dataclasses import dataclass
 
 import torch
 from torch import Tensor
 
-from orbiflow.density.fitting.budget import Budget, training
+from orbiflow.density.fitting.budget import Budget
 from orbiflow.density.fitting.rows import Rows
 from orbiflow.density.models import (
     SCALES,
     VonMisesChains,
-    averaged,
     chained,
     shares_of,
     waves,
 )
 from orbiflow.density.spaces import Space
-from orbiflow.errors import OrbiflowError
 from orbiflow.typed_torch import linalg, special
 
 PRIOR, PRIOR_RESULTANT = 0.05, 0.9
@@ -38,101 +33,6 @@ STRAIGHT = 5
 
 EVERY, PATIENCE = 5, 2
 """Iterations between looks at the validation points, and looks that may bring nothing better."""
-
-SMALLEST, PER_POINT = 8, 10
-"""Components tried first, and training points that each must have on average."""
-
-WORTHWHILE = 0.01
-"""Nats of validation that twice as many components must bring."""
-
-Watch = Callable[[float, str], None]
-"""Told the share of the work done and what is being done."""
-
-
-@dataclass(frozen=True)
-class ChainsFit:
-    """What a fit found: the mixture, components of each member, members; whether time ran out."""
-
-    mixture: VonMisesChains
-    components: int
-    members: int
-    late: bool
-    seconds: float
-
-
-@training()
-def fit_chains(
-    space: Space,
-    train: Tensor,
-    validation: Tensor,
-    *,
-    components: int = 64,
-    members: int = 12,
-    iterations: int = 60,
-    seconds: float = math.inf,
-    seed: int = 0,
-    watch: Watch | None = None,
-) -> ChainsFit:
-    """Mixtures of 8, 16, ... components while validation improves, then the mean of several starts.
-
-    EM ends in another optimum from every start; the mean of their densities is better on new points
-    than any of them (Breiman, Bagging predictors, 1996, without the bootstrap). Starts after the
-    first have their angles in random orders, so that they differ more (as in Germain et al., MADE,
-    2015).
-
-    Args:
-        space: a `Torus`.
-        train, validation: (N, d) and (M, d) canonical points, float64.
-        components: at most, in each member.
-        members: starts that are averaged; those that do not help on `validation` are left out.
-        iterations: of EM, at most.
-        seconds: after which no further iteration of EM begins; the first mixture has its start at
-            least.
-        seed: of the starts.
-        watch: told how far it is.
-
-    Raises:
-        OrbiflowError: for a space that is not a torus, or fewer than two training points.
-    """
-    if len(train) < 2 or not len(validation):
-        raise OrbiflowError(f"a mixture needs 2 training points or more, got {len(train)}")
-    began, budget = time.monotonic(), Budget(seconds=seconds)
-    rows, held = Rows(train), Rows(validation)
-    most = max(1, min(components, len(train) // PER_POINT))
-    generator = torch.Generator().manual_seed(seed)
-    size = min(SMALLEST, most)
-
-    def start(count: int, order: Tensor) -> VonMisesChains:
-        spread = spread_chains(space, rows, count, order, generator)
-        return fit_chain_mixture(spread, rows, held, iterations, budget)
-
-    natural = torch.arange(space.dim)
-    best = start(size, natural)
-    while size < most:
-        if budget.is_spent:
-            break
-        larger = min(2 * size, most)
-        if watch is not None:
-            watch(0.0, f"mixture of {larger} components")
-        found = start(larger, natural)
-        if _nll(found, held) > _nll(best, held) - WORTHWHILE:
-            break
-        size, best = larger, found
-    kept, score = [best], best.log_prob(validation)
-    for number in range(1, members):
-        if budget.is_spent:
-            break
-        if watch is not None:
-            watch(number / members, f"mixture of {size} components, start {number + 1}")
-        found = start(size, torch.randperm(space.dim, generator=generator))
-        joint = torch.logaddexp(score, found.log_prob(validation))
-        if _mean(joint, len(kept) + 1) > _mean(score, len(kept)):
-            kept, score = [*kept, found], joint
-    return ChainsFit(averaged(kept), size, len(kept), budget.is_late, time.monotonic() - began)
-
-
-def _mean(log_sum: Tensor, count: int) -> float:
-    return float(log_sum.mean()) - math.log(count)
 
 
 def _nll(mixture: VonMisesChains, rows: Rows) -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import count
+from typing import Any
 
 import torch
 from torch import Tensor
@@ -26,7 +27,7 @@ from orbiflow.density.fitting.weights import (
     stacked,
     stacking_weights,
 )
-from orbiflow.density.models import Base, UniformBase
+from orbiflow.density.models import Density, UniformDensity
 from orbiflow.density.spaces import Space
 from orbiflow.typed_torch import listed
 
@@ -52,7 +53,7 @@ class Candidates:
     families: list[str]
     names: list[str]
     table: Tensor
-    fitted: dict[str, list[dict[str, Base]]]
+    fitted: dict[str, list[dict[str, Density]]]
     row_weights: Tensor | None = None
 
     @property
@@ -66,12 +67,12 @@ class Candidates:
 
 
 def candidates_of(
-    space: Space, families: list[Family], folds: Folds, say: Progress, budget: Budget
+    space: Space, families: list[Family[Any]], folds: Folds, say: Progress, budget: Budget
 ) -> Candidates:
     """Fit all families to all folds; after the first, only what may be of use."""
     blocks: list[dict[tuple[str, str], Tensor]] = []
     weights: list[Tensor | None] = []
-    fitted: dict[str, list[dict[str, Base]]] = {family.name: [] for family in families}
+    fitted: dict[str, list[dict[str, Density]]] = {family.name: [] for family in families}
     for number, (train, held) in enumerate(folds):
         if number and budget.is_spent:
             break
@@ -85,7 +86,7 @@ def candidates_of(
             with torch.no_grad():
                 for name, part in found.items():
                     block[family.name, name] = log_prob_of_rows(part, held.points)
-        block[FLOOR, FLOOR] = log_prob_of_rows(UniformBase(space), held.points)
+        block[FLOOR, FLOOR] = log_prob_of_rows(UniformDensity(space), held.points)
         blocks.append(block)
         weights.append(held.weights)
         if number == 0:
@@ -113,7 +114,7 @@ def _teller(number: int, used: int, say: Progress) -> Callable[[str], None]:
     return tell
 
 
-def _narrow(families: list[Family], block: dict[tuple[str, str], Tensor], held: Rows) -> None:
+def _narrow(families: list[Family[Any]], block: dict[tuple[str, str], Tensor], held: Rows) -> None:
     """Of each family keep what has most weight in the first fold, and the best alone."""
     keys = list(block)
     table = torch.stack([block[key] for key in keys])

@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
+from typing import Generic, TypeVar
 
 import torch
 from torch import Tensor
@@ -13,7 +14,6 @@ from orbiflow.density.fitting.budget import Budget
 from orbiflow.density.fitting.chains import fit_chain_mixture, spread_chains
 from orbiflow.density.fitting.kernels import (
     NARROWEST,
-    joined,
     kernel_estimates,
 )
 from orbiflow.density.fitting.mixtures import fit_mixture
@@ -31,7 +31,7 @@ from orbiflow.density.fitting.rows import (
 from orbiflow.density.fitting.weights import gain_of
 from orbiflow.density.models import (
     AdaptiveKernels,
-    Base,
+    Density,
     VonMisesChains,
     VonMisesNetwork,
     averaged,
@@ -61,17 +61,21 @@ Say = Callable[[str], None]
 """Told what is being tried."""
 
 
-class Family(ABC):
-    """Densities of a kind, by their names."""
+D = TypeVar("D", bound=Density)
+"""The class of the densities of a family."""
+
+
+class Family(ABC, Generic[D]):
+    """Candidates of one class of densities, by their names."""
 
     name: str
 
     @abstractmethod
-    def fitted(self, number: int, train: Rows, held: Rows, say: Say) -> dict[str, Base]:
+    def fitted(self, number: int, train: Rows, held: Rows, say: Say) -> dict[str, D]:
         """What is fitted to the training rows of a fold, to be judged by the rows held out."""
 
     @abstractmethod
-    def final(self, rows: Rows, folds: list[dict[str, Base]], names: list[str]) -> list[Base]:
+    def final(self, rows: Rows, folds: list[dict[str, D]], names: list[str]) -> list[D]:
         """What the density is made of, given all rows and what was fitted to each fold."""
 
     def keep(self, names: set[str]) -> None:
@@ -80,7 +84,7 @@ class Family(ABC):
 
 
 @dataclass
-class KernelFamily(Family):
+class KernelFamily(Family[AdaptiveKernels]):
     """Kernel estimates, in the end about all rows."""
 
     space: Space
@@ -88,12 +92,14 @@ class KernelFamily(Family):
     repeats: bool = True
     name = "kernels"
 
-    def fitted(self, number: int, train: Rows, held: Rows, say: Say) -> dict[str, Base]:
+    def fitted(self, number: int, train: Rows, held: Rows, say: Say) -> dict[str, AdaptiveKernels]:
         del number, held
         say("kernels")
-        return dict(self._estimates(train))
+        return self._estimates(train)
 
-    def final(self, rows: Rows, folds: list[dict[str, Base]], names: list[str]) -> list[Base]:
+    def final(
+        self, rows: Rows, folds: list[dict[str, AdaptiveKernels]], names: list[str]
+    ) -> list[AdaptiveKernels]:
         del folds
         found = self._estimates(rows)
         return [found[name] for name in names]
@@ -116,7 +122,7 @@ class KernelFamily(Family):
 
 
 @dataclass
-class MixtureFamily(Family):
+class MixtureFamily(Family[AdaptiveKernels]):
     """Mixtures of several sizes, in the end the mean of those of all folds.
 
     By concavity the mean of densities scores at least the mean of their scores, and EM ends in another
@@ -129,12 +135,12 @@ class MixtureFamily(Family):
     sizes: tuple[int, ...] | None = None
     name = "mixture"
 
-    def fitted(self, number: int, train: Rows, held: Rows, say: Say) -> dict[str, Base]:
+    def fitted(self, number: int, train: Rows, held: Rows, say: Say) -> dict[str, AdaptiveKernels]:
         train = train[:MOST_MIXED]
         whole = int(is_whole(train).sum())
         generator = torch.Generator().manual_seed(self.seed + number)
 
-        def fit(size: int) -> Base:
+        def fit(size: int) -> AdaptiveKernels:
             say(f"mixture of {size}")
             return fit_mixture(
                 self.space,
@@ -149,13 +155,14 @@ class MixtureFamily(Family):
             return _grown(fit, [k for k in SIZES if k == 1 or MIXTURE_ROWS * k <= whole], held)
         return {str(size): fit(size) for size in self.sizes}
 
-    def final(self, rows: Rows, folds: list[dict[str, Base]], names: list[str]) -> list[Base]:
+    def final(
+        self, rows: Rows, folds: list[dict[str, AdaptiveKernels]], names: list[str]
+    ) -> list[AdaptiveKernels]:
         del rows
-        found: list[Base] = []
+        found: list[AdaptiveKernels] = []
         for name in names:
             parts = [fold[name] for fold in folds if name in fold]
-            kernels = [part for part in parts if isinstance(part, AdaptiveKernels)]
-            found.append(joined(kernels, torch.ones(len(kernels), dtype=torch.float64)))
+            found.append(AdaptiveKernels.joined(parts, torch.ones(len(parts), dtype=torch.float64)))
         return found
 
     def keep(self, names: set[str]) -> None:
@@ -163,7 +170,7 @@ class MixtureFamily(Family):
 
 
 @dataclass
-class ChainFamily(Family):
+class ChainFamily(Family[VonMisesChains]):
     """Mixtures of von Mises chains on a torus, in the end the mean of those of all folds.
 
     Args:
@@ -176,9 +183,8 @@ class ChainFamily(Family):
     starts: int = 1
     sizes: tuple[int, ...] | None = None
     name = "chains"
-    _first: dict[str, Base] = field(default_factory=dict[str, Base])
 
-    def fitted(self, number: int, train: Rows, held: Rows, say: Say) -> dict[str, Base]:
+    def fitted(self, number: int, train: Rows, held: Rows, say: Say) -> dict[str, VonMisesChains]:
         train = train[:MOST_CHAINED]
         generator = torch.Generator().manual_seed(self.seed + number)
         natural = torch.arange(self.space.dim)
@@ -200,12 +206,14 @@ class ChainFamily(Family):
             for size in self.sizes
         }
 
-    def final(self, rows: Rows, folds: list[dict[str, Base]], names: list[str]) -> list[Base]:
+    def final(
+        self, rows: Rows, folds: list[dict[str, VonMisesChains]], names: list[str]
+    ) -> list[VonMisesChains]:
         del rows
-        found: list[Base] = []
+        found: list[VonMisesChains] = []
         for name in names:
             parts = [fold[name] for fold in folds if name in fold]
-            found.append(averaged([part for part in parts if isinstance(part, VonMisesChains)]))
+            found.append(averaged(parts))
         return found
 
     def keep(self, names: set[str]) -> None:
@@ -213,7 +221,7 @@ class ChainFamily(Family):
 
 
 @dataclass
-class NetworkFamily(Family):
+class NetworkFamily(Family[VonMisesNetwork]):
     """A Bayesian network on a torus of many angles: its arrows are those that the first fold says."""
 
     space: Torus
@@ -222,7 +230,7 @@ class NetworkFamily(Family):
     name = "network"
     _shapes: list[Shape] = field(default_factory=list[Shape])
 
-    def fitted(self, number: int, train: Rows, held: Rows, say: Say) -> dict[str, Base]:
+    def fitted(self, number: int, train: Rows, held: Rows, say: Say) -> dict[str, VonMisesNetwork]:
         train = train[:MOST_CHAINED]
         generator = torch.Generator().manual_seed(self.seed + number)
         if not self._shapes:
@@ -234,16 +242,18 @@ class NetworkFamily(Family):
             "network": fit_network(self.space, train, held, self._shapes, generator, self.starts)
         }
 
-    def final(self, rows: Rows, folds: list[dict[str, Base]], names: list[str]) -> list[Base]:
+    def final(
+        self, rows: Rows, folds: list[dict[str, VonMisesNetwork]], names: list[str]
+    ) -> list[VonMisesNetwork]:
         del rows
         found = [part for fold in folds for part in fold.values()]
-        mean = averaged_networks([part for part in found if isinstance(part, VonMisesNetwork)])
+        mean = averaged_networks(found)
         return [mean for _ in names]
 
 
-def _grown(fit: Callable[[int], Base], sizes: Iterable[int], held: Rows) -> dict[str, Base]:
+def _grown(fit: Callable[[int], D], sizes: Iterable[int], held: Rows) -> dict[str, D]:
     """Fits of growing size, until one is clearly worse on the held-out rows than the best before."""
-    found: dict[str, Base] = {}
+    found: dict[str, D] = {}
     best: Tensor | None = None
     for size in sizes:
         part = found[str(size)] = fit(size)

@@ -22,6 +22,7 @@ from orbiflow.density.fitting.report import (
     MOST_REPORTED,
     FitReport,
     Progress,
+    mass_with,
     mean_nll,
     nll_at,
     own_points,
@@ -40,16 +41,15 @@ from orbiflow.density.fitting.rows import (
 from orbiflow.density.fitting.settings import FitSettings
 from orbiflow.density.models import (
     MOST_DIM,
-    Base,
-    SymmetricDensity,
-    UniformBase,
-    VonMisesBase,
+    Density,
+    FlowDensity,
+    UniformDensity,
+    VonMisesDensity,
 )
 from orbiflow.density.spaces import Space
 from orbiflow.errors import OrbiflowError
 from orbiflow.fields import SplineField
 from orbiflow.flows import Flow
-from orbiflow.typed_torch import listed
 
 MOST_TRAINING_STEPS = 16
 """Runge-Kutta steps a segment, to which they are doubled where the integrator has not converged."""
@@ -65,7 +65,7 @@ MERGED, CROWD = 4096, 2
 
 
 def refine_in_stages(
-    density: SymmetricDensity,
+    density: FlowDensity,
     train: Rows,
     validation: Rows,
     settings: FitSettings,
@@ -129,7 +129,7 @@ def refine_in_stages(
     return stages
 
 
-def _exploits(density: SymmetricDensity, held: Rows, stage: Refinement) -> bool:
+def _exploits(density: FlowDensity, held: Rows, stage: Refinement) -> bool:
     if stage.best == 0:
         return False
     honest = nll_at(density, held.points, 4 * density.flow.steps, held.weights)
@@ -142,7 +142,7 @@ def _shares(rows: Rows) -> Tensor | None:
 
 
 @torch.no_grad()
-def _restore(density: SymmetricDensity, values: list[Tensor]) -> None:
+def _restore(density: FlowDensity, values: list[Tensor]) -> None:
     for parameter, value in zip(density.flow.parameters(), values, strict=True):
         parameter.copy_(value)
 
@@ -162,13 +162,13 @@ def fit_density(
     *,
     weights: Any = None,
     progress: Progress | None = None,
-) -> tuple[SymmetricDensity, FitReport]:
+) -> tuple[Density, FitReport]:
     """Fit a flow of spline fields to canonical points by flow matching, then by likelihood.
 
     Points that share a small cell are merged, so the time hardly grows with their number.
 
     Args:
-        space: of three dimensions at most; see `fit_neural` for tori of more.
+        space: of three dimensions at most.
         points: (N, d) in the chart, anything that NumPy takes, N >= 10 different ones.
         settings: default `FitSettings()`.
         weights: of the points (N,), at least 0; only their ratios count; default equal.
@@ -185,8 +185,8 @@ def fit_density(
     check_kind(settings, FitSettings, "settings")
     if check_kind(space, Space, "space", "see `make_space`").dim > MOST_DIM:
         raise OrbiflowError(
-            f"splines have grids of {MOST_DIM} dimensions at most, this {space.name} has {space.dim}: "
-            "call `fit_neural`"
+            f"a flow has {MOST_DIM} dimensions at most, this {space.name} has {space.dim}: fit other "
+            'components, such as "kernels,mixture,chains,network"'
         )
     say = progress or silent
     generator = torch.Generator().manual_seed(settings.seed)
@@ -194,36 +194,35 @@ def fit_density(
     order, out, duplicates = sides(rows.points, settings.validation, generator)
     train, validation = (rows[order[side]] for side in (~out, out))
     say(0.0, "matching")
-    density = _start(space, train, settings, generator)
+    flow = _start(space, train, settings, generator)
     start_nll = mean_nll(
-        density, validation.points.to(next(density.flow.parameters()).dtype), validation.weights
+        flow, validation.points.to(next(flow.flow.parameters()).dtype), validation.weights
     )
     budget = Budget(settings.evaluations, settings.seconds)
-    stages = refine_in_stages(density, train, validation, settings, say, budget)
-    density.flow.double()
-    error, mass = settle(density, validation.points[:MOST_HELD], MOST_STEPS)
+    stages = refine_in_stages(flow, train, validation, settings, say, budget)
+    flow.flow.double()
+    error, mass = settle(flow, validation.points[:MOST_HELD], MOST_STEPS)
     notes = [
         *weights_note(rows),
         *repeats_note(len(rows), duplicates),
         *budget.notes(),
-        *steps_note(density, error),
+        *steps_note(flow.flow.steps, error),
     ]
-    shares = None
+    found: dict[str, float] | None = None
+    density: Density = flow
     if settings.kernels:
         say(1.0, "kernels")
-        density = blend_kernels(
-            density,
+        mixture = blend_kernels(
+            flow,
             train.points,
             validation.points,
             row_weights=train.weights,
             held_weights=validation.weights,
         )
-        mass = None if mass is None else density.mass_with(mass)
-        shares = tuple(listed(density.shares))
-        flow, kernels, floor = (f"{share:.1%}" for share in shares)
-        notes.append(
-            f"the density is a blend: flow {flow}, kernels {kernels}, uniform floor {floor}"
-        )
+        density, found = mixture, mixture.weight_of_kind
+        mass = None if mass is None else mass_with(found["flow"], mass)
+        shares = ", ".join(f"{name} {weight:.1%}" for name, weight in found.items())
+        notes.append(f"the density is a mixture: {shares}")
     report = FitReport(
         points=len(rows),
         duplicates=duplicates,
@@ -233,26 +232,26 @@ def fit_density(
         train_nll=_nll(density, train),
         validation_nll=_nll(density, validation),
         stages=tuple(stages),
-        steps=density.flow.steps,
+        steps=flow.flow.steps,
         mass=mass,
         integration_error=error,
-        shares=shares,
+        weights=found,
         effective=None if rows.weights is None else effective_rows(rows.weights),
         notes=(*notes, *_mass_note(space, mass)),
     )
     return density, report
 
 
-def _nll(density: SymmetricDensity, rows: Rows) -> float:
+def _nll(density: Density, rows: Rows) -> float:
     some = rows[:MOST_REPORTED]
     return mean_nll(density, some.points, some.weights)
 
 
 def _start(
     space: Space, train: Rows, settings: FitSettings, generator: torch.Generator
-) -> SymmetricDensity:
+) -> FlowDensity:
     """The closed-form start, by flow matching."""
-    base: Base = UniformBase(space) if settings.base == "uniform" else VonMisesBase(space)
+    base = UniformDensity(space) if settings.base == "uniform" else VonMisesDensity(space)
     dtype = torch.float32 if settings.single else torch.float64
     frequency = max_frequency(space, settings.detail)
     segments = [
@@ -269,7 +268,7 @@ def _start(
         ridge=settings.ridge,
         generator=generator,
     )
-    return SymmetricDensity(space, Flow(segments, steps=settings.steps, warn=False), base)
+    return FlowDensity(space, Flow(segments, steps=settings.steps, warn=False), base)
 
 
 def _matched(train: Rows, generator: torch.Generator) -> Tensor:

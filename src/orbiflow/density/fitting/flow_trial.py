@@ -22,7 +22,7 @@ from orbiflow.density.fitting.weights import (
     stacked,
     stacking_weights,
 )
-from orbiflow.density.models import MOST_DIM, SymmetricDensity
+from orbiflow.density.models import MOST_DIM, Density
 from orbiflow.density.spaces import Space
 
 FEW_ROWS, MANY_ROWS = 5_000, 20_000
@@ -39,7 +39,7 @@ FIRST = 2 / 3
 class TriedFlow(NamedTuple):
     """A flow, its share and what came of it; without a share there is none."""
 
-    flow: SymmetricDensity | None = None
+    flow: Density | None = None
     share: float = 0.0
     evidence: tuple[PartEvidence, ...] = ()
     report: FitReport | None = None
@@ -63,7 +63,7 @@ def try_flow(
         weights: (P,) of the candidates that it is to be beside.
     """
 
-    def fitted(number: int) -> tuple[SymmetricDensity, FitReport]:
+    def fitted(number: int) -> tuple[Density, FitReport]:
         train = folds.train(number)
         begin, end = ((0.0, FIRST), (FIRST, 1.0))[number]
         return fit_density(
@@ -91,7 +91,7 @@ def try_flow(
     return TriedFlow(density if kept else None, worth.share, (worth,), report)
 
 
-def _beside(density: SymmetricDensity, held: Rows, columns: Tensor, weights: Tensor) -> Tensor:
+def _beside(density: Density, held: Rows, columns: Tensor, weights: Tensor) -> Tensor:
     """Log densities (3, N) at rows held out: of the other parts, the flow, and the uniform one."""
     with torch.no_grad():
         own = density.log_prob(held.points)

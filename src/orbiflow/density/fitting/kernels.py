@@ -16,9 +16,9 @@ from orbiflow.density.fitting.folds import places
 from orbiflow.density.fitting.rows import mean_of
 from orbiflow.density.models import (
     AdaptiveKernels,
-    BlendedDensity,
-    SymmetricDensity,
-    UniformBase,
+    Density,
+    Mixture,
+    UniformDensity,
 )
 from orbiflow.density.spaces import Space
 from orbiflow.errors import OrbiflowError
@@ -39,13 +39,13 @@ FLOOR = 1e-3
 
 @training()
 def blend_kernels(
-    density: SymmetricDensity,
+    density: Density,
     train: Tensor,
     held: Tensor,
     *,
     row_weights: Tensor | None = None,
     held_weights: Tensor | None = None,
-) -> BlendedDensity:
+) -> Mixture:
     """A fitted density blended with adaptive kernels about the training points and a uniform floor.
 
     Each kernel's variance is a share of the mean square distance to its nearest neighbours (Breiman,
@@ -61,7 +61,7 @@ def blend_kernels(
         OrbiflowError: for points of another shape, fewer than three different ones to train on, or none
             held out.
     """
-    space = check_kind(density, SymmetricDensity, "density").space
+    space = check_kind(density, Density, "density").space
     train = points_tensor(train, space.dim, "training points", flat=True).double()
     held = points_tensor(held, space.dim, "held points", flat=True).double()
     centers, place, counts = unique(train, dim=0, return_inverse=True, return_counts=True)
@@ -79,19 +79,19 @@ def blend_kernels(
     held = held[:MOST_HELD]
     held_weights = None if held_weights is None else held_weights[:MOST_HELD]
     found_spreads = spreads(space, centers, [m for m in NEIGHBOURS if m < len(centers)])
-    uniform = UniformBase(space).log_prob(held)
+    uniform = UniformDensity(space)
     with torch.no_grad():
-        flow = density.log_prob(held)
+        others = [density.log_prob(held), uniform.log_prob(held)]
     best, found = -math.inf, None
     shrinkage = (1.0,) if space.is_round or space.dim == 1 else ISOTROPY
     for spread, scale, share in itertools.product(found_spreads, SCALES, shrinkage):
         mean = spread.mean(dim=1, keepdim=True)
         kappa = 1 / (scale * ((1 - share) * spread + share * mean))
         kernels = AdaptiveKernels(space, centers, kappa.clamp(WIDEST, NARROWEST), weights)
-        parts = torch.stack([flow, kernels.log_prob(held), uniform])
+        parts = torch.stack([others[0], kernels.log_prob(held), others[1]])
         shares, score = proportions(parts, row_weights=held_weights)
         if score > best:
-            best, found = score, BlendedDensity(space, density.flow, density.base, kernels, shares)
+            best, found = score, Mixture([density, kernels, uniform], shares)
     assert found is not None
     return found
 
@@ -194,16 +194,3 @@ def even_kernels(
     if weights is None:
         weights = torch.full((len(centers),), 1 / len(centers), dtype=torch.float64)
     return AdaptiveKernels(space, centers, centers.new_full((len(centers), width), kappa), weights)
-
-
-def joined(parts: list[AdaptiveKernels], shares: Tensor) -> AdaptiveKernels:
-    """The mixture of mixtures of kernels on one space, in proportions (P,)."""
-    weights = [
-        share * part.weights for share, part in zip(shares / shares.sum(), parts, strict=True)
-    ]
-    return AdaptiveKernels(
-        parts[0].space,
-        torch.cat([part.centers for part in parts]),
-        torch.cat([part.concentrations for part in parts]),
-        torch.cat(weights),
-    )

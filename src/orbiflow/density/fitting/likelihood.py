@@ -14,7 +14,7 @@ from torch import Tensor
 
 from orbiflow.arrays import Array
 from orbiflow.density.fitting.budget import Budget, Spent
-from orbiflow.density.models import SymmetricDensity
+from orbiflow.density.models import FlowDensity
 from orbiflow.fields import InvariantField
 from orbiflow.typed_torch import unique
 
@@ -71,7 +71,7 @@ class Objective:
 
     def __init__(
         self,
-        density: SymmetricDensity,
+        density: FlowDensity,
         points: Tensor,
         weights: Tensor | None = None,
         *,
@@ -133,7 +133,7 @@ class Objective:
 
 
 def refine(
-    density: SymmetricDensity,
+    density: FlowDensity,
     train: Tensor,
     validation: Tensor,
     *,
@@ -243,7 +243,7 @@ class _Descent:
         return self._nll(finer, self.validation, self.weights)
 
     @torch.no_grad()
-    def _nll(self, density: SymmetricDensity, points: Tensor, weights: Tensor) -> float:
+    def _nll(self, density: FlowDensity, points: Tensor, weights: Tensor) -> float:
         return -float((weights * density.log_prob(points)).sum())
 
 

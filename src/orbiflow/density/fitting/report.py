@@ -14,7 +14,7 @@ from orbiflow.density.arguments import check_kind, points_tensor
 from orbiflow.density.fitting.folds import Repeats
 from orbiflow.density.fitting.likelihood import Refinement
 from orbiflow.density.fitting.rows import mean_of
-from orbiflow.density.models import SymmetricDensity
+from orbiflow.density.models import Density, FlowDensity
 from orbiflow.density.spaces import Space
 from orbiflow.errors import OrbiflowError
 from orbiflow.typed_torch import unique
@@ -77,10 +77,9 @@ class FitReport:
     - `start_nll`: on the validation points, of the closed-form start.
     - `stages`: one for each roughness, without those that were undone.
     - `steps`: RK4 steps a segment, in the end.
-    - `mass`: integral over the square, see `SymmetricDensity.mass`; None above two dimensions.
+    - `mass`: integral over the square, see `FlowDensity.mass`; None above two dimensions.
     - `integration_error`: change of the flow's mean validation log density at doubled steps.
-    - `shares`: of flow, kernels, uniform floor, and chains and network if they are there; None for a
-      flow alone.
+    - `weights`: of each kind of component; None for a flow alone.
     - `parts`: of a fit by evidence, what each part is worth.
     - `repeats`: of a fit by evidence, what was found of rows that repeat another.
     - `effective`: rows of equal weight that say as much (Kish); None where all weigh the same.
@@ -98,7 +97,7 @@ class FitReport:
     steps: int
     mass: float | None
     integration_error: float
-    shares: tuple[float, ...] | None = None
+    weights: dict[str, float] | None = None
     parts: tuple[PartEvidence, ...] = ()
     repeats: Repeats | None = None
     effective: float | None = None
@@ -118,12 +117,12 @@ def report_from_json(document: Mapping[str, Any]) -> FitReport:
             for stage in values.pop("stages")
         )
         parts = tuple(PartEvidence(**part) for part in values.pop("parts"))
-        repeats, shares = values.pop("repeats"), values.pop("shares")
+        repeats = values.pop("repeats")
+        values.pop("shares", None)  # version 0.1 wrote them without names
         return FitReport(
             stages=stages,
             parts=parts,
             repeats=None if repeats is None else Repeats(**repeats),
-            shares=None if shares is None else tuple(shares),
             **values,
         )
     except (AttributeError, KeyError, TypeError, ValueError) as error:
@@ -142,17 +141,6 @@ def own_points(space: Space, points: Any) -> Tensor:
     """
     check_kind(space, Space, "space", "see `make_space`")
     return space.project(points_tensor(points, space.dim, flat=True).detach().double().clone())
-
-
-def split(points: Tensor, share: float, generator: torch.Generator) -> tuple[Tensor, Tensor, int]:
-    """Shuffle and hold out a share, equal points on the same side; and how many repeat another.
-
-    Raises:
-        OrbiflowError: if there are fewer than ten different points.
-    """
-    order, held, repeats = sides(points, share, generator)
-    points = points[order]
-    return points[~held], points[held], repeats
 
 
 def sides(points: Tensor, share: float, generator: torch.Generator) -> tuple[Tensor, Tensor, int]:
@@ -176,24 +164,24 @@ def sides(points: Tensor, share: float, generator: torch.Generator) -> tuple[Ten
 
 
 @torch.no_grad()
-def mean_nll(density: SymmetricDensity, points: Tensor, weights: Tensor | None = None) -> float:
+def mean_nll(density: Density, points: Tensor, weights: Tensor | None = None) -> float:
     """Mean negative log density at `points` (N, d), weighted, per area of the square."""
     return -mean_of(density.log_prob(points), weights)
 
 
 def nll_at(
-    density: SymmetricDensity, points: Tensor, steps: int, weights: Tensor | None = None
+    density: FlowDensity, points: Tensor, steps: int, weights: Tensor | None = None
 ) -> float:
     """`mean_nll` with another number of Runge-Kutta steps a segment."""
     return mean_nll(density.with_steps(steps), points, weights)
 
 
-def step_error(density: SymmetricDensity, points: Tensor) -> float:
+def step_error(density: FlowDensity, points: Tensor) -> float:
     """Change of the mean log density at `points` when the steps are doubled."""
     return abs(nll_at(density, points, 2 * density.flow.steps) - mean_nll(density, points))
 
 
-def settle(density: SymmetricDensity, points: Tensor, most: int) -> tuple[float, float | None]:
+def settle(density: FlowDensity, points: Tensor, most: int) -> tuple[float, float | None]:
     """Double the steps until the mean log density has settled and, in two dimensions, the mass is 1.
 
     Args:
@@ -216,6 +204,11 @@ def settle(density: SymmetricDensity, points: Tensor, most: int) -> tuple[float,
         density.flow, now = density.flow.with_steps(2 * density.flow.steps), finer
 
 
+def mass_with(weight: float, mass: float) -> float:
+    """Return the integral of a mixture in which a flow has this weight, and itself this integral."""
+    return weight * mass + 1 - weight
+
+
 def repeats_note(count: int, duplicates: int) -> list[str]:
     """What to say of `duplicates` among `count` points."""
     if not duplicates:
@@ -226,11 +219,11 @@ def repeats_note(count: int, duplicates: int) -> list[str]:
     ]
 
 
-def steps_note(density: SymmetricDensity, error: float) -> list[str]:
+def steps_note(steps: int, error: float) -> list[str]:
     """What to say of the error that `settle` left."""
     if error <= MASS_TOLERANCE:
         return []
     return [
-        f"the integrator has not converged at {density.flow.steps} steps a segment: the mean log "
+        f"the integrator has not converged at {steps} steps a segment: the mean log "
         f"density changes by {error:.1e} when they are doubled"
     ]

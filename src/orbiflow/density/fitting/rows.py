@@ -16,9 +16,8 @@ from orbiflow.density.arguments import check_kind, float_tensor
 from orbiflow.density.inference import (
     at_observed,
     check_torus,
-    log_kernels,
 )
-from orbiflow.density.models import AdaptiveKernels, Base
+from orbiflow.density.models import AdaptiveKernels, Density
 from orbiflow.density.spaces import Space, such_rows
 from orbiflow.errors import OrbiflowError
 from orbiflow.typed_torch import listed, unique
@@ -207,7 +206,7 @@ def missing_notes(rows: Rows, empty: int) -> list[str]:
     return notes
 
 
-def log_prob_of_rows(part: Base, points: Tensor) -> Tensor:
+def log_prob_of_rows(part: Density, points: Tensor) -> Tensor:
     """Log density (N,) of a part at points that may lack angles, of those that they have."""
     if not bool(points.isnan().any()):
         return part.log_prob(points)
@@ -231,9 +230,7 @@ def with_incomplete(kernels: AdaptiveKernels, rows: Rows, total: float) -> Adapt
     logs = kernels.weights.log()
     for observed, part in _patterns(some):
         for block in _blocks(part, len(logs)):
-            share = torch.softmax(
-                log_kernels(kernels, block.points[:, observed], observed) + logs, 1
-            )
+            share = torch.softmax(kernels.log_each(block.points[:, observed], observed) + logs, 1)
             gained += share.sum(dim=0) if block.weights is None else block.weights @ share
     weights = total * kernels.weights + lacking * gained / gained.sum()
     return AdaptiveKernels(

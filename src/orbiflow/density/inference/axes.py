@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import numbers
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import torch
@@ -16,33 +15,6 @@ from orbiflow.arguments import is_a
 from orbiflow.density.arguments import float_tensor
 from orbiflow.density.spaces import Space, Torus
 from orbiflow.errors import OrbiflowError
-
-
-@dataclass(frozen=True)
-class Split:
-    """The angles of a torus in three.
-
-    - `dim`: angles of the torus.
-    - `kept`: numbers of those of the density that is asked for, in its order.
-    - `given`: numbers of those that are known; `values`: where, in turns.
-
-    The others are integrated out.
-    """
-
-    dim: int
-    kept: tuple[int, ...]
-    given: tuple[int, ...] = ()
-    values: tuple[float, ...] = ()
-
-    @property
-    def observed(self) -> tuple[int, ...]:
-        """Kept, then given."""
-        return (*self.kept, *self.given)
-
-    def located(self, points: Tensor) -> Tensor:
-        """Kept angles (N, r) and the given ones: (N, r + g)."""
-        given = points.new_tensor(self.values).expand(len(points), -1)
-        return torch.cat([points, given], dim=1)
 
 
 def check_torus(space: Space, what: str) -> Torus:

@@ -1,75 +1,52 @@
-"""Densities of some of a torus' angles: marginal, and conditional on others."""
+"""Densities of some of a torus' angles: marginal, conditional, and at rows that lack some."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
 
 import torch
 from torch import Tensor
 
-from orbiflow.density.arguments import check_kind
-from orbiflow.density.inference.axes import (
-    Split,
-    check_torus,
-    given_axes,
-    kept_axes,
-)
-from orbiflow.density.inference.chains import partial_chains
-from orbiflow.density.inference.flows import (
-    Tabulated,
-    partial_kernels,
-    tabulated,
-)
-from orbiflow.density.inference.network import draws_anew
-from orbiflow.density.inference.observed import (
-    Part,
-    part_at,
-    parts_of,
-)
-from orbiflow.density.models import (
-    AdaptiveKernels,
-    BlendedDensity,
-    SymmetricDensity,
-    UniformBase,
-    VonMisesChains,
-    VonMisesNetwork,
-    still_flow,
-)
-from orbiflow.density.spaces import Torus
+from orbiflow.density.arguments import check_kind, float_tensor
+from orbiflow.density.inference.axes import check_torus, given_axes, kept_axes
+from orbiflow.density.models import AdaptiveKernels, Density, Mixture, Split, mixture_of
+from orbiflow.density.spaces import CHART, Torus
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import one_thread
+from orbiflow.typed_torch import fft, listed, special, unique
 
 MOST_TABULATED = 2
-"""Angles of a density that can be tabulated."""
+"""The most angles of a density that can be tabulated."""
 
-DEAR = {1: 1024, 2: 48}
-"""Points along an angle at most where each is an integral of its own, by the number of angles."""
+COSTLY_GRID = {1: 1024, 2: 48}
+"""The most points along an angle where each is an integral of its own, by the number of angles."""
 
 MOST_OFF = 0.5
-"""Nats, root mean square, by which what is handed out may be off."""
+"""Root mean square error, in nats, up to which a density is handed out."""
 
 CHECKED_TWICE = 64
 """Points at which values by quasi-random nodes are compared with those by others."""
 
-FLAT, FLOOR = 1e-6, 1e-9
-"""Concentration of a kernel that is as good as uniform; least share of a part."""
+LEAST_WEIGHT = 1e-9
+"""The least weight of a component."""
 
 
-def marginal(density: SymmetricDensity, axes: Iterable[int] | int) -> BlendedDensity:
-    """The density of some of a torus' angles alone, whatever the others are.
+def marginal(density: Density, axes: Iterable[int] | int) -> Mixture:
+    """Return the density of some of a torus' angles alone, whatever the others are.
 
-    Kernels and the uniform part are so in closed form, and so are chains that end in the other angles.
-    The rest, of one or two angles, is integrated and tabulated: what comes out is exactly normalised,
-    and its `error` says by how many nats (root mean square) it is off that which it stands for.
+    Kernels and the uniform component have a closed form, and so have chains that end in the other
+    angles. The rest, of one or two angles, is integrated and tabulated: what comes out is exactly
+    normalised, and its `error` says by how many nats (root mean square) it is off the true density.
 
     Args:
-        density: of two angles or more.
-        axes: numbers of the angles to keep, from 0, in the order that is wanted.
+        density: A density of two angles or more.
+        axes: The numbers of the angles to keep, from 0, in the order that is wanted.
 
     Raises:
-        OrbiflowError: for other spaces, no such angles, or three and more of them where a part has
-            no closed form.
+        OrbiflowError: for other spaces, no such angles, or three and more of them where a component
+            has no closed form.
 
     >>> from orbiflow.density import DensityEstimator
     >>> import numpy as np
@@ -78,148 +55,211 @@ def marginal(density: SymmetricDensity, axes: Iterable[int] | int) -> BlendedDen
     >>> marginal(fit.density_, [0]).space
     Torus(dim=1, unit='radians')
     """
-    space = check_torus(
-        check_kind(density, SymmetricDensity, "density").space, "marginal densities"
-    )
-    return _derived(density, Split(space.dim, kept_axes(axes, space.dim)), space)
+    space = check_torus(check_kind(density, Density, "density").space, "marginal densities")
+    return _restricted(density, Split(space.dim, kept_axes(axes, space.dim)), space)
 
 
 def conditional(
-    density: SymmetricDensity,
+    density: Density,
     given: Mapping[int, float],
     axes: Iterable[int] | int | None = None,
-) -> BlendedDensity:
-    """The density of a torus' other angles where some are known.
+) -> Mixture:
+    """Return the density of a torus' other angles where some are known.
 
-    As `marginal`: the parts' conditional densities, each with the share that what is known leaves it.
+    As in `marginal`, it is made of the components' conditional densities, each with the weight that
+    the known angles leave it.
 
     Args:
-        density: of two angles or more.
-        given: values of angles in turns (points of the chart), by the angles' numbers from 0.
-        axes: of the other angles, the numbers of those to keep; default all.
+        density: A density of two angles or more.
+        given: The values of known angles in turns (points of the chart), by their numbers from 0.
+        axes: The numbers of the other angles to keep; default: all.
 
     Raises:
         OrbiflowError: for other spaces, no such angles, all angles, or three and more that are left
-            where a part has no closed form.
+            where a component has no closed form.
     """
-    space = check_torus(
-        check_kind(density, SymmetricDensity, "density").space, "conditional densities"
-    )
+    space = check_torus(check_kind(density, Density, "density").space, "conditional densities")
     known, values = given_axes(given, space.dim)
     left = [axis for axis in range(space.dim) if axis not in known]
     kept = kept_axes(left if axes is None else axes, space.dim)
     if set(kept) & set(known):
         raise OrbiflowError(f"axes {sorted(set(kept) & set(known))} are given and cannot be kept")
-    return _derived(density, Split(space.dim, kept, known, values), space)
+    return _restricted(density, Split(space.dim, kept, known, values), space)
 
 
 @one_thread()
 @torch.no_grad()
-def _derived(density: SymmetricDensity, split: Split, torus: Torus) -> BlendedDensity:
+def _restricted(density: Density, split: Split, torus: Torus) -> Mixture:
     space = Torus(len(split.kept), unit=str(torus.unit))
-    kernels: list[tuple[float, AdaptiveKernels]] = []
-    chains: tuple[float, VonMisesChains] | None = None
-    uniform = -math.inf
-    open_: list[tuple[float, Part]] = []
-    for share, part in parts_of(density):
-        log_share = math.log(share)
-        if isinstance(part, UniformBase):
-            uniform = log_share
-        elif isinstance(part, AdaptiveKernels):
-            found, evidence = partial_kernels(part, split, space)
-            kernels.append((log_share + evidence, found))
-        elif isinstance(part, VonMisesChains):
-            closed, log_closed, rest, log_rest = partial_chains(part, split, space)
-            if closed is not None:
-                chains = (log_share + log_closed, closed)
-            if rest is not None:
-                open_.append((log_share + log_rest, rest))
-        else:
-            open_.append((log_share, part))
-    if not open_:
-        return _blended(space, kernels, uniform, chains)
-    table, off = _tabulated(open_, split, space)
-    kernels.append((table.log_total, table.kernels))
-    found = _blended(space, kernels, uniform, chains)
-    closed = [
-        uniform,
-        *(log for log, _ in kernels[:-1]),
-        -math.inf if chains is None else chains[0],
-    ]
-    share = 1 / (1 + math.exp(torch.tensor(closed).double().logsumexp(0).item() - table.log_total))
-    found.error = math.sqrt(share) * max(table.error, off)
-    if found.error > MOST_OFF:
+    closed, left = density.restricted(split, space)
+    error = 0.0
+    if left:
+        table, off = _tabulated(left, split, space)
+        sums = torch.tensor([log for log, _ in closed], dtype=torch.float64).logsumexp(0).item()
+        weight = 1 / (1 + math.exp(sums - table.log_total))
+        error = math.sqrt(weight) * max(table.error, off)
+        closed.append((table.log_total, table.kernels))
+    # kernels first, where they are: the order of components is that of the draws of samples
+    closed.sort(key=lambda part: part[1].kernel_part is None)
+    logs = torch.tensor([log for log, _ in closed], dtype=torch.float64)
+    weights: list[float] = listed(torch.softmax(logs, dim=0).clamp_min(LEAST_WEIGHT))
+    own = [part for _, part in closed]
+    found = mixture_of(list(zip(weights, own, strict=True)))
+    found.error = error
+    if error > MOST_OFF:
         raise OrbiflowError(
-            f"the density of these angles can only be had within {found.error:.1f} nats (root mean "
-            'square): keep one angle, or fit with --parts kernels,mixture (parts="kernels,mixture")'
+            f"the density of these angles cannot be approximated to better than {error:.1f} nats (root "
+            'mean square): keep one angle, or fit with components="kernels,mixture"'
         )
     return found
 
 
 def _tabulated(
-    parts: list[tuple[float, Part]], split: Split, space: Torus
-) -> tuple[Tabulated, float]:
-    """Parts without a closed form as one table, and nats by which its values themselves may be off."""
+    left: list[tuple[float, Density]], split: Split, space: Torus
+) -> tuple[Table, float]:
+    """Return densities without a closed form as one table, and the error of its values in nats."""
     if space.dim > MOST_TABULATED:
-        kinds = " and ".join(sorted({_kind(part) for _, part in parts}))
+        kinds = " and ".join(sorted({own.article or own.kind for _, own in left}))
         raise OrbiflowError(
-            f"a density of {space.dim} angles has no closed form where {kinds} have a share: keep one "
-            'or two angles, or fit with --parts kernels,mixture (parts="kernels,mixture")'
+            f"a density of {space.dim} angles has no closed form where {kinds} have a weight: keep one "
+            'or two angles, or fit with components="kernels,mixture"'
         )
     observed = list(split.observed)
 
     def log_function(points: Tensor, seed: int = 0) -> Tensor:
         whole = split.located(points)
-        logs = [log + part_at(part, whole, observed, seed) for log, part in parts]
+        logs = [log + own.log_marginal(whole, observed, seed) for log, own in left]
         return torch.stack(logs).logsumexp(dim=0)
 
-    dear = any(_is_dear(part, split) for _, part in parts)
-    table = tabulated(log_function, space, DEAR[space.dim] if dear else None)
+    costly = any(own.is_costly(split) for _, own in left)
+    table = tabulated(log_function, space, COSTLY_GRID[space.dim] if costly else None)
     drawn = table.kernels.sample(CHECKED_TWICE, torch.Generator().manual_seed(1))
     twice = log_function(drawn) - log_function(drawn, seed=1)  # where nodes are quasi-random
     return table, float(twice.square().mean().sqrt())
 
 
-def _is_dear(part: Part, split: Split) -> bool:
-    if isinstance(part, VonMisesNetwork):
-        return draws_anew(part, list(split.observed), list(split.kept))
-    return isinstance(part, SymmetricDensity) and split.dim > len(split.observed)
+@one_thread()
+@torch.no_grad()
+def log_prob_observed(density: Density, points: Tensor, *, measure: str = CHART) -> Tensor:
+    """Return log densities (N,) at points (N, d) of a torus some of whose angles are missing (NaN).
 
+    The density of a row is that of the angles that it has, integrated over the others, with respect to
+    `measure` of those. Of a row that has none its logarithm is 0.
 
-def _kind(part: Part) -> str:
-    if isinstance(part, VonMisesChains):
-        return "chains"
-    return "a network" if isinstance(part, VonMisesNetwork) else "a flow"
-
-
-def _blended(
-    space: Torus,
-    kernels: list[tuple[float, AdaptiveKernels]],
-    uniform: float,
-    chains: tuple[float, VonMisesChains] | None,
-) -> BlendedDensity:
-    """One density of parts and the logarithms of their shares, up to a common factor."""
-    if not kernels:
-        even = torch.full((1, space.dim), FLAT, dtype=torch.float64)
-        one = torch.ones(1, dtype=torch.float64)
-        uniform -= math.log(2)
-        kernels = [(uniform, AdaptiveKernels(space, 0 * even, even, one))]
-    logs = torch.tensor([log for log, _ in kernels], dtype=torch.float64)
-    within = torch.softmax(logs, dim=0)
-    joined = AdaptiveKernels(
-        space,
-        torch.cat([part.centers for _, part in kernels]),
-        torch.cat([part.concentrations for _, part in kernels]),
-        torch.cat([part.weights * share for (_, part), share in zip(kernels, within, strict=True)]),
+    Raises:
+        OrbiflowError: for another space or shape, infinite angles, or a component that cannot be
+            integrated.
+    """
+    space = check_torus(
+        check_kind(density, Density, "density").space, "densities at missing angles"
     )
-    every = [float(logs.logsumexp(0)), uniform, *([] if chains is None else [chains[0]])]
-    shares = torch.softmax(torch.tensor(every, dtype=torch.float64), dim=0).clamp_min(FLOOR)
-    shares = torch.cat([shares.new_zeros(1), shares / shares.sum()])
-    return BlendedDensity(
+    points = float_tensor(points, "points").double()
+    if points.dim() != 2 or points.shape[1] != space.dim:
+        raise OrbiflowError(f"expected points (N, {space.dim}), got {tuple(points.shape)}")
+    if bool(points.isinf().any()):
+        raise OrbiflowError("angles may be missing (NaN), but not infinite")
+    return at_observed(density, points, measure=measure)
+
+
+def at_observed(density: Density, points: Tensor, *, measure: str = CHART) -> Tensor:
+    """Return what `log_prob_observed` does, at float64 points (N, d) that are checked."""
+    found = torch.zeros(len(points), dtype=torch.float64)
+    patterns, number = unique(~points.isnan(), dim=0, return_inverse=True)
+    for k, pattern in enumerate(patterns):
+        observed: list[int] = listed(torch.nonzero(pattern)[:, 0])
+        rows = torch.nonzero(number == k)[:, 0]
+        if not observed:
+            continue
+        some = points[rows][:, observed]
+        own = Torus(len(observed), unit=str(density.space.unit))
+        whole = len(observed) == density.space.dim
+        value = density.log_prob(some) if whole else density.log_marginal(some, observed)
+        found[rows] = value + own.log_density_factor(some, measure)
+    return found
+
+
+FIRST_GRID, FINEST_GRID = {1: 256, 2: 48}, {1: 4096, 2: 192}
+"""Points of the grid along an angle, at first and at most, by the number of angles."""
+
+ENOUGH = 1e-5
+"""Root mean square error of the logarithm, in nats, below which the grid need not be finer."""
+
+CHECKED = 256
+"""Random points at which the table is compared with the function."""
+
+DROPPED = 1e-8
+"""The weight that the lightest kernels may have together, to be left out."""
+
+
+@dataclass(frozen=True)
+class Table:
+    """Normalised kernels, the log of the tabulated function's integral, and the error in nats."""
+
+    kernels: AdaptiveKernels
+    log_total: float
+    error: float
+
+
+def tabulated(
+    log_function: Callable[[Tensor], Tensor], space: Torus, most: int | None = None
+) -> Table:
+    """Return kernels on an even grid that take a function's values there, of one or two angles.
+
+    Von Mises kernels whose deviation is one step interpolate what is smooth over a few steps nearly to
+    rounding: their weights are one deconvolution by Fourier transform. The grid is refined until
+    random points agree as well.
+
+    Args:
+        log_function: The logarithm of a positive function of points (N, r), of any integral.
+        space: The torus of r = 1 or 2 angles.
+        most: The most points along an angle; default: `FINEST_GRID`.
+    """
+    count, most = FIRST_GRID[space.dim], most or FINEST_GRID[space.dim]
+    while True:
+        found = _on_grid(log_function, space, count)
+        if found.error < ENOUGH or 2 * count > most:
+            return found
+        count *= 2
+
+
+def _on_grid(log_function: Callable[[Tensor], Tensor], space: Torus, count: int) -> Table:
+    line = torch.arange(count, dtype=torch.float64) / count
+    grid = torch.cartesian_prod(*[line] * space.dim).reshape(-1, space.dim)
+    logs = log_function(grid)
+    top = float(logs.max())
+    values = (logs - top).exp()
+    log_total = top + float(values.mean().log())
+    kappa = (count / (2 * math.pi)) ** 2
+    kernel = _kernel(line, kappa)
+    shape = [count] * space.dim
+    spectrum = fft.fftn(values.reshape(shape))
+    smoothing = fft.fft(kernel).real
+    for axis in range(space.dim):
+        spectrum = spectrum / smoothing.reshape([-1 if i == axis else 1 for i in range(space.dim)])
+    weights = fft.ifftn(spectrum).real.flatten().clamp_min(0)
+    weights = weights / weights.sum()
+    kept = _heaviest(weights)
+    kernels = AdaptiveKernels(
         space,
-        still_flow(space),
-        UniformBase(space),
-        joined,
-        shares,
-        chains=None if chains is None else chains[1],
+        grid[kept],
+        torch.full((int(kept.sum()), space.dim), kappa, dtype=torch.float64),
+        weights[kept] / weights[kept].sum(),
     )
+    generator = torch.Generator().manual_seed(0)
+    drawn = kernels.sample(CHECKED, generator)
+    off = kernels.log_prob(drawn) + log_total - log_function(drawn)
+    return Table(kernels, log_total, float(off.square().mean().sqrt()))
+
+
+def _kernel(line: Tensor, kappa: float) -> Tensor:
+    scaled = special.i0e(torch.tensor(kappa, dtype=torch.float64))
+    return (kappa * ((2 * math.pi * line).cos() - 1)).exp() / scaled
+
+
+def _heaviest(weights: Tensor) -> Tensor:
+    """Return which (K,) are left when the lightest go."""
+    ordered, order = weights.sort()
+    light = ordered.cumsum(0) < DROPPED
+    kept = torch.ones_like(weights, dtype=torch.bool)
+    kept[order[light]] = False
+    return kept

@@ -1,28 +1,33 @@
-"""Mixtures of von Mises chains: a base for concentrated data on tori of many angles, by EM."""
+"""Mixtures of von Mises chains: the component for dependent angles on tori."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
+from typing import Any, Self
 
 import numpy as np
 import torch
 from torch import Tensor
 
 from orbiflow.density.arguments import float_tensor
-from orbiflow.density.models.bases import Base
-from orbiflow.density.models.terms import log_sum_exp
-from orbiflow.density.spaces import Space
+from orbiflow.density.models.chain_integrals import SCALES, ChainTensors, chains_at, waves
+from orbiflow.density.models.density import Density, Restriction, Split
+from orbiflow.density.models.headers import checked_integer, checked_tensors
+from orbiflow.density.models.terms import log_sum_exp, shares_of
+from orbiflow.density.spaces import Space, Torus
 from orbiflow.errors import OrbiflowError
 from orbiflow.typed_torch import special
-
-SCALES = (1.0, 4.0, 16.0)
-"""A component's concentrations are divided by these, each with its own weight: heavy tails."""
 
 BLOCK = 256
 """Points at a time: few enough for the cache."""
 
 
-class VonMisesChains(Base):
+MOST_COMPONENTS = 65536
+"""The most components that a file may hold."""
+
+
+class VonMisesChains(Density, kind="chains"):
     """A mixture of chains of von Mises distributions, exact and normalised on the torus.
 
     In a component, angle i is von Mises about a trigonometric polynomial of the angles before it,
@@ -31,11 +36,11 @@ class VonMisesChains(Base):
     Each component comes at several scales, its concentrations divided by `SCALES`.
 
     Args:
-        space: a `Torus` of d angles.
-        log_weights: (K, L) of each component and scale; exp sums to 1.
-        means: (K, d, 1 + 2 d): b_i, s_ij, c_ij in radians, zero unless j is before i.
-        concentrations: (K, d), at least 0; 0 is uniform.
-        order: (K, d), the numbers of the angles from the first to the last of each chain; default
+        space: A `Torus` of d angles.
+        log_weights: Logarithms (K, L) of the weight of each component and scale, of sum 1.
+        means: The regressions (K, d, 1 + 2 d): b_i, s_ij, c_ij in radians, zero unless j is before i.
+        concentrations: Concentrations (K, d), at least 0; 0 is uniform.
+        order: The numbers (K, d) of the angles from the first to the last of each chain; default
             0, 1, ..., d - 1.
 
     Raises:
@@ -88,27 +93,26 @@ class VonMisesChains(Base):
         )
         self.order = order.detach().long().clone()
 
-    def log_prob(self, points: Tensor) -> Tensor:
-        """Log density (...,) at points (..., d), in their dtype; differentiable in the points."""
+    def log_chart(self, points: Tensor) -> Tensor:
         flat = points.reshape(-1, self.space.dim)
         parts = [log_sum_exp(self.joint(block).flatten(1)) for block in torch.split(flat, BLOCK)]
         return torch.cat(parts).reshape(points.shape[:-1])
 
     def joint(self, points: Tensor) -> Tensor:
-        """Log density (N, L, K) at points (N, d), of being there and of that scale and component."""
+        """Return the log density (N, L, K) at points (N, d) of each scale and component, weighted."""
         residual = self.residuals(points)
         kappa = self.concentrations.to(points)
         fit = torch.einsum("nkd,kd->nk", residual.cos() - 1, kappa)
         return fit[:, None] / fit.new_tensor(SCALES)[:, None] + self._constant().to(points)
 
     def residuals(self, points: Tensor) -> Tensor:
-        """Angles less their regressions, radians (N, K, d), for points (N, d)."""
+        """Return angles less their regressions, in radians (N, K, d), for points (N, d)."""
         angle = 2 * math.pi * points
         mean = waves(angle) @ self.means.to(points).flatten(0, 1).mT
         # in place: at this size, fresh memory costs more than the arithmetic
         return mean.reshape(len(points), *self.concentrations.shape).neg_().add_(angle[:, None])
 
-    def sample(self, count: int, generator: torch.Generator) -> Tensor:
+    def draw(self, count: int, generator: torch.Generator) -> Tensor:
         own = self.to("cpu")
         weights = own.log_weights.exp().flatten()
         chosen = torch.multinomial(weights, count, replacement=True, generator=generator)
@@ -122,14 +126,110 @@ class VonMisesChains(Base):
             angle[rows, now] = mean + noise[rows, now]
         return self.space.project(angle / (2 * math.pi))
 
+    @classmethod
+    def joined(cls, components: Sequence[Any], weights: Tensor) -> Self:
+        """Return all chains of several densities on one torus, in proportions (P,)."""
+        logs = (weights.double() / weights.sum()).log()
+        return cls(
+            components[0].space,
+            torch.cat([own.log_weights + log for own, log in zip(components, logs, strict=True)]),
+            torch.cat([own.means for own in components]),
+            torch.cat([own.concentrations for own in components]),
+            torch.cat([own.order for own in components]),
+        )
+
+    def log_marginal(self, points: Tensor, axes: list[int], seed: int = 0) -> Tensor:
+        return chains_at(self._tensors(), points, axes, seed)
+
+    def restricted(self, split: Split, space: Torus) -> Restriction:
+        """Keep the chains in which all that is given comes first and all that is hidden last."""
+        place = self.order.argsort(dim=1)
+        kept, given = list(split.kept), list(split.given)
+        hidden = [axis for axis in range(split.dim) if axis not in split.observed]
+        closed = torch.ones(len(self.order), dtype=torch.bool)
+        first = place[:, kept].amin(dim=1)
+        last = place[:, list(split.observed)].amax(dim=1)
+        if given:
+            closed &= place[:, given].amax(dim=1) < first
+        if hidden:
+            closed &= place[:, hidden].amin(dim=1) > last
+        parts: list[tuple[float, Density]] = []
+        for log, chains in self._some(closed):
+            evidence, some = chains._closed(split, space)
+            parts.append((log + evidence, some))
+        return Restriction(parts, [*self._some(~closed)])
+
+    def _some(self, chosen: Tensor) -> list[tuple[float, VonMisesChains]]:
+        """Return the chains of a mask (K,), with the logarithm of their weight, if they have any."""
+        if not bool(chosen.any()) or bool((self.log_weights[chosen] == -math.inf).all()):
+            return []
+        logs = self.log_weights[chosen]
+        total = float(logs.flatten().logsumexp(0))
+        parts = (self.means[chosen], self.concentrations[chosen], self.order[chosen])
+        return [(total, VonMisesChains(self.space, logs - total, *parts))]
+
+    def _closed(self, split: Split, space: Torus) -> tuple[float, VonMisesChains]:
+        """Return the log density of what is given, and chains of the angles kept.
+
+        Their constants are moved and their weights changed by what is given.
+        """
+        kept, given, d = list(split.kept), list(split.given), split.dim
+        logs, means, evidence = self.log_weights, self.means, 0.0
+        constant = means[:, :, 0]
+        if given:
+            angle = torch.zeros(1, d, dtype=torch.float64)
+            angle[0, given] = 2 * math.pi * torch.tensor(split.values, dtype=torch.float64)
+            known = torch.zeros(1 + 2 * d, dtype=torch.float64)
+            at = [0, *(1 + j for j in given), *(1 + d + j for j in given)]
+            known[at] = waves(angle)[0, at]
+            constant = means @ known
+            residual = angle[0, given] - constant[:, given]
+            kappa = self.concentrations[:, given, None] / torch.tensor(SCALES)
+            logs = logs + (kappa * (residual.cos() - 1)[..., None] - special.i0e(kappa).log()).sum(
+                dim=1
+            )
+            evidence = float(log_sum_exp(logs.flatten()))
+            logs = shares_of(logs.flatten()).log().reshape(logs.shape)
+        at = [*(1 + j for j in kept), *(1 + d + j for j in kept)]
+        some = torch.cat([constant[:, kept, None], means[:, kept][:, :, at]], dim=2)
+        order = self.order.argsort(dim=1)[:, kept].argsort(dim=1)
+        return evidence, VonMisesChains(space, logs, some, self.concentrations[:, kept], order)
+
+    def header(self) -> dict[str, Any]:
+        return {"components": len(self.concentrations), "scales": list(SCALES)}
+
+    def tensors(self) -> dict[str, Tensor]:
+        return {**self._tensors()._asdict(), "order": self.order.double()}
+
+    @classmethod
+    def from_header(
+        cls, space: Space, header: Mapping[str, Any], tensors: Mapping[str, Tensor]
+    ) -> Self:
+        count, d = checked_integer(header, "components", MOST_COMPONENTS), space.dim
+        if header.get("scales") != list(SCALES):
+            raise OrbiflowError(f"scales {header.get('scales')!r}, expected {list(SCALES)}")
+        shapes = {
+            "log_weights": (count, len(SCALES)),
+            "means": (count, d, 1 + 2 * d),
+            "concentrations": (count, d),
+            "order": (count, d),
+        }
+        # a component of no weight has the logarithm -inf
+        return cls(space, *checked_tensors(tensors, shapes, least=-math.inf))
+
+    def _tensors(self) -> ChainTensors:
+        return ChainTensors(self.log_weights, self.means, self.concentrations, self.order)
+
     def _constant(self) -> Tensor:
-        """Log weights less log normalising constants, per unit of the cube: (L, K)."""
+        """Return log weights less log normalising constants, per unit of the cube: (L, K)."""
         kappa = self.concentrations / self.concentrations.new_tensor(SCALES)[:, None, None]
         return self.log_weights.mT - special.i0e(kappa).log().sum(dim=-1)
 
 
 def chained(order: Tensor) -> Tensor:
-    """Which of the means (..., d, 1 + 2 d) chains of order (..., d) may use: constants, angles before.
+    """Return which means (..., d, 1 + 2 d) chains of an order (..., d) may use.
+
+    These are the constants and the waves of the angles before.
 
     >>> chained(torch.tensor([1, 0])).int()
     tensor([[1, 0, 1, 0, 1],
@@ -140,16 +240,10 @@ def chained(order: Tensor) -> Tensor:
     return torch.cat([torch.ones_like(before[..., :1]), before, before], dim=-1)
 
 
-def waves(angle: Tensor) -> Tensor:
-    """1, sin and cos of angles (N, d) in radians: (N, 1 + 2 d)."""
-    return torch.cat([torch.ones_like(angle[:, :1]), angle.sin(), angle.cos()], dim=1)
-
-
-def averaged(mixtures: list[VonMisesChains]) -> VonMisesChains:
-    """The mean of the densities, again a mixture."""
-    first = mixtures[0]
+def averaged(mixtures: Sequence[VonMisesChains]) -> VonMisesChains:
+    """Return the mean of several densities, again a mixture of chains."""
     return VonMisesChains(
-        first.space,
+        mixtures[0].space,
         torch.cat([m.log_weights for m in mixtures]) - math.log(len(mixtures)),
         torch.cat([m.means for m in mixtures]),
         torch.cat([m.concentrations for m in mixtures]),

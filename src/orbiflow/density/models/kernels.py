@@ -1,9 +1,10 @@
-"""Kernels whose width follows the data: a base distribution for sharp, clustered points."""
+"""Mixtures of kernels: the component for what is sharp and clustered."""
 
 from __future__ import annotations
 
 import math
-from typing import cast
+from collections.abc import Mapping, Sequence
+from typing import Any, Self, cast
 
 import numpy as np
 import torch
@@ -11,19 +12,22 @@ from torch import Tensor
 
 from orbiflow.arrays import Array
 from orbiflow.density.arguments import float_tensor
-from orbiflow.density.models.bases import Base
+from orbiflow.density.models.density import Density, Restriction, Split
+from orbiflow.density.models.headers import checked_integer, checked_tensors
 from orbiflow.density.models.near_sums import TOLERANCE, near_log_sum
-from orbiflow.density.models.terms import Terms
-from orbiflow.density.spaces import (
-    RoundSpace,
-    Space,
-    rectangle,
-)
+from orbiflow.density.models.terms import Terms, log_sum_exp, shares_of
+from orbiflow.density.spaces import RoundSpace, Space, Torus, rectangle
 from orbiflow.errors import OrbiflowError
 from orbiflow.typed_torch import special
 
+MOST_KERNELS = 1_000_000
+"""The most kernels that a file may hold."""
 
-class AdaptiveKernels(Base):
+BLOCK_ENTRIES = 250_000
+"""Entries of the table of points against kernels worked on at a time."""
+
+
+class AdaptiveKernels(Density, kind="kernels"):
     """A mixture of kernels made invariant under the space's group.
 
     Products of von Mises kernels in the angles of the lattice on torus and Klein bottle, summed over
@@ -31,10 +35,10 @@ class AdaptiveKernels(Base):
     both ends of the axis.
 
     Args:
-        space: any; with a rectangular lattice if it is flat.
-        centers: (N, d) chart points.
-        concentrations: kappa > 0, (N, d) on flat spaces and (N, 1) on round ones.
-        weights: (N,) of sum 1.
+        space: Any space; with a rectangular lattice if it is flat.
+        centers: The chart points (N, d) that the kernels are about.
+        concentrations: Concentrations kappa > 0, (N, d) on flat spaces and (N, 1) on round ones.
+        weights: Weights (N,) of sum 1.
 
     Raises:
         OrbiflowError: for wrong shapes or values.
@@ -72,19 +76,28 @@ class AdaptiveKernels(Base):
         self._center_features = images[0]
         self._terms = _terms(space, images, self.concentrations, self.weights)
 
-    def log_prob(self, points: Tensor) -> Tensor:
+    @property
+    def kernel_part(self) -> tuple[float, AdaptiveKernels]:
+        """The density itself."""
+        return 1.0, self
+
+    def log_density_without_kernels(self, points: Tensor) -> Tensor:
+        return points.new_full(points.shape[:-1], -math.inf)
+
+    def log_chart(self, points: Tensor) -> Tensor:
         values = self.log_density(points)
         return values + self.space.log_area(points) if self.space.is_round else values
 
     def log_density(
         self, points: Tensor, beside: float = -math.inf, tolerance: float = TOLERANCE
     ) -> Tensor:
-        """As `log_prob`, but on round spaces with respect to the round area: (...,) at points (..., d).
+        """Return log densities (...,) per area of the sphere on round spaces, else of the square.
 
         Args:
-            beside: logarithm of a constant density that will be added.
-            tolerance: of the sum of both, what far kernels that are left out may add, and smooth ones
-                that are interpolated may be off, at most each.
+            points: Chart points (..., d).
+            beside: Logarithm of a constant density that will be added.
+            tolerance: The share of the sum of both that far kernels that are left out may add, at
+                most, and by which smooth ones that are interpolated may be off.
         """
         flat = points.reshape(-1, self.space.dim).double()
         features = self.space.features(flat)[0].mT
@@ -95,7 +108,10 @@ class AdaptiveKernels(Base):
         return values.reshape(points.shape[:-1]).to(points.dtype)
 
     def parted(self, wide: Tensor) -> tuple[AdaptiveKernels | None, AdaptiveKernels | None, float]:
-        """Those of a mask (N,) and the others, each with weights of sum 1, and the former's weight."""
+        """Return the kernels of a mask (N,), the others, and the weight of the former.
+
+        Each has weights of sum 1; None if there are none.
+        """
         weight = float(self.weights[wide].sum())
         found = [
             AdaptiveKernels(
@@ -107,7 +123,7 @@ class AdaptiveKernels(Base):
         ]
         return found[0], found[1], weight
 
-    def sample(self, count: int, generator: torch.Generator) -> Tensor:
+    def draw(self, count: int, generator: torch.Generator) -> Tensor:
         seed = int(torch.randint(2**31, (), generator=generator))
         rng = np.random.default_rng(seed)
         weights = self.weights.cpu().numpy()
@@ -122,9 +138,79 @@ class AdaptiveKernels(Base):
             self.centers.cpu()[chosen] + angle / (2 * math.pi) * rectangle(self.space)
         )
 
+    @classmethod
+    def joined(cls, components: Sequence[Any], weights: Tensor) -> Self:
+        """Return all kernels of several densities on one space, in proportions (P,)."""
+        proportions = weights.double() / weights.sum()
+        return cls(
+            components[0].space,
+            torch.cat([one.centers for one in components]),
+            torch.cat([one.concentrations for one in components]),
+            torch.cat(
+                [share * one.weights for share, one in zip(proportions, components, strict=True)]
+            ),
+        )
+
+    def log_marginal(self, points: Tensor, axes: list[int], seed: int = 0) -> Tensor:
+        del seed
+        logs = self.weights.log()
+        block = max(1, BLOCK_ENTRIES // len(self.weights))
+        parts = [
+            log_sum_exp(self.log_each(part, axes) + logs) for part in torch.split(points, block)
+        ]
+        return torch.cat(parts)
+
+    def restricted(self, split: Split, space: Torus) -> Restriction:
+        """Keep the kernels' own marginals.
+
+        A kernel weighs as much more as it has the given values more likely.
+        """
+        kept, given = list(split.kept), list(split.given)
+        weights, evidence = self.weights, 0.0
+        if given:
+            at = torch.tensor([split.values], dtype=torch.float64)
+            logs = self.log_each(at, given)[0] + weights.log()
+            evidence, weights = float(log_sum_exp(logs)), shares_of(logs)
+        some = AdaptiveKernels(space, self.centers[:, kept], self.concentrations[:, kept], weights)
+        return Restriction([(evidence, some)], [])
+
+    def log_each(self, points: Tensor, axes: list[int]) -> Tensor:
+        """Return the log density (N, K) of each kernel of some angles, at points (N, len(axes))."""
+        kappa = self.concentrations[:, axes]
+        angle, center = 2 * math.pi * points.double(), 2 * math.pi * self.centers[:, axes]
+        images = torch.cat([angle.cos(), angle.sin()], dim=1)
+        rows = torch.cat([kappa * center.cos(), kappa * center.sin()], dim=1)
+        return images @ rows.mT - (special.i0e(kappa).log() + kappa).sum(dim=1)
+
+    def header(self) -> dict[str, Any]:
+        if len(self.centers) > MOST_KERNELS:
+            raise OrbiflowError(
+                f"there are {len(self.centers)} kernels: {MOST_KERNELS} at most are saved"
+            )
+        return {"kernels": len(self.centers)}
+
+    def tensors(self) -> dict[str, Tensor]:
+        return {
+            "centers": self.centers,
+            "concentrations": self.concentrations,
+            "weights": self.weights,
+        }
+
+    @classmethod
+    def from_header(
+        cls, space: Space, header: Mapping[str, Any], tensors: Mapping[str, Tensor]
+    ) -> Self:
+        count = checked_integer(header, "kernels", MOST_KERNELS)
+        shapes = {
+            "centers": (count, space.dim),
+            "concentrations": (count, 1 if space.is_round else space.dim),
+            "weights": (count,),
+        }
+        return cls(space, *checked_tensors(tensors, shapes))
+
 
 def _terms(space: Space, images: Tensor, kappa: Tensor, weights: Tensor) -> Terms:
-    """Kernels about all images (E, N, m) of their centers: then points need no images."""
+    """Return kernels about all images (E, N, m) of their centers: then points need no images."""
     if space.is_round:
         every = kappa.mT.repeat(1, len(images))
         peaks = _round_peaks(kappa[:, 0])
@@ -138,14 +224,14 @@ def _terms(space: Space, images: Tensor, kappa: Tensor, weights: Tensor) -> Term
 
 
 def _round_peaks(kappa: Tensor) -> Tensor:
-    """Logarithms of the largest values of von Mises-Fisher kernels, per round area."""
+    """Return logarithms of the largest values of von Mises-Fisher kernels, per round area."""
     return (kappa / (2 * math.pi)).log() - (-torch.expm1(-2 * kappa)).log()
 
 
 def kernel_rows(space: Space, centers: Tensor, kappa: Tensor) -> tuple[Tensor, Tensor]:
-    """Log kernels as linear functions of the space's `features`: rows (N, m) and offsets (N,).
+    """Return log kernels as linear functions of the space's `features`: rows (N, m), offsets (N,).
 
-    With respect to the chart's area on flat spaces and to the round area on round ones.
+    They are with respect to the chart's area on flat spaces and to the round area on round ones.
     """
     if space.is_round:
         k = kappa[:, 0]
@@ -155,7 +241,7 @@ def kernel_rows(space: Space, centers: Tensor, kappa: Tensor) -> tuple[Tensor, T
 
 
 def _von_mises_fisher(centers: Array, kappa: Array, rng: np.random.Generator) -> Array:
-    """One draw (N, 3) about each of `centers` (Wood, 1994; closed form on the sphere)."""
+    """Return one draw (N, 3) about each of `centers` (Wood, 1994; closed form on the sphere)."""
     u = rng.uniform(size=len(centers))
     height = 1 + np.log(u + (1 - u) * np.exp(-2 * kappa)) / kappa
     across = rng.normal(size=centers.shape)

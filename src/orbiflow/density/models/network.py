@@ -3,26 +3,33 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 import torch
 from torch import Tensor
 
 from orbiflow.density.arguments import check_kind
-from orbiflow.density.models.bases import Base
-from orbiflow.density.models.chains import (
-    BLOCK,
-    SCALES,
-    VonMisesChains,
-    averaged,
-    waves,
-)
+from orbiflow.density.models.chain_integrals import SCALES, quantiles, waves
+from orbiflow.density.models.chains import BLOCK, VonMisesChains, averaged
+from orbiflow.density.models.density import Density, Split
+from orbiflow.density.models.headers import within
 from orbiflow.density.models.terms import log_sum_exp, shares_of
-from orbiflow.density.spaces import Space
+from orbiflow.density.spaces import Space, Torus
 from orbiflow.errors import OrbiflowError
-from orbiflow.typed_torch import listed, special
+from orbiflow.runtime import is_list, is_object
+from orbiflow.typed_torch import broadcast, listed, special, unique
+
+DRAWS = 4096
+"""Quasi-random draws of the hidden angles."""
+
+AT_ONCE = 2**17
+"""Points times draws that are worked on at a time."""
+
+ROWS, ENTRIES = 256, 2**18
+"""Rows of angles, and terms of a sum, at a time: few enough for the cache."""
 
 
 class Factor(NamedTuple):
@@ -36,7 +43,7 @@ class Factor(NamedTuple):
     chains: VonMisesChains
 
 
-class VonMisesNetwork(Base):
+class VonMisesNetwork(Density, kind="network"):
     """A Bayesian network of angles (Pearl, 1988): the product of each given its parents.
 
     A mixture of all angles at once needs a component for each combination of states that they take; a
@@ -51,6 +58,8 @@ class VonMisesNetwork(Base):
     Raises:
         OrbiflowError: for another space, angles without a factor or with two, or parents after a child.
     """
+
+    article = "a network"
 
     def __init__(self, space: Space, factors: Sequence[Factor]) -> None:
         super().__init__(space)
@@ -77,8 +86,7 @@ class VonMisesNetwork(Base):
             raise OrbiflowError(f"a network of {space.dim} angles needs a factor for each")
         self.factors = tuple(factors)
 
-    def log_prob(self, points: Tensor) -> Tensor:
-        """Log density (...,) at points (..., d), in their dtype; differentiable in the points."""
+    def log_chart(self, points: Tensor) -> Tensor:
         flat = points.reshape(-1, self.space.dim)
         parts = [self._block(block) for block in torch.split(flat, BLOCK)]
         return torch.cat(parts).reshape(points.shape[:-1])
@@ -91,7 +99,7 @@ class VonMisesNetwork(Base):
         ]
         return torch.stack(found).sum(dim=0)
 
-    def sample(self, count: int, generator: torch.Generator) -> Tensor:
+    def draw(self, count: int, generator: torch.Generator) -> Tensor:
         rng = np.random.default_rng(int(torch.randint(2**31, (), generator=generator)))
         points = torch.zeros(count, self.space.dim, dtype=torch.float64)
         for axes, chains in self.factors:
@@ -106,10 +114,92 @@ class VonMisesNetwork(Base):
             points[:, axes[-1]] = drawn / (2 * math.pi)
         return self.space.project(points)
 
-    def to(self, device: torch.device | str) -> VonMisesNetwork:
-        return VonMisesNetwork(
-            self.space, [Factor(axes, chains.to(device)) for axes, chains in self.factors]
+    @property
+    def device(self) -> torch.device | None:
+        """The device of the factors."""
+        return self.factors[0].chains.device
+
+    def to(self, *wanted: Any) -> Self:
+        new = super().to(*wanted)
+        new.factors = tuple(Factor(axes, chains.to(*wanted)) for axes, chains in self.factors)
+        return new
+
+    def log_marginal(self, points: Tensor, axes: list[int], seed: int = 0) -> Tensor:
+        """Integrate over the other angles by draws that the observed angles weigh.
+
+        Angles from which no arrow leads to an observed one integrate to 1. Parents that are hidden are
+        drawn, each given its own, and the observed angles weigh the draws (likelihood weighting: Fung
+        and Chang, 1990). The draws are quasi-random and the same at all points.
+        """
+        points = points.double()
+        if not len(points):
+            return points.new_zeros(0)
+        factors = self._leading_to(axes)
+        hidden = [own[-1] for own, _ in factors if own[-1] not in axes]
+        count = DRAWS if hidden else 1
+        draws = torch.quasirandom.SobolEngine(
+            max(1, 2 * len(hidden)), scramble=True, seed=seed
+        ).draw(count, dtype=torch.float64)
+        even = {axis: draws[:, 2 * k : 2 * k + 2] for k, axis in enumerate(hidden)}
+        same: list[bool] = listed((points == points[0]).all(dim=0))
+        known = {axis: points[:1, k, None] for k, axis in enumerate(axes) if same[k]}
+        once = _Once.of(factors, known, even)
+        found: list[Tensor] = []
+        for block in torch.split(points, AT_ONCE // count):
+            at = {axis: block[:, k, None] for k, axis in enumerate(axes) if not same[k]}
+            logs = once.weighted(at, even).expand(len(block), count)
+            found.append(log_sum_exp(logs) - math.log(count))
+        return torch.cat(found)
+
+    def is_costly(self, split: Split) -> bool:
+        """Return whether hidden angles depend on angles that are kept: then each point draws anew."""
+        moving, observed = set(split.kept), list(split.observed)
+        return any(
+            axes[-1] not in observed and moving & set(axes[:-1])
+            for axes, _ in self._leading_to(observed)
         )
+
+    def _leading_to(self, observed: list[int]) -> list[Factor]:
+        """Return the factors of the observed angles, and of all from which arrows lead to them."""
+        wanted = set(observed)
+        found: list[Factor] = []
+        for factor in reversed(self.factors):
+            if factor.axes[-1] in wanted:
+                wanted |= set(factor.axes)
+                found.append(factor)
+        return found[::-1]
+
+    def header(self) -> dict[str, Any]:
+        return {
+            "factors": [{"axes": list(axes), **chains.header()} for axes, chains in self.factors]
+        }
+
+    def tensors(self) -> dict[str, Tensor]:
+        """Return the tensors of all factors, by names that begin with the number of their angle."""
+        return {
+            f"{axes[-1]}.{name}": tensor
+            for axes, chains in self.factors
+            for name, tensor in chains.tensors().items()
+        }
+
+    @classmethod
+    def from_header(
+        cls, space: Space, header: Mapping[str, Any], tensors: Mapping[str, Tensor]
+    ) -> Self:
+        stored: Any = header.get("factors")
+        if not is_list(stored) or len(stored) != space.dim or not all(map(is_object, stored)):
+            raise OrbiflowError(f"a network of {space.dim} angles needs a factor for each")
+        factors: list[Factor] = []
+        for own in stored:
+            axes: Any = own.get("axes")
+            if not is_list(axes) or not 0 < len(axes) <= space.dim:
+                raise OrbiflowError(f"a factor of the angles {axes!r}")
+            if not all(type(axis) is int and 0 <= axis < space.dim for axis in axes):
+                raise OrbiflowError(f"a factor of the angles {axes!r}")
+            below = within(tensors, f"{axes[-1]}.")
+            chains = VonMisesChains.from_header(Torus(len(axes)), own, below)
+            factors.append(Factor(tuple(axes), chains))
+        return cls(space, factors)
 
     def __repr__(self) -> str:
         arrows = ", ".join(
@@ -160,3 +250,107 @@ def averaged_networks(networks: Sequence[VonMisesNetwork]) -> VonMisesNetwork:
         first.space,
         [Factor(column[0].axes, averaged([own.chains for own in column])) for column in columns],
     )
+
+
+@dataclass(frozen=True)
+class _Mixture:
+    """Of an angle given draws of its parents: logs of weights (Q, C), means (Q, C), kappa (C,)."""
+
+    logs: Tensor
+    means: Tensor
+    kappa: Tensor
+
+    @classmethod
+    def of(cls, chains: VonMisesChains, axes: tuple[int, ...], at: dict[int, Tensor]) -> _Mixture:
+        around = {**at, axes[-1]: torch.zeros(1, 1, dtype=torch.float64)}
+        logs = _along(lambda p: log_of_parents(chains, p).mT.flatten(1), axes, around)[0]
+        scale = torch.tensor(SCALES, dtype=torch.float64)
+        kappa = (chains.concentrations[:, -1, None] / scale).flatten()
+        logs = logs - log_sum_exp(logs)[:, None] - special.i0e(kappa).log()
+        wave = _along(lambda p: waves(2 * math.pi * p), axes, around)[0]
+        means = (wave @ chains.means[:, -1].mT).repeat_interleave(len(SCALES), dim=1)
+        return cls(logs, means, kappa)
+
+    def log_prob(self, angle: Tensor) -> Tensor:
+        """(N, Q) at angles (N, 1) in turns; equal ones are worked on once."""
+        own, place = unique(angle[:, 0], return_inverse=True)
+        rows = torch.split(2 * math.pi * own[:, None, None], max(1, ENTRIES // self.logs.numel()))
+        found = [
+            log_sum_exp((row - self.means).cos_().sub_(1).mul_(self.kappa).add_(self.logs))
+            for row in rows
+        ]
+        return torch.cat(found)[place]
+
+
+@dataclass(frozen=True)
+class _Once:
+    """What does not depend on the points, and is worked on once.
+
+    - `factors`: those that do.
+    - `at`: angles that are known (1, 1) or drawn (1, Q). `total`: log density of those that are known.
+    - `mixtures`: of angles whose parents are among them.
+    """
+
+    factors: list[Factor]
+    at: dict[int, Tensor]
+    total: Tensor
+    mixtures: dict[int, _Mixture]
+
+    @classmethod
+    def of(cls, factors: list[Factor], known: dict[int, Tensor], even: dict[int, Tensor]) -> _Once:
+        at, mixtures = dict(known), dict[int, _Mixture]()
+        total = torch.zeros(1, 1, dtype=torch.float64)
+        left: list[Factor] = []
+        for axes, chains in factors:
+            axis = axes[-1]
+            fixed = all(parent in at for parent in axes[:-1])
+            if fixed and axis in even:
+                at[axis] = _drawn_at(chains, axes, at, even[axis])
+            elif fixed and axis in at:
+                total = total + _along(lambda p, c=chains: log_conditional(c, p), axes, at)
+            else:
+                left.append(Factor(axes, chains))
+                if fixed:
+                    mixtures[axis] = _Mixture.of(chains, axes, at)
+        return cls(left, at, total, mixtures)
+
+    def weighted(self, points: dict[int, Tensor], even: dict[int, Tensor]) -> Tensor:
+        """Log density of what is seen, given what is drawn: (N, Q), or what broadcasts to it."""
+        at, total = {**self.at, **points}, self.total
+        for axes, chains in self.factors:
+            axis = axes[-1]
+            if axis in even:
+                at[axis] = _drawn_at(chains, axes, at, even[axis])
+            elif axis in self.mixtures:
+                total = total + self.mixtures[axis].log_prob(at[axis])
+            else:
+                total = total + _along(lambda p, c=chains: log_conditional(c, p), axes, at)
+        return total
+
+
+def _along(
+    function: Callable[[Tensor], Tensor], axes: tuple[int, ...], at: dict[int, Tensor]
+) -> Tensor:
+    """A function of points (R, len(axes)), at angles whose shapes broadcast: in their common one."""
+    own = broadcast(*[at[axis] for axis in axes])
+    rows = torch.stack(own, dim=-1).flatten(0, 1)
+    value = torch.cat([function(block) for block in torch.split(rows, ROWS)])
+    return value.reshape(*own[0].shape, *value.shape[1:])
+
+
+def _drawn_at(
+    chains: VonMisesChains, axes: tuple[int, ...], at: dict[int, Tensor], even: Tensor
+) -> Tensor:
+    """The last of the angles, (N, Q) or (1, Q), given its parents, at probabilities (Q, 2)."""
+    around = {**at, axes[-1]: even.new_zeros(1, 1)}
+    shares = _along(lambda p: shares_of(log_of_parents(chains, p).mT.flatten(1)), axes, around)
+    rows = len(shares)
+    below = shares.cumsum(dim=-1).expand(rows, len(even), -1).contiguous()
+    chosen = torch.searchsorted(below, even[None, :, :1].expand(rows, -1, 1).contiguous())[..., 0]
+    chosen = chosen.clamp_max(below.shape[-1] - 1)
+    component = chosen // len(SCALES)
+    kappa = chains.concentrations[:, -1, None] / torch.tensor(SCALES, dtype=torch.float64)
+    offset = quantiles(kappa.flatten(), even[:, 1])[chosen, torch.arange(len(even))]
+    wave = _along(lambda p: waves(2 * math.pi * p), axes, around)
+    mean = (wave * chains.means[:, -1][component]).sum(dim=-1)
+    return (mean + offset) / (2 * math.pi)

@@ -14,10 +14,14 @@ from orbiflow.density.arguments import (
     check_range,
     points_tensor,
 )
-from orbiflow.density.models.blend import BlendedDensity
+from orbiflow.density.models.density import (
+    Density,
+    destination,
+    log_area_factor,
+    midpoints,
+    moved,
+)
 from orbiflow.density.models.kernels import AdaptiveKernels
-from orbiflow.density.models.moving import destination, moved
-from orbiflow.density.models.symmetric import SymmetricDensity, midpoints
 from orbiflow.density.spaces import CHART, rectangle
 from orbiflow.errors import OrbiflowError
 from orbiflow.fields import (
@@ -63,8 +67,8 @@ class TabulatedDensity:
     """
 
     @one_thread()
-    def __init__(self, density: SymmetricDensity, resolution: int = 512, seed: int = 0) -> None:
-        space = check_kind(density, SymmetricDensity, "density").space
+    def __init__(self, density: Density, resolution: int = 512, seed: int = 0) -> None:
+        space = check_kind(density, Density, "density").space
         if space.dim != 2:
             raise OrbiflowError(f"a table needs two dimensions, this {space.name} has {space.dim}")
         check_range("resolution", resolution, 8, 4096, integer=True)
@@ -80,26 +84,27 @@ class TabulatedDensity:
         self.error = float(off[0].square().mean().sqrt())
         self.largest = float(torch.cat(off).abs().max())
 
-    def _smooth_part(self, density: SymmetricDensity) -> Callable[[Tensor], Tensor]:
-        """Log of what is tabulated at points (N, 2), relative to the uniform density.
+    def _smooth_part(self, density: Density) -> Callable[[Tensor], Tensor]:
+        """Return the log of what is tabulated at points (N, 2), relative to the uniform density.
 
-        Sets aside what is not.
+        Kernels that are too narrow for the table are set aside.
         """
-        if not isinstance(density, BlendedDensity):
+        part = density.kernel_part
+        if part is None:
             return lambda points: density.log_prob(points, measure="uniform")
-        wide, self._narrow, share = density.kernels.parted(_wide(density.kernels, self.resolution))
-        of_kernels, volume = float(density.shares[1]), math.log(self.space.volume)
-        # the kernels' own measure is the round area, or that of the square
-        self._shift = volume if self.space.is_round else 0.0
-        self._floor = float(density.shares[2])
-        self._log_share = math.log(of_kernels * (1 - share)) if self._narrow else -math.inf
-        if wide is None:
-            return lambda points: density.log_prob_without_kernels(points, measure="uniform")
+        weight, kernels = part
+        uniform = log_area_factor(self.space, "uniform")
+        wide, self._narrow, share = kernels.parted(_wide(kernels, self.resolution))
+        # the kernels' own measure is the area of the sphere, or that of the square
+        self._shift, self._log_floor = uniform, density.log_floor + uniform
+        self._log_weight = math.log(weight * (1 - share)) if self._narrow else -math.inf
 
         def smooth(points: Tensor) -> Tensor:
-            rest = density.log_prob_without_kernels(points, measure="uniform")
+            rest = density.log_density_without_kernels(points) + uniform
+            if wide is None:
+                return rest
             own = wide.log_density(points, tolerance=LOOSE).to(rest)
-            return torch.logaddexp(rest, own + math.log(of_kernels * share) + self._shift)
+            return torch.logaddexp(rest, own + math.log(weight * share) + uniform)
 
         return smooth
 
@@ -139,9 +144,9 @@ class TabulatedDensity:
         parts = [spline_sum(self._table, block)[0] for block in torch.split(cells, BLOCK, dim=1)]
         values = torch.cat(parts)
         if self._narrow is not None:
-            beside = math.log(self._floor) - self._log_share - self._shift
+            beside = self._log_floor - self._log_weight - self._shift
             own = self._narrow.log_density(flat, beside, LOOSE)
-            values = torch.logaddexp(values, own + (self._log_share + self._shift))
+            values = torch.logaddexp(values, own + (self._log_weight + self._shift))
         if measure == "natural":  # the area factor, costlier than the table, drops out
             values = values - math.log(self.space.volume)
         elif measure != "uniform":

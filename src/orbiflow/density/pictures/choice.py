@@ -20,7 +20,7 @@ from orbiflow.arguments import (
     path as as_path,
 )
 from orbiflow.density.estimator import DensityEstimator
-from orbiflow.density.models import BlendedDensity, SymmetricDensity
+from orbiflow.density.models import Density, read_density
 from orbiflow.density.pictures.axes import space_title, view_of
 from orbiflow.density.pictures.coastlines import read_coastlines, simplified
 from orbiflow.density.pictures.corner import MOST_COLUMNS, corner_picture
@@ -37,7 +37,6 @@ from orbiflow.density.pictures.scale import SCALES
 from orbiflow.density.pictures.square import density_picture
 from orbiflow.density.regions import DensityLevels, samples_for
 from orbiflow.density.spaces import MEASURES, Space
-from orbiflow.density.storage import read_density
 from orbiflow.drawing import (
     FigureFormat,
     Picture,
@@ -137,7 +136,7 @@ PAGE_POINTS = 40_000
 class DensityPlots:
     """What the pictures of a density show: chart points beside it."""
 
-    density: SymmetricDensity
+    density: Density
     settings: PlotSettings
     samples: Tensor
     data: Tensor | None
@@ -147,7 +146,7 @@ class DensityPlots:
     @classmethod
     def of(
         cls,
-        density: SymmetricDensity | DensityEstimator | str | Path,
+        density: Density | DensityEstimator | str | Path,
         settings: PlotSettings,
         data: ArrayLike | None = None,
     ) -> DensityPlots:
@@ -271,8 +270,7 @@ class DensityPlots:
     @property
     def _flows(self) -> bool:
         """Whether a flow has a part in the density."""
-        density = self.density
-        return not (isinstance(density, BlendedDensity) and float(density.shares[0]) == 0)
+        return self.density.flow_part is not None
 
     @property
     def _coasts(self) -> Sequence[Any]:
@@ -287,7 +285,7 @@ def known_names(space: Space, columns: Sequence[str] | None) -> Sequence[str] | 
     return columns if angles and columns and len(columns) == len(space.columns) else None
 
 
-def _regions(density: SymmetricDensity, settings: PlotSettings) -> tuple[RegionLine, ...]:
+def _regions(density: Density, settings: PlotSettings) -> tuple[RegionLine, ...]:
     """
     Raises:
         OrbiflowError: for regions of what is not drawn in two dimensions.
@@ -331,10 +329,10 @@ def _coastlines(
 
 
 def _density(
-    given: SymmetricDensity | DensityEstimator | str | Path,
-) -> tuple[SymmetricDensity, Sequence[str] | None]:
+    given: Density | DensityEstimator | str | Path,
+) -> tuple[Density, Sequence[str] | None]:
     """It, and the columns that it was fitted to, where they are known."""
-    if isinstance(given, SymmetricDensity):
+    if isinstance(given, Density):
         return given, None
     if isinstance(given, DensityEstimator):
         density = getattr(given, "density_", None)

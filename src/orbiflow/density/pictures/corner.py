@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 
 from orbiflow.arrays import Array
-from orbiflow.density.models import SymmetricDensity
+from orbiflow.density.models import Density
 from orbiflow.density.pictures.axes import (
     INK,
     LETTER,
@@ -43,7 +43,7 @@ _SMALLEST = 0.5
 
 
 def corner_png(
-    density: SymmetricDensity,
+    density: Density,
     data: Tensor | None,
     drawn: Tensor,
     *,
@@ -59,7 +59,7 @@ def corner_png(
 
 
 def corner_picture(
-    density: SymmetricDensity,
+    density: Density,
     data: Tensor | None,
     drawn: Tensor,
     *,

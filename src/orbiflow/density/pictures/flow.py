@@ -13,9 +13,8 @@ from torch import Tensor
 
 from orbiflow.arrays import Array
 from orbiflow.density.models import (
-    BlendedDensity,
-    NeuralFlow,
-    SymmetricDensity,
+    Density,
+    FlowDensity,
 )
 from orbiflow.density.pictures.axes import (
     INK,
@@ -45,12 +44,9 @@ SPEED = "speed, sides of the square per unit time"
 SCREEN = Room(1.8, 3.8, 10.8, 2.7, 1.7, 1.5)
 """With a caption below."""
 
-_TIMES = 16
-"""At which a field that changes with time is averaged."""
-
 
 def flow_png(
-    density: SymmetricDensity,
+    density: Density,
     *,
     cells: int = 3,
     center: Sequence[float] | None = None,
@@ -66,7 +62,7 @@ def flow_png(
 
 
 def flow_picture(
-    density: SymmetricDensity,
+    density: Density,
     *,
     cells: int = 3,
     center: Sequence[float] | None = None,
@@ -113,11 +109,24 @@ def flow_picture(
     return Picture(frame.figure, sheet, title, f"The {signs}.")
 
 
-def _subject(density: SymmetricDensity) -> str:
+def _subject(density: Density) -> str:
     name = f"the {space_title(density.space)}"
-    if isinstance(density, BlendedDensity):
-        return f"Flow, {100 * float(density.shares[0]):.0f} % of the density on {name}"
-    return f"Flow on {name}"
+    weight, flow = flow_of(density)
+    if flow is density:
+        return f"Flow on {name}"
+    return f"Flow, {100 * weight:.0f} % of the density on {name}"
+
+
+def flow_of(density: Density) -> tuple[float, FlowDensity]:
+    """Return the weight and the density of the flow to draw.
+
+    Raises:
+        OrbiflowError: if the density has none.
+    """
+    part = density.flow_part
+    if part is None:
+        raise OrbiflowError("the density has no flow: draw another picture of it")
+    return part
 
 
 def few_colours(png: bytes) -> bytes:
@@ -149,14 +158,11 @@ def _palette() -> Array:
 
 
 @torch.no_grad()
-def mean_field(density: SymmetricDensity, points: Tensor) -> Tensor:
+def mean_field(density: Density, points: Tensor) -> Tensor:
     """The time mean of the flow's fields (..., d) at chart points (..., d), float64."""
-    flow, like = density.flow, next(iter(density.flow.parameters()), points)
-    if isinstance(flow, NeuralFlow):  # whose field changes with time
-        times = (torch.arange(_TIMES).to(like) + 0.5) / _TIMES
-        vectors = [flow.field(points.to(like), time) for time in times]
-    else:
-        vectors = [field(points.to(like)) for field in flow.segments]
+    flow = flow_of(density)[1].flow
+    like = next(iter(flow.parameters()), points)
+    vectors = [field(points.to(like)) for field in flow.segments]
     return torch.stack(vectors).mean(dim=0).double().cpu()
 
 

@@ -6,7 +6,7 @@ from typing import Unpack
 
 from torch import Tensor
 
-from orbiflow.density.models import SymmetricDensity
+from orbiflow.density.models import Density
 from orbiflow.density.pictures.axes import space_title
 from orbiflow.density.pictures.dots import MAX_DOTS, dot_shrink
 from orbiflow.density.pictures.frame import Room, two_panels
@@ -39,7 +39,7 @@ _BESIDE = 120 / 25.4
 
 
 def map_samples_picture(
-    density: SymmetricDensity,
+    density: Density,
     data: Tensor | None,
     drawn: Tensor,
     *,

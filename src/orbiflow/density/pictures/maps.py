@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from torch import Tensor
 
 from orbiflow.arrays import Array
-from orbiflow.density.models import SymmetricDensity
+from orbiflow.density.models import Density
 from orbiflow.density.pictures.axes import chart_points, space_title
 from orbiflow.density.pictures.dots import (
     MAX_DOTS,
@@ -92,7 +92,7 @@ class MapOptions(TypedDict, total=False):
 
 
 def map_picture(
-    density: SymmetricDensity,
+    density: Density,
     samples: Tensor | None = None,
     *,
     measure: str = "natural",
@@ -221,9 +221,7 @@ class ColouredMap(NamedTuple):
         return image
 
 
-def coloured_map(
-    density: SymmetricDensity, projection: Projection, measure: str, scale: str
-) -> ColouredMap:
+def coloured_map(density: Density, projection: Projection, measure: str, scale: str) -> ColouredMap:
     """The colours of a density on a map.
 
     Raises:

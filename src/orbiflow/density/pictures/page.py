@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from torch import Tensor
 
 from orbiflow.arrays import Array
-from orbiflow.density.models import BlendedDensity, SymmetricDensity
+from orbiflow.density.models import Density
 from orbiflow.density.pictures.axes import (
     chart_points,
     space_title,
@@ -60,7 +60,7 @@ _SOFT = 1.6
 
 
 def density_page(
-    density: SymmetricDensity,
+    density: Density,
     *,
     measure: str = "natural",
     scale: str = "linear",
@@ -96,7 +96,7 @@ def density_page(
             fit, coastlines on a space without latitudes, or a page above `MAX_BYTES`.
     """
     space = density.space
-    cells = resolution or (_FINE_CELLS if isinstance(density, BlendedDensity) else _CELLS)
+    cells = resolution or (_FINE_CELLS if density.has_fine_detail else _CELLS)
     grid, view = mesh(space, cells), view_of(space, names)
     drawing = DRAWINGS[space.name]
     t = torch.linspace(0.0, 1.0, cells + 1, dtype=torch.float64)

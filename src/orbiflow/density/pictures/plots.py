@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from orbiflow.arguments import path as as_path
 from orbiflow.density.estimator import DensityEstimator
-from orbiflow.density.models import SymmetricDensity
+from orbiflow.density.models import Density
 from orbiflow.density.pictures.choice import (
     MODEL,
     DensityPlots,
@@ -55,7 +55,7 @@ class Plotted(NamedTuple):
 
 @one_thread()
 def plot_density(
-    density: SymmetricDensity | DensityEstimator | str | Path,
+    density: Density | DensityEstimator | str | Path,
     out: str | Path,
     settings: PlotSettings | None = None,
     *,

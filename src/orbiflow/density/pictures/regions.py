@@ -9,7 +9,7 @@ import numpy as np
 import torch
 
 from orbiflow.arrays import Array
-from orbiflow.density.models import SymmetricDensity
+from orbiflow.density.models import Density
 from orbiflow.density.spaces import Space
 from orbiflow.drawing import Sheet
 
@@ -77,9 +77,7 @@ def draw_regions(
         drawn.set_path_effects([halo, Stroke(linewidth=width, foreground=LINE)])
 
 
-def log_natural(
-    density: SymmetricDensity, values: Array, points: torch.Tensor, measure: str
-) -> Array:
+def log_natural(density: Density, values: Array, points: torch.Tensor, measure: str) -> Array:
     """Logarithms (N,) in natural measure of values (N,) in another one at chart points (N, d)."""
     space: Space = density.space
     own = np.log(np.maximum(values, 1e-300))

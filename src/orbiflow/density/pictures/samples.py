@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Unpack
 from torch import Tensor
 
 from orbiflow.arrays import Array
-from orbiflow.density.models import SymmetricDensity
+from orbiflow.density.models import Density
 from orbiflow.density.pictures.axes import (
     ANGLE_AXES,
     check_plane,
@@ -42,7 +42,7 @@ GROUND = "#f4f4f1"
 
 
 def samples_png(
-    density: SymmetricDensity,
+    density: Density,
     data: Tensor | None,
     drawn: Tensor,
     *,
@@ -59,7 +59,7 @@ def samples_png(
 
 
 def samples_picture(
-    density: SymmetricDensity,
+    density: Density,
     data: Tensor | None,
     drawn: Tensor,
     *,

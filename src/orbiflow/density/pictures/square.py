@@ -11,8 +11,7 @@ from torch import Tensor
 
 from orbiflow.arrays import Array
 from orbiflow.density.models import (
-    BlendedDensity,
-    SymmetricDensity,
+    Density,
     midpoints,
 )
 from orbiflow.density.pictures.axes import (
@@ -83,7 +82,7 @@ class SquareOptions(DensityOptions, total=False):
 
 
 def density_png(
-    density: SymmetricDensity,
+    density: Density,
     samples: Tensor | None = None,
     *,
     width_px: int = 1600,
@@ -98,7 +97,7 @@ def density_png(
 
 
 def density_picture(
-    density: SymmetricDensity,
+    density: Density,
     samples: Tensor | None = None,
     *,
     measure: str = "natural",
@@ -178,13 +177,13 @@ class Coloured(NamedTuple):
         )  # fmt: skip
 
 
-def square_colours(density: SymmetricDensity, view: View, measure: str, scale: str) -> Coloured:
+def square_colours(density: Density, view: View, measure: str, scale: str) -> Coloured:
     """The colours of a density's picture on the square.
 
     Raises:
         OrbiflowError: for an unknown measure or scale.
     """
-    space, count = density.space, _FINE_GRID if isinstance(density, BlendedDensity) else _GRID
+    space, count = density.space, _FINE_GRID if density.has_fine_detail else _GRID
     middles = (torch.arange(count, dtype=torch.float64) + 0.5) / count
     values = density_on_grid(density, middles + view.low[0], middles + view.low[1], measure)
     areas = space.log_area(midpoints(space, count)).exp().numpy().reshape(count, count)

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from PIL import Image, ImageDraw
 
 from orbiflow.arrays import Array
-from orbiflow.density.models import SymmetricDensity, midpoints
+from orbiflow.density.models import Density, midpoints
 from orbiflow.density.pictures.axes import view_of
 from orbiflow.density.pictures.map_choice import chosen_map
 from orbiflow.density.pictures.maps import pixels_of
@@ -45,7 +45,7 @@ MARGIN = 6
 
 
 @torch.no_grad()
-def density_thumbnail(density: SymmetricDensity, data: ArrayLike) -> bytes:
+def density_thumbnail(density: Density, data: ArrayLike) -> bytes:
     """PNG of 360 x 240 pixels, the same every time.
 
     Colours are by logarithms where most of the picture would be dark otherwise.
@@ -87,7 +87,7 @@ def _shade(values: Array, areas: Array) -> Shade:
     return shading(values, areas, log=dark_share(values, areas) > DARKEST)
 
 
-def _square(density: SymmetricDensity) -> Image.Image:
+def _square(density: Density) -> Image.Image:
     space, view = density.space, view_of(density.space)
     middles = (torch.arange(COARSE, dtype=torch.float64) + 0.5) / COARSE
     values = density_on_grid(density, middles + view.low[0], middles + view.low[1], "natural")
@@ -96,7 +96,7 @@ def _square(density: SymmetricDensity) -> Image.Image:
     return picture.resize((SIZE[1], SIZE[1]), Image.Resampling.BICUBIC)
 
 
-def _map(density: SymmetricDensity, data: Array) -> Image.Image:
+def _map(density: Density, data: Array) -> Image.Image:
     space = density.space
     assert isinstance(space, RoundSpace)
     projection = chosen_map(space, space.to_chart(data))
@@ -119,7 +119,7 @@ def _map(density: SymmetricDensity, data: Array) -> Image.Image:
     return paper
 
 
-def _histogram(density: SymmetricDensity, data: Array) -> Image.Image:
+def _histogram(density: Density, data: Array) -> Image.Image:
     """Bars of the data under the density's line, from minus half a turn to half a turn."""
     space, view, fine = density.space, view_of(density.space), 4
     width, height = (fine * (side - 2 * MARGIN) for side in SIZE)

@@ -11,8 +11,7 @@ from torch import Tensor
 from orbiflow.arrays import Array
 from orbiflow.density.models import (
     AdaptiveKernels,
-    BlendedDensity,
-    SymmetricDensity,
+    Density,
     midpoints,
 )
 from orbiflow.density.pictures.scale import (
@@ -35,7 +34,7 @@ _COARSE = 120
 
 
 @torch.no_grad()
-def density_at(density: SymmetricDensity, points: Tensor, measure: str) -> Array:
+def density_at(density: Density, points: Tensor, measure: str) -> Array:
     """Density (N,) at chart points (N, 2) of the plane; at cone points, next to them.
 
     Raises:
@@ -43,13 +42,18 @@ def density_at(density: SymmetricDensity, points: Tensor, measure: str) -> Array
     """
     if density.space.is_round:
         points = off_cones(points)
-    like = next(iter(density.flow.parameters()), points)
-    return density.log_prob(points.to(like), measure=measure).double().cpu().exp().numpy()
+    return (
+        density.log_prob(points.to(device=density.device, dtype=density.dtype), measure=measure)
+        .double()
+        .cpu()
+        .exp()
+        .numpy()
+    )
 
 
 @torch.no_grad()
 def density_on_grid(
-    density: SymmetricDensity, x: Tensor, y: Tensor, measure: str, *, pixel: float | None = None
+    density: Density, x: Tensor, y: Tensor, measure: str, *, pixel: float | None = None
 ) -> Array:
     """Density (len(x), len(y)) on the grid of chart coordinates x and y, float64.
 
@@ -65,23 +69,25 @@ def density_on_grid(
     """
     space, shape = density.space, (len(x), len(y))
     points = torch.stack(torch.meshgrid(x, y, indexing="ij"), dim=-1).reshape(-1, 2)
-    if not isinstance(density, BlendedDensity):
+    part = density.kernel_part
+    if part is None:
         return density_at(density, points, measure).reshape(shape)
     if space.is_round:
         points = off_cones(points)
-    values = density.log_prob_without_kernels(points).exp().numpy()
-    kernels, pixel = density.kernels, pixel or float(x[1] - x[0])
+    weight, kernels = part
+    values = _without_kernels(density, points).numpy()
+    pixel = pixel or float(x[1] - x[0])
     kappa = _widened(kernels, _half_pixels(kernels, pixel))
     if space.is_round:
         sums = _round_sums(kernels, kappa, points).reshape(shape)
     else:
         sums = _flat_sums(kernels, kappa, x, y)
-    values = values.reshape(shape) + float(density.shares[1]) * sums.numpy()
+    values = values.reshape(shape) + weight * sums.numpy()
     return values * space.log_density_factor(points, measure).exp().numpy().reshape(shape)
 
 
 @torch.no_grad()
-def density_on_map(density: SymmetricDensity, points: Tensor, measure: str, angle: float) -> Array:
+def density_on_map(density: Density, points: Tensor, measure: str, angle: float) -> Array:
     """Density (N,) at chart points (N, 2) of a round space, that of kernels averaged over pixels.
 
     Args:
@@ -90,12 +96,14 @@ def density_on_map(density: SymmetricDensity, points: Tensor, measure: str, angl
     Raises:
         OrbiflowError: for an unknown measure.
     """
-    if not isinstance(density, BlendedDensity):
+    part = density.kernel_part
+    if part is None:
         return density_at(density, points, measure)
+    weight, kernels = part
     points = off_cones(points)
-    kappa = _widened(density.kernels, torch.tensor(angle / 2))
-    values = density.log_prob_without_kernels(points).exp()
-    values = values + float(density.shares[1]) * _round_sums(density.kernels, kappa, points)
+    kappa = _widened(kernels, torch.tensor(angle / 2))
+    values = _without_kernels(density, points)
+    values = values + weight * _round_sums(kernels, kappa, points)
     return (values * density.space.log_density_factor(points, measure).exp()).numpy()
 
 
@@ -106,7 +114,7 @@ class Chosen(NamedTuple):
     why: str
 
 
-def chosen_scale(density: SymmetricDensity, measure: str, scale: str) -> Chosen:
+def chosen_scale(density: Density, measure: str, scale: str) -> Chosen:
     """The scale of colours: the same for all pictures of a density.
 
     Raises:
@@ -130,23 +138,29 @@ def chosen_scale(density: SymmetricDensity, measure: str, scale: str) -> Chosen:
 _SAID = {False: "colours are linear", True: "colours are logarithmic"}
 
 
-def takes_logarithms(density: SymmetricDensity, measure: str, scale: str) -> bool:
+def takes_logarithms(density: Density, measure: str, scale: str) -> bool:
     """`chosen_scale` without the reason."""
     return chosen_scale(density, measure, scale).log
 
 
-def is_sharp(density: SymmetricDensity, pixel: float) -> bool:
+def is_sharp(density: Density, pixel: float) -> bool:
     """Whether peaks of the density may be narrower than pixels of that side show."""
-    if not isinstance(density, BlendedDensity):
-        return False
-    return _is_narrower(density.kernels, _half_pixels(density.kernels, pixel))
+    part = density.kernel_part
+    return part is not None and _is_narrower(part[1], _half_pixels(part[1], pixel))
 
 
-def is_sharp_on_map(density: SymmetricDensity, angle: float) -> bool:
+def is_sharp_on_map(density: Density, angle: float) -> bool:
     """The same of pixels `angle` radians wide on the sphere."""
-    if not isinstance(density, BlendedDensity):
-        return False
-    return _is_narrower(density.kernels, torch.tensor(angle / 2))
+    part = density.kernel_part
+    return part is not None and _is_narrower(part[1], torch.tensor(angle / 2))
+
+
+def _without_kernels(density: Density, points: Tensor) -> Tensor:
+    """Return the density (N,) per area of the square, without its kernels."""
+    values = density.log_density_without_kernels(points)
+    if density.space.is_round:
+        values = values + density.space.log_area(points)
+    return values.exp()
 
 
 def _is_narrower(kernels: AdaptiveKernels, half: Tensor) -> bool:

@@ -14,7 +14,7 @@ from torch import Tensor
 
 from orbiflow.arrays import Array
 from orbiflow.density.arguments import silent
-from orbiflow.density.models import BlendedDensity, SymmetricDensity
+from orbiflow.density.models import Density
 from orbiflow.density.regions.contours import filled
 from orbiflow.density.regions.grid import LevelGrid, Seeds
 from orbiflow.density.regions.levels import DensityLevels, DensityRegion
@@ -169,11 +169,12 @@ def outlines(
     return found
 
 
-def _peaks(density: SymmetricDensity) -> Tensor:
+def _peaks(density: Density) -> Tensor:
     """Chart points (P, 2) at which narrow islands may be: centres of kernels."""
-    if not isinstance(density, BlendedDensity):
+    part = density.kernel_part
+    if part is None:
         return torch.zeros(0, 2, dtype=torch.float64)
-    places = unique((density.kernels.centers * 1e6).round(), dim=0) / 1e6
+    places = unique((part[1].centers * 1e6).round(), dim=0) / 1e6
     chosen = torch.randperm(len(places), generator=torch.Generator().manual_seed(0))
     return places[chosen[:MOST_PEAKS]]
 

@@ -16,7 +16,7 @@ from orbiflow.arguments import number, whole
 from orbiflow.arrays import Array
 from orbiflow.density.comparing import density_of, scores_of
 from orbiflow.density.estimator import DensityEstimator
-from orbiflow.density.models import SymmetricDensity
+from orbiflow.density.models import Density
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import one_thread
 
@@ -114,7 +114,7 @@ class DensityRegion:
 
     """
 
-    density: SymmetricDensity
+    density: Density
     mass: float | None
     held: float
     error: float
@@ -162,7 +162,7 @@ class DensityLevels:
     @torch.no_grad()
     def __init__(
         self,
-        density: SymmetricDensity | DensityEstimator,
+        density: Density | DensityEstimator,
         *,
         samples: int = SAMPLES,
         seed: int = 0,
@@ -245,7 +245,7 @@ class DensityLevels:
 
 
 def highest_density_region(
-    density: SymmetricDensity | DensityEstimator,
+    density: Density | DensityEstimator,
     mass: float = 0.9,
     *,
     samples: int | None = None,

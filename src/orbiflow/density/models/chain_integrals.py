@@ -1,28 +1,20 @@
-"""Von Mises chains of some angles: closed where chains end or begin, by quadrature elsewhere."""
+"""Von Mises chains of some of their angles, by quadrature over those that come before them."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import torch
 from torch import Tensor
 
-from orbiflow.density.inference.axes import Split
-from orbiflow.density.models import (
-    SCALES,
-    VonMisesChains,
-    log_sum_exp,
-    shares_of,
-    waves,
-)
-from orbiflow.density.spaces import Torus
-from orbiflow.typed_torch import (
-    listed,
-    special,
-    unique,
-)
+from orbiflow.density.models.terms import log_sum_exp
+from orbiflow.typed_torch import listed, special, unique
+
+SCALES = (1.0, 4.0, 16.0)
+"""A component's concentrations are divided by these, each with its own weight: heavy tails."""
 
 REACH = 7.0
 """Deviations from its mean at which an angle is not looked at any more."""
@@ -161,90 +153,29 @@ class _Group:
     hidden: tuple[int, ...]
 
 
-def partial_chains(
-    chains: VonMisesChains, split: Split, space: Torus
-) -> tuple[VonMisesChains | None, float, VonMisesChains | None, float]:
-    """Chains of the kept angles where they are chains again, and those left, where they are not.
+class ChainTensors(NamedTuple):
+    """The parameters of a `VonMisesChains`, as they are named there."""
 
-    Closed are components in which all that is given comes first and all that is integrated out last.
-
-    Returns:
-        Closed chains on `space`, or None; the log of their share times their log density at what is
-        given; the others, all angles, or None; the log of their share.
-    """
-    order = chains.order
-    place = order.argsort(dim=1)
-    kept, given = list(split.kept), list(split.given)
-    hidden = [axis for axis in range(split.dim) if axis not in split.observed]
-    closed = torch.ones(len(order), dtype=torch.bool)
-    first = place[:, kept].amin(dim=1)
-    last = place[:, list(split.observed)].amax(dim=1)
-    if given:
-        closed &= place[:, given].amax(dim=1) < first
-    if hidden:
-        closed &= place[:, hidden].amin(dim=1) > last
-    rest, rest_log = _some(chains, ~closed)
-    some, some_log = _some(chains, closed)
-    if some is None:
-        return None, -math.inf, rest, rest_log
-    found, evidence = _closed(some, split, space)
-    return found, some_log + evidence, rest, rest_log
+    log_weights: Tensor
+    means: Tensor
+    concentrations: Tensor
+    order: Tensor
 
 
-def _some(chains: VonMisesChains, chosen: Tensor) -> tuple[VonMisesChains | None, float]:
-    if not bool(chosen.any()) or bool((chains.log_weights[chosen] == -math.inf).all()):
-        return None, -math.inf
-    logs = chains.log_weights[chosen]
-    total = float(logs.flatten().logsumexp(0))
-    found = VonMisesChains(
-        chains.space,
-        logs - total,
-        chains.means[chosen],
-        chains.concentrations[chosen],
-        chains.order[chosen],
-    )
-    return found, total
-
-
-def _closed(chains: VonMisesChains, split: Split, space: Torus) -> tuple[VonMisesChains, float]:
-    """Chains of the kept angles, their constants moved and their weights changed by what is given."""
-    kept, given, d = list(split.kept), list(split.given), split.dim
-    logs, means, evidence = chains.log_weights, chains.means, 0.0
-    constant = means[:, :, 0]
-    if given:
-        angle = torch.zeros(1, d, dtype=torch.float64)
-        angle[0, given] = 2 * math.pi * torch.tensor(split.values, dtype=torch.float64)
-        known = torch.zeros(1 + 2 * d, dtype=torch.float64)
-        at = [0, *(1 + j for j in given), *(1 + d + j for j in given)]
-        known[at] = waves(angle)[0, at]
-        constant = means @ known
-        residual = angle[0, given] - constant[:, given]
-        kappa = chains.concentrations[:, given, None] / torch.tensor(SCALES)
-        logs = logs + (kappa * (residual.cos() - 1)[..., None] - special.i0e(kappa).log()).sum(
-            dim=1
-        )
-        evidence = float(log_sum_exp(logs.flatten()))
-        logs = shares_of(logs.flatten()).log().reshape(logs.shape)
-    at = [*(1 + j for j in kept), *(1 + d + j for j in kept)]
-    some = torch.cat([constant[:, kept, None], means[:, kept][:, :, at]], dim=2)
-    order = chains.order.argsort(dim=1)[:, kept].argsort(dim=1)
-    return VonMisesChains(space, logs, some, chains.concentrations[:, kept], order), evidence
-
-
-def chains_at(chains: VonMisesChains, points: Tensor, observed: list[int], seed: int = 0) -> Tensor:
+def chains_at(chains: ChainTensors, points: Tensor, observed: list[int], seed: int = 0) -> Tensor:
     """Log density (N,) of the `observed` angles alone, at points (N, len(observed)).
 
     Angles that come before others and are not observed are integrated out at `nodes_of` them, spread
     about their means, which makes a mixture that is normalised however many nodes there are; `seed` is
     of those that are quasi-random.
     """
-    angle = torch.zeros(len(points), chains.space.dim, dtype=torch.float64)
+    angle = torch.zeros(len(points), chains.order.shape[1], dtype=torch.float64)
     angle[:, observed] = 2 * math.pi * points.double()
     logs = [_group_at(chains, group, angle, seed) for group in _groups(chains, observed)]
     return log_sum_exp(torch.cat(logs, dim=1))
 
 
-def _groups(chains: VonMisesChains, observed: list[int]) -> Iterator[_Group]:
+def _groups(chains: ChainTensors, observed: list[int]) -> Iterator[_Group]:
     orders, number = unique(chains.order, dim=0, return_inverse=True)
     rows: list[list[int]] = listed(orders)
     for k, order in enumerate(rows):
@@ -258,7 +189,7 @@ def _groups(chains: VonMisesChains, observed: list[int]) -> Iterator[_Group]:
         )
 
 
-def _group_at(chains: VonMisesChains, group: _Group, angle: Tensor, seed: int) -> Tensor:
+def _group_at(chains: ChainTensors, group: _Group, angle: Tensor, seed: int) -> Tensor:
     """Logs (N, C) of weight times density of the group's components, each at every scale."""
     scale = torch.tensor(SCALES, dtype=torch.float64)
     means = chains.means[group.components].repeat_interleave(len(SCALES), dim=0)
@@ -302,3 +233,8 @@ def _walked(angle: Tensor, means: Tensor, kappa: Tensor, group: _Group, nodes: N
         else:
             plain = plain + kappa[:, axis] * ((angle[:, None, axis] - mean).cos() - 1)
     return plain if bent is None else plain + log_sum_exp(bent + nodes.log_weights)
+
+
+def waves(angle: Tensor) -> Tensor:
+    """1, sin and cos of angles (N, d) in radians: (N, 1 + 2 d)."""
+    return torch.cat([torch.ones_like(angle[:, :1]), angle.sin(), angle.cos()], dim=1)

@@ -1,4 +1,4 @@
-"""Flows of Fourier and spline fields as a JSON header and tensors."""
+"""Densities and flows as JSON headers and tensors, from which they are made again."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from orbiflow.density.models.density import KINDS, Density
 from orbiflow.density.spaces import Space
 from orbiflow.errors import OrbiflowError
 from orbiflow.fields import (
@@ -22,17 +23,95 @@ from orbiflow.runtime import is_list
 from orbiflow.symmetry import CrystallographicGroup, group_header
 
 
-def checked_tensor(
-    name: str, value: Tensor, shape: tuple[int, ...], *, least: float = -1e30
-) -> Tensor:
-    if tuple(value.shape) != tuple(shape):
-        raise OrbiflowError(f"{name} has shape {tuple(value.shape)}, expected {tuple(shape)}")
-    if not value.is_floating_point() or not bool(((value >= least) & (value < 1e30)).all()):
-        raise OrbiflowError(f"{name} has values that are not finite numbers")
-    return value
+def density_parts(
+    density: Density, name: str, prefix: str = ""
+) -> tuple[dict[str, Any], dict[str, Tensor]]:
+    """Return a density's header and its tensors, whose names begin with `prefix`.
+
+    Args:
+        density: The density.
+        name: What it is in messages, such as "base".
+        prefix: The beginning of the tensors' names.
+
+    Raises:
+        OrbiflowError: naming a class that has no kind of its own.
+    """
+    kind = type(density).kind
+    if KINDS.get(kind) is not type(density):
+        raise OrbiflowError(
+            f"the {name} is a {type(density).__name__}, which a file does not hold: save a density of "
+            f"one of the kinds {', '.join(sorted(KINDS))}, or give the class a kind, "
+            f'class {type(density).__name__}(Density, kind="...")'
+        )
+    tensors = {prefix + key: tensor for key, tensor in density.tensors().items()}
+    return {"kind": kind, **density.header()}, tensors
+
+
+def density_from(space: Space, header: Mapping[str, Any], tensors: Mapping[str, Tensor]) -> Density:
+    """Make the density of `density_parts` again, bit for bit.
+
+    Raises:
+        OrbiflowError: for an unknown kind.
+        OrbiflowError, ValueError, KeyError, TypeError: for what does not fit.
+    """
+    kind = header["kind"]
+    if kind not in KINDS:
+        raise OrbiflowError(
+            f"a density of the kind {kind!r} is not known here: import the module that defines it"
+        )
+    return KINDS[kind].from_header(space, header, tensors)
+
+
+def within(tensors: Mapping[str, Tensor], prefix: str) -> dict[str, Tensor]:
+    """Return the tensors whose names begin with `prefix`, without it."""
+    return {
+        name.removeprefix(prefix): tensor
+        for name, tensor in tensors.items()
+        if name.startswith(prefix)
+    }
+
+
+def check_same_space(density: Density, component: Density, name: str) -> None:
+    """Check that a component is on the space of the density.
+
+    Raises:
+        OrbiflowError: if it is not.
+    """
+    one, other = ((s.name, s.settings()) for s in (density.space, component.space))
+    if one != other:
+        raise OrbiflowError(
+            f"the {name} is on {component.space!r}, the density on {density.space!r}: make both on "
+            "one space"
+        )
+
+
+def checked_tensors(
+    tensors: Mapping[str, Tensor], shapes: Mapping[str, tuple[int, ...]], *, least: float = -1e30
+) -> list[Tensor]:
+    """Return the tensors of these names and shapes, in this order.
+
+    Raises:
+        OrbiflowError: if one is missing, has another shape, or values below `least` or not finite.
+    """
+    found: list[Tensor] = []
+    for name, shape in shapes.items():
+        if name not in tensors:
+            raise OrbiflowError(f"the tensor {name} is missing")
+        value = tensors[name]
+        if tuple(value.shape) != tuple(shape):
+            raise OrbiflowError(f"{name} has shape {tuple(value.shape)}, expected {tuple(shape)}")
+        if not value.is_floating_point() or not bool(((value >= least) & (value < 1e30)).all()):
+            raise OrbiflowError(f"{name} has values that are not finite numbers")
+        found.append(value)
+    return found
 
 
 def checked_integer(header: Mapping[str, Any], name: str, most: int) -> int:
+    """Return an entry of a header that must be an integer from 1 to `most`.
+
+    Raises:
+        OrbiflowError: for another value.
+    """
     value = header.get(name)
     if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= most:
         raise OrbiflowError(f"{name} must be an integer from 1 to {most}, got {value!r}")
@@ -40,11 +119,11 @@ def checked_integer(header: Mapping[str, Any], name: str, most: int) -> int:
 
 
 TOLERANCE = 1e-9
-"""Of matrices and translations that are read as equal."""
+"""Difference of matrices and translations up to which they are read as equal."""
 
 
 def is_same_group(one: CrystallographicGroup, other: CrystallographicGroup) -> bool:
-    """Whether lattice *basis* and coset representatives agree.
+    """Return whether lattice *basis* and coset representatives agree.
 
     Another basis of the same lattice numbers the frequencies otherwise: the same parameters would be
     another field.
@@ -58,9 +137,10 @@ def is_same_group(one: CrystallographicGroup, other: CrystallographicGroup) -> b
 
 
 def check_group(header: Any, group: CrystallographicGroup) -> None:
-    """
+    """Check that `header`, from `group_header`, describes this group.
+
     Raises:
-        OrbiflowError: if `header`, from `group_header`, is of another group.
+        OrbiflowError: if it describes another one.
     """
     try:
         tables = [np.array(header[name], dtype=float) for name in group_header(group)]
@@ -84,19 +164,19 @@ FIELDS: dict[str, type[FourierField | SplineField]] = {
     "fourier": FourierField,
     "spline": SplineField,
 }
-KINDS = {kind: name for name, kind in FIELDS.items()}
+FIELD_NAMES = {kind: name for name, kind in FIELDS.items()}
 
 
 def series_parts(flow: Flow, space: Space) -> tuple[dict[str, Any], dict[str, Tensor]]:
-    """What makes the flow again, float64: a header ready for JSON, and a tensor "flow.k" a segment.
+    """Return a header ready for JSON and a float64 tensor "flow.k" for each segment of a flow.
 
     Raises:
         OrbiflowError: naming the part of the flow that cannot be saved.
     """
     if type(flow) is not Flow:
         raise OrbiflowError(
-            f"the flow is a {type(flow).__name__}: only flows of Fourier, spline or neural fields "
-            "are saved; save its weights yourself"
+            f"the flow is a {type(flow).__name__}: only flows of Fourier and spline fields are "
+            "saved in a density; save it with orbiflow.flows.save_flow"
         )
     if len(flow.segments) > MAX_SEGMENTS or flow.steps > MAX_STEPS or space.dim > MAX_DIM:
         raise OrbiflowError(
@@ -121,10 +201,10 @@ def series_parts(flow: Flow, space: Space) -> tuple[dict[str, Any], dict[str, Te
 
 def _segment(number: int, field: Any, space: Space) -> dict[str, Any]:
     name = f"segment {number + 1} of the flow"
-    if type(field) not in KINDS:
+    if type(field) not in FIELD_NAMES:
         raise OrbiflowError(
-            f"{name} is a {type(field).__name__}: only flows of Fourier, spline or neural fields are "
-            "saved; save its weights yourself"
+            f"{name} is a {type(field).__name__}: only flows of Fourier and spline fields are saved "
+            "in a density; save it with orbiflow.flows.save_flow"
         )
     if field.parameters_.dim() != 1:
         raise OrbiflowError(
@@ -141,7 +221,7 @@ def _segment(number: int, field: Any, space: Space) -> dict[str, Any]:
             "parameters that are not finite"
         )
     return {
-        "kind": KINDS[type(field)],
+        "kind": FIELD_NAMES[type(field)],
         "max_frequency": field.max_frequency,
         "smoothness": float(field.smoothness),
     }
@@ -150,7 +230,7 @@ def _segment(number: int, field: Any, space: Space) -> dict[str, Any]:
 def series_from_header(
     header: Mapping[str, Any], tensors: Mapping[str, Tensor], space: Space
 ) -> Flow:
-    """The flow of `series_parts`, or of a file of version 0.1.
+    """Make the flow of `series_parts` again; headers of the first files of version 0.1 work as well.
 
     Raises:
         OrbiflowError, ValueError, KeyError, TypeError: for what does not fit.
@@ -174,7 +254,7 @@ def series_from_header(
 def _of_version_1(
     header: Mapping[str, Any], stack: Tensor
 ) -> tuple[Mapping[str, Any], Mapping[str, Tensor]]:
-    """All segments had one kind, frequency and smoothness, and their parameters one tensor."""
+    """Translate a header whose segments had one kind, and their parameters one tensor."""
     if stack.dim() != 2 or not 1 <= len(stack) <= MAX_SEGMENTS:
         raise ValueError(f"parameters of shape {tuple(stack.shape)}")
     shared = {name: header[name] for name in ("kind", "max_frequency", "smoothness")}

@@ -1,0 +1,466 @@
+"""What every density on an identification space can do, whatever it is made of."""
+
+from __future__ import annotations
+
+import copy
+import math
+import numbers
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol, Self, runtime_checkable
+
+import torch
+from torch import Tensor, nn
+from torch.distributions import Distribution, constraints
+
+from orbiflow.density.arguments import check_kind, check_range, float_tensor, points_tensor
+from orbiflow.density.spaces import CHART, Space, Torus, check_measure
+from orbiflow.errors import OrbiflowError
+from orbiflow.runtime import one_thread
+
+if TYPE_CHECKING:
+    from orbiflow.density.models.flow import FlowDensity
+    from orbiflow.density.models.kernels import AdaptiveKernels
+
+BLOCK = 2**19
+"""Points evaluated at a time where no gradient is asked for: bounds the memory."""
+
+KINDS: dict[str, type[Density]] = {}
+"""The classes of densities that a file can hold, by the names they have there."""
+
+
+class Density(Distribution):
+    """A normalised density on an identification space, invariant under the space's group.
+
+    A `torch.distributions.Distribution` over chart points: canonical representatives in [0, 1]^d,
+    though any point of an orbit may be given. A `Mixture` of densities is a density again, and any
+    density can be a component of one.
+
+    **To add a kind of component**, write a subclass with a `kind`, `log_chart` and `draw`::
+
+        class Bump(Density, kind="bump"):
+            ...
+
+    Then it can be evaluated, sampled, drawn and blended. With `header`, `tensors` and `from_header`
+    it can be saved; with `log_marginal` and `restricted` it has marginal and conditional densities.
+
+    Args:
+        space: The identification space.
+    """
+
+    arg_constraints: ClassVar[dict[str, Any]] = {}  # pyright: ignore[reportIncompatibleMethodOverride]
+    has_rsample = True
+
+    kind: ClassVar[str] = ""
+    """The name of the class in files and reports; empty for a class that is not saved."""
+
+    article: ClassVar[str] = ""
+    """The kind in a sentence, such as "a flow"; default: the kind itself."""
+
+    has_fine_detail: bool = True
+    """Whether the density may hold detail that a coarse picture would miss."""
+
+    error: float = 0.0
+    """Root mean square difference, in nats, from the density that a tabulated one stands for; see
+    `orbiflow.density.marginal`."""
+
+    _dtype: torch.dtype = torch.float64
+
+    def __init_subclass__(cls, kind: str = "", **options: Any) -> None:
+        super().__init_subclass__(**options)
+        cls.kind = kind
+        if not kind:
+            return
+        known = KINDS.setdefault(kind, cls)
+        if (known.__module__, known.__qualname__) != (cls.__module__, cls.__qualname__):
+            raise OrbiflowError(f"the kind {kind!r} is taken by {known.__name__}: choose another")
+        KINDS[kind] = cls
+
+    def __init__(self, space: Space) -> None:
+        self.space = check_kind(space, Space, "space", "see `make_space`")
+        super().__init__(event_shape=torch.Size([space.dim]), validate_args=False)
+
+    # What a component must say, and what it may.
+
+    def log_chart(self, points: Tensor) -> Tensor:
+        """Return log densities (...,) per area of the chart's square, at points (..., d).
+
+        Differentiable in the points, in their dtype.
+        """
+        raise NotImplementedError
+
+    def draw(self, count: int, generator: torch.Generator) -> Tensor:
+        """Return `count` random canonical points (count, d), the same on every device."""
+        raise NotImplementedError
+
+    def log_density(self, points: Tensor, beside: float = -math.inf) -> Tensor:
+        """Return log densities (...,) per area of the sphere on round spaces, else of the square.
+
+        Args:
+            points: Chart points (..., d).
+            beside: Logarithm of a constant density that the caller will add. What is negligible
+                beside it may be left out.
+        """
+        del beside
+        values = self.log_chart(points)
+        return values - self.space.log_area(points) if self.space.is_round else values
+
+    @property
+    def log_floor(self) -> float:
+        """Logarithm of a constant that the density, as in `log_density`, is never below."""
+        return -math.inf
+
+    @property
+    def kernel_part(self) -> tuple[float, AdaptiveKernels] | None:
+        """The weight and the kernels that the density contains; None if there are none."""
+        return None
+
+    def log_density_without_kernels(self, points: Tensor) -> Tensor:
+        """Return what `log_density` would be without `kernel_part`."""
+        return self.log_density(points)
+
+    @property
+    def flow_part(self) -> tuple[float, FlowDensity] | None:
+        """The weight and the density of the flow that the density contains; None if there is none."""
+        return None
+
+    @classmethod
+    def joined(cls, components: Sequence[Any], weights: Tensor) -> Self | None:
+        """Return one density of this class that is the mixture of several; None if there is none."""
+        del components, weights
+        return None
+
+    def mass(self, resolution: int = 64) -> float:
+        """Return the integral over the square: 1 for what is normalised in closed form."""
+        del resolution
+        return 1.0
+
+    # Marginal and conditional densities on tori: see orbiflow.density.inference.
+
+    def log_marginal(self, points: Tensor, axes: list[int], seed: int = 0) -> Tensor:
+        """Return log densities (N,) of some angles alone, at points (N, len(axes)) of these.
+
+        Args:
+            points: The angles in turns.
+            axes: The numbers of the angles.
+            seed: Seed of quasi-random nodes, if there are any.
+
+        Raises:
+            OrbiflowError: if the other angles cannot be integrated out.
+        """
+        del points, axes, seed
+        raise OrbiflowError(f"a {type(self).__name__} cannot be integrated over some of its angles")
+
+    def restricted(self, split: Split, space: Torus) -> Restriction:
+        """Return the density of the angles kept, given others, as far as there is a closed form."""
+        del split, space
+        return Restriction([], [(0.0, self)])
+
+    def is_costly(self, split: Split) -> bool:
+        """Whether each value of the density of the angles kept takes an integral of its own."""
+        del split
+        return False
+
+    # Saving and loading: see orbiflow.density.models.files.
+
+    def header(self) -> dict[str, Any]:
+        """Return what makes the density again, together with `tensors`; ready for JSON."""
+        return {}
+
+    def tensors(self) -> dict[str, Tensor]:
+        """Return the density's tensors by name."""
+        return {}
+
+    @classmethod
+    def from_header(
+        cls, space: Space, header: Mapping[str, Any], tensors: Mapping[str, Tensor]
+    ) -> Self:
+        """Make the density that `header` and `tensors` describe."""
+        del header, tensors
+        return cls(space)
+
+    # What follows is the same for all densities.
+
+    @property
+    def dtype(self) -> torch.dtype:
+        """The dtype in which the density is evaluated, and that of samples."""
+        return self._dtype
+
+    @property
+    def device(self) -> torch.device | None:
+        """The device of the density's tensors; None if it has none and works anywhere."""
+        return next((v.device for v in vars(self).values() if isinstance(v, Tensor)), None)
+
+    @property
+    def support(self) -> Any:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """All of R^d: every point stands for its orbit."""
+        return constraints.independent(constraints.real, 1)
+
+    @one_thread()
+    def log_prob(self, value: Tensor, *, measure: str = CHART) -> Tensor:
+        """Return log densities (...,) at chart points (..., d), with respect to `measure`.
+
+        They are evaluated in the density's dtype and returned in that of the points.
+
+        Args:
+            value: The points.
+            measure: One of `orbiflow.density.MEASURES`; default: area of the square.
+
+        Raises:
+            OrbiflowError: for points of another dimension or on another device, points that are not
+                finite, or an unknown measure.
+        """
+        points = self._here(value)
+        own = points.to(self.dtype)
+        if torch.is_grad_enabled() or own[..., 0].numel() <= BLOCK:
+            return self._log_prob(own, measure).to(points.dtype)
+        flat = own.reshape(-1, self.space.dim)
+        parts = [self._log_prob(block, measure) for block in torch.split(flat, BLOCK)]
+        return torch.cat(parts).reshape(points.shape[:-1]).to(points.dtype)
+
+    def _log_prob(self, points: Tensor, measure: str) -> Tensor:
+        check_measure(measure)
+        if measure == CHART:
+            return self.log_chart(points)
+        return self.log_density(points) + log_area_factor(self.space, measure)
+
+    def sample(  # pyright: ignore[reportIncompatibleMethodOverride]
+        self, sample_shape: Any = (), generator: torch.Generator | None = None
+    ) -> Tensor:
+        """Return random canonical points (*sample_shape, d) in the density's dtype.
+
+        Args:
+            sample_shape: A shape or a number of points.
+            generator: The same state gives the same points. Default: torch's own generator.
+
+        Raises:
+            OrbiflowError: for what is no shape.
+        """
+        with torch.no_grad():
+            return self.rsample(sample_shape, generator)
+
+    @one_thread()
+    def rsample(  # pyright: ignore[reportIncompatibleMethodOverride]
+        self, sample_shape: Any = (), generator: torch.Generator | None = None
+    ) -> Tensor:
+        """Return samples as `sample` does, differentiable in the parameters of a flow."""
+        shape, source = _shape_of(sample_shape), _source_of(generator)
+        if not shape.numel():
+            return torch.empty(*shape, self.space.dim, dtype=self.dtype, device=self.device)
+        drawn = self.draw(shape.numel(), source).to(dtype=self.dtype, device=self.device)
+        return drawn.reshape(*shape, self.space.dim)
+
+    @torch.no_grad()
+    def entropy(
+        self,
+        count: int = 16384,
+        *,
+        measure: str = CHART,
+        generator: torch.Generator | None = None,
+    ) -> Tensor:
+        """Return a Monte Carlo estimate of -E[log p] in nats, from `count` samples.
+
+        It is with respect to `measure`, by default that of `log_prob`; "natural" gives the entropy in
+        the user's units or per steradian.
+        """
+        return -self.log_prob(self.sample((count,), generator), measure=measure).mean()
+
+    @torch.no_grad()
+    def kl_to(
+        self, other: Distribution, count: int = 16384, *, generator: torch.Generator | None = None
+    ) -> Tensor:
+        """Return a Monte Carlo estimate of KL(self || other) from `count` samples of self."""
+        points = self.sample((count,), generator)
+        return (self.log_prob(points) - other.log_prob(points)).mean()
+
+    def to(self, *wanted: Any) -> Self:
+        """Return a copy elsewhere: `to("cuda")`, `to(torch.float32)`, `to("cuda", torch.float32)`.
+
+        Or where a tensor is: `to(tensor)`. The dtype is that of evaluation and of a flow's parameters.
+        Kernels, chains, networks and weights stay in float64 on any device, as sharp kernels need
+        their digits. Samples are drawn on the CPU and moved, so that the same state of a generator
+        gives the same points.
+
+        Raises:
+            OrbiflowError: for what is neither a device nor a floating dtype.
+
+        >>> from orbiflow.density import UniformDensity, make_space
+        >>> single = UniformDensity(make_space("torus")).to(torch.float32)
+        >>> single.sample(5).dtype
+        torch.float32
+        """
+        device, dtype = destination(*wanted)
+        new = copy.copy(self)
+        for name, value in vars(self).items():
+            setattr(new, name, moved(value, device, dtype))
+        if dtype is not None:
+            new._dtype = dtype
+        return new
+
+    def _here(self, value: Any) -> Tensor:
+        """Return points (..., d) on the density's device; tensors are never moved from another."""
+        points, device = points_tensor(value, self.space.dim), self.device
+        if device is None:
+            return points
+        if not isinstance(value, Tensor):
+            return points.to(device)
+        if points.device != device:
+            raise OrbiflowError(
+                f"the points are on {points.device}, the density is on {device}: move one of them, "
+                "such as density.to(points.device)"
+            )
+        return points
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.space!r})"
+
+
+@dataclass(frozen=True)
+class Split:
+    """The angles of a torus in three: kept, given and integrated out.
+
+    Attributes:
+        dim: The number of angles of the torus.
+        kept: The numbers of the angles of the density that is asked for, in its order.
+        given: The numbers of the angles that are known.
+        values: Where these are, in turns.
+    """
+
+    dim: int
+    kept: tuple[int, ...]
+    given: tuple[int, ...] = ()
+    values: tuple[float, ...] = ()
+
+    @property
+    def observed(self) -> tuple[int, ...]:
+        """The angles kept, then those given."""
+        return (*self.kept, *self.given)
+
+    def located(self, points: Tensor) -> Tensor:
+        """Return kept angles (N, r) and the given ones behind them: (N, r + g)."""
+        given = points.new_tensor(self.values).expand(len(points), -1)
+        return torch.cat([points, given], dim=1)
+
+
+class Restriction(NamedTuple):
+    """A density of some angles, given others, as far as there is a closed form.
+
+    Attributes:
+        closed: Densities of the angles kept, each with the logarithm of its weight; what is given
+            makes these weights, whose sum is the density of what is given.
+        left: Densities of all angles that have no closed form, with the logarithms of their weights.
+    """
+
+    closed: list[tuple[float, Density]]
+    left: list[tuple[float, Density]]
+
+
+def log_area_factor(space: Space, measure: str) -> float:
+    """Return what makes a `Density.log_density` one of another measure than the chart's area."""
+    volume = math.log(space.volume)
+    natural = 0.0 if space.is_round else -volume
+    return natural + (volume if measure == "uniform" else 0.0)
+
+
+@runtime_checkable
+class _Movable(Protocol):
+    def to(self, device: torch.device, /) -> Any: ...
+
+
+def destination(*wanted: Any) -> tuple[torch.device | None, torch.dtype | None]:
+    """Return a device and a dtype from what `torch.Tensor.to` takes: either, both, or a tensor.
+
+    Raises:
+        OrbiflowError: for another thing, a device that torch does not know, or a dtype that is not
+            floating.
+
+    >>> destination("cpu", torch.float32)
+    (device(type='cpu'), torch.float32)
+    """
+    device: torch.device | None = None
+    dtype: torch.dtype | None = None
+    for one in wanted:
+        if isinstance(one, torch.dtype):
+            dtype = one
+        elif isinstance(one, Tensor):
+            device, dtype = one.device, one.dtype
+        elif one is not None:
+            device = _device(one)
+    if dtype is not None and not dtype.is_floating_point:
+        raise OrbiflowError(f"a density is evaluated in floating-point numbers, not in {dtype}")
+    return device, dtype
+
+
+def moved(value: Any, device: torch.device | None, dtype: torch.dtype | None = None) -> Any:
+    """Return a copy on the device of whatever can be moved; only modules change their dtype."""
+    if isinstance(value, nn.Module):  # which would move in place
+        return copy.deepcopy(value).to(device=device, dtype=dtype)
+    if isinstance(value, Density):
+        return value.to(device, dtype)
+    return value.to(device) if device is not None and isinstance(value, _Movable) else value
+
+
+def _device(wanted: Any) -> torch.device:
+    try:
+        return torch.device(wanted)
+    except (RuntimeError, TypeError) as error:
+        raise OrbiflowError(
+            f"expected a device or a dtype, such as 'cuda' or torch.float32, got {wanted!r}"
+        ) from error
+
+
+def _source_of(generator: torch.Generator | None) -> torch.Generator:
+    if generator is None:
+        return torch.default_generator
+    if generator.device.type != "cpu":
+        raise OrbiflowError(
+            f"samples are drawn on the CPU, the generator is on {generator.device}: give a "
+            "torch.Generator() without a device"
+        )
+    return generator
+
+
+def _shape_of(sample_shape: Any) -> torch.Size:
+    sizes = (int(sample_shape),) if isinstance(sample_shape, numbers.Integral) else sample_shape
+    try:
+        shape = torch.Size(sizes)
+    except TypeError as error:
+        raise OrbiflowError(f"expected a number or shape of samples: {error}") from error
+    if any(size < 0 for size in shape):
+        raise OrbiflowError(f"expected a number or shape of samples, got {tuple(shape)}")
+    return shape
+
+
+def midpoints(space: Space, resolution: int) -> Tensor:
+    """Return the midpoints (resolution^2, 2) of a grid on the canonical square, float64.
+
+    Raises:
+        OrbiflowError: if the space has another dimension than two, or for a resolution below 1.
+    """
+    check_range("resolution", resolution, 1, 1e6, integer=True)
+    if space.dim != 2:
+        raise OrbiflowError(f"a grid needs two dimensions, this {space.name} has {space.dim}")
+    t = (torch.arange(resolution, dtype=torch.float64) + 0.5) / resolution
+    return torch.stack(torch.meshgrid(t, t, indexing="ij"), dim=-1).reshape(-1, 2)
+
+
+def kl_by_quadrature(target: Tensor, log_density: Tensor) -> float:
+    """Return KL(p || p_hat) in nats from values on an even grid of the square.
+
+    Args:
+        target: The density p >= 0 (N,) on the square.
+        log_density: Values (N,) of log p_hat.
+
+    Raises:
+        OrbiflowError: for other shapes.
+    """
+    target, log_density = float_tensor(target, "target"), float_tensor(log_density, "log_density")
+    if target.dim() != 1 or target.shape != log_density.shape:
+        raise OrbiflowError(
+            f"expected two tables (N,), got {tuple(target.shape)} and {tuple(log_density.shape)}"
+        )
+    weight = target / target.sum()
+    live = weight > 0
+    log_target = (weight[live] * len(weight)).log()
+    value = (weight[live] * (log_target - log_density[live])).sum()
+    return float(value) if math.isfinite(float(value)) else math.inf

@@ -1,0 +1,224 @@
+"""Mixtures of densities: what a fit finds."""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, Self
+
+import torch
+from torch import Tensor
+
+from orbiflow.density.arguments import check_kind, float_tensor
+from orbiflow.density.models.density import Density, Restriction, Split
+from orbiflow.density.models.flow import FlowDensity
+from orbiflow.density.models.headers import (
+    check_same_space,
+    checked_tensors,
+    density_from,
+    density_parts,
+    within,
+)
+from orbiflow.density.models.kernels import AdaptiveKernels
+from orbiflow.density.spaces import Space, Torus
+from orbiflow.errors import OrbiflowError
+from orbiflow.runtime import is_list
+from orbiflow.typed_torch import listed
+
+MOST_COMPONENTS = 4096
+"""The most components that a file may hold."""
+
+
+class Mixture(Density, kind="mixture"):
+    """A weighted sum of densities on one space: exact and normalised, as they are.
+
+    Args:
+        components: The densities: of any kind, also mixtures.
+        weights: Their weights (P,): positive, of sum 1; kept on the CPU.
+
+    Raises:
+        OrbiflowError: for components on spaces of another group, or weights that do not fit.
+
+    >>> from orbiflow.density import UniformDensity, VonMisesDensity, make_space
+    >>> space = make_space("torus")
+    >>> Mixture([VonMisesDensity(space), UniformDensity(space)], [0.75, 0.25])
+    Mixture(Torus(dim=2, unit='radians'), von-mises 75.0%, uniform 25.0%)
+    """
+
+    def __init__(self, components: Sequence[Density], weights: Any) -> None:
+        if not components:
+            raise OrbiflowError("components must be one density or more")
+        for one in components:
+            check_kind(one, Density, "each of the components")
+        super().__init__(components[0].space)
+        self.components = tuple(components)
+        weights = float_tensor(weights, "weights").detach().double().cpu()
+        if (
+            weights.shape != (len(self.components),)
+            or not bool((weights > 0).all())
+            or abs(float(weights.sum()) - 1) > 1e-6
+        ):
+            raise OrbiflowError(
+                f"weights must be {len(self.components)} positive numbers of sum 1, got "
+                f"{listed(weights)}"
+            )
+        self.weights = weights
+
+    @property
+    def dtype(self) -> torch.dtype:
+        """The coarsest dtype of the components."""
+        return min((one.dtype for one in self.components), key=lambda t: torch.finfo(t).bits)
+
+    @property
+    def device(self) -> torch.device | None:
+        """The device of the components; None if they work anywhere."""
+        return next((one.device for one in self.components if one.device is not None), None)
+
+    @property
+    def weight_of_kind(self) -> dict[str, float]:
+        """The weight of each kind of component."""
+        found: dict[str, float] = {}
+        for one, weight in zip(self.components, listed(self.weights), strict=True):
+            name = one.kind or type(one).__name__
+            found[name] = found.get(name, 0.0) + weight
+        return found
+
+    @property
+    def has_fine_detail(self) -> bool:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """Whether a component has."""
+        return any(one.has_fine_detail for one in self.components)
+
+    @property
+    def log_floor(self) -> float:
+        floors = [log + one.log_floor for log, one in self._weighted()]
+        return torch.tensor(floors, dtype=torch.float64).logsumexp(0).item()
+
+    @property
+    def kernel_part(self) -> tuple[float, AdaptiveKernels] | None:
+        parts: list[tuple[float, AdaptiveKernels]] = []
+        for one, weight in zip(self.components, listed(self.weights), strict=True):
+            if (own := one.kernel_part) is not None:
+                parts.append((weight * own[0], own[1]))
+        if len(parts) < 2:
+            return parts[0] if parts else None
+        weights = torch.tensor([weight for weight, _ in parts], dtype=torch.float64)
+        joined = AdaptiveKernels.joined([kernels for _, kernels in parts], weights)
+        return float(weights.sum()), joined
+
+    @property
+    def flow_part(self) -> tuple[float, FlowDensity] | None:
+        """The weight and the density of the first flow among the components."""
+        for one, weight in zip(self.components, listed(self.weights), strict=True):
+            if (own := one.flow_part) is not None:
+                return weight * own[0], own[1]
+        return None
+
+    def log_chart(self, points: Tensor) -> Tensor:
+        values = self.log_density(points)
+        return values + self.space.log_area(points) if self.space.is_round else values
+
+    def log_density(self, points: Tensor, beside: float = -math.inf) -> Tensor:
+        floor = float(torch.logaddexp(*torch.tensor([self.log_floor, beside], dtype=torch.float64)))
+        return _log_sum(
+            [own.log_density(points, floor - log) + log for log, own in self._weighted()]
+        )
+
+    def log_density_without_kernels(self, points: Tensor) -> Tensor:
+        return _log_sum(
+            [own.log_density_without_kernels(points) + log for log, own in self._weighted()]
+        )
+
+    def draw(self, count: int, generator: torch.Generator) -> Tensor:
+        chosen = torch.multinomial(self.weights, count, replacement=True, generator=generator)
+        counts: list[int] = listed(torch.bincount(chosen, minlength=len(self.components)))
+        drawn = torch.empty(count, self.space.dim, dtype=self.dtype, device=self.device)
+        for index, (number, own) in enumerate(zip(counts, self.components, strict=True)):
+            if number:
+                at = torch.nonzero(chosen == index)[:, 0].to(drawn.device)
+                drawn = drawn.index_put((at,), own.draw(number, generator).to(drawn))
+        return drawn
+
+    def mass(self, resolution: int = 64) -> float:
+        """Return the integral over the square: only that of a flow may be off 1."""
+        pairs = zip(listed(self.weights), self.components, strict=True)
+        return 1 + sum(weight * (own.mass(resolution) - 1) for weight, own in pairs)
+
+    def log_marginal(self, points: Tensor, axes: list[int], seed: int = 0) -> Tensor:
+        table = [own.log_marginal(points, axes, seed) + log for log, own in self._weighted()]
+        return torch.stack(table).logsumexp(dim=0)
+
+    def restricted(self, split: Split, space: Torus) -> Restriction:
+        found = Restriction([], [])
+        for log, own in self._weighted():
+            closed, left = own.restricted(split, space)
+            found.closed.extend((log + more, density) for more, density in closed)
+            found.left.extend((log + more, density) for more, density in left)
+        return found
+
+    def is_costly(self, split: Split) -> bool:
+        return any(own.is_costly(split) for own in self.components)
+
+    def to(self, *wanted: Any) -> Self:
+        new = copy.copy(self)
+        new.components = tuple(own.to(*wanted) for own in self.components)
+        return new
+
+    def header(self) -> dict[str, Any]:
+        headers: list[dict[str, Any]] = []
+        for own in self.components:
+            check_same_space(self, own, own.article or own.kind or type(own).__name__)
+            headers.append(density_parts(own, "component")[0])
+        return {"components": headers}
+
+    def tensors(self) -> dict[str, Tensor]:
+        found = {"weights": self.weights}
+        for number, own in enumerate(self.components):
+            found |= density_parts(own, "component", f"{number}.")[1]
+        return found
+
+    @classmethod
+    def from_header(
+        cls, space: Space, header: Mapping[str, Any], tensors: Mapping[str, Tensor]
+    ) -> Self:
+        headers = header["components"]
+        if not is_list(headers) or not 1 <= len(headers) <= MOST_COMPONENTS:
+            raise OrbiflowError("no components, or too many")
+        (weights,) = checked_tensors(tensors, {"weights": (len(headers),)})
+        components = [
+            density_from(space, own, within(tensors, f"{number}."))
+            for number, own in enumerate(headers)
+        ]
+        return cls(components, weights)
+
+    def _weighted(self) -> list[tuple[float, Density]]:
+        """Return the components, each with the logarithm of its weight."""
+        return list(zip(listed(self.weights.log()), self.components, strict=True))
+
+    def __repr__(self) -> str:
+        parts = [f"{name} {100 * weight:.1f}%" for name, weight in self.weight_of_kind.items()]
+        return f"Mixture({self.space!r}, {', '.join(parts)})"
+
+
+def mixture_of(weighted: Sequence[tuple[float, Density]]) -> Mixture:
+    """Return the mixture of weighted densities, those of a kind in one component where it can.
+
+    Components are in the order in which their kinds come first; weights of any sum.
+    """
+    groups: dict[type[Density], list[tuple[float, Density]]] = {}
+    for weight, density in weighted:
+        groups.setdefault(type(density), []).append((weight, density))
+    found: list[tuple[float, Density]] = []
+    for kind, group in groups.items():
+        weights = torch.tensor([weight for weight, _ in group], dtype=torch.float64)
+        joined = kind.joined([density for _, density in group], weights)
+        found += group if joined is None else [(float(weights.sum()), joined)]
+    weights = torch.tensor([weight for weight, _ in found], dtype=torch.float64)
+    return Mixture([density for _, density in found], weights / weights.sum())
+
+
+def _log_sum(logs: list[Tensor]) -> Tensor:
+    total = logs[0]
+    for one in logs[1:]:
+        total = torch.logaddexp(total, one)
+    return total

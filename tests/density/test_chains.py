@@ -1,0 +1,155 @@
+"""Mixtures of von Mises chains: periodic, normalised, saved as they are, fitted by EM."""
+
+import json
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from orbiflow.density import Torus, VonMisesChains, midpoints
+from orbiflow.density.fitting.budget import Budget
+from orbiflow.density.fitting.chains import concentration, fit_chain_mixture, spread_chains
+from orbiflow.density.fitting.rows import Rows
+from orbiflow.density.models import SCALES, chained
+from orbiflow.errors import OrbiflowError
+
+seeds = st.integers(0, 2**31 - 1)
+dims = st.integers(1, 5)
+
+
+def random_mixture(dim: int, seed: int, count: int = 4, most: float = 30.0) -> VonMisesChains:
+    rng = np.random.default_rng(seed)
+    weights = rng.dirichlet(np.ones(count * len(SCALES))).reshape(count, -1)
+    order = torch.tensor(rng.permuted(np.tile(np.arange(dim), (count, 1)), axis=1))
+    means = torch.tensor(rng.normal(size=(count, dim, 1 + 2 * dim))) * chained(order)
+    kappa = torch.tensor(rng.uniform(0, most, (count, dim)))
+    return VonMisesChains(Torus(dim), torch.tensor(np.log(weights)), means, kappa, order)
+
+
+def points(count: int, dim: int, seed: int) -> torch.Tensor:
+    return torch.tensor(np.random.default_rng(seed).random((count, dim)))
+
+
+@settings(max_examples=5)
+@given(seeds)
+def test_mixture_samples_follow_its_density(seed: int) -> None:
+    mixture = random_mixture(2, seed, most=5.0)
+    drawn = mixture.sample(20_000, torch.Generator().manual_seed(seed))
+    assert torch.equal(drawn, mixture.sample(20_000, torch.Generator().manual_seed(seed)))
+    cells = 8
+    grid = midpoints(mixture.space, 160)
+    number = lambda x: ((x * cells).long() % cells) @ torch.tensor([cells, 1])  # noqa: E731
+    expected = torch.zeros(cells**2, dtype=torch.float64)
+    expected.index_add_(0, number(grid), mixture.log_prob(grid).exp() / len(grid))
+    found = torch.bincount(number(drawn), minlength=cells**2) / len(drawn)
+    assert float((found - expected).abs().sum()) < 0.1
+
+
+@given(dims, seeds)
+def test_renaming_the_angles_renames_those_of_the_chains(dim: int, seed: int) -> None:
+    mixture, at = random_mixture(dim, seed), points(20, dim, seed)
+    name = torch.tensor(np.random.default_rng(seed).permutation(dim))  # of the new angle i
+    used = torch.cat([torch.tensor([0]), 1 + name, 1 + dim + name])
+    renamed = VonMisesChains(
+        mixture.space,
+        mixture.log_weights,
+        mixture.means[:, name][:, :, used],
+        mixture.concentrations[:, name],
+        name.argsort()[mixture.order],
+    )
+    assert torch.allclose(renamed.log_prob(at[:, name]), mixture.log_prob(at), atol=1e-9)
+
+
+def test_orders_are_checked() -> None:
+    good = random_mixture(3, 0)
+    parts = (good.space, good.log_weights, good.means, good.concentrations)
+    for bad in (good.order[:, :2], good.order + 1, 0 * good.order, good.order + 0.5):
+        with pytest.raises(OrbiflowError, match="order"):
+            VonMisesChains(*parts, bad)
+    with pytest.raises(OrbiflowError, match="chained"):
+        VonMisesChains(*parts, good.order.flip(1))
+
+
+@given(st.lists(st.floats(0.01, 0.9999), min_size=1, max_size=5))
+def test_concentration_inverts_the_bessel_ratio(resultants: list[float]) -> None:
+    r = torch.tensor(resultants, dtype=torch.float64)
+    kappa = concentration(r)
+    assert torch.allclose(torch.special.i1e(kappa) / torch.special.i0e(kappa), r, atol=1e-6)
+
+
+@settings(max_examples=6)
+@given(dims, seeds)
+def test_log_prob_is_periodic(dim: int, seed: int) -> None:
+    mixture, at = random_mixture(dim, seed), points(7, dim, seed)
+    shift = torch.tensor(np.random.default_rng(seed).integers(-3, 4, (7, dim)), dtype=at.dtype)
+    assert torch.allclose(mixture.log_prob(at + shift), mixture.log_prob(at), atol=1e-9)
+
+
+@settings(max_examples=6)
+@given(st.integers(1, 2), seeds)
+def test_density_integrates_to_one(dim: int, seed: int) -> None:
+    mixture = random_mixture(dim, seed)
+    line = (torch.arange(400, dtype=torch.float64)[:, None] + 0.5) / 400
+    grid = midpoints(mixture.space, 96) if dim == 2 else line
+    assert float(mixture.log_prob(grid).exp().mean()) == pytest.approx(1.0, abs=2e-3)
+
+
+@settings(max_examples=6)
+@given(dims, seeds)
+def test_storage_is_bit_equal(dim: int, seed: int) -> None:
+    mixture, at = random_mixture(dim, seed), points(9, dim, seed)
+    header = json.loads(json.dumps(mixture.header()))
+    again = VonMisesChains.from_header(Torus(dim), header, mixture.tensors())
+    assert torch.equal(again.log_prob(at), mixture.log_prob(at))
+
+
+@pytest.mark.parametrize("change", [{"components": 5}, {"components": -1}, {"scales": [1.0]}])
+def test_hostile_headers_are_rejected(change: dict[str, Any]) -> None:
+    mixture = random_mixture(3, 0)
+    with pytest.raises(OrbiflowError, match=r"shape|integer|scales"):
+        VonMisesChains.from_header(Torus(3), {**mixture.header(), **change}, mixture.tensors())
+
+
+def test_hostile_tensors_are_rejected() -> None:
+    mixture, space = random_mixture(3, 0), Torus(3)
+    header, tensors = mixture.header(), mixture.tensors()
+    for name, own in tensors.items():
+        others = {k: v for k, v in tensors.items() if k != name}
+        with pytest.raises(OrbiflowError, match="missing"):
+            VonMisesChains.from_header(space, header, others)
+        for value in (own + math.nan, 1 - 2 * own.abs() - 9, own[:, :1], own.long()):
+            with pytest.raises(OrbiflowError):
+                VonMisesChains.from_header(space, header, {**others, name: value})
+
+
+def chained_angles(count: int, seed: int = 0) -> torch.Tensor:
+    """Four angles, each near a function of the one before; two clusters."""
+    rng = np.random.default_rng(seed)
+    first = np.where(rng.random(count) < 0.6, 0.1, 0.6) + 0.05 * rng.normal(size=count)
+    columns = [first]
+    for _ in range(3):
+        wave = 0.1 * np.sin(2 * np.pi * columns[-1])
+        columns.append(columns[-1] + wave + 0.03 * rng.normal(size=count))
+    return Torus(4).project(torch.tensor(np.stack(columns, axis=1)))
+
+
+def test_a_fit_finds_correlations_and_repeats() -> None:
+    data, space = chained_angles(800), Torus(4)
+    train, held = Rows(data[:700]), Rows(data[700:])
+
+    def fitted() -> VonMisesChains:
+        generator = torch.Generator().manual_seed(0)
+        start = spread_chains(space, train, 16, torch.arange(4), generator)
+        return fit_chain_mixture(start, train, held, 60, Budget())
+
+    # of the data's own chain: three normals of width 0.03 and a mixture of two of width 0.05
+    fresh = chained_angles(2000, seed=1)
+    entropy = sum(0.5 * math.log(2 * math.pi * math.e * s**2) for s in (0.03, 0.03, 0.03, 0.05))
+    best = -entropy + 0.6 * math.log(0.6) + 0.4 * math.log(0.4)
+    found = fitted()
+    assert float(found.log_prob(fresh).mean()) > best - 0.2
+    assert torch.equal(found.log_prob(fresh), fitted().log_prob(fresh))
