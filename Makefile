@@ -4,7 +4,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
 
-.PHONY: demo test lint bench docs gallery wheel clean
+.PHONY: demo test lint bench docs gallery paper wheel clean
 
 demo: $(VENV)/.installed
 	$(BIN)/orbiflow escherize examples/silhouettes/turtle.png --out out/demo
@@ -36,6 +36,9 @@ bench: $(VENV)/.installed-dev
 docs: $(VENV)/.installed-docs
 	$(BIN)/python -m sphinx -b html -W --keep-going -q docs out/site
 	@echo "open out/site/index.html"
+
+paper: $(VENV)/.installed
+	$(BIN)/python -m reproduction --out out/paper
 
 gallery: $(VENV)/.installed
 	$(BIN)/python docs/gallery/make.py

@@ -16,12 +16,17 @@ import numpy as np
 import torch
 from common import goal
 
-from orbiflow.escher import ClassFailure, DescentSettings, OccupancySettings, escherize_class
-from orbiflow.escher.descent import Descent
-from orbiflow.escher.methods import Settings
-from orbiflow.escher.outline_starts import outline_starts
-from orbiflow.silhouette.soft_target import SoftTarget
-from orbiflow.tilings import isohedral_class
+from orbiflow.tiles import (
+    ClassFailure,
+    DescentSettings,
+    OccupancySettings,
+    Settings,
+    SoftTarget,
+    escherize_class,
+    isohedral_class,
+)
+from orbiflow.tiles.search.descent import Descent
+from orbiflow.tiles.search.starts import outline_starts
 
 GOALS = ("bat_60", "beetle_60", "octpus_94")
 CLASSES = ("IH4", "IH6", "IH7")

@@ -16,15 +16,17 @@ import numpy as np
 import torch
 from PIL import Image
 
-from orbiflow.export.art import (
+from orbiflow.tiles import (
     ArtSettings,
-    ArtTile,
+    EscherTile,
     artwork,
-    read_art_tile,
+    read_result,
     render_artwork,
+    with_map,
 )
-from orbiflow.export.art.picture import Picture
-from orbiflow.export.art.writing import png_of
+from orbiflow.tiles.art.pictures import Picture
+from orbiflow.tiles.art.scene import png_of
+from orbiflow.tiles.art.source import covered_area
 
 
 def main() -> None:
@@ -33,7 +35,7 @@ def main() -> None:
     parser.add_argument("--tile", default="1")
     options = parser.parse_args()
     torch.set_num_threads(1)
-    tile = read_art_tile(options.result, options.tile)
+    tile = with_map(read_result(options.result, options.tile))
     render_artwork(artwork(tile, ArtSettings(size=(60, 40), engrave="hatch")))  # imports
     board = checkerboard(tile)
     print(f"{'':34} {'tiles':>6} {'prepare s':>9} {'render s':>9} {'PNG s':>6} {'MB':>6}")
@@ -44,7 +46,7 @@ def main() -> None:
     row(tile, "repeat", ArtSettings(tile_size=600, repeat=True, tolerance=0.05), board)
 
 
-def row(tile: ArtTile, name: str, settings: ArtSettings, picture: Picture | None = None) -> None:
+def row(tile: EscherTile, name: str, settings: ArtSettings, picture: Picture | None = None) -> None:
     start = time.perf_counter()
     art = artwork(tile, settings, picture=picture)
     ready = time.perf_counter()
@@ -59,13 +61,13 @@ def row(tile: ArtTile, name: str, settings: ArtSettings, picture: Picture | None
     )
 
 
-def checkerboard(tile: ArtTile) -> Picture:
+def checkerboard(tile: EscherTile) -> Picture:
     """A picture of the silhouette, 1500 pixels along its longer side."""
-    sides = tile.covered.high - tile.covered.low
+    sides = covered_area(tile).high - covered_area(tile).low
     width, height = np.rint(1500 * sides / sides.max()).astype(int)
     rows, columns = np.indices((height, width)) // 50
     image = Image.fromarray((((rows + columns) % 2) * 200 + 30).astype(np.uint8))
-    return Picture(image.convert("RGBA"), tile.covered)
+    return Picture(image.convert("RGBA"), covered_area(tile))
 
 
 if __name__ == "__main__":

@@ -15,8 +15,7 @@ import numpy as np
 import shapely
 from common import DATA, GOALS, aligned, goal, needed
 
-from orbiflow.likeness.metrics import compare
-from orbiflow.likeness.recognition import Recogniser
+from orbiflow.tiles import Recogniser, compare
 
 METHODS = {"est": "est_euclid_top20", "arap": "arap_EIR_top20"}
 

@@ -26,10 +26,16 @@ import shapely
 import torch
 from common import BUNDLED, DATA
 
-from orbiflow.cancel import Cancel
 from orbiflow.errors import OrbiflowError
-from orbiflow.jobs import BatchRequest, Event, Finished, ItemDone, run
-from orbiflow.silhouette import Target
+from orbiflow.jobs import (
+    BatchRequest,
+    Event,
+    Finished,
+    ItemDone,
+    run,
+)
+from orbiflow.runtime import Cancel
+from orbiflow.tiles import Target
 
 SEED = 15
 BEND = 0.012

@@ -13,14 +13,11 @@ import scipy.optimize
 import shapely
 from numpy.typing import NDArray
 
-from orbiflow.escher.bending import bent_tiles
-from orbiflow.escher.bending_settings import BendingSettings
-from orbiflow.escher.hands import hands
-from orbiflow.geometry import orient, plane_points
-from orbiflow.likeness.thinnest import least_neck
-from orbiflow.silhouette import Target
-from orbiflow.threads import one_blas_thread
-from orbiflow.tilings import CLASSES
+from orbiflow.runtime import one_blas_thread
+from orbiflow.tiles import CLASSES, BendingSettings, Target, orient, plane_points
+from orbiflow.tiles.likeness import least_neck
+from orbiflow.tiles.search.bending import bent_tiles
+from orbiflow.tiles.search.co_deformation import hands
 
 ROOT = Path(__file__).resolve().parents[1]
 BUNDLED = ROOT / "examples" / "silhouettes"

@@ -18,10 +18,8 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from orbiflow.density import BlendedDensity, midpoints
-from orbiflow.density.models.chains import SCALES, VonMisesChains, waves
-from orbiflow.density.models.kernels import AdaptiveKernels
-from orbiflow.density.spaces.round import RoundSpace
+from orbiflow.density import AdaptiveKernels, BlendedDensity, RoundSpace, VonMisesChains, midpoints
+from orbiflow.density.models import SCALES, waves
 
 GRID = 256
 """Points a side of the whole space's grid."""

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.special import ive
 
 from orbiflow.density import to_vectors
-from orbiflow.density.models.log_sum import log_sum_exp
+from orbiflow.density.models import log_sum_exp
 from orbiflow.density.models.terms import BLOCK_ENTRIES
 
 Data = NDArray[np.float64]

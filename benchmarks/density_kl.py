@@ -31,8 +31,13 @@ from orbiflow.density import (
     make_space,
     midpoints,
 )
-from orbiflow.paper.density_targets import FIT_SETTINGS, TargetMeasure, drawn, weighted
-from orbiflow.paper.published import KL
+from reproduction.density_targets import (
+    FIT_SETTINGS,
+    TargetMeasure,
+    drawn,
+    weighted,
+)
+from reproduction.published import KL
 
 BARS = {"4-gaussian": 0.01, "6-gaussian": 0.02, "checkerboard": 0.08}
 AUTHORS = {

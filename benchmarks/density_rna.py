@@ -26,9 +26,14 @@ from common import published
 from density_data import rna, splits
 from density_kde import KernelDensity
 
-from orbiflow.density import AutomaticSettings, Torus, fit_automatic
-from orbiflow.density.fitting.chains import fit_chains
-from orbiflow.density.fitting.neural import NeuralSettings, fit_neural
+from orbiflow.density import (
+    AutomaticSettings,
+    NeuralSettings,
+    Torus,
+    fit_automatic,
+    fit_chains,
+    fit_neural,
+)
 
 QUERIES = 10_000
 

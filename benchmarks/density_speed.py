@@ -28,8 +28,7 @@ from orbiflow.density import (
     TabulatedDensity,
     log_density_gradient,
 )
-from orbiflow.density.models.kernels import kernel_rows
-from orbiflow.density.models.log_sum import log_sum_exp
+from orbiflow.density.models import kernel_rows, log_sum_exp
 from orbiflow.density.models.terms import BLOCK_ENTRIES
 
 SPACES = ("torus", "sphere", "klein-bottle", "projective-plane", "three angles")

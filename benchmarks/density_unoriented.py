@@ -22,7 +22,11 @@ from density_data import Data, splits
 from density_unoriented_data import AXES, KLEIN, known, load
 from density_unoriented_kde import Kernel, UnorientedKernelDensity, tuned
 
-from orbiflow.density import BlendedDensity, DensityEstimator, SymmetricDensity
+from orbiflow.density import (
+    BlendedDensity,
+    DensityEstimator,
+    SymmetricDensity,
+)
 
 QUERIES, KERNEL_QUERIES = 100_000, 5_000
 """Points that evaluation is timed on; kernels are so slow that fewer are taken, and scaled up."""

@@ -11,7 +11,7 @@ from density_kde import Data, with_floor
 from scipy.special import ive
 
 from orbiflow.density import to_vectors
-from orbiflow.density.models.log_sum import log_sum_exp
+from orbiflow.density.models import log_sum_exp
 from orbiflow.density.models.terms import BLOCK_ENTRIES
 
 CONCENTRATIONS = np.geomspace(2.0, 2e4, 9)

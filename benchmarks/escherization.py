@@ -18,9 +18,13 @@ import numpy as np
 import torch
 from common import DATA, GOALS, goal, needed, published
 
-from orbiflow.escher import DescentSettings, TileResult, escherize
-from orbiflow.silhouette import Target
-from orbiflow.tilings import CLASSES
+from orbiflow.tiles import (
+    CLASSES,
+    DescentSettings,
+    EscherTile,
+    Target,
+    escherize,
+)
 
 DISTORTED = {"octpus_94": "octpus", "penguin_60": "penguin2", "squirrel1_60": "squirrel"}
 
@@ -33,7 +37,7 @@ def target_of(name: str, distorted: bool) -> Target:
     return Target.read(folder / f"{DISTORTED.get(name, name.rsplit('_', 1)[0])}.png")
 
 
-def search(target: Target, effort: str, seed: int) -> tuple[list[TileResult], float]:
+def search(target: Target, effort: str, seed: int) -> tuple[list[EscherTile], float]:
     """Certified tiles of all classes, largest IoU first, and the seconds that they took."""
     begin = time.perf_counter()
     results, failures = escherize(

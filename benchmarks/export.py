@@ -12,8 +12,13 @@ import time
 
 import numpy as np
 
-from orbiflow.export import ExportSettings, scenes, write_scene
-from orbiflow.tilings import Tile, isohedral_class
+from orbiflow.tiles import (
+    ExportSettings,
+    Tile,
+    isohedral_class,
+    scenes,
+    write_scene,
+)
 
 SIDE = 20.0  # of a tile, in mm
 
@@ -66,7 +71,7 @@ def wavy_tile() -> Tile:
 
 
 def longer(tile: Tile) -> float:
-    from orbiflow.export.layout import longer_side
+    from orbiflow.tiles.exporting import longer_side
 
     return longer_side(tile.polygon)
 

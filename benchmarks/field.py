@@ -43,9 +43,8 @@ from orbiflow.fields import (
     rotation_operator,
     transflection_operator,
 )
-from orbiflow.symmetry import CrystallographicGroup, Line
-from orbiflow.symmetry.isometry import Isometry
-from orbiflow.tilings.classes import CLASSES, IsohedralClass
+from orbiflow.symmetry import CrystallographicGroup, Isometry, Line
+from orbiflow.tiles import CLASSES, IsohedralClass
 
 POINTS = 5_000
 FREQUENCIES = (5, 10, 15, 30)

@@ -13,14 +13,19 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from orbiflow.escher import BendingSettings, escherize
-from orbiflow.export.folder import overlay
-from orbiflow.export.gallery import write_gallery
-from orbiflow.export.overview import overview_png
-from orbiflow.export.svg import tile_svg, tiling_svg
-from orbiflow.figures.tilings import tiling_png
-from orbiflow.silhouette import Target
-from orbiflow.tilings import colouring
+from orbiflow.tiles import (
+    BendingSettings,
+    Target,
+    TileMap,
+    colouring,
+    escherize,
+    overview_png,
+    tile_svg,
+    tiling_png,
+    tiling_svg,
+    write_gallery,
+)
+from orbiflow.tiles.pages.tile_folder import overlay
 
 TURTLE = Path(__file__).parents[1] / "examples" / "silhouettes" / "turtle.png"
 
@@ -43,7 +48,7 @@ def main() -> None:
     row("tiling.svg", lambda: [tiling_svg(r.tile, y_down=y_down, colours=c) for r, c in both])
     row("tiling.png", lambda: [tiling_png(r.tile, y_down=y_down, colours=c) for r, c in both])
     row("overlay.png", lambda: [overlay(r, target) for r in results])
-    row("model", lambda: [r.model.to_bytes() for r in results])
+    row("model", lambda: [(r.map or TileMap()).to_bytes() for r in results])
     row("overview.png", lambda: overview_png(results, target, colours))
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder)

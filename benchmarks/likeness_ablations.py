@@ -21,13 +21,17 @@ from typing import Any
 import numpy as np
 from likeness_methods import silhouette
 
-from orbiflow.escher import BendingSettings, bending, corner_shifts
-from orbiflow.escher.co_deformation import TIGHTER, drawn_to_tiles
-from orbiflow.escher.hands import FIRM, SOFT, hands
-from orbiflow.likeness import fidelity
-from orbiflow.likeness.fidelity import USUAL
-from orbiflow.threads import one_blas_thread
-from orbiflow.tilings import CLASSES
+from orbiflow.runtime import one_blas_thread
+from orbiflow.tiles import CLASSES, BendingSettings, fidelity
+from orbiflow.tiles.likeness.faithful import USUAL
+from orbiflow.tiles.search import bending, corner_shifts
+from orbiflow.tiles.search.co_deformation import (
+    FIRM,
+    SOFT,
+    TIGHTER,
+    drawn_to_tiles,
+    hands,
+)
 
 NAMES = ("bat_60", "camel_60", "octpus_94", "squirrel1_60")
 KINDS = ("IH4", "IH5", "IH6")

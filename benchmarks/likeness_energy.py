@@ -25,9 +25,15 @@ from common import DATA, GOALS, LikenessTile, Ring, goal, likeness_tiles, needed
 from likeness_methods import kept
 from numpy.typing import NDArray
 
-from orbiflow.geometry import complex_points, orient, plane_points, ring_length, signed_area
-from orbiflow.likeness.elastic import Elastic, Stiffness
-from orbiflow.silhouette.mesh import triangulate
+from orbiflow.tiles import (
+    complex_points,
+    orient,
+    plane_points,
+    ring_length,
+    signed_area,
+)
+from orbiflow.tiles.likeness import Elastic, Stiffness
+from orbiflow.tiles.silhouette import triangulate
 
 Complex = NDArray[np.complex128]
 

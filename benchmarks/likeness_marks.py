@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 from common import ROOT, Ring
 
-from orbiflow.likeness.elastic import POSE
-from orbiflow.likeness.fidelity import Fidelity
+from orbiflow.tiles import Fidelity
+from orbiflow.tiles.likeness.elastic import POSE
 
 Row = dict[str, Any]
 

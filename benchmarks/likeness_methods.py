@@ -15,9 +15,7 @@ import numpy as np
 from common import DATA, LikenessTile, Ring, aligned, goal, likeness_tiles, needed
 from PIL import Image, ImageDraw
 
-from orbiflow.escher import DescentSettings, escherize
-from orbiflow.geometry import centroid, signed_area
-from orbiflow.silhouette import Target
+from orbiflow.tiles import DescentSettings, Target, centroid, escherize, signed_area
 
 METHODS = ("overlap", "likeness", "arap", "est", "trial")
 """Overlap: the flow that maximises IoU; likeness: the silhouette bends; the others' tiles are files."""

@@ -18,8 +18,14 @@ import numpy as np
 from common import GOALS, Ring
 from likeness_methods import silhouette
 
-from orbiflow.escher import BendingSettings, Event, escherize
-from orbiflow.likeness import hair_share, narrowest_neck, slit_share
+from orbiflow.tiles import (
+    BendingSettings,
+    Event,
+    escherize,
+    hair_share,
+    narrowest_neck,
+    slit_share,
+)
 
 THIN = 0.01
 """Of the size: hairs and slits."""

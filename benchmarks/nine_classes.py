@@ -14,16 +14,21 @@ from pathlib import Path
 
 from common import BUNDLED
 
-from orbiflow.escher import ClassFailure, OccupancySettings, TileResult, escherize
-from orbiflow.silhouette import Target
-from orbiflow.tilings import CLASSES
+from orbiflow.tiles import (
+    CLASSES,
+    ClassFailure,
+    EscherTile,
+    OccupancySettings,
+    Target,
+    escherize,
+)
 
 IMAGES = [
     BUNDLED / n for n in ("squirrel.dat", "nagata/bat_60.dat", "turtle.png", "night-monkey.png")
 ]
 
 
-def row(outcome: TileResult | ClassFailure) -> str:
+def row(outcome: EscherTile | ClassFailure) -> str:
     """One line of the table."""
     if isinstance(outcome, ClassFailure):
         return f"{outcome.name:6} failed: {outcome.reason}"

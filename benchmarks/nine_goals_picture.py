@@ -16,11 +16,20 @@ import numpy as np
 import torch
 from common import goal
 
-from orbiflow.escher import DescentSettings, TileResult, escherize
-from orbiflow.figures.canvas import blank_figure, fill_rings, plane_axes, png_bytes
-from orbiflow.files import write_atomic
-from orbiflow.silhouette import Target
-from orbiflow.tilings.window import Window
+from orbiflow.arrays import Window
+from orbiflow.drawing import (
+    blank_figure,
+    fill_rings,
+    plane_axes,
+    png_bytes,
+)
+from orbiflow.runtime import write_atomic
+from orbiflow.tiles import (
+    DescentSettings,
+    EscherTile,
+    Target,
+    escherize,
+)
 
 BEST = {
     "bat_60": ("bat", "IH6"),
@@ -39,7 +48,7 @@ COLUMNS = 3
 PANEL, CAPTION, LEGEND, MARGIN = (500, 360), 52, 52, 20  # pixels
 TILE, GOAL, INK = "#8ab6d9", "#c0480a", "#1a1a1a"
 
-Found = tuple[str, Target, TileResult]
+Found = tuple[str, Target, EscherTile]
 
 
 def fitted(file: str, effort: str, seed: int) -> Found:

@@ -16,15 +16,20 @@ import torch
 from common import DATA, needed
 from PIL import Image, ImageDraw, ImageFont
 
-from orbiflow.escher import DescentSettings, TileResult, escherize
-from orbiflow.figures.tilings import overlay_png, tiling_png
-from orbiflow.silhouette import Target
-from orbiflow.tilings import CLASSES
+from orbiflow.tiles import (
+    CLASSES,
+    DescentSettings,
+    EscherTile,
+    Target,
+    escherize,
+    overlay_png,
+    tiling_png,
+)
 
 PANEL = 420  # pixels
 
 
-def sheet(found: list[tuple[str, Target, TileResult]]) -> Image.Image:
+def sheet(found: list[tuple[str, Target, EscherTile]]) -> Image.Image:
     """Each silhouette under its best tile, and the tiling."""
     columns = 4
     rows = -(-len(found) // columns)
@@ -57,7 +62,7 @@ def main() -> None:
     files = sorted(folder.glob("*.png"))[: 2 if options.quick else None]
     settings = DescentSettings.for_effort("fast" if options.quick else options.effort)
     print("silhouette         vertices class     IoU   Dice  recog  certified  failed seconds")
-    found: list[tuple[str, Target, TileResult]] = []
+    found: list[tuple[str, Target, EscherTile]] = []
     for path in files:
         target = Target.read(path)
         begin = time.perf_counter()

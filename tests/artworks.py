@@ -9,13 +9,11 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageDraw
 
-from orbiflow.escher.carried import CarriedTile
-from orbiflow.escher.report import group_json
-from orbiflow.escher.storage import SavedModel
-from orbiflow.export.art.picture import Picture
-from orbiflow.export.art.source import ArtTile
-from orbiflow.export.result_file import ExportTile
-from orbiflow.silhouette.frame import Frame
+from orbiflow.tiles import EscherTile, Frame, TileMap, as_map
+from orbiflow.tiles.art.pictures import Picture
+from orbiflow.tiles.art.source import covered_area
+from orbiflow.tiles.result_file import group_json
+from orbiflow.tiles.search.bent_map import map_of_bent
 from outlines import animal, bent_squirrel, flowless
 
 EYE = (210.0, 190.0)
@@ -23,53 +21,54 @@ EYE = (210.0, 190.0)
 
 
 @lru_cache(maxsize=32)
-def squirrel(name: str) -> ArtTile:
+def squirrel(name: str) -> EscherTile:
     """A small search's tile of a class, in the input's coordinates."""
     target = animal("squirrel.dat")
     own = bent_squirrel(name)
-    carried = CarriedTile.from_bent(own.bent, own.factor, own.shift, own.tile, target.frame)
-    assert carried.bending is not None
-    return ArtTile(ExportTile(carried.tile, target.y_down, f"squirrel-{name}"), carried)
+    frame = target.frame
+    placed = own.tile.transformed(frame.linear, frame.offset)
+    maps = TileMap(frame=frame, bending=map_of_bent(own.bent, own.factor, own.shift, own.tile))
+    return EscherTile(placed, y_down=target.y_down, name=f"squirrel-{name}", map_source=maps)
 
 
-def upside_down(tile: ArtTile) -> ArtTile:
+def upside_down(tile: EscherTile) -> EscherTile:
     """The same with y up: what was at the top of a picture still is."""
-    flip, frame = np.diag([1.0, -1.0]), tile.carried.frame
-    turned = tile.carried.tile.transformed(flip, np.zeros(2))
+    bending, frame = tile.require_map()
+    flip = np.diag([1.0, -1.0])
+    turned = tile.tile.transformed(flip, np.zeros(2))
     own = Frame(flip @ frame.linear, flip @ frame.offset, frame.kind)
-    carried = CarriedTile(turned, own, tile.carried.bending)
-    return ArtTile(ExportTile(turned, False, tile.given.name), carried)
+    return tile.changed(tile=turned, y_down=False, map_source=TileMap(frame=own, bending=bending))
 
 
-def picture(image: Image.Image, tile: ArtTile) -> Picture:
+def picture(image: Image.Image, tile: EscherTile) -> Picture:
     """An image over the silhouette."""
-    return Picture(image.convert("RGBA"), tile.covered)
+    return Picture(image.convert("RGBA"), covered_area(tile))
 
 
-def size_of(tile: ArtTile, longer: int = 600) -> tuple[int, int]:
+def size_of(tile: EscherTile, longer: int = 600) -> tuple[int, int]:
     """Of a picture of the silhouette, in pixels."""
-    sides = tile.covered.high - tile.covered.low
+    sides = covered_area(tile).high - covered_area(tile).low
     width, height = np.rint(sides * longer / sides.max()).astype(int)
     return int(width), int(height)
 
 
-def flat(tile: ArtTile, colour: str) -> Picture:
+def flat(tile: EscherTile, colour: str) -> Picture:
     """One colour."""
     return picture(Image.new("RGB", size_of(tile), colour), tile)
 
 
-def checkerboard(tile: ArtTile, cells: int = 10) -> Picture:
+def checkerboard(tile: EscherTile, cells: int = 10) -> Picture:
     """Black and white, so many squares along the longer side."""
     width, height = size_of(tile)
     rows, columns = np.indices((height, width)) * cells // max(width, height)
     return picture(Image.fromarray((((rows + columns) % 2) * 255).astype(np.uint8)), tile)
 
 
-def face(tile: ArtTile) -> Picture:
+def face(tile: EscherTile) -> Picture:
     """White, with a red disc at the eye."""
     width, height = size_of(tile)
     image = Image.new("RGB", (width, height), "white")
-    low, high = tile.covered.low, tile.covered.high
+    low, high = covered_area(tile)[:2]
     x, y = (np.array(EYE) - low) / (high - low) * (width, height)
     ImageDraw.Draw(image).ellipse([x - 14, y - 14, x + 14, y + 14], fill="red")
     return picture(image, tile)
@@ -78,7 +77,7 @@ def face(tile: ArtTile) -> Picture:
 def write_run(folder: Path, name: str, *, model: bool = True) -> Path:
     """A run's folder with one tile."""
     target, own, tile = animal("squirrel.dat"), bent_squirrel(name), squirrel(name)
-    polygon = tile.carried.tile.polygon
+    polygon = tile.tile.polygon
     document = {
         "schema_version": 1,
         "input": {**target.report()},
@@ -86,8 +85,8 @@ def write_run(folder: Path, name: str, *, model: bool = True) -> Path:
             {
                 "class": name,
                 "polygon": np.concatenate([polygon, polygon[:1]]).tolist(),
-                "corners": list(tile.carried.tile.corners),
-                "group": group_json(tile.carried.tile.group),
+                "corners": list(tile.tile.corners),
+                "group": group_json(tile.tile.group),
             }
         ],
     }
@@ -95,6 +94,6 @@ def write_run(folder: Path, name: str, *, model: bool = True) -> Path:
     (folder / "result.json").write_text(json.dumps(document))
     if model:
         fitted = flowless(name, own.bent, own.factor, own.shift)
-        saved = SavedModel.of(fitted, target.frame, tile.carried.bending)
+        saved = as_map(fitted, target.frame, tile.bending)
         (folder / name / "model.safetensors").write_bytes(saved.to_bytes())
     return folder

@@ -7,9 +7,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from orbiflow.arrays import Array
 from orbiflow.symmetry import CrystallographicGroup
-from orbiflow.symmetry.isometry import Array
-from orbiflow.tilings import Tile, isohedral_class
+from orbiflow.tiles import Tile, isohedral_class
 
 
 def equivariant(group: CrystallographicGroup) -> Callable[[Array], Array]:

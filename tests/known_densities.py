@@ -9,7 +9,12 @@ import numpy as np
 import torch
 from numpy.typing import ArrayLike
 
-from orbiflow.density import AdaptiveKernels, BlendedDensity, Space, UniformBase
+from orbiflow.density import (
+    AdaptiveKernels,
+    BlendedDensity,
+    Space,
+    UniformBase,
+)
 from orbiflow.fields import SplineField
 from orbiflow.flows import Flow
 

@@ -7,8 +7,7 @@ from typing import Any
 import pytest
 from PIL import Image, ImageDraw
 
-from orbiflow.silhouette.emphasis import Emphasis
-from orbiflow.silhouette.target import Target
+from orbiflow.tiles import Emphasis, Target
 
 # A picture of 200 x 100 pixels with a box drawn from (20, 10) to (180, 90).
 SIZE = (200, 100)

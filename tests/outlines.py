@@ -8,17 +8,25 @@ from typing import NamedTuple
 
 import numpy as np
 
-from orbiflow.escher.bending import Bent, bent_tiles
-from orbiflow.escher.bending_settings import BendingSettings
-from orbiflow.escher.boundary import extract_tile
-from orbiflow.escher.fit_bending import PlacedBent, placed_best, prototile
-from orbiflow.escher.hands import Hand, hands
-from orbiflow.escher.model import TileModel
-from orbiflow.geometry import plane_points, signed_area
-from orbiflow.likeness.overlap import Overlap
-from orbiflow.silhouette import Target
-from orbiflow.symmetry.isometry import Array
-from orbiflow.tilings import CLASSES, Tile
+from orbiflow.arrays import Array
+from orbiflow.tiles import (
+    CLASSES,
+    BendingSettings,
+    Overlap,
+    Target,
+    Tile,
+    TileModel,
+    plane_points,
+    signed_area,
+)
+from orbiflow.tiles.search.bending import Bent, bent_tiles
+from orbiflow.tiles.search.bending_fit import (
+    PlacedBent,
+    placed_best,
+    prototile,
+)
+from orbiflow.tiles.search.boundary import extract_tile
+from orbiflow.tiles.search.co_deformation import Hand, hands
 
 FOLDER = Path(__file__).parent.parent / "examples" / "silhouettes"
 ANIMALS = ("squirrel.dat", "nagata/spider_120.dat", "nagata/octpus_94.dat", "nagata/camel_60.dat")

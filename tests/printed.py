@@ -9,7 +9,7 @@ import numpy as np
 import pypdfium2
 import pypdfium2.raw as pdfium
 
-from orbiflow.figures import Picture
+from orbiflow.drawing import Picture
 
 
 def letters(pdf: bytes) -> set[float]:

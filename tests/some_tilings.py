@@ -11,17 +11,21 @@ import shapely
 from hypothesis import assume
 from hypothesis import strategies as st
 
-from orbiflow.geometry import orient
+from orbiflow.arrays import Array
 from orbiflow.symmetry import (
     WALLPAPER_GROUPS,
     CrystallographicGroup,
     Isometry,
     rotation_matrix,
+    symmetry_elements,
     wallpaper_group,
 )
-from orbiflow.symmetry.elements import symmetry_elements
-from orbiflow.symmetry.isometry import Array
-from orbiflow.tilings import Tiling, dirichlet_tiling, isohedral_class
+from orbiflow.tiles import (
+    Tiling,
+    dirichlet_tiling,
+    isohedral_class,
+    orient,
+)
 from strategies import lattices, seeds, wallpaper_groups
 
 Field: TypeAlias = Callable[[Array], Array]

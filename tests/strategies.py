@@ -11,6 +11,7 @@ import torch
 from hypothesis import strategies as st
 from torch import Tensor
 
+from orbiflow.arrays import Array
 from orbiflow.fields import FourierField, VectorField
 from orbiflow.symmetry import (
     IDENTIFICATION_SPACES,
@@ -22,8 +23,7 @@ from orbiflow.symmetry import (
     translation,
     wallpaper_group,
 )
-from orbiflow.symmetry.isometry import Array
-from orbiflow.tilings.classes import CLASSES
+from orbiflow.tiles import CLASSES
 
 Operation = tuple[Sequence[Sequence[int]], Sequence[float]]
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, settings
 
-from orbiflow.density.tables import read_table
+from orbiflow.density import read_table
 from orbiflow.errors import InputFileError
 
 PROPERTY = settings(

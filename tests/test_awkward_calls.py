@@ -10,45 +10,45 @@ import pytest
 import torch
 
 from awkward import NOT_SIMPLE, SQUARE, STRANGE, USELESS
-from orbiflow import escher, figures, likeness, silhouette, tilings
+from orbiflow import tiles
 from orbiflow.errors import CertificationError, OrbiflowError
-from orbiflow.escher.boundary import extract_tile
-from orbiflow.escher.outline_starts import outline_starts, template_starts
 from orbiflow.symmetry import translation, wallpaper_group
+from orbiflow.tiles.search.boundary import extract_tile
+from orbiflow.tiles.search.starts import outline_starts, template_starts
 
 Call = Callable[..., object]
 
-KIND: Any = tilings.CLASSES["IH4"]
-PENTAGON: Any = tilings.CLASSES["IH28"]
+KIND: Any = tiles.CLASSES["IH4"]
+PENTAGON: Any = tiles.CLASSES["IH28"]
 GROUP = wallpaper_group("p1", 2 * np.eye(2))
-TILE = tilings.Tile(SQUARE, GROUP)
+TILE = tiles.Tile(SQUARE, GROUP)
 BOOT = [[0, 0], [3, 0], [3.4, 1.2], [2.2, 1.5], [2.0, 2.8], [0.8, 2.5], [-0.3, 1.2]]
-TARGET = silhouette.Target.from_polygon(BOOT)
-FAST = escher.DescentSettings.for_effort("fast", stages=((2, 1),), polish=0)
-QUICK = escher.OccupancySettings(
+TARGET = tiles.Target.from_polygon(BOOT)
+FAST = tiles.DescentSettings.for_effort("fast", stages=((2, 1),), polish=0)
+QUICK = tiles.OccupancySettings(
     max_frequency=1, turns=1, finalists=1, affine_iterations=1, iterations=1, points=30
 )
-Model: Any = escher.TileModel
-Tile: Any = tilings.Tile
-Emphasis: Any = silhouette.Emphasis
-patch: Any = tilings.patch
+Model: Any = tiles.TileModel
+Tile: Any = tiles.Tile
+Emphasis: Any = tiles.Emphasis
+patch: Any = tiles.patch
 MODEL = Model(KIND, 0.0, max_frequency=1)
 PAIR = Model(KIND, [0.0, 1.0], max_frequency=1)
 OTHER = Model("IH7", 0.0, max_frequency=1)
-SOFT = silhouette.SoftTarget(TARGET, resolution=32)
+SOFT = tiles.SoftTarget(TARGET, resolution=32)
 FEW: dict[str, Any] = {"count": 1, "projected": 20, "measured": 5, "vertices": 60}
 
 polygon_functions: dict[str, Call] = {
-    "Tile": lambda ring: tilings.certify(Tile(ring, GROUP)),
-    "Target": lambda ring: silhouette.Target.from_polygon(ring).normal,
-    "iou": lambda ring: likeness.iou(ring, SQUARE),
-    "compare": lambda ring: likeness.compare(SQUARE, ring),
-    "hausdorff": lambda ring: likeness.hausdorff(ring, SQUARE),
-    "Recogniser": lambda ring: likeness.Recogniser(ring)(ring),
-    "tile_similarity": lambda ring: likeness.tile_similarity([ring], ["IH1"]),
-    "prepared_region": likeness.prepared_region,
-    "Overlap": likeness.Overlap,
-    "overlay_png": lambda ring: figures.overlay_png(TILE, ring, width_px=200),
+    "Tile": lambda ring: tiles.certify(Tile(ring, GROUP)),
+    "Target": lambda ring: tiles.Target.from_polygon(ring).normal,
+    "iou": lambda ring: tiles.iou(ring, SQUARE),
+    "compare": lambda ring: tiles.compare(SQUARE, ring),
+    "hausdorff": lambda ring: tiles.hausdorff(ring, SQUARE),
+    "Recogniser": lambda ring: tiles.Recogniser(ring)(ring),
+    "tile_similarity": lambda ring: tiles.tile_similarity([ring], ["IH1"]),
+    "prepared_region": tiles.prepared_region,
+    "Overlap": tiles.Overlap,
+    "overlay_png": lambda ring: tiles.overlay_png(TILE, ring, width_px=200),
 }
 MEASURING = ("Target", "iou", "compare", "hausdorff", "Recogniser", "tile_similarity")
 
@@ -75,12 +75,12 @@ def test_what_encloses_no_region_is_refused(name: str, ring: Any) -> None:
 
 @pytest.mark.parametrize("ring", NOT_SIMPLE.values(), ids=NOT_SIMPLE)
 def test_a_tile_that_is_none_is_not_certified(ring: Any) -> None:
-    assert not tilings.certify(Tile(ring, GROUP)).valid
+    assert not tiles.certify(Tile(ring, GROUP)).valid
 
 
-loss: Any = escher.occupancy_loss
+loss: Any = tiles.occupancy_loss
 WORKS: dict[str, Call] = {
-    "class for its name": lambda: tilings.isohedral_class(KIND),
+    "class for its name": lambda: tiles.isohedral_class(KIND),
     "shape in a list": lambda: PENTAGON.template([0.1, 0]),
     "shape of integers": lambda: PENTAGON.template(torch.tensor([0, 0])),
     "stretch of integers": lambda: KIND.stretch(np.array([1, 0])),
@@ -91,8 +91,8 @@ WORKS: dict[str, Call] = {
     "points in an array": lambda: MODEL(np.zeros((1, 3, 2))),
     "points in a list": lambda: MODEL.inverse([[0.0, 0.0], [0.1, 0.2]]),
     "one index": lambda: MODEL.take(0),
-    "descent by name": lambda: escher.fit_descent(TARGET, "IH4", FAST),
-    "occupancy by name": lambda: escher.fit_occupancy(TARGET, "ih4", QUICK),
+    "descent by name": lambda: tiles.fit_descent(TARGET, "IH4", FAST),
+    "occupancy by name": lambda: tiles.fit_occupancy(TARGET, "ih4", QUICK),
     "starts by name": lambda: outline_starts(TARGET, "IH4", resolutions=(30,), **FEW),
     "template starts by name": lambda: template_starts("IH4", turns=1, stretch=0.1, vertices=30),
     "loss of arrays": lambda: loss(MODEL, np.zeros((3, 2)), np.zeros(3), 1.0),
@@ -114,7 +114,7 @@ bow_tie, space, whole = (
     torch.zeros(3, 2).long(),
 )
 hexagons = template_starts("IH4", turns=1, stretch=0.0, vertices=30)
-distance: Any = silhouette.signed_distance
+distance: Any = tiles.signed_distance
 REFUSED: list[tuple[Call, Any, str]] = [
     (lambda g: Tile(SQUARE, g), "p4", "the tile's group must be a CrystallographicGroup, got 'p4'"),
     (lambda g: Tile(SQUARE, g), KIND, r"isohedral_class\(name\).group\(\)"),
@@ -122,35 +122,35 @@ REFUSED: list[tuple[Call, Any, str]] = [
     (lambda c: Tile(SQUARE, GROUP, "", c), (0, 9), "from 0 to 3, got 9"),
     (lambda c: Tile(SQUARE, GROUP, "", c), (0.5,), "whole number"),
     (
-        tilings.certify,
+        tiles.certify,
         SQUARE,
         r"the tile must be a Tile or a Tiling, got an array of shape \(4, 2\)",
     ),
-    (tilings.neighbours, SQUARE, "must be a Tile"),
-    (tilings.colouring, SQUARE, "must be a Tile"),
+    (tiles.neighbours, SQUARE, "must be a Tile"),
+    (tiles.colouring, SQUARE, "must be a Tile"),
     (lambda t: patch(t, (0, 0, 1, 1)), SQUARE, "must be a Tile"),
-    (figures.tiling_png, SQUARE, "must be a Tile"),
-    (lambda t: tilings.certify(TILE, tolerance=t), np.nan, "tolerance must be"),
-    (lambda t: tilings.certify(TILE, tolerance=t), 0, "must be above 0, got 0"),
-    (lambda t: tilings.certify(TILE, tolerance=t), "1e-9", "got '1e-9'"),
+    (tiles.tiling_png, SQUARE, "must be a Tile"),
+    (lambda t: tiles.certify(TILE, tolerance=t), np.nan, "tolerance must be"),
+    (lambda t: tiles.certify(TILE, tolerance=t), 0, "must be above 0, got 0"),
+    (lambda t: tiles.certify(TILE, tolerance=t), "1e-9", "got '1e-9'"),
     (lambda w: patch(TILE, w), "all", r"a window is \(xmin"),
     (lambda w: patch(TILE, w), None, r"a window is \(xmin"),
     (lambda w: patch(TILE, w), [[0, 0], [1, 1]], "a window is"),
-    (lambda g: tilings.aspects(TILE, [g]), np.eye(2), "must be an Isometry"),
-    (lambda g: tilings.aspects(TILE, [g]), translation([0.3, 0]), "not an element"),
-    (tilings.isohedral_class, None, "unknown isohedral class None; the nine"),
-    (tilings.isohedral_class, ["IH4"], "unknown isohedral class a list of 1"),
-    (PENTAGON.template, [np.nan, 0], "shape parameters: every number must be finite"),
-    (PENTAGON.template, "x", "expected real numbers"),
-    (KIND.stretch, 1.0, r"expected shape \(..., 2\), got \(\)"),
+    (lambda g: tiles.aspects(TILE, [g]), np.eye(2), "must be an Isometry"),
+    (lambda g: tiles.aspects(TILE, [g]), translation([0.3, 0]), "not an element"),
+    (tiles.isohedral_class, None, "unknown isohedral class None; the nine"),
+    (tiles.isohedral_class, ["IH4"], "unknown isohedral class a list of 1"),
+    (PENTAGON.template, [np.nan, 0], "shape parameters.*finite"),
+    (PENTAGON.template, "x", "real numbers"),
+    (KIND.stretch, 1.0, r"shape \(..., 2\), got .*\(\)"),
     (lambda k: Model(k, 0.0), "IH8", "unknown isohedral class 'IH8'"),
     (lambda k: Model(k, 0.0), GROUP, "unknown isohedral class"),
-    (lambda a: Model(KIND, a), [np.nan], "angles: every number"),
+    (lambda a: Model(KIND, a), [np.nan], "angles.*finite"),
     (lambda a: Model(KIND, a), np.zeros((2, 2)), r"shape \(S,\)"),
     (lambda a: Model(KIND, a), [], "S at least 1"),
-    (lambda a: Model(KIND, a), "IH4", "angles: expected real numbers"),
+    (lambda a: Model(KIND, a), "IH4", "angles must be real numbers"),
     (lambda a: Model(KIND, a), None, "needs angles or prototiles"),
-    (lambda m: Model(KIND, [0.0, 1.0], mirrored=m), [True], r"expected shape \(2,\)"),
+    (lambda m: Model(KIND, [0.0, 1.0], mirrored=m), [True], r"shape \(2,\)"),
     (lambda d: Model(KIND, 0.0, dtype=d), torch.int64, "floating-point type"),
     (lambda s: Model(KIND, 0.0, smoothness=s), np.nan, "smoothness must be"),
     (lambda s: Model(KIND, 0.0, segments=s), 0, "segments must be"),
@@ -158,8 +158,8 @@ REFUSED: list[tuple[Call, Any, str]] = [
     (lambda p: Model("IH7", prototiles=p), hexagons, "not of class IH7"),
     (MODEL, torch.zeros(1, 3, 2), "points are torch.float32, the model is torch.float64"),
     (MODEL.inverse, whole[None], "points are torch.int64"),
-    (MODEL.inverse, space, r"expected shape \(S, N, 2"),
-    (MODEL, [[0.0, 0.0, 0.0]], r"expected shape \(..., N, 2\)"),
+    (MODEL.inverse, space, r"shape \(S, N, 2"),
+    (MODEL, [[0.0, 0.0, 0.0]], r"shape \(..., N, 2\)"),
     (MODEL.boundary, 0, "pieces must be at least 1"),
     (MODEL.take, [5], "from 0 to 0, got 5"),
     (MODEL.take, [], "choose at least one"),
@@ -167,29 +167,29 @@ REFUSED: list[tuple[Call, Any, str]] = [
     (Model.joined, [MODEL, OTHER], r"\['IH4', 'IH7'\]"),
     (extract_tile, "IH4", "the model must be a TileModel, got 'IH4'"),
     (extract_tile, PAIR, "take one candidate first: this model holds 2"),
-    (escher.SavedModel.of, "IH4", "must be a TileModel"),
-    (escher.load_model, 3, "the model's file must be a path, got 3"),
-    (lambda t: escher.fit_descent(t, KIND, FAST), BOOT, "must be a Target, got a list of 7"),
-    (lambda s: escher.fit_descent(TARGET, KIND, s), "fast", "must be a DescentSettings"),
-    (lambda t: escher.OccupancySamples(t, 9, seed=0), BOOT, "must be a Target"),
+    (tiles.as_map, "IH4", "must be a TileModel"),
+    (tiles.load_model, 3, "the model's file must be a path, got 3"),
+    (lambda t: tiles.fit_descent(t, KIND, FAST), BOOT, "must be a Target, got a list of 7"),
+    (lambda s: tiles.fit_descent(TARGET, KIND, s), "fast", "must be a DescentSettings"),
+    (lambda t: tiles.OccupancySamples(t, 9, seed=0), BOOT, "must be a Target"),
     (lambda t: outline_starts(t, KIND, **FEW), BOOT, "must be a Target"),
     (lambda r: outline_starts(TARGET, KIND, resolutions=r, **FEW), (35,), "must divide vertices"),
-    (silhouette.SoftTarget, BOOT, "must be a Target"),
-    (lambda r: silhouette.SoftTarget(TARGET, resolution=r), 0, "resolution must be"),
+    (tiles.SoftTarget, BOOT, "must be a Target"),
+    (lambda r: tiles.SoftTarget(TARGET, resolution=r), 0, "resolution must be"),
     (lambda b: SOFT.occupancy(torch.zeros(1, 2), b), 0.0, "blur must be above 0"),
     (lambda p: distance(p, torch.tensor(SQUARE)), SQUARE, "must be a Tensor"),
     (lambda p: distance(p, p), whole, "floating-point"),
     (lambda p: distance(p, p), space, r"shape \(..., N, 2\)"),
-    (silhouette.Target.read, None, "must be a path or a binary stream; .*got None"),
-    (TARGET.to_input, [1, 2, 3], r"expected shape \(..., 2\), got \(3,\)"),
-    (TARGET.to_normal, "x", "points: expected real numbers"),
-    (TARGET.frame.to_normal, torch.zeros(3), r"expected shape \(..., 2\)"),
-    (lambda s: likeness.rank_score(s, 0.5), "a", "iou must be a number"),
-    (lambda s: likeness.rank_score(0.5, s), None, "recognisability must be"),
-    (lambda n: likeness.diverse([1, 2], n, lambda *_: 0.0), 1.5, "count must be a whole"),
-    (likeness.Overlap(SQUARE).iou, bow_tie, "not a simple polygon"),
-    (lambda m: Emphasis(m, (0, 0, 1, 1)), "x", "expected real numbers"),
-    (lambda b: Emphasis(np.eye(2), b), (0, 0, 1), r"expected shape \(4,\)"),
+    (tiles.Target.read, None, "must be a path or a binary stream; .*got None"),
+    (TARGET.to_input, [1, 2, 3], r"shape \(..., 2\), got an array of shape \(3,\)"),
+    (TARGET.to_normal, "x", "points must be real numbers"),
+    (TARGET.frame.to_normal, torch.zeros(3), r"shape \(..., 2\)"),
+    (lambda s: tiles.rank_score(s, 0.5), "a", "iou must be a number"),
+    (lambda s: tiles.rank_score(0.5, s), None, "recognisability must be"),
+    (lambda n: tiles.diverse([1, 2], n, lambda *_: 0.0), 1.5, "count must be a whole"),
+    (tiles.Overlap(SQUARE).iou, bow_tie, "not a simple polygon"),
+    (lambda m: Emphasis(m, (0, 0, 1, 1)), "x", "real numbers"),
+    (lambda b: Emphasis(np.eye(2), b), (0, 0, 1), r"shape \(4,\)"),
     (Emphasis(np.eye(2), (-1, -1, 1, 1)).weight, [1, 2, 3], "points"),
 ]
 
@@ -203,7 +203,7 @@ def test_what_cannot_be_meant_is_refused(call: Call, argument: Any, message: str
 
 NO_WHOLE = ("3", 2.5, None, True, -1, [1], np.nan)
 BAD_SETTINGS: dict[type, dict[str, tuple[Any, ...]]] = {
-    escher.DescentSettings: {
+    tiles.DescentSettings: {
         **dict.fromkeys(("max_frequency", "turns", "finalists", "seed", "candidates"), NO_WHOLE),
         "stages": ((20, 12), (), ((1, 0),), ((1.5, 1),), "x"),
         "resolutions": (60, "60", (7,), (60, "x"), (np.nan,)),
@@ -214,7 +214,7 @@ BAD_SETTINGS: dict[type, dict[str, tuple[Any, ...]]] = {
         "boundary": (45, 100.0, "240"),
         "starts": (None, "anywhere"),
     },
-    escher.OccupancySettings: {
+    tiles.OccupancySettings: {
         **dict.fromkeys(("max_frequency", "turns", "finalists", "seed", "points"), NO_WHOLE),
         "hardness": (3.0, (0.0, 1.0), "ab"),
         "learning_rate": (0, np.nan, None),

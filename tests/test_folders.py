@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from orbiflow.errors import OutputError
-from orbiflow.folders import ResultFolder
+from orbiflow.runtime import ResultFolder
 
 OURS = {"result.json", "IH4/tile.svg", "IH6/tile.svg"}
 

@@ -13,8 +13,8 @@ from PIL import Image
 from gallery_page import PAGE, SHEET, page, shown
 from gallery_table import FREE, Entry, read_table
 from orbiflow.cli.app import app
-from orbiflow.figures.palette import palette
-from orbiflow.tilings import CLASSES
+from orbiflow.drawing import palette
+from orbiflow.tiles import CLASSES
 
 ROOT = Path(__file__).parents[1]
 GALLERY = ROOT / "docs" / "gallery"

@@ -10,9 +10,8 @@ from typing import Any
 
 import pytest
 
-from orbiflow.cancel import Cancel
 from orbiflow.errors import OrbiflowError
-from orbiflow.processes import work
+from orbiflow.runtime import Cancel, work
 
 Tell = Callable[[Any], None]
 

@@ -7,8 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-from orbiflow.escher import BendingSettings, TileResult, escherize_class
-from orbiflow.silhouette import Target
+from orbiflow.tiles import (
+    BendingSettings,
+    EscherTile,
+    Target,
+    escherize_class,
+)
 
 README_PATH = Path(__file__).parents[1] / "README.md"
 README = README_PATH.read_text(encoding="utf-8")
@@ -26,15 +30,33 @@ def test_the_symmetric_field_snippet_runs():
     assert "log_det" in run(snippet)
 
 
+def test_the_first_snippet_draws_a_certified_tile(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "examples").symlink_to(README_PATH.parent / "examples")
+    run(SNIPPETS[0])
+    assert capsys.readouterr().out.endswith("True\n")
+    assert (tmp_path / "turtles.png").stat().st_size > 1000
+
+
+def test_the_first_screen_is_short():
+    first = README.split("\n## ")[0]
+    assert first.index("![") < first.index("make demo")
+    shell = re.findall(r"```sh\n(.*?)```", first, flags=re.DOTALL)
+    lengths = [
+        len(re.findall(r"^\S", block, flags=re.MULTILINE)) for block in [*shell, SNIPPETS[0]]
+    ]
+    assert lengths == [2, 5, 5]
+    assert len(first.splitlines()) < 45
+
+
 def test_the_model_snippet_maps_there_and_back(tmp_path, monkeypatch):
-    (snippet,) = [s for s in SNIPPETS if "load_saved" in s]
-    folder = tmp_path / "out" / "turtle" / "IH4"
-    folder.mkdir(parents=True)
+    (snippet,) = [s for s in SNIPPETS if "tile.forward" in s]
     target = Target.read(README_PATH.parent / "examples" / "silhouettes" / "turtle.png")
     small = BendingSettings(placements=20, held=4, finalists=1, rounds=4)
     found = escherize_class(target, "IH4", small)
-    assert isinstance(found, TileResult)
-    (folder / "model.safetensors").write_bytes(found.model.to_bytes())
+    assert isinstance(found, EscherTile)
+    (tmp_path / "out").mkdir()
+    found.save(tmp_path / "out" / "turtle")
     monkeypatch.chdir(tmp_path)
     names = run(snippet)
     np.testing.assert_allclose(np.asarray(names["back"]), np.asarray(names["eye"]), atol=1e-8)

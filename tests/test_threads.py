@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 import pytest
 import torch
 
-from orbiflow.threads import one_thread
+from orbiflow.runtime import one_thread
 
 THREADS = 3
 

@@ -1,4 +1,4 @@
-"""The gallery's page and its contact sheet."""
+"""The page of the gallery, and its contact sheet."""
 
 from __future__ import annotations
 
@@ -14,37 +14,41 @@ SHEET = HERE / "contact-sheet.webp"
 COLUMNS, CELL, GAP = 5, (300, 225), 8
 QUALITY = 72
 ZOOM = 1.45
-"""How much nearer the contact sheet goes than it must, so that animals can be told."""
+"""How much the contact sheet magnifies, so that the animals can be recognised."""
 
 HEAD = """# Gallery
 
-Tilings of {count} silhouettes, in all nine isohedral classes, every one with the commands that
-make it.
+This page has tilings of {count} silhouettes, in all nine isohedral classes. Each comes with the
+commands that make it.
 
 ![All of them](contact-sheet.webp)
 
-Each tile is one closed shape whose copies cover the plane, certified. The drawing lies over the
-silhouette as it was and came to the tile through the same map that bent it
-([artwork](../artwork.md)). Body colours are the palette's, neighbours never share one; lines are
-drawn in what shows on them.
+Each tile is one closed shape, and it is certified that its copies cover the plane. The drawing lies
+over the original silhouette, and came to the tile through the same map that bent the silhouette
+([artwork](../artwork.md)). Body colours come from the palette, and neighbours never have the same
+one. Lines are drawn in a colour that shows on the body.
 
 Type the commands in the project's root; a search in one class takes some seconds.
-`python docs/gallery/make.py` makes everything on this page again, `--only owl` one picture; the
-table is `gallery.toml`. Another machine may find tiles that differ a little.
+`python docs/gallery/make.py` makes everything on this page again, and `--only owl` one picture. The
+table behind the page is `gallery.toml`. Another machine may find tiles that differ a little.
 """
 
 TAIL = """
 ## Draw your own
 
-Draw over the silhouette, in its frame (`viewBox`); what lies outside it is cut off, what reaches a
-little beyond its outline leaves no gap. Leave the body open: its colour is the palette's. Draw
-lines in `currentColor`, dark on light tiles and light on dark ones; shade with black and white of
-little opacity; keep colours of their own for what all have alike, such as beaks and eyes. Where two
-animals touch, let them differ: one wide patch of one colour on both, and their outlines are lost.
+- Draw over the silhouette, in its frame (`viewBox`). What lies outside it is cut off. Draw a little
+  beyond the outline to leave no gap.
+- Leave the body open: its colour comes from the palette.
+- Draw lines in `currentColor`, which is dark on light tiles and light on dark ones.
+- Shade with black and white of little opacity.
+- Keep colours of their own for what all animals have alike, such as beaks and eyes.
+- Where two animals touch, let them differ. If both have a wide patch of the same colour there, their
+  outlines are lost.
 
 ## Sources and licences
 
-All drawings were made for this gallery and are under the project's licence (MIT). Silhouettes:
+All drawings were made for this gallery and are under the project's licence (MIT). The silhouettes
+come from these sources:
 
 | tilings | silhouettes | licence |
 |---|---|---|
@@ -52,14 +56,14 @@ All drawings were made for this gallery and are under the project's licence (MIT
 
 
 def compress(made: Path, entry: Entry) -> None:
-    """The picture that the page shows, from the one that the command wrote."""
+    """Compress the picture that a command wrote into the one that the page shows."""
     image = Image.open(made).convert("RGB")
     entry.picture.parent.mkdir(exist_ok=True)
     image.save(entry.picture, quality=QUALITY, method=6)
 
 
 def contact_sheet(entries: list[Entry]) -> None:
-    """Every picture's middle, side by side."""
+    """Write a sheet with the middle of every picture, side by side."""
     rows = -(-len(entries) // COLUMNS)
     step = (CELL[0] + GAP, CELL[1] + GAP)
     size = (COLUMNS * step[0] - GAP, rows * step[1] - GAP)
@@ -88,7 +92,7 @@ def _middle(entry: Entry) -> Image.Image:
 
 
 def page(entries: list[Entry]) -> str:
-    """README.md."""
+    """Return the text of the page, README.md."""
     parts = [HEAD.format(count=len(entries))]
     for entry in entries:
         lines = "\n".join("    " + shown(words) for words in entry.commands())
@@ -101,7 +105,7 @@ def page(entries: list[Entry]) -> str:
 
 
 def shown(words: list[str]) -> str:
-    """A command as one types it."""
+    """Return a command as one types it."""
     return shlex.join(["orbiflow", *words])
 
 

@@ -24,7 +24,7 @@ def make(entry: Entry) -> None:
 
 
 def main() -> None:
-    """Pictures, the contact sheet and the page; what is named, or all."""
+    """Make the pictures (all, or those that are named), the contact sheet and the page."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--only", nargs="+", metavar="NAME", help="make these pictures alone")
     parser.add_argument("--page", action="store_true", help="the contact sheet and the page alone")

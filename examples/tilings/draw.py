@@ -11,16 +11,16 @@ from pathlib import Path
 
 import numpy as np
 
-from orbiflow.figures import tilings_png
-from orbiflow.files import write_atomic
+from orbiflow.runtime import write_atomic
 from orbiflow.symmetry import WALLPAPER_GROUPS, wallpaper_group
-from orbiflow.tilings import (
+from orbiflow.tiles import (
     Tile,
     Tiling,
     certify,
     dirichlet_tile,
     dirichlet_tiling,
     isohedral_class,
+    tilings_png,
 )
 
 SQUARE = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])

@@ -1,57 +1,207 @@
-"""Arguments of public functions: taken as they are meant, or refused with what to give instead."""
+"""Checks of arguments and settings: one vocabulary, one wording, for the whole package.
+
+Each function `as_...(value, name, ...)` returns the value as it will be used, or raises a
+`SettingError` that names the argument, says what is allowed and shows what was given. Settings classes
+(`orbiflow.settings`) use the same ranges and words. A `name` that is a phrase rather than an identifier
+("the file to export to") opens the message as it is.
+
+No numerical library is imported until an array or a tensor is really needed.
+"""
 
 from __future__ import annotations
 
+import difflib
 import math
+import numbers as abstract
 import operator
 import os
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from types import EllipsisType, UnionType
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
-import numpy as np
-import torch
-from numpy.typing import NDArray
+from orbiflow.errors import SettingError, literal
 
-from orbiflow.errors import OrbiflowError
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+    from torch import Tensor
 
 Kind = TypeVar("Kind")
+Choice = TypeVar("Choice", bound=str)
 Shape = tuple[int | str | EllipsisType, ...]
 
 
-def instance(value: Any, kind: type[Kind], name: str, how: str = "") -> Kind:
-    """`value`, which must be a `kind`; `how` says where one comes from.
+@dataclass(frozen=True)
+class Range:
+    """The numbers that are allowed, all finite.
 
-    Raises `OrbiflowError` for anything else.
+    - `least`, `most`: The bounds, which are allowed themselves. Default: no bound.
+    - `above`, `below`: The bounds, which are not. Default: no bound.
+
+    >>> str(Range(1, 100)), str(Range(above=0)), str(Range(above=0, below=1))
+    ('from 1 to 100', 'above 0', 'above 0 and below 1')
     """
-    if isinstance(value, kind):
-        return value
-    raise OrbiflowError(
-        f"{name} must be {_with_article(kind.__name__)}, got {described(value)}{how and '; ' + how}"
+
+    least: float | None = None
+    most: float | None = None
+    above: float | None = None
+    below: float | None = None
+
+    def __contains__(self, value: float) -> bool:
+        return (
+            (isinstance(value, int) or math.isfinite(value))
+            and (self.least is None or value >= self.least)
+            and (self.most is None or value <= self.most)
+            and (self.above is None or value > self.above)
+            and (self.below is None or value < self.below)
+        )
+
+    def __str__(self) -> str:
+        if self.least is not None and self.most is not None:
+            return f"from {_plainly(self.least)} to {_plainly(self.most)}"
+        bounds = {
+            "at least": self.least,
+            "above": self.above,
+            "at most": self.most,
+            "below": self.below,
+        }
+        given = [f"{word} {_plainly(bound)}" for word, bound in bounds.items() if bound is not None]
+        return " and ".join(given)
+
+    @property
+    def schema(self) -> dict[str, float]:
+        """The keywords of JSON Schema for these bounds."""
+        bounds = {
+            "minimum": self.least,
+            "maximum": self.most,
+            "exclusiveMinimum": self.above,
+            "exclusiveMaximum": self.below,
+        }
+        return {name: bound for name, bound in bounds.items() if bound is not None}
+
+
+ANY = Range()
+
+
+def refusal(name: str, wanted: str, value: Any, hint: str = "") -> SettingError:
+    """Return the error for a value that is not what is wanted.
+
+    >>> print(refusal("dpi", "a number above 0", "many", "300 suits most printers"))
+    dpi must be a number above 0, got 'many'; 300 suits most printers
+    """
+    more = f"; {literal(hint)}" if hint else ""
+    return SettingError(
+        f"{placeholder(name)} must be {literal(wanted)}, got {literal(described(value))}{more}"
     )
 
 
-def is_a(value: object, kind: type | UnionType) -> bool:
-    """`isinstance` of what is annotated as it should be, and may be anything all the same."""
-    return isinstance(value, kind)
+def placeholder(name: str) -> str:
+    """Return how the template of a `SettingError` names an argument."""
+    return f"{{{name}}}" if name.isidentifier() else literal(name)
 
 
-def numbers(values: Any, name: str, shape: Shape, *, finite: bool = True) -> NDArray[np.float64]:
-    """`values` (nested lists, an array of any real dtype, a tensor) as a new float64 array.
+def as_instance(value: Any, kind: type[Kind], name: str, hint: str = "") -> Kind:
+    """Return `value`, which must be of the class `kind`; `hint` says where to get one.
+
+    >>> as_instance("torus", int, "dim")
+    Traceback (most recent call last):
+    orbiflow.errors.SettingError: dim must be an int, got 'torus'
+    """
+    if isinstance(value, kind):
+        return value
+    raise refusal(name, _with_article(kind.__name__), value, hint)
+
+
+def as_choice(value: Any, choices: Sequence[Choice], name: str) -> Choice:
+    """Return `value`, which must be one of `choices`.
+
+    >>> as_choice("skelton", ("none", "skeleton"), "cut")
+    Traceback (most recent call last):
+    orbiflow.errors.SettingError: cut must be none or skeleton, got 'skelton'; did you mean skeleton?
+    """
+    if isinstance(value, str) and value in choices:
+        return choices[choices.index(cast(Any, value))]
+    raise refusal(name, one_of(choices), value, meant(value, choices))
+
+
+def as_whole(value: Any, name: str, least: float | None = None, most: float | None = None) -> int:
+    """Return `value` as an integer in the range; Booleans and fractions are refused.
+
+    >>> as_whole(0, "copies", 1)
+    Traceback (most recent call last):
+    orbiflow.errors.SettingError: copies must be at least 1, got 0
+    """
+    allowed = Range(least, most)
+    try:
+        result = None if _is_boolean(value) else operator.index(value)
+    except TypeError:
+        result = None
+    if result is None or result not in allowed:
+        raise refusal(name, number_wanted(allowed, result, whole=True), value)
+    return result
+
+
+def as_number(
+    value: Any,
+    name: str,
+    least: float | None = None,
+    most: float | None = None,
+    *,
+    above: float | None = None,
+    below: float | None = None,
+) -> float:
+    """Return `value` as a finite number in the range; Booleans and text are refused.
+
+    >>> as_number(float("nan"), "dpi", above=0)
+    Traceback (most recent call last):
+    orbiflow.errors.SettingError: dpi must be a number above 0, got nan
+    """
+    allowed = Range(least, most, above, below)
+    try:
+        given = not (isinstance(value, str | bytes) or _is_boolean(value))
+        result = float(value) if given else math.nan
+    except (TypeError, ValueError, OverflowError):
+        result = math.nan
+    if result not in allowed:
+        raise refusal(name, number_wanted(allowed, result), value)
+    return result
+
+
+def as_path(value: Any, name: str) -> Path:
+    """Return `value`, text or a path, as a `Path`."""
+    text = path_text(value)
+    if text is None:
+        raise refusal(name, "a path", value)
+    return Path(text)
+
+
+def path_text(value: Any) -> str | None:
+    """Return the text of a path that a file can have, or None for anything else."""
+    # what a PathLike is made of, isinstance does not say
+    text: Any = cast(Any, os.fspath)(value) if is_a(value, str | os.PathLike) else None
+    return text if isinstance(text, str) and text and "\0" not in text else None
+
+
+def as_array(values: Any, name: str, shape: Shape, *, finite: bool = True) -> NDArray[np.float64]:
+    """Return real numbers in any container as a new float64 array.
 
     Args:
-        values: what a user gave.
-        name: of the argument, which opens each message.
-        shape: whose entries are lengths, names for any length, or a leading `...`.
-        finite: whether NaN and infinity are refused.
+        values: Nested lists, an array of any real dtype, or a tensor.
+        name: The argument's name.
+        shape: The shape that is wanted; entries are lengths, names for any length, or a leading `...`.
+        finite: Whether NaN and infinity are refused.
 
-    Raises `OrbiflowError` for what is not real numbers of that shape.
-
-    >>> numbers([[0, 1]], "points", (..., 2)).shape
+    >>> as_array([[0, 1]], "points", (..., 2)).shape
     (1, 2)
     """
-    wanted = f"({', '.join('...' if n is ... else str(n) for n in shape)}{',' * (len(shape) == 1)})"
-    if isinstance(values, torch.Tensor):
+    import numpy as np
+
+    sizes = ", ".join("..." if n is ... else str(n) for n in shape)
+    wanted = f"real numbers of shape ({sizes}{',' * (len(shape) == 1)})"
+    if _is_tensor(values):
         values = values.detach().cpu()
         # NumPy has no bfloat16
         values = (values.double() if values.is_floating_point() else values).numpy()
@@ -63,78 +213,113 @@ def numbers(values: Any, name: str, shape: Shape, *, finite: bool = True) -> NDA
                 raise TypeError
         array = np.array(given, dtype=np.float64)
     except (TypeError, ValueError, OverflowError) as error:
-        raise OrbiflowError(
-            f"{name}: expected real numbers of shape {wanted}, got {described(values)}"
-        ) from error
+        raise refusal(name, wanted, values) from error
     if not _fits(array.shape, shape):
-        raise OrbiflowError(f"{name}: expected shape {wanted}, got {array.shape}")
+        raise refusal(name, wanted, array)
     if finite and not np.isfinite(array).all():
-        raise OrbiflowError(f"{name}: every number must be finite, found NaN or infinity")
+        raise refusal(name, "finite", values, "remove NaN and infinity first")
     return array
 
 
-def whole(value: Any, name: str, least: int, most: int | None = None) -> int:
-    """`value` as an integer from `least` to `most`; Booleans and fractions are refused."""
-    bounds = f"at least {least}" if most is None else f"from {least} to {_plainly(most)}"
-    try:
-        if isinstance(value, bool | np.bool_):
-            raise TypeError
-        result = operator.index(value)
-    except TypeError as error:
-        raise OrbiflowError(f"{name} must be a whole number {bounds}, got {value!r}") from error
-    if result < least or (most is not None and result > most):
-        raise OrbiflowError(f"{name} must be {bounds}, got {value!r}")
-    return result
+def as_tensor(value: Any, name: str) -> Tensor:
+    """Return a floating-point tensor as it is, and other real numbers as one of float64.
+
+    >>> as_tensor([[1, 2]], "points")
+    tensor([[1., 2.]], dtype=torch.float64)
+    """
+    import numpy as np
+    import torch
+
+    if not isinstance(value, torch.Tensor):
+        try:
+            value = torch.as_tensor(np.array(value, dtype=np.float64))
+        except (TypeError, ValueError) as error:
+            raise refusal(name, "real numbers", value, str(error)) from error
+    if value.is_complex():
+        raise refusal(name, "real numbers", value, f"its dtype is {value.dtype}")
+    return value if value.is_floating_point() else value.double()
 
 
-def _plainly(bound: int) -> str:
-    power = (bound + 1).bit_length() - 1
-    return f"2^{power} - 1" if power > 20 and bound + 1 == 2**power else str(bound)
+def as_points(value: Any, dim: int, name: str = "points", *, flat: bool = False) -> Tensor:
+    """Return finite points as a tensor of shape (..., dim), or (N, dim) if `flat`."""
+    points = as_tensor(value, name)
+    if not points.dim() or points.shape[-1] != dim or (flat and points.dim() != 2):
+        raise refusal(name, f"points of shape ({'N' if flat else '...'}, {dim})", points)
+    if not bool(points.detach().isfinite().all()):
+        raise refusal(name, "finite", points, "remove what is missing or infinite first")
+    return points
 
 
-def number(
-    value: Any, name: str, least: float = -math.inf, most: float = math.inf, *, above: bool = False
-) -> float:
-    """`value` as a finite number from `least` to `most`; with `above` it must exceed `least`."""
-    if above:
-        bounds = f"above {least:g}" + (f" and at most {most:g}" if most < math.inf else "")
-    else:
-        bounds = f"from {least:g} to {most:g}" if most < math.inf else f"at least {least:g}"
-    try:
-        if isinstance(value, str | bytes):
-            raise TypeError
-        result = float(value)
-    except (TypeError, ValueError) as error:
-        raise OrbiflowError(f"{name} must be a number {bounds}, got {value!r}") from error
-    inside = least < result <= most if above else least <= result <= most
-    if not (inside and math.isfinite(result)):
-        raise OrbiflowError(f"{name} must be {bounds}, got {value!r}")
-    return result
-
-
-def path(value: Any, name: str) -> Path:
-    """`value`, text or a path, as a path."""
-    given: Any = value  # which stays as it is: of what a PathLike is, isinstance does not say
-    if isinstance(value, str | os.PathLike) and isinstance(os.fspath(given), str):
-        return Path(given)
-    raise OrbiflowError(f"{name} must be a path, got {described(value)}")
+def is_a(value: object, kind: type | UnionType) -> bool:
+    """Return `isinstance(value, kind)`, for values that a type checker believes it knows."""
+    return isinstance(value, kind)
 
 
 def described(value: Any) -> str:
-    """What a wrong argument is, in a few words.
+    """Return in a few words what a wrong argument is.
 
-    >>> described("IH4"), described([[0, 1]]), described(np.zeros((2, 3)))
-    ("'IH4'", 'a list of 1', 'an array of shape (2, 3)')
+    >>> described("IH4"), described([[0, 1]])
+    ("'IH4'", 'a list of 1')
     """
-    given: Any = value
-    if isinstance(value, np.ndarray | torch.Tensor):
-        what = "an array" if isinstance(value, np.ndarray) else "a tensor"
-        return f"{what} of shape {tuple(given.shape)}"
-    if isinstance(value, list | tuple | dict | set):
-        return f"a {type(given).__name__} of {len(given)}"
-    if value is None or isinstance(value, str | bytes | int | float | complex):
-        return f"{value!a:.60}"
+    if _is_array(value) or _is_tensor(value):
+        what = "an array" if _is_array(value) else "a tensor"
+        return f"{what} of shape {tuple(value.shape)}"
+    if is_a(value, list | tuple | dict | set):
+        return f"a {type(value).__name__} of {len(value)}"
+    given: Any = str(value) if is_a(value, Path) else value
+    if is_a(given, str | bytes | abstract.Number | None):
+        return f"{given.item() if hasattr(given, 'item') else given!a:.60}"
     return _with_article(type(value).__name__)
+
+
+def number_wanted(allowed: Range, number: float | None = None, *, whole: bool = False) -> str:
+    """Return what a value must be, in words: of a finite number, only the range.
+
+    >>> number_wanted(Range(above=0)), number_wanted(Range(above=0), -1.0)
+    ('a number above 0', 'above 0')
+    """
+    if isinstance(number, int) or (number is not None and math.isfinite(number)):
+        return str(allowed)
+    return f"a {'whole ' if whole else ''}number {allowed}".strip()
+
+
+def one_of(choices: Sequence[object]) -> str:
+    """Return choices in words.
+
+    >>> one_of(("svg", "pdf", "png"))
+    'svg, pdf or png'
+    """
+    *first, last = map(str, choices)
+    return f"{', '.join(first)} or {last}" if first else last
+
+
+def meant(value: object, choices: Sequence[object]) -> str:
+    """Return a question for the choice that a mistyped value is closest to, or ""."""
+    near = difflib.get_close_matches(str(value), list(map(str, choices)), n=1)
+    return f"did you mean {near[0]}?" if near else ""
+
+
+def _plainly(bound: float) -> str:
+    if bound != int(bound):
+        return f"{bound:g}"
+    power = (abs(int(bound)) + 1).bit_length() - 1
+    if power > 20 and bound in (2**power, -(2**power), 2**power - 1):
+        return f"{'-' if bound < 0 else ''}2^{power}{' - 1' if bound == 2**power - 1 else ''}"
+    return str(int(bound))
+
+
+def _is_boolean(value: object) -> bool:
+    return isinstance(value, bool) or type(value).__name__ in ("bool", "bool_")
+
+
+def _is_array(value: object) -> bool:
+    numpy = sys.modules.get("numpy")
+    return numpy is not None and isinstance(value, numpy.ndarray)
+
+
+def _is_tensor(value: object) -> bool:
+    torch = sys.modules.get("torch")
+    return torch is not None and isinstance(value, torch.Tensor)
 
 
 def _with_article(name: str) -> str:
@@ -148,3 +333,23 @@ def _fits(actual: tuple[int, ...], wanted: Shape) -> bool:
     return len(actual) == len(wanted) and all(
         isinstance(want, str) or have == want for have, want in zip(actual, wanted, strict=True)
     )
+
+
+# The names of version 0.1, until every room uses the ones above.
+instance, numbers, path = as_instance, as_array, as_path
+
+
+def whole(value: Any, name: str, least: int, most: int | None = None) -> int:
+    """Return `as_whole`, under its former name."""
+    return as_whole(value, name, least, most)
+
+
+def number(
+    value: Any, name: str, least: float = -math.inf, most: float = math.inf, *, above: bool = False
+) -> float:
+    """Return `as_number`, under its former name."""
+    low = None if least == -math.inf else least
+    high = None if most == math.inf else most
+    if above:
+        return as_number(value, name, None, high, above=low)
+    return as_number(value, name, low, high)

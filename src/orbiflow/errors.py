@@ -4,9 +4,47 @@ Every message says what was wrong, where, and what to do. All derive from `Orbif
 a `ValueError`, so one `except` catches them; the command line turns them into exit status 2.
 """
 
+import re
+from collections.abc import Callable
+
 
 class OrbiflowError(ValueError):
     """Base of all errors caused by an argument, a file or a setting that cannot be used."""
+
+
+class SettingError(OrbiflowError):
+    """A setting or an argument that cannot be used.
+
+    Args:
+        template: The message, with the names of settings in braces, such as "{dpi} must be above 0".
+            Any other text that may hold braces goes through `literal` first.
+
+    >>> error = SettingError("{tile_size} must be above 0")
+    >>> str(error), error.named(lambda name: "--" + name.replace("_", "-"))
+    ('tile_size must be above 0', '--tile-size must be above 0')
+    """
+
+    def __init__(self, template: str) -> None:
+        super().__init__(template)
+        self.template = template
+
+    def __str__(self) -> str:
+        return self.named(lambda name: name)
+
+    def named(self, name: Callable[[str], str]) -> str:
+        """Return the message, with each setting called what `name` returns for it."""
+        text = re.sub(r"(?<!\{)\{(\w+)\}(?!\})", lambda found: name(found[1]), self.template)
+        return text.replace("{{", "{").replace("}}", "}")
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The settings that the message speaks of."""
+        return tuple(re.findall(r"(?<!\{)\{(\w+)\}(?!\})", self.template))
+
+
+def literal(text: str) -> str:
+    """Return `text` as it must be written in the template of a `SettingError`."""
+    return text.replace("{", "{{").replace("}", "}}")
 
 
 class InputFileError(OrbiflowError):

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orbiflow.geometry import resampled
+from orbiflow.tiles import resampled
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 NAMES = ("common", "likeness_methods", "likeness_energy", "likeness_blind")

@@ -13,10 +13,17 @@ import pytest
 from PIL import Image
 
 from artworks import EYE, size_of, squirrel, write_run
-from orbiflow.cancel import Cancel
-from orbiflow.figures.palette import PALETTES
-from orbiflow.jobs import ArtRequest, Finished, Note, Written, run
-from orbiflow.silhouette import Target
+from orbiflow.drawing import PALETTES
+from orbiflow.jobs import (
+    ArtRequest,
+    Finished,
+    Note,
+    run,
+)
+from orbiflow.runtime import Cancel
+from orbiflow.runtime.events import Written
+from orbiflow.tiles import Target
+from orbiflow.tiles.art.source import covered_area
 
 
 @pytest.fixture(name="result", scope="module")
@@ -83,13 +90,13 @@ def png_that_says(width: int, height: int) -> bytes:
         (("--size", "0x100"), "a picture's side in pixels must be from 1 to 30000, got 0"),
         (("--size", "30000x30000"), "is too large; at most 100 megapixels are made"),
         (("--size", "999999999x2"), "must be from 1 to 30000"),
-        (("--size", "big"), "--size 'big' is no width and height"),
-        (("--size", "300.5x200"), "write two whole numbers, as 3000x2000"),
+        (("--size", "big"), "--size 'big' is not a width and a height"),
+        (("--size", "300.5x200"), "write two whole numbers, such as 3000x2000"),
         (("--tile-size", "0"), "--tile-size '0' must be above 0"),
         (("--tile-size", "1"), "tile_size must be from 8"),
         (("--tile-size", "9", "--size", "9000x9000"), "the most is 20000: choose larger tiles"),
         (("--palette", "neon"), "unknown palette 'neon'; there are delft"),
-        (("--outline", "thick"), "--outline 'thick' is no length"),
+        (("--outline", "thick"), "--outline 'thick' is not a length"),
         (("--eye", "5,5"), "the eye at 5,5 lies outside the silhouette, which reaches from"),
         (("--eye", "here"), "--eye 'here' is no place; write x,y or x,y,radius"),
         (("--eye", "nan,1"), "an eye's x must be"),
@@ -181,7 +188,7 @@ def test_the_snippet_of_the_documentation(tmp_path: Path, monkeypatch) -> None:
     (snippet,) = re.findall(r"```python\n(.*?)```", DOCS, flags=re.DOTALL)
     monkeypatch.chdir(tmp_path)
     write_run(tmp_path / "out" / "barbet", "IH5")
-    low, high = squirrel("IH5").covered[:2]
+    low, high = covered_area(squirrel("IH5"))[:2]
     box = " ".join(str(value) for value in (*low, *(high - low)))
     (tmp_path / "examples" / "artwork").mkdir(parents=True)
     drawing = f'<svg viewBox="{box}"><circle cx="{EYE[0]}" cy="{EYE[1]}" r="20"/></svg>'

@@ -7,8 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orbiflow.density import DensityEstimator, density_to_bytes, read_density
-from orbiflow.density.regions import DensityLevels
+from orbiflow.density import (
+    DensityEstimator,
+    DensityLevels,
+    density_to_bytes,
+    read_density,
+)
 
 
 @pytest.fixture(name="folder", scope="module")
@@ -26,8 +30,8 @@ def folder_fixture(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(autouse=True)
 def small(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("orbiflow.figures.density_square._FINE_GRID", 40)
-    monkeypatch.setattr("orbiflow.figures.density_page._FINE_CELLS", 20)
+    monkeypatch.setattr("orbiflow.density.pictures.square._FINE_GRID", 40)
+    monkeypatch.setattr("orbiflow.density.pictures.page._FINE_CELLS", 20)
 
 
 def test_a_mass_gets_the_samples_that_it_needs(folder: Path, orbiflow) -> None:

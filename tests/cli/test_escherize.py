@@ -17,13 +17,11 @@ import torch
 from PIL import Image, ImageDraw
 
 from orbiflow import __version__
-from orbiflow.escher import TileModel, load_model, methods
-from orbiflow.escher.boundary import extract_tile
-from orbiflow.escher.fit import Fit
-from orbiflow.escher.result import best_tiles
-from orbiflow.export.folder import FIGURE_FILES, write_tile_folder
-from orbiflow.silhouette import Target
-from orbiflow.tilings import CLASSES
+from orbiflow.tiles import CLASSES, Fit, Target, TileModel, load_model, write_tile_folder
+from orbiflow.tiles.pages.tile_folder import FIGURE_FILES
+from orbiflow.tiles.search import methods
+from orbiflow.tiles.search.boundary import extract_tile
+from orbiflow.tiles.search.result import best_tiles
 
 DOCS = Path(__file__).parents[2] / "docs"
 FILES = {"tile.svg", "tiling.svg", "tiling.png", "overlay.png", "model.safetensors"}

@@ -13,8 +13,13 @@ import pypdfium2
 import pytest
 
 from exported import tile_of
-from orbiflow.escher.report import group_json
-from orbiflow.jobs import ExportRequest, Finished, Written, run
+from orbiflow.jobs import (
+    ExportRequest,
+    Finished,
+    run,
+)
+from orbiflow.runtime.events import Written
+from orbiflow.tiles.result_file import group_json
 
 
 def entry(name: str) -> dict[str, Any]:
@@ -119,7 +124,7 @@ MISTAKES: dict[str, tuple[list[str], str]] = {
     "no unit": (["--tile-size", "40"], "--tile-size '40' has no unit; write 40mm, 40cm or 40in"),
     "no unit of the area": (["--area", "300x200"], "--area '300x200' has no unit; write 300x200mm"),
     "zero": (["--tile-size", "0mm"], "--tile-size '0mm' must be above 0"),
-    "one side": (["--bed", "300mm"], "--bed '300mm' is no width and height"),
+    "one side": (["--bed", "300mm"], "--bed '300mm' is not a width and a height"),
     "small page": (["--area", "10x10mm"], "does not fit on the page of 10 x 10 mm: it needs"),
     "kerf of the skeleton": (["--for", "laser", "--kerf", "1mm"], "cannot be moved by half a kerf"),
     "wide kerf": (["--cut", "pieces", "--kerf", "5cm"], "wider than the piece's neck"),

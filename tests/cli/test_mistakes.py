@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from PIL import Image, ImageDraw
 
-from orbiflow.tilings import CLASSES
+from orbiflow.tiles import CLASSES
 
 SQUARE = [[0, 0], [1, 0], [1, 1], [0, 1]]
 

@@ -11,7 +11,7 @@ import pytest
 from orbiflow.cli.animate import animate
 from orbiflow.cli.art import art
 from orbiflow.cli.export import export
-from orbiflow.figures import PALETTES
+from orbiflow.drawing import PALETTES
 
 every_command = pytest.mark.parametrize("command", [art, export, animate])
 

@@ -8,14 +8,13 @@ import torch
 from orbiflow.density import (
     AdaptiveKernels,
     BlendedDensity,
+    Factor,
     Torus,
     UniformBase,
     VonMisesChains,
     VonMisesNetwork,
 )
-from orbiflow.density.models.chains import SCALES, chained
-from orbiflow.density.models.network import Factor
-from orbiflow.density.models.still import still_flow
+from orbiflow.density.models import SCALES, chained, still_flow
 from orbiflow.fields import SplineField
 from orbiflow.flows import Flow
 

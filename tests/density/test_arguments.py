@@ -52,35 +52,35 @@ QUICK: Any = {"detail": 1, "segments": 1, "iterations": 1}
 WRONG: dict[str, tuple[Callable[[], Any], str]] = {
     "a name for a space": (
         lambda: SymmetricDensity("torus", Flow(lambda x: x)),  # type: ignore[arg-type]
-        "space must be of the class Space, got 'torus': see `make_space`",
+        "space must be an? Space, got 'torus'; see `make_space`",
     ),
-    "no flow": (lambda: SymmetricDensity(torus, None), "flow must be of the class Flow"),  # type: ignore[arg-type]
+    "no flow": (lambda: SymmetricDensity(torus, None), "flow must be an? Flow"),  # type: ignore[arg-type]
     "no base": (
         lambda: SymmetricDensity(torus, Flow(lambda x: x), "uniform"),  # type: ignore[arg-type]
-        "base must be of the class Base",
+        "base must be an? Base",
     ),
-    "three columns": (lambda: a_density().log_prob(torch.rand(5, 3)), r"got \(5, 3\)"),
-    "a number": (lambda: a_density().log_prob(torch.tensor(0.5)), r"got \(\)"),
-    "text": (lambda: a_density().log_prob("points"), "points: expected real numbers"),  # type: ignore[arg-type]
+    "three columns": (lambda: a_density().log_prob(torch.rand(5, 3)), r"got .*\(5, 3\)"),
+    "a number": (lambda: a_density().log_prob(torch.tensor(0.5)), r"got .*\(\)"),
+    "text": (lambda: a_density().log_prob("points"), "points must be real numbers"),  # type: ignore[arg-type]
     "complex": (
         lambda: a_density().log_prob(torch.rand(2, 2, dtype=torch.complex64)),
-        "points: expected real numbers",
+        "points must be real numbers",
     ),
     "nan": (lambda: a_density().log_prob(torch.full((2, 2), torch.nan)), "points must be finite"),
-    "to_base": (lambda: a_density().to_base(torch.rand(5)), r"got \(5,\)"),
-    "from_base": (lambda: a_density().from_base(torch.rand(5, 4)), r"got \(5, 4\)"),
+    "to_base": (lambda: a_density().to_base(torch.rand(5)), r"got .*\(5,\)"),
+    "from_base": (lambda: a_density().from_base(torch.rand(5, 4)), r"got .*\(5, 4\)"),
     "measure": (lambda: a_density().log_prob(POINTS, measure=3), "measure must be one of"),  # type: ignore[arg-type]
     "sample text": (lambda: a_density().sample("five"), "a number or shape of samples"),
     "sample less": (lambda: a_density().sample(-1), "a number or shape of samples"),
-    "midpoints": (lambda: midpoints(torus, 2.5), "resolution must be an integer"),  # type: ignore[arg-type]
+    "midpoints": (lambda: midpoints(torus, 2.5), "resolution must be a whole number"),  # type: ignore[arg-type]
     "kl": (lambda: kl_by_quadrature(torch.ones(3), torch.ones(4)), r"\(3,\) and \(4,\)"),
-    "a table of nothing": (lambda: TabulatedDensity("x"), "class SymmetricDensity"),  # type: ignore[arg-type]
+    "a table of nothing": (lambda: TabulatedDensity("x"), "a SymmetricDensity"),  # type: ignore[arg-type]
     "a table's size": (lambda: TabulatedDensity(a_density(), 64.5), "resolution must be"),  # type: ignore[arg-type]
-    "a base's space": (lambda: UniformBase("sphere"), "space must be of the class Space"),  # type: ignore[arg-type]
+    "a base's space": (lambda: UniformBase("sphere"), "space must be an? Space"),  # type: ignore[arg-type]
     "concentration": (lambda: VonMisesBase(torus, "1"), "concentration must be positive"),  # type: ignore[arg-type]
     "kernels": (
         lambda: AdaptiveKernels(torus, "a", torch.ones(1), torch.ones(1)),  # type: ignore[arg-type]
-        "centers: expected real numbers",
+        "centers must be real numbers",
     ),
     "kernels' shapes": (
         lambda: AdaptiveKernels(torus, torch.tensor(1.0), torch.ones(1), torch.ones(1)),
@@ -96,48 +96,48 @@ WRONG: dict[str, tuple[Callable[[], Any], str]] = {
     ),
     "a blend of nothing": (
         lambda: BlendedDensity(torus, a_density().flow, None, None, torch.ones(3) / 3),  # type: ignore[arg-type]
-        "kernels must be of the class AdaptiveKernels",
+        "kernels must be an? AdaptiveKernels",
     ),
     "blend_kernels": (
         lambda: blend_kernels("density", POINTS, POINTS),  # type: ignore[arg-type]
-        "density must be of the class SymmetricDensity",
+        "density must be an? SymmetricDensity",
     ),
     "blend_kernels' points": (
         lambda: blend_kernels(a_density(), POINTS, POINTS[:, :1]),
-        r"expected held points \(N, 2\), got \(30, 1\)",
+        r"held points must be points of shape \(N, 2\), got .*\(30, 1\)",
     ),
-    "fit: a name": (lambda: fit_density("torus", POINTS), "space must be of the class Space"),  # type: ignore[arg-type]
-    "fit: columns": (lambda: fit_density(sphere, torch.rand(30, 3)), r"\(N, 2\), got \(30, 3\)"),
-    "fit: one row": (lambda: fit_density(sphere, torch.rand(2)), r"\(N, 2\), got \(2,\)"),
+    "fit: a name": (lambda: fit_density("torus", POINTS), "space must be an? Space"),  # type: ignore[arg-type]
+    "fit: columns": (lambda: fit_density(sphere, torch.rand(30, 3)), r"\(N, 2\), got .*\(30, 3\)"),
+    "fit: one row": (lambda: fit_density(sphere, torch.rand(2)), r"\(N, 2\), got .*\(2,\)"),
     "fit: nan": (lambda: fit_density(sphere, POINTS / 0 * 0), "points must be finite"),
     "fit: settings": (
         lambda: fit_density(sphere, POINTS, {"detail": 2}),  # type: ignore[arg-type]
-        "settings must be of the class FitSettings",
+        "settings must be an? FitSettings",
     ),
     "fit: other settings": (
         lambda: fit_density(sphere, POINTS, NeuralSettings()),  # type: ignore[arg-type]
-        "settings must be of the class FitSettings",
+        "settings must be an? FitSettings",
     ),
     "fit: four angles": (lambda: fit_density(Torus(4), torch.rand(30, 4)), "call `fit_neural`"),
-    "neural: a name": (lambda: fit_neural("torus", POINTS), "space must be of the class Space"),  # type: ignore[arg-type]
-    "neural: columns": (lambda: fit_neural(torus, torch.rand(30, 3)), r"\(N, 2\), got \(30, 3\)"),
-    "detail": (lambda: FitSettings(detail=2.5), "detail must be an integer from 1 to 64"),  # type: ignore[arg-type]
-    "detail text": (lambda: FitSettings(detail="8"), "detail must be an integer"),  # type: ignore[arg-type]
-    "seed": (lambda: FitSettings(seed=None), "seed must be an integer"),  # type: ignore[arg-type]
+    "neural: a name": (lambda: fit_neural("torus", POINTS), "space must be an? Space"),  # type: ignore[arg-type]
+    "neural: columns": (lambda: fit_neural(torus, torch.rand(30, 3)), r"\(N, 2\), got .*\(30, 3\)"),
+    "detail": (lambda: FitSettings(detail=2.5), "detail must be a whole number from 1 to 64"),  # type: ignore[arg-type]
+    "detail text": (lambda: FitSettings(detail="8"), "detail must be a whole number"),  # type: ignore[arg-type]
+    "seed": (lambda: FitSettings(seed=None), "seed must be a whole number"),  # type: ignore[arg-type]
     "roughness": (lambda: FitSettings(roughness=1e-3), "roughness needs weights"),  # type: ignore[arg-type]
     "weights": (lambda: FitSettings(roughness=("a",)), "each weight of roughness"),  # type: ignore[arg-type]
-    "validation": (lambda: FitSettings(validation="a"), "validation must be between"),  # type: ignore[arg-type]
+    "validation": (lambda: FitSettings(validation="a"), "validation must be .*below 1"),  # type: ignore[arg-type]
     "base": (lambda: FitSettings(base=["uniform"]), "base must be"),  # type: ignore[arg-type]
-    "width": (lambda: NeuralSettings(width=3.5), "width must be an integer"),  # type: ignore[arg-type]
-    "dim": (lambda: Torus("2"), "dim must be an integer from 1 to 64"),  # type: ignore[arg-type]
+    "width": (lambda: NeuralSettings(width=3.5), "width must be a whole number"),  # type: ignore[arg-type]
+    "dim": (lambda: Torus("2"), "dim must be a whole number from 1 to 64"),  # type: ignore[arg-type]
     "unit": (lambda: Torus(2, unit=None), "unit must be one of"),  # type: ignore[arg-type]
     "form": (lambda: Sphere(form=["latlon"]), "form must be one of"),  # type: ignore[arg-type]
     "rotation": (lambda: Sphere(rotation="none"), "rotation: expected numbers"),
-    "clear_rotation": (lambda: clear_rotation(torus, [[0.0, 0.0]]), "class RoundSpace"),  # type: ignore[arg-type]
+    "clear_rotation": (lambda: clear_rotation(torus, [[0.0, 0.0]]), "a RoundSpace"),  # type: ignore[arg-type]
     "make_space": (lambda: make_space(torus), "unknown space"),  # type: ignore[arg-type]
-    "from_chart": (lambda: torus.from_chart(torch.rand(3, 3)), r"got \(3, 3\)"),
-    "from_chart, round": (lambda: sphere.from_chart(torch.rand(3, 1)), r"got \(3, 1\)"),
-    "project": (lambda: sphere.project(torch.rand(3, 5)), r"got \(3, 5\)"),
+    "from_chart": (lambda: torus.from_chart(torch.rand(3, 3)), r"got .*\(3, 3\)"),
+    "from_chart, round": (lambda: sphere.from_chart(torch.rand(3, 1)), r"got .*\(3, 1\)"),
+    "project": (lambda: sphere.project(torch.rand(3, 5)), r"got .*\(3, 5\)"),
     "to bytes": (lambda: density_to_bytes("density"), "the density is a str"),  # type: ignore[arg-type]
     "read": (lambda: read_density(3), "the file must be a path, got 3"),  # type: ignore[arg-type]
     "estimator": (lambda: DensityEstimator(3).fit(POINTS), "unknown space 3"),  # type: ignore[arg-type]

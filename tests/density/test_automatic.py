@@ -20,7 +20,7 @@ from orbiflow.density import (
     midpoints,
     read_density,
 )
-from orbiflow.density.fitting.automatic import PARTS
+from orbiflow.density.fitting import PARTS
 from orbiflow.errors import OrbiflowError
 from orbiflow.jobs import density_requests
 

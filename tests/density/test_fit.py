@@ -19,9 +19,12 @@ from orbiflow.density import (
     fit_density,
     make_space,
 )
-from orbiflow.density.fitting.flow_matching import conjugate_gradients, coupled, match_flow
-from orbiflow.density.fitting.likelihood import Objective
-from orbiflow.density.fitting.merging import LEVELS, merged
+from orbiflow.density.fitting.flow_matching import (
+    conjugate_gradients,
+    coupled,
+    match_flow,
+)
+from orbiflow.density.fitting.likelihood import LEVELS, Objective, merged
 from orbiflow.density.fitting.report import split
 from orbiflow.errors import OrbiflowError
 from orbiflow.fields import FourierField

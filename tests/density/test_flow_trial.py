@@ -6,22 +6,28 @@ import numpy as np
 import pytest
 import torch
 
-from orbiflow.density import FitSettings, Torus
-from orbiflow.density.fitting import flow_trial
-from orbiflow.density.fitting.automatic import (
-    BEFORE_END,
-    PARTS,
-    AutomaticSettings,
-    fit_automatic,
-)
+from orbiflow.density import AutomaticSettings, FitSettings, Torus, fit_automatic, weighed
+from orbiflow.density.fitting import PARTS, flow_trial
+from orbiflow.density.fitting.automatic import BEFORE_END
 from orbiflow.density.fitting.budget import Budget
-from orbiflow.density.fitting.evidence import Candidates, candidates_of, judged
+from orbiflow.density.fitting.evidence import (
+    Candidates,
+    candidates_of,
+    judged,
+)
 from orbiflow.density.fitting.families import KernelFamily
-from orbiflow.density.fitting.flow_trial import FIRST, TriedFlow, try_flow
+from orbiflow.density.fitting.flow_trial import (
+    FIRST,
+    TriedFlow,
+    try_flow,
+)
 from orbiflow.density.fitting.folds import Folds, folds_of
 from orbiflow.density.fitting.report import PartEvidence
-from orbiflow.density.fitting.rows import weighed
-from orbiflow.density.fitting.weights import Gain, stacked, supported_weights
+from orbiflow.density.fitting.weights import (
+    Gain,
+    stacked,
+    supported_weights,
+)
 
 QUICK = FitSettings(detail=2, segments=2, iterations=10, roughness=(1e-3,))
 SPACE = Torus(2)

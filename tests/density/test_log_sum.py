@@ -7,7 +7,7 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from orbiflow.density.models.log_sum import log_sum_exp, shares_of
+from orbiflow.density.models import log_sum_exp, shares_of
 
 seeds = st.integers(0, 2**31 - 1)
 sizes = st.floats(0.0, 6.0)

@@ -11,20 +11,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from density.blends import random_kernels
+from orbiflow.arrays import Array
 from orbiflow.density import (
     AutomaticSettings,
     DensityEstimator,
     Torus,
+    at_observed,
     density_to_bytes,
     fit_automatic,
     log_prob_observed,
 )
-from orbiflow.density.fitting.missing import with_incomplete
 from orbiflow.density.fitting.mixtures import fit_mixture
-from orbiflow.density.fitting.rows import Rows
-from orbiflow.density.partial import at_observed
+from orbiflow.density.fitting.rows import Rows, with_incomplete
 from orbiflow.errors import OrbiflowError
-from orbiflow.symmetry.isometry import Array
 
 seeds = st.integers(0, 2**31)
 MARGINALISE = AutomaticSettings(parts=("kernels", "mixture"), missing="marginalise")

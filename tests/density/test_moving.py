@@ -17,6 +17,7 @@ from elsewhere import DEVICE, a_device
 from orbiflow.density import (
     AdaptiveKernels,
     BlendedDensity,
+    NeuralFlow,
     Space,
     SymmetricDensity,
     TabulatedDensity,
@@ -26,9 +27,8 @@ from orbiflow.density import (
     make_space,
     read_density,
 )
-from orbiflow.density.models.neural import NeuralFlow, NeuralTorusField
 from orbiflow.errors import OrbiflowError
-from orbiflow.fields import FourierField, SplineField
+from orbiflow.fields import FourierField, NeuralTorusField, SplineField
 from orbiflow.flows import Flow
 
 SPACES = ("torus", "klein-bottle", "sphere", "projective-plane")

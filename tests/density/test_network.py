@@ -18,6 +18,7 @@ from orbiflow.density import (
     AdaptiveKernels,
     BlendedDensity,
     DensityEstimator,
+    Factor,
     Torus,
     UniformBase,
     VonMisesChains,
@@ -28,12 +29,20 @@ from orbiflow.density import (
     marginal,
     read_density,
 )
-from orbiflow.density.fitting.network import Screen, fit_network, network_shapes
+from orbiflow.density.fitting.network import (
+    Screen,
+    fit_network,
+    network_shapes,
+)
 from orbiflow.density.fitting.rows import Rows
-from orbiflow.density.models.network import Factor, averaged_networks, log_conditional
-from orbiflow.density.partial import network as network_of_some
-from orbiflow.density.partial.network import draws_anew, network_at
-from orbiflow.density.storage.network import network_from_header, network_header, network_tensors
+from orbiflow.density.inference import network as network_of_some
+from orbiflow.density.inference.network import draws_anew, network_at
+from orbiflow.density.models import averaged_networks, log_conditional
+from orbiflow.density.storage.components import (
+    network_from_header,
+    network_header,
+    network_tensors,
+)
 from orbiflow.errors import OrbiflowError
 
 seeds = st.integers(0, 2**31)

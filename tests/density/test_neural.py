@@ -10,16 +10,33 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from orbiflow.density import SymmetricDensity, Torus
-from orbiflow.density.fitting.chains import concentration, fit_chains
-from orbiflow.density.fitting.neural import NeuralSettings, fit_neural
-from orbiflow.density.models.chains import SCALES, VonMisesChains, chained
-from orbiflow.density.models.neural import NeuralFlow, NeuralTorusField, speed, way
-from orbiflow.density.models.symmetric import midpoints
-from orbiflow.density.spaces.round import Sphere
-from orbiflow.density.storage.chains import chains_from_header, chains_header, chains_tensors
-from orbiflow.density.storage.neural import neural_from_header, neural_header, neural_tensors
+from orbiflow.density import (
+    NeuralFlow,
+    NeuralSettings,
+    Sphere,
+    SymmetricDensity,
+    Torus,
+    VonMisesChains,
+    fit_chains,
+    fit_neural,
+    midpoints,
+)
+from orbiflow.density.fitting.chains import concentration
+from orbiflow.density.models import SCALES, chained
+from orbiflow.density.storage.components import (
+    chains_from_header,
+    chains_header,
+    chains_tensors,
+    neural_from_header,
+    neural_header,
+    neural_tensors,
+)
 from orbiflow.errors import OrbiflowError
+from orbiflow.fields import (
+    NeuralTorusField,
+    speed,
+    way,
+)
 
 seeds = st.integers(0, 2**31 - 1)
 dims = st.integers(1, 5)

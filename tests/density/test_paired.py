@@ -10,8 +10,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from orbiflow.density import DensityEstimator, make_space
-from orbiflow.density.comparing import ModelComparison, compare_models, compare_scores
+from orbiflow.density import (
+    DensityEstimator,
+    ModelComparison,
+    compare_models,
+    compare_scores,
+    make_space,
+)
 from orbiflow.density.comparing.resampling import Groups, resampled_sums
 from orbiflow.errors import OrbiflowError
 

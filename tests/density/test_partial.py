@@ -23,7 +23,7 @@ from orbiflow.density import (
     marginal,
     read_density,
 )
-from orbiflow.density.models.still import still_flow
+from orbiflow.density.models import still_flow
 from orbiflow.errors import OrbiflowError
 
 seeds = st.integers(0, 2**31)

@@ -9,14 +9,12 @@ import scipy.io
 from hypothesis import given
 from hypothesis import strategies as st
 
-from orbiflow.density import KleinBottle
+from orbiflow.density import KleinBottle, from_klein, to_klein
 from orbiflow.density.spaces.patches import (
     DCT_BASIS,
     dct_to_pixels,
-    from_klein,
     klein_patch,
     pixels_to_dct,
-    to_klein,
 )
 from orbiflow.errors import OrbiflowError
 

@@ -8,17 +8,26 @@ import torch
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from orbiflow.density import AdaptiveKernels, BlendedDensity, UniformBase, make_space
-from orbiflow.density.models.still import still_flow
-from orbiflow.density.regions import (
+from orbiflow.density import (
+    AdaptiveKernels,
+    BlendedDensity,
     DensityLevels,
+    PlotSettings,
+    UniformBase,
     highest_density_region,
+    make_space,
     samples_for,
     told_masses,
 )
-from orbiflow.density.regions.enough import GOOD, LEAST, MOST_SAMPLES, MOST_UNASKED, SAMPLES
+from orbiflow.density.models import still_flow
+from orbiflow.density.regions.levels import (
+    GOOD,
+    LEAST,
+    MOST_SAMPLES,
+    MOST_UNASKED,
+    SAMPLES,
+)
 from orbiflow.errors import OrbiflowError
-from orbiflow.export import PlotSettings
 from orbiflow.jobs import density_requests
 
 masses = st.floats(2e-5, 1 - 2e-5)

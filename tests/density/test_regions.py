@@ -15,8 +15,14 @@ from hypothesis import strategies as st
 from scipy.stats import kstest
 
 from known_densities import angle_between, cap_height, kernels_about
-from orbiflow.density import DensityEstimator, make_space
-from orbiflow.density.regions import DensityLevels, highest_density_region, outlines, to_geojson
+from orbiflow.density import (
+    DensityEstimator,
+    DensityLevels,
+    highest_density_region,
+    make_space,
+    outlines,
+    to_geojson,
+)
 from orbiflow.density.regions.contours import filled
 from orbiflow.density.regions.grid import LevelGrid, Seeds
 from orbiflow.errors import OrbiflowError

@@ -17,8 +17,8 @@ from orbiflow.density import (
     SymmetricDensity,
     Torus,
     UniformBase,
+    log_density_gradient,
 )
-from orbiflow.density.slopes import log_density_gradient
 from orbiflow.errors import OrbiflowError
 from orbiflow.flows import Flow
 from strategies import random_field

@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from orbiflow.density import (
+    MEASURES,
     KleinBottle,
     ProjectivePlane,
     Sphere,
@@ -18,7 +19,6 @@ from orbiflow.density import (
     to_latlon,
     to_vectors,
 )
-from orbiflow.density.spaces.space import MEASURES
 from orbiflow.errors import OrbiflowError
 
 TURN = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))[0]

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from orbiflow.density.comparing import compare_scores, cross_validation_folds
+from orbiflow.density import compare_scores, cross_validation_folds
 from orbiflow.errors import OrbiflowError
 
 labels = st.lists(st.integers(0, 30), min_size=2, max_size=200)

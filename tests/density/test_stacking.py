@@ -8,14 +8,20 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from orbiflow.density import UniformBase, VonMisesChains, make_space, midpoints
+from orbiflow.density import (
+    AutomaticSettings,
+    UniformBase,
+    VonMisesChains,
+    fit_automatic,
+    make_space,
+    midpoints,
+)
+from orbiflow.density.fitting import group_numbers
 from orbiflow.density.fitting.assembly import mixed
-from orbiflow.density.fitting.automatic import AutomaticSettings, fit_automatic
-from orbiflow.density.fitting.folds import FOLDS, folds_of
+from orbiflow.density.fitting.folds import FOLDS, folds_of, repeats_of
+from orbiflow.density.fitting.kernels import joined, kernel_estimates
 from orbiflow.density.fitting.mixtures import fit_mixture
-from orbiflow.density.fitting.repeats import repeats_of
-from orbiflow.density.fitting.rows import Rows, group_numbers
-from orbiflow.density.fitting.scales import joined, kernel_estimates
+from orbiflow.density.fitting.rows import Rows
 from orbiflow.density.fitting.weights import (
     TOLERANCE,
     gain_of,

@@ -16,7 +16,6 @@ from orbiflow.density import (
     BlendedDensity,
     DensityEstimator,
     NeuralFlow,
-    NeuralTorusField,
     Sphere,
     SymmetricDensity,
     Torus,
@@ -27,7 +26,12 @@ from orbiflow.density import (
     read_density,
 )
 from orbiflow.errors import InputFileError, OrbiflowError
-from orbiflow.fields import FourierField, InvariantField, SplineField
+from orbiflow.fields import (
+    FourierField,
+    InvariantField,
+    NeuralTorusField,
+    SplineField,
+)
 from orbiflow.flows import Flow
 from orbiflow.symmetry import CrystallographicGroup, wallpaper_group
 from strategies import seeds

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from orbiflow.density.tables import append_column, read_table
+from orbiflow.density import append_column, read_table
 from orbiflow.errors import InputFileError, OrbiflowError
 from table_files import PROPERTY, refuse, write
 

@@ -11,8 +11,13 @@ import pytest
 import torch
 from scipy.stats import vonmises
 
-from orbiflow.density import Sphere, make_space
-from orbiflow.density.comparing import RowSketch, compare_samples, mmd_test
+from orbiflow.density import (
+    RowSketch,
+    Sphere,
+    compare_samples,
+    make_space,
+    mmd_test,
+)
 from orbiflow.density.comparing.resampling import Groups
 from orbiflow.density.comparing.two_samples import chosen_rows
 from orbiflow.errors import OrbiflowError

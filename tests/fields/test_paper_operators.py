@@ -24,7 +24,7 @@ from orbiflow.symmetry import (
     rotation_matrix,
     transflection,
 )
-from orbiflow.tilings.classes import CLASSES
+from orbiflow.tiles import CLASSES
 from strategies import equivariance_error, isometries, random_field, random_tensor, seeds
 
 UNIT_CELL = CrystallographicGroup.generate(np.eye(2))

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from torch import nn
 
 from orbiflow.fields import jacobian, symmetrize
-from orbiflow.fields.symmetrize import blend
+from orbiflow.fields.symmetrization import blend
 from orbiflow.symmetry import WALLPAPER_GROUPS, wallpaper_group
 from strategies import (
     central_difference,

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from orbiflow.flows import METHODS, Flow
 from orbiflow.symmetry import rotation_matrix, wallpaper_group
-from orbiflow.tilings.classes import CLASSES
+from orbiflow.tiles import CLASSES
 from strategies import (
     TABLED,
     gentle_field,

@@ -7,8 +7,7 @@ import pytest
 import torch
 
 from orbiflow.errors import OrbiflowError
-from orbiflow.flows import METHODS, Flow
-from orbiflow.flows.integrators import method
+from orbiflow.flows import METHODS, Flow, method
 from strategies import largest
 
 # of Euler, midpoint, Kutta 3, the classical method, Butcher 5

@@ -16,7 +16,11 @@ from hypothesis import strategies as st
 from safetensors.torch import load, save
 from torch import Tensor, nn
 
-from orbiflow.errors import InputFileError, OrbiflowError, OutputError
+from orbiflow.errors import (
+    InputFileError,
+    OrbiflowError,
+    OutputError,
+)
 from orbiflow.fields import (
     FourierField,
     NeuralTorusField,
@@ -25,8 +29,17 @@ from orbiflow.fields import (
     symmetrize,
     time_dependent,
 )
-from orbiflow.flows import METHODS, Flow, load_flow, save_flow
-from orbiflow.symmetry import CrystallographicGroup, identification_group, wallpaper_group
+from orbiflow.flows import (
+    METHODS,
+    Flow,
+    load_flow,
+    save_flow,
+)
+from orbiflow.symmetry import (
+    CrystallographicGroup,
+    identification_group,
+    wallpaper_group,
+)
 from strategies import groups, random_tensor, seeds, space_group
 
 one_folder = settings(

@@ -11,11 +11,18 @@ from types import TracebackType
 from typing import Any, Self
 
 from jobs.searches import BOOT
-from orbiflow.cancel import Cancel
-from orbiflow.jobs import BatchRequest, EscherizeRequest, Event, Failed, Finished, run
+from orbiflow.jobs import (
+    BatchRequest,
+    EscherizeRequest,
+    Event,
+    Finished,
+    run,
+)
 from orbiflow.jobs.executors import Answer, Parcel
 from orbiflow.jobs.executors.parcel import carry_out
 from orbiflow.jobs.run import Sink
+from orbiflow.runtime import Cancel
+from orbiflow.runtime.events import Failed
 
 QUICK: dict[str, Any] = {
     "classes": ["IH4"],

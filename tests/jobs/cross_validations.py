@@ -9,8 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from orbiflow.cancel import Cancel
-from orbiflow.jobs import DensityCvRequest, Event, run
+from orbiflow.jobs import (
+    DensityCvRequest,
+    Event,
+    run,
+)
+from orbiflow.runtime import Cancel
 
 QUICK: dict[str, Any] = {"space": "torus", "parts": ["kernels"], "against": ["mixture"], "folds": 3}
 

@@ -6,16 +6,18 @@ import json
 from pathlib import Path
 
 from orbiflow.jobs import (
-    ClassFailed,
     EscherizeRequest,
     Event,
-    Failed,
     Finished,
     Note,
     Preview,
     Progress,
     Started,
     TileFound,
+)
+from orbiflow.runtime.events import (
+    ClassFailed,
+    Failed,
     Written,
 )
 
@@ -42,7 +44,7 @@ def boot_request(
 
 
 def check_order(events: list[Event], *classes: str) -> None:
-    """What the documentation of `orbiflow.jobs.events` promises."""
+    """What the documentation of `orbiflow.runtime.events` promises."""
     kinds = [type(event) for event in events]
     assert kinds[0] is Started
     assert kinds[-1] in (Finished, Failed)

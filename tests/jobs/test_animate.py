@@ -8,7 +8,6 @@ import pytest
 from PIL import Image
 
 from jobs.searches import boot_request, check_order
-from orbiflow.cancel import Cancel
 from orbiflow.errors import OrbiflowError
 from orbiflow.jobs import (
     AnimateRequest,
@@ -16,10 +15,11 @@ from orbiflow.jobs import (
     Note,
     Progress,
     RecordError,
-    Written,
-    request_from_json,
     run,
 )
+from orbiflow.jobs.requests import request_from_json
+from orbiflow.runtime import Cancel
+from orbiflow.runtime.events import Written
 
 
 @pytest.fixture(scope="module", name="folder")

@@ -9,9 +9,13 @@ from hypothesis import given as drawn
 from hypothesis import strategies as st
 
 from orbiflow.errors import OrbiflowError
-from orbiflow.export.lengths import length
-from orbiflow.jobs import ArtRequest, ExportRequest, RecordError
+from orbiflow.jobs import (
+    ArtRequest,
+    ExportRequest,
+    RecordError,
+)
 from orbiflow.jobs.asked import given, read_as
+from orbiflow.units import length
 
 
 def test_what_was_set_is_given_and_nothing_else() -> None:

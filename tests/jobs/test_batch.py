@@ -10,11 +10,18 @@ from typing import Any
 import pytest
 
 from jobs.batches import QUICK, Here, rows, run_batch, write_boot
-from orbiflow.cancel import Cancel
 from orbiflow.errors import OrbiflowError, OutputError
-from orbiflow.jobs import BatchRequest, Finished, ItemDone, Note, RecordError, run
+from orbiflow.jobs import (
+    BatchRequest,
+    Finished,
+    ItemDone,
+    Note,
+    RecordError,
+    run,
+)
 from orbiflow.jobs.batch import folder as folder_module
 from orbiflow.jobs.batch import work
+from orbiflow.runtime import Cancel
 
 
 @pytest.fixture(name="here")

@@ -9,11 +9,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from orbiflow.errors import InputFileError, OrbiflowError, OutputError
-from orbiflow.folders import stays_inside
+from orbiflow.errors import (
+    InputFileError,
+    OrbiflowError,
+    OutputError,
+)
 from orbiflow.jobs.batch.folder import RESERVED
-from orbiflow.jobs.batch.inputs import content, folder_names, listed
+from orbiflow.jobs.batch.inputs import (
+    content,
+    folder_names,
+    listed,
+)
 from orbiflow.jobs.batch.journal import Entry, Journal
+from orbiflow.runtime import stays_inside
 
 letters = st.text("aAbB .-é/", min_size=1, max_size=5)
 paths = st.builds("{}.{}".format, letters, st.sampled_from(["png", "svg", "PNG"]))

@@ -12,8 +12,14 @@ from PIL import Image
 
 from jobs.searches import boot_request, check_order
 from orbiflow.errors import OrbiflowError
-from orbiflow.escher.front import MOST
-from orbiflow.jobs import EscherizeRequest, Event, Note, request_from_json, run
+from orbiflow.jobs import (
+    EscherizeRequest,
+    Event,
+    Note,
+    run,
+)
+from orbiflow.jobs.requests import request_from_json
+from orbiflow.tiles.search.front import MOST
 
 DOCS = Path(__file__).parents[2] / "docs"
 SQUIRREL = Path(__file__).parents[2] / "examples" / "silhouettes" / "squirrel.dat"

@@ -25,16 +25,22 @@ from jobs.cross_validations import (
     table_of,
     write_table,
 )
-from orbiflow.cancel import Cancel
 from orbiflow.density import DensityEstimator
 from orbiflow.errors import OrbiflowError, OutputError
-from orbiflow.jobs import DensityFoldRequest, Finished, ItemDone, Note, RecordError, run
+from orbiflow.jobs import (
+    Finished,
+    ItemDone,
+    Note,
+    RecordError,
+    run,
+)
 from orbiflow.jobs.batch import work
 from orbiflow.jobs.density_cv import overview
-from orbiflow.jobs.density_cv_requests import setting_of
+from orbiflow.jobs.density_cv_requests import DensityFoldRequest, setting_of
 from orbiflow.jobs.density_requests import PARTS
 from orbiflow.jobs.executors import local_processes
 from orbiflow.jobs.executors.parcel import carry_out
+from orbiflow.runtime import Cancel
 
 
 @pytest.fixture(name="here")

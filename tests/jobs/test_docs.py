@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from orbiflow.jobs import Event, request_from_json
+from orbiflow.jobs import Event
+from orbiflow.jobs.requests import request_from_json
 
 ROOT = Path(__file__).parents[2]
 TEXT = (ROOT / "docs" / "jobs.md").read_text(encoding="utf-8")

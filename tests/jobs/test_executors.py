@@ -16,9 +16,13 @@ from hypothesis import strategies as st
 
 from jobs.batches import Here, boot_parcels, deadly, deadly_locally, state_of, without_seconds
 from orbiflow import __version__
-from orbiflow.cancel import Cancel
 from orbiflow.errors import OrbiflowError
-from orbiflow.jobs import EscherizeRequest, Event, Failed, Finished, Note
+from orbiflow.jobs import (
+    EscherizeRequest,
+    Event,
+    Finished,
+    Note,
+)
 from orbiflow.jobs.executors import (
     Answer,
     DaskCluster,
@@ -30,6 +34,8 @@ from orbiflow.jobs.executors import (
     parcel,
 )
 from orbiflow.jobs.executors.memory import VARIABLE, keeping_memory
+from orbiflow.runtime import Cancel
+from orbiflow.runtime.events import Failed
 
 DEADLY = EscherizeRequest(image=Path("any.png"))
 

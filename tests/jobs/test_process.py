@@ -11,7 +11,14 @@ from pathlib import Path
 import pytest
 
 from jobs.searches import ENDLESS, boot_request, check_order
-from orbiflow.jobs import ClassFailed, Event, Failed, Finished, Progress, TileFound, start
+from orbiflow.jobs import (
+    Event,
+    Finished,
+    Progress,
+    TileFound,
+)
+from orbiflow.jobs.process import start
+from orbiflow.runtime.events import ClassFailed, Failed
 
 
 def test_a_search_in_a_process(tmp_path: Path) -> None:

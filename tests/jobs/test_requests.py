@@ -20,6 +20,7 @@ from orbiflow.jobs import (
     BatchRequest,
     DensityBatchRequest,
     DensityCompareRequest,
+    DensityCvRequest,
     DensityFitRequest,
     DensityPlotRequest,
     DensityRegionRequest,
@@ -31,9 +32,9 @@ from orbiflow.jobs import (
     RecordError,
     Request,
     density_requests,
-    request_from_json,
 )
-from orbiflow.jobs.density_cv_requests import DensityCvRequest, DensityFoldRequest
+from orbiflow.jobs.density_cv_requests import DensityFoldRequest
+from orbiflow.jobs.requests import request_from_json
 
 names = st.text(st.characters(exclude_characters="\0"), min_size=1)
 paths = names.map(Path)

@@ -11,23 +11,25 @@ import numpy as np
 import pytest
 
 from jobs.searches import ENDLESS, boot_request, check_order
-from orbiflow.cancel import Cancel
 from orbiflow.errors import OrbiflowError
-from orbiflow.export.folder import TILE_FILES
 from orbiflow.jobs import (
-    ClassFailed,
     DensityFitRequest,
     DensitySampleRequest,
     Event,
-    Failed,
     Finished,
     Preview,
     Progress,
     Request,
     TileFound,
-    Written,
     run,
 )
+from orbiflow.runtime import Cancel
+from orbiflow.runtime.events import (
+    ClassFailed,
+    Failed,
+    Written,
+)
+from orbiflow.tiles.pages.tile_folder import TILE_FILES
 
 
 def files(folder: Path) -> set[str]:

@@ -10,10 +10,10 @@ from orbiflow.symmetry import (
     WALLPAPER_GROUPS,
     CrystallographicGroup,
     rotation,
+    symmetry_elements,
     transflection,
     wallpaper_group,
 )
-from orbiflow.symmetry.elements import symmetry_elements
 
 
 @pytest.mark.parametrize("name", WALLPAPER_GROUPS)

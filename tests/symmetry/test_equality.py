@@ -10,7 +10,7 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from orbiflow.density.spaces import make_space
+from orbiflow.density import make_space
 from orbiflow.fields import FourierField
 from orbiflow.symmetry import (
     WALLPAPER_GROUPS,

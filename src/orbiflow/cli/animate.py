@@ -8,7 +8,12 @@ from typing import Annotated
 
 import typer
 
-from orbiflow.cli.tile_options import Palette, Result, Tile, file_option
+from orbiflow.cli.tile_options import (
+    Palette,
+    Result,
+    Tile,
+    file_option,
+)
 from orbiflow.cli.work import do
 from orbiflow.jobs import AnimateRequest
 

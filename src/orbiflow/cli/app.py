@@ -17,7 +17,6 @@ from orbiflow.cli.console import errors
 from orbiflow.cli.density import density
 from orbiflow.cli.escherize import escherize
 from orbiflow.cli.export import export
-from orbiflow.cli.paper import paper
 from orbiflow.errors import OrbiflowError
 from orbiflow.jobs import RecordError
 
@@ -39,7 +38,6 @@ app.command()(art)
 app.command()(animate)
 app.command()(classes)
 app.add_typer(density)
-app.command()(paper)
 
 
 @app.callback(invoke_without_command=True)

@@ -8,10 +8,13 @@ from rich.table import Table
 
 from orbiflow.cli.console import output
 from orbiflow.errors import OutputError
-from orbiflow.figures import classes_png
-from orbiflow.files import write_atomic
-from orbiflow.symmetry.elements import symmetry_elements
-from orbiflow.tilings import CLASSES, IsohedralClass
+from orbiflow.runtime import write_atomic
+from orbiflow.symmetry import symmetry_elements
+from orbiflow.tiles import (
+    CLASSES,
+    IsohedralClass,
+    classes_png,
+)
 
 _FREEDOM = {0: "none", 1: "one axis", 2: "any"}
 

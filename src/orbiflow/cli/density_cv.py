@@ -7,7 +7,12 @@ from typing import Annotated
 
 import typer
 
-from orbiflow.cli.batch_options import OutFolder, RetryFailed, Scheduler, Workers
+from orbiflow.cli.batch_options import (
+    OutFolder,
+    RetryFailed,
+    Scheduler,
+    Workers,
+)
 from orbiflow.cli.density_options import (
     Columns,
     Data,

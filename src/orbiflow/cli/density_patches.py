@@ -7,7 +7,12 @@ from typing import Annotated
 
 import typer
 
-from orbiflow.cli.density_options import DropMissing, NoHeader, Unit, named_columns
+from orbiflow.cli.density_options import (
+    DropMissing,
+    NoHeader,
+    Unit,
+    named_columns,
+)
 from orbiflow.cli.work import do
 from orbiflow.jobs import PatchesRequest
 

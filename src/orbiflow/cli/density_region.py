@@ -7,7 +7,11 @@ from typing import Annotated
 
 import typer
 
-from orbiflow.cli.density_options import Model, RegionSamples, numbers_of
+from orbiflow.cli.density_options import (
+    Model,
+    RegionSamples,
+    numbers_of,
+)
 from orbiflow.cli.work import do
 from orbiflow.jobs import DensityRegionRequest
 

@@ -7,7 +7,7 @@ import threading
 from collections.abc import Generator
 from contextlib import contextmanager
 
-from orbiflow.cancel import Cancel
+from orbiflow.runtime import Cancel
 
 
 @contextmanager

@@ -10,11 +10,20 @@ from rich.progress import Progress as Bar
 from rich.table import Table
 
 from orbiflow.cli.console import errors, output
-from orbiflow.jobs import Event, Finished, ItemDone, Note, Preview, Progress, Started, TileFound
+from orbiflow.jobs import (
+    Event,
+    Finished,
+    ItemDone,
+    Note,
+    Preview,
+    Progress,
+    Started,
+    TileFound,
+)
 
 INTERRUPTED = "interrupted"
 BATCHES = ("batch", "density-batch", "density-cv")
-FORKING = ("escherize", "paper", *BATCHES)
+FORKING = ("escherize", *BATCHES)
 """Jobs that start processes."""
 
 
@@ -35,7 +44,7 @@ class Terminal:
         """Show an event."""
         match event:
             case Started():
-                self.job = event.job
+                self.job = event.operation
             case Progress():
                 if self.bar is None:
                     self.bar = _Bar(search=self.job == "escherize", forks=self.job in FORKING)

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from orbiflow.figures.palette import PALETTES
+from orbiflow.drawing import PALETTES
 
 Result = Annotated[
     Path,

@@ -6,7 +6,6 @@ from contextlib import nullcontext
 
 import typer
 
-from orbiflow.cancel import Cancel
 from orbiflow.cli.interrupts import stopped_by_interrupt
 from orbiflow.cli.terminal import Terminal
 from orbiflow.jobs import (
@@ -18,6 +17,7 @@ from orbiflow.jobs import (
     Request,
     run,
 )
+from orbiflow.runtime import Cancel
 
 KEEPING = (EscherizeRequest, BatchRequest, DensityBatchRequest, DensityCvRequest)
 STATUS = {"done": 0, "nothing found": 1, "cancelled": 130}

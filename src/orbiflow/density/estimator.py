@@ -2,34 +2,37 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 import numbers
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, Self, TypeAlias
 
 import numpy as np
 import torch
 from numpy.typing import ArrayLike
 
 from orbiflow.arguments import is_a
+from orbiflow.arrays import Array
 from orbiflow.density.arguments import check_kind
-from orbiflow.density.fitting.automatic import (
+from orbiflow.density.fitting import (
     PARTS,
     AutomaticSettings,
+    FitReport,
+    FitSettings,
+    NeuralSettings,
+    Progress,
+    check_missing,
     fit_automatic,
+    fit_density,
+    fit_neural,
     flow_settings,
+    mean_of,
+    weighed,
 )
-from orbiflow.density.fitting.flow import fit_density
-from orbiflow.density.fitting.missing import check_missing
-from orbiflow.density.fitting.neural import NeuralSettings, fit_neural
-from orbiflow.density.fitting.report import FitReport, Progress
-from orbiflow.density.fitting.rows import mean_of, weighed
-from orbiflow.density.fitting.settings import FitSettings
-from orbiflow.density.models.still import MOST_DIM
-from orbiflow.density.models.symmetric import SymmetricDensity
-from orbiflow.density.parameters import Parameters
-from orbiflow.density.partial import (
+from orbiflow.density.gradients import log_density_gradient
+from orbiflow.density.inference import (
     axes_named,
     chart_of_observed,
     conditional,
@@ -37,12 +40,81 @@ from orbiflow.density.partial import (
     log_prob_observed,
     marginal,
 )
-from orbiflow.density.random_state import RandomState, seed_of
-from orbiflow.density.slopes import log_density_gradient
-from orbiflow.density.spaces.catalogue import space_class
-from orbiflow.density.spaces.space import Space
+from orbiflow.density.models import MOST_DIM, SymmetricDensity
+from orbiflow.density.spaces import Space, space_class
 from orbiflow.errors import OrbiflowError
-from orbiflow.symmetry.isometry import Array
+
+
+class Parameters:
+    """What scikit-learn asks of an estimator whose constructor keeps its arguments as they are."""
+
+    def get_params(self, deep: bool = True) -> dict[str, Any]:
+        """The constructor's arguments, by name."""
+        del deep
+        return {name: getattr(self, name) for name in self._names()}
+
+    def set_params(self, **params: Any) -> Self:
+        """Change constructor arguments.
+
+        Raises:
+            OrbiflowError: for a name that is none.
+        """
+        for name, value in params.items():
+            if name not in self._names():
+                raise OrbiflowError(f"no parameter {name!r}; there are {', '.join(self._names())}")
+            setattr(self, name, value)
+        return self
+
+    def __sklearn_tags__(self) -> Any:
+        # asked for by scikit-learn alone, which is therefore there
+        from sklearn.utils import Tags, TargetTags  # pyright: ignore[reportMissingImports, reportMissingTypeStubs]
+
+        return Tags(
+            estimator_type="density_estimator",
+            target_tags=TargetTags(required=False),
+            transformer_tags=None,
+            regressor_tags=None,
+            classifier_tags=None,
+        )
+
+    def __repr__(self) -> str:
+        shown = [f"{name}={value!r}" for name, value in self._changed(self._names()).items()]
+        return f"{type(self).__name__}({', '.join(shown)})"
+
+    @classmethod
+    def _names(cls) -> list[str]:
+        return list(inspect.signature(cls).parameters)
+
+    def _changed(self, names: Iterable[str]) -> dict[str, Any]:
+        """Parameters that are not at their defaults."""
+        defaults = inspect.signature(type(self)).parameters
+        given = {name: getattr(self, name) for name in names}
+        return {name: v for name, v in given.items() if v != defaults[name].default}
+
+
+RandomState: TypeAlias = int | np.integer | np.random.RandomState | np.random.Generator | None
+"""As scikit-learn has it, and NumPy's newer generators."""
+
+
+def seed_of(random_state: RandomState) -> int:
+    """A seed; None and generators give another one at every call.
+
+    Raises:
+        OrbiflowError: for another thing.
+    """
+    if random_state is None:
+        return int(np.random.randint(2**31))  # noqa: NPY002  scikit-learn's convention
+    if isinstance(random_state, np.random.RandomState):
+        return int(random_state.randint(2**31))
+    if isinstance(random_state, np.random.Generator):
+        return int(random_state.integers(2**31))
+    if not isinstance(random_state, bool) and isinstance(random_state, numbers.Integral):
+        return int(random_state) % 2**63
+    raise OrbiflowError(
+        "random_state must be None, an integer, a NumPy RandomState or Generator, got "
+        f"{random_state!r}"
+    )
+
 
 ONLY_SPLINES = (
     "detail", "segments", "smoothness", "ridge", "roughness", "kinetic", "iterations", "base",

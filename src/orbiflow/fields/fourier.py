@@ -10,13 +10,20 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from orbiflow.fields.invariant_field import InvariantField, sobolev_weights
-from orbiflow.fields.invariants import InvariantBasis, invariant_basis
+from orbiflow.arrays import Array
+from orbiflow.fields.invariants import (
+    InvariantBasis,
+    InvariantField,
+    invariant_basis,
+    sobolev_weights,
+)
 from orbiflow.fields.lipschitz import coefficient_bound
-from orbiflow.fields.series import differentiate, evaluate, weight_cotangent
-from orbiflow.symmetry import CrystallographicGroup
-from orbiflow.symmetry.as_written import cached_as_written
-from orbiflow.symmetry.isometry import Array
+from orbiflow.fields.series import (
+    differentiate,
+    evaluate,
+    weight_cotangent,
+)
+from orbiflow.symmetry import CrystallographicGroup, cached_as_written
 
 
 class FourierField(InvariantField):

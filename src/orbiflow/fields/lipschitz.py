@@ -26,9 +26,9 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from orbiflow.arrays import Array
 from orbiflow.fields.invariants import InvariantBasis
 from orbiflow.symmetry import CrystallographicGroup
-from orbiflow.symmetry.isometry import Array
 
 MOST_SIGNS = 6
 """Largest orbit, in terms, of which all signs are tried: no plane group has a larger one."""

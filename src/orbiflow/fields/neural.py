@@ -10,9 +10,8 @@ import torch
 from torch import Tensor, nn
 
 from orbiflow.errors import OrbiflowError
-from orbiflow.fields.symmetrize import Symmetrized
-from orbiflow.symmetry import CrystallographicGroup
-from orbiflow.symmetry.group import checked_group
+from orbiflow.fields.symmetrization import Symmetrized
+from orbiflow.symmetry import CrystallographicGroup, checked_group
 from orbiflow.typed_torch import random
 
 

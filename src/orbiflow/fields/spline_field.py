@@ -9,13 +9,21 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
-from orbiflow.fields.invariant_field import InvariantField, sobolev_weights
-from orbiflow.fields.invariants import InvariantBasis, invariant_basis
-from orbiflow.fields.splines import padded, spline_sum, spline_sum_with_divergence, symbol
-from orbiflow.symmetry import CrystallographicGroup
-from orbiflow.symmetry.as_written import cached_as_written
-from orbiflow.symmetry.isometry import Array
+from orbiflow.fields.invariants import (
+    InvariantBasis,
+    InvariantField,
+    invariant_basis,
+    sobolev_weights,
+)
+from orbiflow.fields.splines import (
+    padded,
+    spline_sum,
+    spline_sum_with_divergence,
+    symbol,
+)
+from orbiflow.symmetry import CrystallographicGroup, cached_as_written
 from orbiflow.typed_torch import fft, linalg
 
 PER_WAVE = 3

@@ -1,7 +1,5 @@
 """Integrators and flows: diffeomorphisms from vector fields."""
 
-from orbiflow.flows.flow import Flow
-from orbiflow.flows.integrators import METHODS, RungeKutta
-from orbiflow.flows.storage import load_flow, save_flow
+import lazy_loader
 
-__all__ = ["METHODS", "Flow", "RungeKutta", "load_flow", "save_flow"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

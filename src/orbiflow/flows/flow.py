@@ -12,12 +12,21 @@ from torch import Tensor, nn
 
 from orbiflow.arguments import is_a
 from orbiflow.errors import OrbiflowError
-from orbiflow.fields.derivatives import prepared, prepared_with_divergence
-from orbiflow.fields.protocol import TimeDependentField, VectorField, is_time_dependent
-from orbiflow.flows.coarseness import Watch
-from orbiflow.flows.integrators import RungeKutta
-from orbiflow.flows.integrators import method as find_method
-from orbiflow.threads import one_thread
+from orbiflow.fields import (
+    TimeDependentField,
+    VectorField,
+    is_time_dependent,
+    prepared,
+    prepared_with_divergence,
+)
+from orbiflow.flows.integrators import (
+    RungeKutta,
+    Watch,
+)
+from orbiflow.flows.integrators import (
+    method as find_method,
+)
+from orbiflow.runtime import one_thread
 from orbiflow.typed_torch import linalg
 
 AnyField = VectorField | TimeDependentField

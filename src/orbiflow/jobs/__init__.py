@@ -8,7 +8,6 @@ tell the same events. Importing this is quick: numerical libraries come with the
 True
 """
 
-from orbiflow.cancel import Cancel
 from orbiflow.jobs.batch_requests import BatchRequest, DensityBatchRequest
 from orbiflow.jobs.density_compare_requests import DensityCompareRequest, DensityRegionRequest
 from orbiflow.jobs.density_cv_requests import DensityCvRequest, DensityFoldRequest
@@ -21,22 +20,7 @@ from orbiflow.jobs.density_requests import (
     DensityScoreRequest,
     PatchesRequest,
 )
-from orbiflow.jobs.events import (
-    ClassFailed,
-    Event,
-    Failed,
-    Finished,
-    ItemDone,
-    Note,
-    Preview,
-    Progress,
-    Started,
-    TileFound,
-    Written,
-    event_from_json,
-)
 from orbiflow.jobs.process import Job, start
-from orbiflow.jobs.records import RecordError
 from orbiflow.jobs.request import Request
 from orbiflow.jobs.requests import request_from_json
 from orbiflow.jobs.run import Sink, run
@@ -45,7 +29,22 @@ from orbiflow.jobs.tile_requests import (
     ArtRequest,
     EscherizeRequest,
     ExportRequest,
-    PaperRequest,
+)
+from orbiflow.runtime import (
+    Cancel,
+    ClassFailed,
+    Event,
+    Failed,
+    Finished,
+    ItemDone,
+    Note,
+    Preview,
+    Progress,
+    RecordError,
+    Started,
+    TileFound,
+    Written,
+    event_from_json,
 )
 
 __all__ = [
@@ -73,7 +72,6 @@ __all__ = [
     "ItemDone",
     "Job",
     "Note",
-    "PaperRequest",
     "PatchesRequest",
     "Preview",
     "Progress",

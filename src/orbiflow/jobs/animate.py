@@ -4,17 +4,25 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from orbiflow.cancel import Cancel
-from orbiflow.export.animation import AnimationSettings, animation
-from orbiflow.export.result_file import read_result
-from orbiflow.figures.palette import palette
-from orbiflow.files import write_atomic
+from orbiflow.drawing import palette
 from orbiflow.jobs.asked import given
-from orbiflow.jobs.events import Finished, Note, Progress, Written
 from orbiflow.jobs.place import check_place
 from orbiflow.jobs.run import Sink
 from orbiflow.jobs.tile_requests import AnimateRequest
-from orbiflow.tilings import colouring
+from orbiflow.runtime import (
+    Cancel,
+    Finished,
+    Note,
+    Progress,
+    Written,
+    write_atomic,
+)
+from orbiflow.tiles import (
+    AnimationSettings,
+    animation,
+    colouring,
+    read_result,
+)
 
 
 def animate(request: AnimateRequest, tell: Sink, cancel: Cancel) -> Finished:

@@ -5,21 +5,30 @@ from __future__ import annotations
 from functools import partial
 from pathlib import Path
 
-from orbiflow.cancel import Cancel
-from orbiflow.export.art.making import Artwork, artwork
-from orbiflow.export.art.over import read_over
-from orbiflow.export.art.settings import ArtSettings
-from orbiflow.export.art.source import ArtTile, read_art_tile
-from orbiflow.export.art.writing import write_artwork
-from orbiflow.export.exporting import require_certified
-from orbiflow.export.lengths import pixel_size, pixels
-from orbiflow.files import write_atomic
 from orbiflow.jobs.asked import given, read_as
-from orbiflow.jobs.events import Finished, Note, Progress, Written
 from orbiflow.jobs.place import check_place
-from orbiflow.jobs.records import RecordError
 from orbiflow.jobs.run import Sink
 from orbiflow.jobs.tile_requests import ArtRequest
+from orbiflow.runtime import (
+    Cancel,
+    Finished,
+    Note,
+    Progress,
+    RecordError,
+    Written,
+    write_atomic,
+)
+from orbiflow.tiles import (
+    ArtSettings,
+    Artwork,
+    EscherTile,
+    artwork,
+    read_over,
+    read_result,
+    with_map,
+    write_artwork,
+)
+from orbiflow.units import pixel_size, pixels
 
 
 def art(request: ArtRequest, tell: Sink, cancel: Cancel) -> Finished:
@@ -34,9 +43,11 @@ def art(request: ArtRequest, tell: Sink, cancel: Cancel) -> Finished:
         Cancelled: if it was told to stop; nothing is written.
     """
     settings = _settings(request)
-    tile = read_art_tile(request.result, request.tile)
-    require_certified(tile.given, force=request.force)
-    out = request.out or Path(f"{tile.given.name}.png")
+    tile = with_map(read_result(request.result, request.tile))
+    tile.require_certified(
+        force=request.force, otherwise="so it is not exported; --force exports it, marked so"
+    )
+    out = request.out or Path(f"{tile.name}.png")
     check_place(out, request.result, request.picture)
     tell(Progress(0.0, "laying out"))
     made = _prepared(request, tile, settings)
@@ -61,7 +72,7 @@ def art(request: ArtRequest, tell: Sink, cancel: Cancel) -> Finished:
     return Finished("done", summary)
 
 
-def _prepared(request: ArtRequest, tile: ArtTile, settings: ArtSettings) -> Artwork:
+def _prepared(request: ArtRequest, tile: EscherTile, settings: ArtSettings) -> Artwork:
     if request.picture is None:
         return artwork(tile, settings)
     tile.require_map()

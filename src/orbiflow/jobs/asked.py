@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterable
 from typing import Any, TypeVar
 
 from orbiflow.errors import OrbiflowError
-from orbiflow.jobs.records import RecordError
 from orbiflow.jobs.request import Request
+from orbiflow.runtime import RecordError
 
 Value = TypeVar("Value")
 
@@ -15,7 +15,7 @@ Value = TypeVar("Value")
 def given(request: Request, names: Iterable[str]) -> dict[str, Any]:
     """The fields of these names that were set, by their names: the others keep their defaults.
 
-    >>> from orbiflow.jobs.tile_requests import AnimateRequest
+    >>> from orbiflow.jobs import AnimateRequest
     >>> given(AnimateRequest(result="out", fps=12), ("seconds", "fps"))
     {'fps': 12.0}
     """
@@ -29,7 +29,7 @@ def samples_asked(request: Request, masses: Iterable[float] = (), field: str = "
     Raises:
         RecordError: where these are too few, by the field's name.
     """
-    from orbiflow.density.regions import samples_for  # not where requests alone are wanted
+    from orbiflow.density import samples_for
 
     try:
         return samples_for(masses, getattr(request, field), name=f"{{{field}}}")

@@ -7,9 +7,9 @@ from pathlib import Path, PurePath
 from typing import Any, ClassVar
 
 from orbiflow.jobs.density_requests import DensityFitRequest
-from orbiflow.jobs.records import RecordError, field_names
 from orbiflow.jobs.request import Request, at_least_one
 from orbiflow.jobs.tile_requests import EscherizeRequest
+from orbiflow.runtime import RecordError, field_names
 
 DRAWN = (".svg", ".json", ".geojson", ".dat")
 """Endings of silhouettes that are no pictures: how these are read does not concern them."""

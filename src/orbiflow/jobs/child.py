@@ -16,11 +16,15 @@ import traceback
 from collections import deque
 from typing import TextIO
 
-from orbiflow.cancel import Cancel
 from orbiflow.errors import OrbiflowError
-from orbiflow.jobs.events import Event, Failed, Finished
 from orbiflow.jobs.requests import request_from_json
 from orbiflow.jobs.run import run
+from orbiflow.runtime import (
+    Cancel,
+    Event,
+    Failed,
+    Finished,
+)
 
 
 class _Listening(Cancel):

@@ -12,28 +12,39 @@ from typing import Any
 
 import numpy as np
 
-from orbiflow.cancel import Cancel
-from orbiflow.density import SymmetricDensity
-from orbiflow.density.comparing import (
+from orbiflow.density import (
     DataComparison,
     ModelComparison,
     RowSketch,
+    SymmetricDensity,
+    Table,
+    column_names,
     compare_samples,
     compare_scores,
+    read_labels,
     require_one_space,
     scores_of,
 )
-from orbiflow.density.tables import Table, column_names, read_labels
 from orbiflow.errors import OrbiflowError
-from orbiflow.files import write_atomic
 from orbiflow.jobs.density_compare_requests import DensityCompareRequest
-from orbiflow.jobs.density_data import read_data, same_columns, unit_of
+from orbiflow.jobs.density_data import (
+    read_data,
+    same_columns,
+    unit_of,
+)
 from orbiflow.jobs.density_models import check_fits, model_at
-from orbiflow.jobs.events import Finished, Note, Progress, Written
 from orbiflow.jobs.place import check_place
-from orbiflow.jobs.records import RecordError
 from orbiflow.jobs.run import Sink
-from orbiflow.threads import one_thread
+from orbiflow.runtime import (
+    Cancel,
+    Finished,
+    Note,
+    Progress,
+    RecordError,
+    Written,
+    one_thread,
+    write_atomic,
+)
 
 SEEMS_FITTED, LEAST_LOOKED_UP = 0.5, 5
 """Share of the rows that a model knows, and rows that must have been looked up, to be warned."""

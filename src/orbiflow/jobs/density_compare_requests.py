@@ -12,8 +12,12 @@ from orbiflow.jobs.density_requests import (
     columns_named,
     region_samples_in_range,
 )
-from orbiflow.jobs.records import RecordError
-from orbiflow.jobs.request import Request, ends_in, in_range
+from orbiflow.jobs.request import (
+    Request,
+    ends_in,
+    in_range,
+)
+from orbiflow.runtime import RecordError
 
 
 @dataclass(frozen=True)

@@ -16,8 +16,8 @@ from orbiflow.jobs.density_requests import (
     Unit,
     columns_named,
 )
-from orbiflow.jobs.records import RecordError
 from orbiflow.jobs.request import Request, in_range
+from orbiflow.runtime import RecordError
 
 DEFAULT, UNIFORM = "default", "uniform"
 """Names of settings: what a fit chooses by itself, and the density that is the same everywhere."""

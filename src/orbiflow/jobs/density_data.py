@@ -11,20 +11,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from orbiflow.density.tables import (
+from orbiflow.density import (
     MissingCellsError,
     Table,
     column_names,
     is_identifier,
+    listing,
     read_table,
 )
-from orbiflow.density.tables.table import listing
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.jobs.density_columns import check_order
 from orbiflow.jobs.density_requests import Unit
-from orbiflow.jobs.events import Note
-from orbiflow.jobs.records import RecordError
 from orbiflow.jobs.run import Sink
+from orbiflow.runtime import Note, RecordError
 
 
 def read_data(

@@ -12,26 +12,37 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from orbiflow.cancel import Cancel
-from orbiflow.density import DensityEstimator, FitSettings, density_to_bytes
-from orbiflow.density.comparing import RowSketch
-from orbiflow.density.fitting.report import FitReport
-from orbiflow.density.tables import Table, read_labels
+from orbiflow.arrays import Array
+from orbiflow.density import (
+    MODEL,
+    REPORT,
+    THUMBNAIL,
+    DensityEstimator,
+    FitReport,
+    FitSettings,
+    RowSketch,
+    Table,
+    density_to_bytes,
+    read_labels,
+)
 from orbiflow.errors import OrbiflowError
-from orbiflow.export.density_figures import MODEL
-from orbiflow.export.density_plots import REPORT, THUMBNAIL
-from orbiflow.files import write_atomic
-from orbiflow.folders import ResultFolder
 from orbiflow.jobs.density_data import unit_of
 from orbiflow.jobs.density_folder import written_files
 from orbiflow.jobs.density_groups import read_beside_groups
 from orbiflow.jobs.density_requests import DensityFitRequest
-from orbiflow.jobs.events import Finished, Note, Progress, Written
 from orbiflow.jobs.place import check_folder
-from orbiflow.jobs.records import RecordError
 from orbiflow.jobs.run import Sink
-from orbiflow.symmetry.isometry import Array
-from orbiflow.threads import one_thread
+from orbiflow.runtime import (
+    Cancel,
+    Finished,
+    Note,
+    Progress,
+    RecordError,
+    ResultFolder,
+    Written,
+    one_thread,
+    write_atomic,
+)
 
 MOST_SCORED = 20_000
 """Rows over which the mean log density is taken: up to here all of them, for a few hundredths of the
@@ -79,7 +90,7 @@ def density_fit(request: DensityFitRequest, tell: Sink, cancel: Cancel) -> Finis
         write_atomic(staged / MODEL, saved)
         write_atomic(staged / REPORT, json.dumps(document, allow_nan=False, indent=1))
         if request.picture:
-            from orbiflow.figures.density_thumbnail import density_thumbnail
+            from orbiflow.density import density_thumbnail
 
             picture = density_thumbnail(estimator.density_, table.values)
             write_atomic(staged / THUMBNAIL, picture)

@@ -11,20 +11,33 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from orbiflow.cancel import Cancel
-from orbiflow.density import DensityEstimator
-from orbiflow.density.fitting.rows import mean_of, weighed
-from orbiflow.density.tables import Table, read_labels, read_table
+from orbiflow.arrays import Array
+from orbiflow.density import (
+    DensityEstimator,
+    Table,
+    mean_of,
+    read_labels,
+    read_table,
+    weighed,
+)
 from orbiflow.errors import OrbiflowError
-from orbiflow.files import write_atomic
-from orbiflow.folders import ResultFolder
 from orbiflow.jobs.density_cv_requests import DensityFoldRequest
 from orbiflow.jobs.density_data import read_weighed, unit_of
-from orbiflow.jobs.density_fit import estimator_of, plain_report, told_of
-from orbiflow.jobs.events import Finished, Note, Written
+from orbiflow.jobs.density_fit import (
+    estimator_of,
+    plain_report,
+    told_of,
+)
 from orbiflow.jobs.run import Sink
-from orbiflow.symmetry.isometry import Array
-from orbiflow.threads import one_thread
+from orbiflow.runtime import (
+    Cancel,
+    Finished,
+    Note,
+    ResultFolder,
+    Written,
+    one_thread,
+    write_atomic,
+)
 
 SCORES, REPORT = "scores.csv", "report.json"
 

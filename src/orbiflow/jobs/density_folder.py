@@ -1,19 +1,5 @@
 """The folder of a density, as a fit and the jobs on its model leave it."""
 
-from __future__ import annotations
+from orbiflow.density import written_files
 
-import json
-from pathlib import Path
-
-from orbiflow.export.density_figures import MODEL
-from orbiflow.export.density_plots import PICTURES, REPORT, TABLE, THUMBNAIL
-
-
-def written_files(folder: Path) -> set[str]:
-    """What an earlier fit wrote into the folder, and pictures of its model."""
-    try:
-        document = json.loads((folder / REPORT).read_text(encoding="utf-8"))
-        ours = "space" in document and "report" in document
-    except (OSError, ValueError, TypeError, RecursionError):
-        ours = False
-    return {MODEL, REPORT, TABLE, THUMBNAIL, *PICTURES} if ours else set()
+__all__ = ["written_files"]

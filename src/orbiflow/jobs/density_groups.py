@@ -5,12 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any, Protocol
 
-from orbiflow.density.tables import Table, column_names
-from orbiflow.density.tables.table import find
+from orbiflow.arrays import Array
+from orbiflow.density import (
+    Table,
+    column_names,
+    find,
+)
 from orbiflow.errors import InputFileError
 from orbiflow.jobs.density_data import read_weighed
 from orbiflow.jobs.run import Sink
-from orbiflow.symmetry.isometry import Array
 
 
 class Grouped(Protocol):

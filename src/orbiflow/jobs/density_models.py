@@ -9,15 +9,18 @@ from typing import Any
 
 import numpy as np
 
-from orbiflow.density import SymmetricDensity, read_density
-from orbiflow.density.spaces.space import Space
-from orbiflow.density.tables import Table
+from orbiflow.arrays import Array
+from orbiflow.density import (
+    MODEL,
+    Space,
+    SymmetricDensity,
+    Table,
+    read_density,
+)
 from orbiflow.errors import InputFileError
-from orbiflow.export.density_figures import MODEL
-from orbiflow.jobs.events import Note
 from orbiflow.jobs.run import Sink
 from orbiflow.jobs.wording import counted
-from orbiflow.symmetry.isometry import Array
+from orbiflow.runtime import Note
 
 FEW_ROWS = 10
 """Fewer may all be within 2 pi degrees without a word."""

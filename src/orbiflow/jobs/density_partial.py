@@ -9,32 +9,40 @@ from typing import Any
 import numpy as np
 import torch
 
-from orbiflow.cancel import Cancel
+from orbiflow.arrays import Array
 from orbiflow.density import (
+    MODEL,
+    REPORT,
+    TABLE,
     SymmetricDensity,
     Torus,
+    axes_named,
     conditional,
+    corner_picture,
+    density_picture,
     density_to_bytes,
+    given_named,
     log_prob_observed,
     marginal,
+    to_csv,
 )
-from orbiflow.density.partial import axes_named, given_named
-from orbiflow.density.tables import to_csv
 from orbiflow.errors import OrbiflowError
-from orbiflow.export.density_figures import MODEL
-from orbiflow.export.density_plots import REPORT, TABLE
-from orbiflow.figures import corner_picture, density_picture
-from orbiflow.files import write_atomic
-from orbiflow.folders import ResultFolder
 from orbiflow.jobs.density_folder import written_files
 from orbiflow.jobs.density_models import model_at, unit_warning
 from orbiflow.jobs.density_requests import DensityConditionalRequest, DensityMarginalRequest
-from orbiflow.jobs.events import Finished, Note, Progress, Written
 from orbiflow.jobs.place import check_folder
-from orbiflow.jobs.records import RecordError
 from orbiflow.jobs.run import Sink
-from orbiflow.symmetry.isometry import Array
-from orbiflow.threads import one_thread
+from orbiflow.runtime import (
+    Cancel,
+    Finished,
+    Note,
+    Progress,
+    RecordError,
+    ResultFolder,
+    Written,
+    one_thread,
+    write_atomic,
+)
 
 PICTURE = "density.png"
 

@@ -8,22 +8,34 @@ from typing import Any
 
 import numpy as np
 
-from orbiflow.cancel import Cancel
-from orbiflow.density.spaces.space import Space
-from orbiflow.export.density_figures import known_names
-from orbiflow.export.density_plot_settings import PlotSettings
-from orbiflow.export.density_plots import is_one_file, plot_density
-from orbiflow.export.lengths import column_width
-from orbiflow.figures.coastlines import read_coastlines
-from orbiflow.jobs.asked import given, read_as, samples_asked
+from orbiflow.density import (
+    PlotSettings,
+    Space,
+    is_one_file,
+    known_names,
+    plot_density,
+    read_coastlines,
+)
+from orbiflow.drawing import column_width
+from orbiflow.jobs.asked import (
+    given,
+    read_as,
+    samples_asked,
+)
 from orbiflow.jobs.density_data import read_data, same_columns
 from orbiflow.jobs.density_models import check_fits, model_at
 from orbiflow.jobs.density_requests import DensityPlotRequest
-from orbiflow.jobs.events import Finished, Note, Progress, Written
 from orbiflow.jobs.place import check_place, keep_apart
-from orbiflow.jobs.records import RecordError
 from orbiflow.jobs.run import Sink
-from orbiflow.threads import one_thread
+from orbiflow.runtime import (
+    Cancel,
+    Finished,
+    Note,
+    Progress,
+    RecordError,
+    Written,
+    one_thread,
+)
 
 
 @one_thread()

@@ -7,18 +7,33 @@ import io
 import json
 from typing import Any
 
-from orbiflow.cancel import Cancel
-from orbiflow.density.regions import DensityLevels, DensityRegion, Outline, outlines, to_geojson
+from orbiflow.density import (
+    DensityLevels,
+    DensityRegion,
+    Outline,
+    outlines,
+    to_geojson,
+)
 from orbiflow.errors import OrbiflowError
-from orbiflow.files import write_atomic
 from orbiflow.jobs.asked import samples_asked
 from orbiflow.jobs.density_compare_requests import DensityRegionRequest
 from orbiflow.jobs.density_models import model_at
-from orbiflow.jobs.events import Finished, Note, Progress, Written
 from orbiflow.jobs.place import check_place
 from orbiflow.jobs.run import Sink
-from orbiflow.jobs.wording import counted, percentage, with_error
-from orbiflow.threads import one_thread
+from orbiflow.jobs.wording import (
+    counted,
+    percentage,
+    with_error,
+)
+from orbiflow.runtime import (
+    Cancel,
+    Finished,
+    Note,
+    Progress,
+    Written,
+    one_thread,
+    write_atomic,
+)
 
 MASSES = (0.5, 0.9)
 

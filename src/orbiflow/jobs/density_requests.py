@@ -6,8 +6,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from orbiflow.jobs.records import RecordError
-from orbiflow.jobs.request import Request, ends_as_table, in_range
+from orbiflow.jobs.request import (
+    Request,
+    ends_as_table,
+    in_range,
+)
+from orbiflow.runtime import RecordError
 
 MOST_SAMPLES = 100_000_000
 MOST_DOTS = 100_000

@@ -9,14 +9,17 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from orbiflow.cancel import Cancel
-from orbiflow.density import SymmetricDensity, TabulatedDensity, log_density_gradient
-from orbiflow.density.models.tabulated import CHECKED
-from orbiflow.density.tables import Table
+from orbiflow.arrays import Array
+from orbiflow.density import (
+    CHECKED,
+    SymmetricDensity,
+    Table,
+    TabulatedDensity,
+    log_density_gradient,
+)
 from orbiflow.jobs.density_requests import DensityScoreRequest
-from orbiflow.jobs.events import Note, Progress
 from orbiflow.jobs.run import Sink
-from orbiflow.symmetry.isometry import Array
+from orbiflow.runtime import Cancel, Note, Progress
 
 BLOCK, BLOCK_GRADIENT = 2**18, 2**16
 """Rows at a time: many cost less each, few leave room and tell how far it is."""

@@ -9,28 +9,46 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from orbiflow.cancel import Cancel
-from orbiflow.density import log_prob_observed
-from orbiflow.density.comparing import scores_of
-from orbiflow.density.fitting.rows import mean_of, weighed
-from orbiflow.density.partial import chart_of_observed
-from orbiflow.density.regions import DensityLevels, told_masses
-from orbiflow.density.spaces.patches import to_klein
-from orbiflow.density.tables import append_columns, to_csv
-from orbiflow.density.tables.table import listing
+from orbiflow.arrays import Array
+from orbiflow.density import (
+    DensityLevels,
+    append_columns,
+    chart_of_observed,
+    listing,
+    log_prob_observed,
+    mean_of,
+    scores_of,
+    to_csv,
+    to_klein,
+    told_masses,
+    weighed,
+)
 from orbiflow.errors import OrbiflowError
-from orbiflow.files import write_atomic
 from orbiflow.jobs.asked import samples_asked
-from orbiflow.jobs.density_data import read_data, read_weighed, same_columns
+from orbiflow.jobs.density_data import (
+    read_data,
+    read_weighed,
+    same_columns,
+)
 from orbiflow.jobs.density_models import check_fits, model_at
-from orbiflow.jobs.density_requests import DensitySampleRequest, DensityScoreRequest, PatchesRequest
+from orbiflow.jobs.density_requests import (
+    DensitySampleRequest,
+    DensityScoreRequest,
+    PatchesRequest,
+)
 from orbiflow.jobs.density_scores import evaluated
-from orbiflow.jobs.events import Finished, Note, Progress, Written
 from orbiflow.jobs.place import check_place
 from orbiflow.jobs.run import Sink
 from orbiflow.jobs.wording import counted
-from orbiflow.symmetry.isometry import Array
-from orbiflow.threads import one_thread
+from orbiflow.runtime import (
+    Cancel,
+    Finished,
+    Note,
+    Progress,
+    Written,
+    one_thread,
+    write_atomic,
+)
 
 PATCH_WIDTHS = (8, 9)
 """Columns of image patches."""

@@ -8,40 +8,45 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from orbiflow.cancel import Cancel
-from orbiflow.escher import (
-    BendingSettings,
-    BothSettings,
-    ClassFailure,
-    DescentSettings,
-    OccupancySettings,
-    TileResult,
-    search,
-)
-from orbiflow.escher.methods import Settings
-from orbiflow.escher.report import report
-from orbiflow.export.folder import FIELD_FILES, figure_files
-from orbiflow.export.gallery import OVERVIEW, written_files
-from orbiflow.export.measures import is_poor
-from orbiflow.export.run_folder import fill_run
-from orbiflow.folders import ResultFolder
 from orbiflow.jobs.asked import given
-from orbiflow.jobs.events import (
+from orbiflow.jobs.place import check_folder
+from orbiflow.jobs.run import Sink
+from orbiflow.jobs.tile_requests import EscherizeRequest
+from orbiflow.runtime import (
+    Cancel,
     ClassFailed,
     Finished,
     Note,
     Preview,
     Progress,
+    RecordError,
+    ResultFolder,
     State,
     TileFound,
     Written,
 )
-from orbiflow.jobs.place import check_folder
-from orbiflow.jobs.records import RecordError
-from orbiflow.jobs.run import Sink
-from orbiflow.jobs.tile_requests import EscherizeRequest
-from orbiflow.silhouette import Emphasis, Pins, Target
-from orbiflow.tilings import CLASSES, isohedral_class
+from orbiflow.tiles import (
+    CLASSES,
+    FIELD_FILES,
+    OVERVIEW,
+    BendingSettings,
+    BothSettings,
+    ClassFailure,
+    DescentSettings,
+    Emphasis,
+    EscherTile,
+    OccupancySettings,
+    Pins,
+    Settings,
+    Target,
+    figure_files,
+    fill_run,
+    is_poor,
+    isohedral_class,
+    report,
+    written_files,
+)
+from orbiflow.tiles.search import searching as search
 
 POOR = (
     "even the first tile hardly looks like it; another pose, fewer or thicker limbs, all nine classes "
@@ -63,7 +68,7 @@ def escherize(request: EscherizeRequest, tell: Sink, cancel: Cancel) -> Finished
         OrbiflowError: for anything that the user can mend.
     """
     begin = time.perf_counter()
-    found: list[TileResult] = []
+    found: list[EscherTile] = []
     names = _class_names(request.classes)
     settings = _settings(request)
     workers = min(request.workers or os.cpu_count() or 1, len(names))
@@ -103,7 +108,7 @@ def escherize(request: EscherizeRequest, tell: Sink, cancel: Cancel) -> Finished
     interrupted = {failure.name for failure in failures if failure.reason == search.INTERRUPTED}
     # a first look at a class that was interrupted is less than an earlier run's tiles
     earlier = folder.has_a_run and (request.out / OVERVIEW).is_file()
-    write = not earlier or any(result.name not in interrupted for result in results)
+    write = not earlier or any(result.isohedral_class not in interrupted for result in results)
     # processes are for figures alone; 0 is without
     figures = workers if request.figures else 0
     if write:
@@ -122,7 +127,7 @@ def escherize(request: EscherizeRequest, tell: Sink, cancel: Cancel) -> Finished
 class _Relay:
     """A search's events as a job's; all tiles of all classes go into `found`."""
 
-    def __init__(self, names: list[str], tell: Sink, found: list[TileResult]) -> None:
+    def __init__(self, names: list[str], tell: Sink, found: list[EscherTile]) -> None:
         self.found = found
         self.shares = dict.fromkeys(names, 0.0)
         self.tell = tell
@@ -184,9 +189,9 @@ def _read(request: EscherizeRequest) -> tuple[Target, Emphasis | None, Pins | No
 def _write(
     folder: ResultFolder,
     document: dict[str, Any],
-    results: list[TileResult],
+    results: list[EscherTile],
     failures: list[ClassFailure],
-    found: list[TileResult],
+    found: list[EscherTile],
     target: Target,
     figures: int,
     tell: Sink,
@@ -213,16 +218,16 @@ def _write(
         tell(Written(folder.path / path))
 
 
-def _chosen(results: list[TileResult], found: list[TileResult]) -> str:
+def _chosen(results: list[EscherTile], found: list[EscherTile]) -> str:
     front = sum(result.front is True for result in results)
     text = f"{len(results)} of {len(found)} tiles are listed: {front} that no other beats in both "
     text += "deformation and overlap"
     return text if front == len(results) else f"{text}, {len(results) - front} near these"
 
 
-def _row(result: TileResult) -> dict[str, Any]:
+def _row(result: EscherTile) -> dict[str, Any]:
     return {
-        "class": result.name,
+        "class": result.isohedral_class,
         "group": result.group_name,
         "objective": result.objective,
         "deformation": result.deformation,

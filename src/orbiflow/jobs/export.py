@@ -7,18 +7,29 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from orbiflow.cancel import Cancel
-from orbiflow.export.exporting import Exported, scenes, sheet_names, write_scene
-from orbiflow.export.lengths import length, page_size, size
-from orbiflow.export.result_file import read_result
-from orbiflow.export.settings import FORMATS, ExportSettings
-from orbiflow.files import write_atomic
 from orbiflow.jobs.asked import given, read_as
-from orbiflow.jobs.events import Finished, Note, Progress, Written
 from orbiflow.jobs.place import check_place
-from orbiflow.jobs.records import RecordError
 from orbiflow.jobs.run import Sink
 from orbiflow.jobs.tile_requests import ExportRequest
+from orbiflow.runtime import (
+    Cancel,
+    Finished,
+    Note,
+    Progress,
+    RecordError,
+    Written,
+    write_atomic,
+)
+from orbiflow.tiles import (
+    FORMATS,
+    Exported,
+    ExportSettings,
+    read_result,
+    scenes,
+    sheet_names,
+    write_scene,
+)
+from orbiflow.units import length, page_size, size
 
 LENGTHS = ("tile_size", "tolerance", "warn_neck")
 LENGTHS_OR_ZERO = ("kerf", "clearance", "spacing")

@@ -12,8 +12,13 @@ from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 
-from orbiflow.jobs.events import Event, Failed, Finished, event_from_json
 from orbiflow.jobs.request import Request
+from orbiflow.runtime import (
+    Event,
+    Failed,
+    Finished,
+    event_from_json,
+)
 
 
 def start(request: Request) -> Job:
@@ -32,7 +37,8 @@ class Job:
     - `exitcode`: 0 if it finished, 1 if it failed, negative for the signal that it died of, None while
       it runs.
 
-    >>> from orbiflow.jobs import EscherizeRequest, start
+    >>> from orbiflow.jobs import EscherizeRequest
+    >>> from orbiflow.jobs.process import start
     >>> job = start(EscherizeRequest(image="no such.png"))
     >>> list(job.events())[-1].failure
     'mistake'

@@ -8,7 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from orbiflow.jobs.records import Record, RecordError
+from orbiflow.runtime import Record, RecordError
 
 SCHEMA_VERSION = 1
 

@@ -17,16 +17,14 @@ from orbiflow.jobs.density_requests import (
     DensityScoreRequest,
     PatchesRequest,
 )
-from orbiflow.jobs.records import RecordError, kind_of
 from orbiflow.jobs.request import SCHEMA_VERSION, Request
 from orbiflow.jobs.tile_requests import (
     AnimateRequest,
     ArtRequest,
     EscherizeRequest,
     ExportRequest,
-    PaperRequest,
 )
-from orbiflow.json_values import is_object
+from orbiflow.runtime import RecordError, is_object, kind_of
 
 REQUESTS: dict[str, type[Request]] = {
     kind.KIND: kind
@@ -44,7 +42,6 @@ REQUESTS: dict[str, type[Request]] = {
         DensityCompareRequest,
         DensityRegionRequest,
         PatchesRequest,
-        PaperRequest,
         BatchRequest,
         DensityBatchRequest,
         DensityCvRequest,

@@ -6,11 +6,17 @@ from collections.abc import Callable
 from importlib import import_module
 from typing import Any
 
-from orbiflow.cancel import Cancel, Cancelled
 from orbiflow.errors import OrbiflowError
-from orbiflow.jobs.events import Event, Failed, Finished, Started
 from orbiflow.jobs.request import Request
 from orbiflow.jobs.requests import REQUESTS
+from orbiflow.runtime import (
+    Cancel,
+    Cancelled,
+    Event,
+    Failed,
+    Finished,
+    Started,
+)
 
 Sink = Callable[[Event], None]
 
@@ -29,7 +35,6 @@ _MODULES = {
     "density-compare": "density_compare",
     "density-region": "density_region",
     "density-patches": "density_use",
-    "paper": "paper",
     "batch": "batch",
     "density-batch": "batch",
     "density-cv": "density_cv",
@@ -42,8 +47,8 @@ def run(request: Request, sink: Sink | None = None, cancel: Cancel | None = None
 
     Args:
         request: of one of the kinds in `REQUESTS`.
-        sink: called in this thread with every event, in the order that `orbiflow.jobs.events` states.
-            What it raises ends the job and comes out of this function.
+        sink: called in this thread with every event, in the order that
+            `orbiflow.runtime.events` states. What it raises ends the job.
         cancel: ends the job early; a search keeps what it has found, others write nothing.
 
     Returns:

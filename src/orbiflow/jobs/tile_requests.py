@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from orbiflow.jobs.records import RecordError
 from orbiflow.jobs.request import Request, at_least_one
+from orbiflow.runtime import RecordError
 
 
 @dataclass(frozen=True)
@@ -220,24 +220,3 @@ class AnimateRequest(Request):
             raise RecordError("{fps} belongs to .gif and .mp4: an SVG moves evenly")
         if self.size is not None and (not 64 <= self.size <= 4000 or self.size % 2):
             raise RecordError(f"{{size}} must be an even number from 64 to 4000, got {self.size}")
-
-
-@dataclass(frozen=True)
-class PaperRequest(Request):
-    """Reproduce the paper; see `orbiflow paper --help`.
-
-    - `fast`: a preview, with less work in each exhibit. `only`: names of exhibits, None for all.
-    - `workers`: processes, None for one a core.
-    """
-
-    KIND = "paper"
-
-    out: Path = Path("paper")
-    fast: bool = False
-    only: tuple[str, ...] | None = None
-    workers: int | None = None
-
-    def check(self) -> None:
-        at_least_one(self, "workers")
-        if self.only == ():
-            raise RecordError("{only} names no exhibit; give some, as in figure-9,table-3")

@@ -8,9 +8,14 @@ import numpy as np
 import torch
 from numpy.typing import ArrayLike
 
+from orbiflow.arrays import Array
 from orbiflow.errors import GroupError
 from orbiflow.symmetry.group import CrystallographicGroup
-from orbiflow.symmetry.isometry import Array, Isometry, Points, cast_like
+from orbiflow.symmetry.isometry import (
+    Isometry,
+    Points,
+    cast_like,
+)
 
 
 class DirichletDomain:

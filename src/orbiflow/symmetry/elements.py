@@ -6,10 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from orbiflow.arrays import Array
 from orbiflow.errors import GroupError
 from orbiflow.symmetry.group import CrystallographicGroup
-from orbiflow.symmetry.isometry import Array, Isometry
-from orbiflow.symmetry.plane import Line
+from orbiflow.symmetry.isometry import Isometry, Line
 
 
 class RotationCenter(NamedTuple):
@@ -51,7 +51,7 @@ def symmetry_elements(
     Raises:
         GroupError: if the group is not one of the plane.
 
-    >>> from orbiflow.symmetry.catalogue import wallpaper_group
+    >>> from orbiflow.symmetry import wallpaper_group
     >>> found = symmetry_elements(wallpaper_group("p4"), np.zeros(2), 0.1)
     >>> [(c.order, c.point.tolist()) for c in found.centers], found.lines
     ([(4, [0.0, 0.0])], ())

@@ -10,9 +10,10 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry.group import CrystallographicGroup, checked_group
-from orbiflow.symmetry.isometry import Array, Isometry, translation
+from orbiflow.symmetry.isometry import Isometry, translation
 from orbiflow.typed_torch import listed
 
 Kind = Literal["field", "map", "invariant"]

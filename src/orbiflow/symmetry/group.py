@@ -10,10 +10,14 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from orbiflow.errors import GroupError, LatticeMismatchError, NotDiscreteError
+from orbiflow.arrays import Array
+from orbiflow.errors import (
+    GroupError,
+    LatticeMismatchError,
+    NotDiscreteError,
+)
 from orbiflow.symmetry.isometry import (
     TOLERANCE,
-    Array,
     Isometry,
     Points,
     cast_like,
@@ -76,7 +80,7 @@ class CrystallographicGroup:
             NotDiscreteError: if the closure modulo the lattice has over `max_order` elements.
             GroupError: for a degenerate lattice or a generator of another dimension.
 
-        >>> from orbiflow.symmetry.plane import rotation
+        >>> from orbiflow.symmetry import rotation
         >>> CrystallographicGroup.generate(np.eye(2), [rotation((0.0, 0.0), 4)]).order
         4
         """
@@ -346,3 +350,21 @@ def _finite_closure(
                 return None
             elements.append(product)
     return tuple(elements)
+
+
+def reduced_basis(lattice: Array) -> Array:
+    """Shortest basis (columns) of a plane lattice, with an angle of 60 to 120 degrees.
+
+    Lagrange's and Gauss's reduction.
+
+    >>> reduced_basis(np.array([[1.0, 7.0], [0.0, 1.0]])).tolist()
+    [[1.0, 0.0], [0.0, 1.0]]
+    """
+    first, second = lattice.T
+    while True:
+        if first @ first > second @ second:
+            first, second = second, first
+        steps = round(float(first @ second) / float(first @ first) * (1 - 1e-12))
+        if steps == 0:
+            return np.stack([first, second], axis=1)
+        second = second - steps * first

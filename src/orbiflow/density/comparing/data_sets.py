@@ -10,10 +10,19 @@ import numpy as np
 import torch
 from numpy.typing import ArrayLike, NDArray
 
-from orbiflow.arguments import is_a, number, numbers, whole
+from orbiflow.arguments import (
+    is_a,
+    number,
+    numbers,
+    whole,
+)
 from orbiflow.density.arguments import silent
 from orbiflow.density.comparing.divergence import Divergence, cross_fitted
-from orbiflow.density.comparing.paired import LEVEL, MOST_RESAMPLES, RESAMPLES
+from orbiflow.density.comparing.paired import (
+    LEVEL,
+    MOST_RESAMPLES,
+    RESAMPLES,
+)
 from orbiflow.density.comparing.resampling import Groups
 from orbiflow.density.comparing.two_samples import (
     MOST_ROWS,
@@ -22,9 +31,8 @@ from orbiflow.density.comparing.two_samples import (
     chosen_rows,
     mmd_test,
 )
-from orbiflow.density.fitting.report import Progress
-from orbiflow.density.spaces.catalogue import space_class
-from orbiflow.density.spaces.space import Space
+from orbiflow.density.fitting import Progress
+from orbiflow.density.spaces import Space, space_class
 from orbiflow.errors import OrbiflowError
 
 MOST_PERMUTATIONS = 100_000

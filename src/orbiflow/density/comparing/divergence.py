@@ -11,14 +11,17 @@ import torch
 from scipy.optimize import minimize_scalar
 from torch import Tensor
 
+from orbiflow.arrays import Array
 from orbiflow.density.arguments import silent
 from orbiflow.density.comparing.resampling import Groups, resampled_sums
-from orbiflow.density.fitting.automatic import AutomaticSettings, fit_automatic
-from orbiflow.density.fitting.report import Progress
-from orbiflow.density.models.blend import BlendedDensity
-from orbiflow.density.spaces.space import Space
+from orbiflow.density.fitting import (
+    AutomaticSettings,
+    Progress,
+    fit_automatic,
+)
+from orbiflow.density.models import BlendedDensity
+from orbiflow.density.spaces import Space
 from orbiflow.errors import OrbiflowError
-from orbiflow.symmetry.isometry import Array
 
 PARTS = ("kernels",)
 """What the densities are made of: fits of a second or so."""

@@ -8,10 +8,10 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from orbiflow.arrays import Array
 from orbiflow.density.comparing.resampling import Groups
-from orbiflow.density.spaces.space import Space
-from orbiflow.symmetry.isometry import Array
-from orbiflow.threads import one_thread
+from orbiflow.density.spaces import Space
+from orbiflow.runtime import one_thread
 from orbiflow.typed_torch import listed
 
 MOST_ROWS = 3_000

@@ -9,16 +9,19 @@ from torch import Tensor
 
 from orbiflow.density.fitting.evidence import Candidates
 from orbiflow.density.fitting.families import Family
+from orbiflow.density.fitting.kernels import even_kernels, joined
 from orbiflow.density.fitting.rows import Rows
-from orbiflow.density.fitting.scales import even_kernels, joined
-from orbiflow.density.models.bases import Base, UniformBase
-from orbiflow.density.models.blend import BlendedDensity
-from orbiflow.density.models.chains import VonMisesChains
-from orbiflow.density.models.kernels import AdaptiveKernels
-from orbiflow.density.models.network import VonMisesNetwork
-from orbiflow.density.models.still import still_flow
-from orbiflow.density.models.symmetric import SymmetricDensity
-from orbiflow.density.spaces.space import Space
+from orbiflow.density.models import (
+    AdaptiveKernels,
+    Base,
+    BlendedDensity,
+    SymmetricDensity,
+    UniformBase,
+    VonMisesChains,
+    VonMisesNetwork,
+    still_flow,
+)
+from orbiflow.density.spaces import Space
 
 FLAT = 1e-6
 """Concentration of a kernel that is as good as uniform."""

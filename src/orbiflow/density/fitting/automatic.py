@@ -10,12 +10,15 @@ import torch
 from numpy.typing import ArrayLike
 from torch import Tensor
 
-from orbiflow.density.arguments import check_kind, check_range, silent
+from orbiflow.density.arguments import (
+    check_kind,
+    check_range,
+    silent,
+)
 from orbiflow.density.fitting.assembly import assembled
-from orbiflow.density.fitting.budget import Budget
+from orbiflow.density.fitting.budget import Budget, training
 from orbiflow.density.fitting.evidence import (
     Candidates,
-    PartEvidence,
     candidates_of,
     judged,
     without_idle,
@@ -27,35 +30,50 @@ from orbiflow.density.fitting.families import (
     MixtureFamily,
     NetworkFamily,
 )
-from orbiflow.density.fitting.flow_trial import TriedFlow, flow_settings, try_flow
-from orbiflow.density.fitting.folds import LEAST_PLACES, Folds, folds_of
-from orbiflow.density.fitting.kernels import NARROWEST
-from orbiflow.density.fitting.missing import (
-    MARGINAL_PARTS,
-    check_missing,
-    is_whole,
-    missing_notes,
-    observed_points,
+from orbiflow.density.fitting.flow_trial import (
+    TriedFlow,
+    flow_settings,
+    try_flow,
 )
-from orbiflow.density.fitting.repeats import Repeats, repeats_of
-from orbiflow.density.fitting.report import FitReport, Progress, mean_nll, own_points, steps_note
+from orbiflow.density.fitting.folds import (
+    LEAST_PLACES,
+    Folds,
+    Repeats,
+    folds_of,
+    repeats_of,
+)
+from orbiflow.density.fitting.kernels import NARROWEST
+from orbiflow.density.fitting.report import (
+    FitReport,
+    PartEvidence,
+    Progress,
+    mean_nll,
+    own_points,
+    steps_note,
+)
 from orbiflow.density.fitting.rows import (
+    MARGINAL_PARTS,
     Rows,
+    check_missing,
     effective_rows,
     group_numbers,
+    is_whole,
     mean_of,
+    missing_notes,
+    observed_points,
     weighed,
     weights_note,
     weights_of,
 )
 from orbiflow.density.fitting.settings import FitSettings
-from orbiflow.density.fitting.training import training
 from orbiflow.density.fitting.weights import stacked, supported_weights
-from orbiflow.density.models.blend import BlendedDensity
-from orbiflow.density.models.still import MOST_DIM
-from orbiflow.density.partial import at_observed
-from orbiflow.density.spaces.flat import Torus, whole_turn
-from orbiflow.density.spaces.space import Space
+from orbiflow.density.inference import at_observed
+from orbiflow.density.models import MOST_DIM, BlendedDensity
+from orbiflow.density.spaces import (
+    Space,
+    Torus,
+    whole_turn,
+)
 from orbiflow.errors import OrbiflowError
 from orbiflow.typed_torch import listed
 

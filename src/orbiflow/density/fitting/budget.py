@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import time
+from collections.abc import Generator
+
+import torch
+
+from orbiflow.runtime import one_thread
 
 clock = time.monotonic
 """Seconds since some moment; tests put another in its place."""
@@ -82,3 +88,18 @@ class Budget:
     def _is_late(self) -> bool:
         # no limit needs no clock
         return self.seconds < math.inf and clock() - self._began >= self.seconds
+
+
+@contextlib.contextmanager
+def training() -> Generator[None]:
+    """For a block, or for a function as its decorator; the caller's settings are left alone.
+
+    Under `torch.no_grad()` or `torch.inference_mode()` there would be no gradients, and what is made
+    in the latter could never be differentiated.
+
+    >>> with torch.no_grad(), training():
+    ...     torch.is_grad_enabled(), torch.get_num_threads()
+    (True, 1)
+    """
+    with one_thread(), torch.inference_mode(False), torch.enable_grad():
+        yield

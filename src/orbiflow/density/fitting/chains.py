@@ -10,12 +10,17 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from orbiflow.density.fitting.budget import Budget
+from orbiflow.density.fitting.budget import Budget, training
 from orbiflow.density.fitting.rows import Rows
-from orbiflow.density.fitting.training import training
-from orbiflow.density.models.chains import SCALES, VonMisesChains, averaged, chained, waves
-from orbiflow.density.models.log_sum import shares_of
-from orbiflow.density.spaces.space import Space
+from orbiflow.density.models import (
+    SCALES,
+    VonMisesChains,
+    averaged,
+    chained,
+    shares_of,
+    waves,
+)
+from orbiflow.density.spaces import Space
 from orbiflow.errors import OrbiflowError
 from orbiflow.typed_torch import linalg, special
 

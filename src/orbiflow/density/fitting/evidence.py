@@ -12,9 +12,12 @@ from torch import Tensor
 from orbiflow.density.fitting.budget import Budget
 from orbiflow.density.fitting.families import Family
 from orbiflow.density.fitting.folds import Folds
-from orbiflow.density.fitting.missing import log_prob_of_rows
 from orbiflow.density.fitting.report import PartEvidence, Progress
-from orbiflow.density.fitting.rows import Rows, mean_of
+from orbiflow.density.fitting.rows import (
+    Rows,
+    log_prob_of_rows,
+    mean_of,
+)
 from orbiflow.density.fitting.weights import (
     NEGLIGIBLE,
     Gain,
@@ -23,8 +26,8 @@ from orbiflow.density.fitting.weights import (
     stacked,
     stacking_weights,
 )
-from orbiflow.density.models.bases import Base, UniformBase
-from orbiflow.density.spaces.space import Space
+from orbiflow.density.models import Base, UniformBase
+from orbiflow.density.spaces import Space
 from orbiflow.typed_torch import listed
 
 KEPT = 2

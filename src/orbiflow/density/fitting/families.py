@@ -11,19 +11,33 @@ from torch import Tensor
 
 from orbiflow.density.fitting.budget import Budget
 from orbiflow.density.fitting.chains import fit_chain_mixture, spread_chains
-from orbiflow.density.fitting.kernels import NARROWEST
-from orbiflow.density.fitting.missing import is_whole, log_prob_of_rows, with_incomplete
+from orbiflow.density.fitting.kernels import (
+    NARROWEST,
+    joined,
+    kernel_estimates,
+)
 from orbiflow.density.fitting.mixtures import fit_mixture
-from orbiflow.density.fitting.network import Shape, fit_network, network_shapes
-from orbiflow.density.fitting.rows import Rows
-from orbiflow.density.fitting.scales import joined, kernel_estimates
+from orbiflow.density.fitting.network import (
+    Shape,
+    fit_network,
+    network_shapes,
+)
+from orbiflow.density.fitting.rows import (
+    Rows,
+    is_whole,
+    log_prob_of_rows,
+    with_incomplete,
+)
 from orbiflow.density.fitting.weights import gain_of
-from orbiflow.density.models.bases import Base
-from orbiflow.density.models.chains import VonMisesChains, averaged
-from orbiflow.density.models.kernels import AdaptiveKernels
-from orbiflow.density.models.network import VonMisesNetwork, averaged_networks
-from orbiflow.density.spaces.flat import Torus
-from orbiflow.density.spaces.space import Space
+from orbiflow.density.models import (
+    AdaptiveKernels,
+    Base,
+    VonMisesChains,
+    VonMisesNetwork,
+    averaged,
+    averaged_networks,
+)
+from orbiflow.density.spaces import Space, Torus
 
 SIZES = (1, 2, 4, 8, 16, 32, 64)
 """Components of the mixtures and chains tried."""

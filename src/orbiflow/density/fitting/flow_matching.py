@@ -9,7 +9,7 @@ import torch
 from scipy.optimize import linear_sum_assignment
 from torch import Tensor
 
-from orbiflow.density.spaces.space import Space
+from orbiflow.density.spaces import Space
 from orbiflow.fields import InvariantField
 
 ORDER = 3

@@ -16,10 +16,14 @@ from orbiflow.density.fitting.folds import Folds
 from orbiflow.density.fitting.report import FitReport, PartEvidence
 from orbiflow.density.fitting.rows import Rows, mean_of
 from orbiflow.density.fitting.settings import FitSettings
-from orbiflow.density.fitting.weights import Gain, gain_of, stacked, stacking_weights
-from orbiflow.density.models.still import MOST_DIM
-from orbiflow.density.models.symmetric import SymmetricDensity
-from orbiflow.density.spaces.space import Space
+from orbiflow.density.fitting.weights import (
+    Gain,
+    gain_of,
+    stacked,
+    stacking_weights,
+)
+from orbiflow.density.models import MOST_DIM, SymmetricDensity
+from orbiflow.density.spaces import Space
 
 FEW_ROWS, MANY_ROWS = 5_000, 20_000
 """With fewer a flow is fitted in one stage; from the latter on it may be finer."""

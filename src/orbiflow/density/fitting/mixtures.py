@@ -8,13 +8,23 @@ from collections.abc import Sequence
 import torch
 from torch import Tensor
 
-from orbiflow.density.fitting.chains import PRIOR, PRIOR_RESULTANT, concentration
+from orbiflow.density.fitting.budget import training
+from orbiflow.density.fitting.chains import (
+    PRIOR,
+    PRIOR_RESULTANT,
+    concentration,
+)
 from orbiflow.density.fitting.kernels import NARROWEST, WIDEST
-from orbiflow.density.fitting.training import training
-from orbiflow.density.models.kernels import AdaptiveKernels, kernel_rows
-from orbiflow.density.models.log_sum import FAINT
-from orbiflow.density.spaces.round import RoundSpace
-from orbiflow.density.spaces.space import Space, rectangle
+from orbiflow.density.models import (
+    FAINT,
+    AdaptiveKernels,
+    kernel_rows,
+)
+from orbiflow.density.spaces import (
+    RoundSpace,
+    Space,
+    rectangle,
+)
 from orbiflow.typed_torch import linalg, special
 
 CONVERGED = 1e-4

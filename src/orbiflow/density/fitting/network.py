@@ -13,9 +13,14 @@ from orbiflow.density.fitting.budget import Budget
 from orbiflow.density.fitting.chains import fit_chain_mixture, spread_chains
 from orbiflow.density.fitting.rows import Rows
 from orbiflow.density.fitting.weights import Gain, gain_of
-from orbiflow.density.models.chains import VonMisesChains, averaged
-from orbiflow.density.models.network import Factor, VonMisesNetwork, log_conditional
-from orbiflow.density.spaces.flat import Torus
+from orbiflow.density.models import (
+    Factor,
+    VonMisesChains,
+    VonMisesNetwork,
+    averaged,
+    log_conditional,
+)
+from orbiflow.density.spaces import Torus
 
 MOST_PARENTS = 3
 """Of an angle."""

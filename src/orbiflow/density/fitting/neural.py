@@ -11,8 +11,13 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from orbiflow.density.arguments import check_kind, check_ranges, check_share, silent
-from orbiflow.density.fitting.budget import Budget
+from orbiflow.density.arguments import (
+    check_kind,
+    check_ranges,
+    check_share,
+    silent,
+)
+from orbiflow.density.fitting.budget import Budget, training
 from orbiflow.density.fitting.chains import ChainsFit, fit_chains
 from orbiflow.density.fitting.flow_matching import coupled
 from orbiflow.density.fitting.likelihood import Refinement
@@ -27,18 +32,20 @@ from orbiflow.density.fitting.report import (
     split,
     steps_note,
 )
-from orbiflow.density.fitting.training import training
-from orbiflow.density.models.bases import Base, UniformBase
-from orbiflow.density.models.neural import (
+from orbiflow.density.models import (
+    Base,
+    NeuralFlow,
+    SymmetricDensity,
+    UniformBase,
+)
+from orbiflow.density.spaces import Space
+from orbiflow.errors import OrbiflowError
+from orbiflow.fields import (
     MAX_DEPTH,
     MAX_WAVES,
     MAX_WIDTH,
-    NeuralFlow,
     NeuralTorusField,
 )
-from orbiflow.density.models.symmetric import SymmetricDensity
-from orbiflow.density.spaces.space import Space
-from orbiflow.errors import OrbiflowError
 from orbiflow.typed_torch import adam
 
 MOST_STEPS = 128

@@ -11,11 +11,11 @@ import torch
 from torch import Tensor
 
 from orbiflow.density.arguments import check_kind, points_tensor
+from orbiflow.density.fitting.folds import Repeats
 from orbiflow.density.fitting.likelihood import Refinement
-from orbiflow.density.fitting.repeats import Repeats
 from orbiflow.density.fitting.rows import mean_of
-from orbiflow.density.models.symmetric import SymmetricDensity
-from orbiflow.density.spaces.space import Space
+from orbiflow.density.models import SymmetricDensity
+from orbiflow.density.spaces import Space
 from orbiflow.errors import OrbiflowError
 from orbiflow.typed_torch import unique
 

@@ -6,7 +6,11 @@ import math
 from dataclasses import dataclass
 
 from orbiflow.arguments import is_a
-from orbiflow.density.arguments import check_range, check_ranges, check_share
+from orbiflow.density.arguments import (
+    check_range,
+    check_ranges,
+    check_share,
+)
 from orbiflow.errors import OrbiflowError
 
 

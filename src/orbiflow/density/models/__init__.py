@@ -1,27 +1,5 @@
-"""Densities: push-forwards of a base, kernels, chains, networks and their blends."""
+"""Models of densities: push-forwards of a base, kernels, chains, networks and their mixtures."""
 
-from orbiflow.density.models.bases import Base, UniformBase, VonMisesBase
-from orbiflow.density.models.blend import BlendedDensity
-from orbiflow.density.models.chains import VonMisesChains
-from orbiflow.density.models.kernels import AdaptiveKernels
-from orbiflow.density.models.network import Factor, VonMisesNetwork
-from orbiflow.density.models.neural import NeuralFlow, NeuralTorusField
-from orbiflow.density.models.symmetric import SymmetricDensity, kl_by_quadrature, midpoints
-from orbiflow.density.models.tabulated import TabulatedDensity
+import lazy_loader
 
-__all__ = [
-    "AdaptiveKernels",
-    "Base",
-    "BlendedDensity",
-    "Factor",
-    "NeuralFlow",
-    "NeuralTorusField",
-    "SymmetricDensity",
-    "TabulatedDensity",
-    "UniformBase",
-    "VonMisesBase",
-    "VonMisesChains",
-    "VonMisesNetwork",
-    "kl_by_quadrature",
-    "midpoints",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

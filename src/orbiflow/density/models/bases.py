@@ -14,8 +14,11 @@ from torch import Tensor
 from orbiflow.arguments import is_a
 from orbiflow.density.arguments import check_kind
 from orbiflow.density.models.moving import moved
-from orbiflow.density.spaces.space import Space, rectangle
+from orbiflow.density.models.neural import NeuralFlow
+from orbiflow.density.spaces import Space, rectangle
 from orbiflow.errors import OrbiflowError
+from orbiflow.fields import NeuralTorusField, SplineField
+from orbiflow.flows import Flow
 from orbiflow.typed_torch import special
 
 
@@ -89,3 +92,19 @@ class VonMisesBase(Base):
             0.0, self.concentration, (count, self.space.dim)
         )
         return self.space.project(0.5 + torch.tensor(angle) / (2 * math.pi) * self.periods.cpu())
+
+
+MOST_DIM = 3
+"""Dimensions of a spline's grid; beyond, it would be too large."""
+
+
+def still_flow(space: Space) -> Flow:
+    """A flow on the space that is the identity: a new field is zero.
+
+    >>> from orbiflow.density import make_space
+    >>> len(still_flow(make_space("torus")).segments)
+    1
+    """
+    if space.dim > MOST_DIM:
+        return NeuralFlow(NeuralTorusField(space.dim, width=1, depth=1, waves=1), steps=1)
+    return Flow([SplineField(space.group, 1)], steps=1, warn=False)

@@ -13,11 +13,20 @@ from orbiflow.density.models.bases import Base, UniformBase
 from orbiflow.density.models.chains import VonMisesChains
 from orbiflow.density.models.kernels import AdaptiveKernels
 from orbiflow.density.models.network import VonMisesNetwork
-from orbiflow.density.models.symmetric import BLOCK, SymmetricDensity, shape_of, source_of
-from orbiflow.density.spaces.space import CHART, Space, check_measure
+from orbiflow.density.models.symmetric import (
+    BLOCK,
+    SymmetricDensity,
+    shape_of,
+    source_of,
+)
+from orbiflow.density.spaces import (
+    CHART,
+    Space,
+    check_measure,
+)
 from orbiflow.errors import OrbiflowError
 from orbiflow.flows import Flow
-from orbiflow.threads import one_thread
+from orbiflow.runtime import one_thread
 from orbiflow.typed_torch import listed
 
 

@@ -10,8 +10,8 @@ from torch import Tensor
 
 from orbiflow.density.arguments import float_tensor
 from orbiflow.density.models.bases import Base
-from orbiflow.density.models.log_sum import log_sum_exp
-from orbiflow.density.spaces.space import Space
+from orbiflow.density.models.terms import log_sum_exp
+from orbiflow.density.spaces import Space
 from orbiflow.errors import OrbiflowError
 from orbiflow.typed_torch import special
 

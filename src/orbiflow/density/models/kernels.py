@@ -9,14 +9,17 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from orbiflow.arrays import Array
 from orbiflow.density.arguments import float_tensor
 from orbiflow.density.models.bases import Base
 from orbiflow.density.models.near_sums import TOLERANCE, near_log_sum
 from orbiflow.density.models.terms import Terms
-from orbiflow.density.spaces.round import RoundSpace
-from orbiflow.density.spaces.space import Space, rectangle
+from orbiflow.density.spaces import (
+    RoundSpace,
+    Space,
+    rectangle,
+)
 from orbiflow.errors import OrbiflowError
-from orbiflow.symmetry.isometry import Array
 from orbiflow.typed_torch import special
 
 

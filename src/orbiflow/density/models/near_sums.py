@@ -9,8 +9,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from orbiflow.density.models.kernel_tiles import Chart, Tile
 from orbiflow.density.models.terms import Terms
-from orbiflow.density.models.tiles import Chart, Tile
 from orbiflow.typed_torch import applied
 
 TOLERANCE = 1e-12

@@ -12,9 +12,15 @@ from torch import Tensor
 
 from orbiflow.density.arguments import check_kind
 from orbiflow.density.models.bases import Base
-from orbiflow.density.models.chains import BLOCK, SCALES, VonMisesChains, averaged, waves
-from orbiflow.density.models.log_sum import log_sum_exp, shares_of
-from orbiflow.density.spaces.space import Space
+from orbiflow.density.models.chains import (
+    BLOCK,
+    SCALES,
+    VonMisesChains,
+    averaged,
+    waves,
+)
+from orbiflow.density.models.terms import log_sum_exp, shares_of
+from orbiflow.density.spaces import Space
 from orbiflow.errors import OrbiflowError
 from orbiflow.typed_torch import listed, special
 

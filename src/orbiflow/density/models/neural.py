@@ -2,25 +2,10 @@
 
 from __future__ import annotations
 
-from orbiflow.fields.torus_network import (
-    MAX_DEPTH,
-    MAX_WAVES,
-    MAX_WIDTH,
+from orbiflow.fields import (
     NeuralTorusField,
-    speed,
-    way,
 )
 from orbiflow.flows import Flow
-
-__all__ = [
-    "MAX_DEPTH",
-    "MAX_WAVES",
-    "MAX_WIDTH",
-    "NeuralFlow",
-    "NeuralTorusField",
-    "speed",
-    "way",
-]
 
 
 class NeuralFlow(Flow):

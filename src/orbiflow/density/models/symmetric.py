@@ -11,13 +11,18 @@ import torch
 from torch import Tensor
 from torch.distributions import Distribution, constraints
 
-from orbiflow.density.arguments import check_kind, check_range, float_tensor, points_tensor
+from orbiflow.density.arguments import (
+    check_kind,
+    check_range,
+    float_tensor,
+    points_tensor,
+)
 from orbiflow.density.models.bases import Base, UniformBase
 from orbiflow.density.models.moving import destination, moved
-from orbiflow.density.spaces.space import CHART, Space
+from orbiflow.density.spaces import CHART, Space
 from orbiflow.errors import OrbiflowError
 from orbiflow.flows import Flow
-from orbiflow.threads import one_thread
+from orbiflow.runtime import one_thread
 from orbiflow.typed_torch import linalg
 
 BLOCK = 65536
@@ -196,7 +201,7 @@ class SymmetricDensity(Distribution):
             OrbiflowError: for what is neither a device nor a floating dtype.
 
         >>> from orbiflow.density import make_space
-        >>> from orbiflow.density.models.still import still_flow
+        >>> from orbiflow.density.models import still_flow
         >>> space = make_space("torus")
         >>> single = SymmetricDensity(space, still_flow(space)).to(torch.float32)
         >>> single.sample(5).dtype

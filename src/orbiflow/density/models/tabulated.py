@@ -9,15 +9,23 @@ from collections.abc import Callable
 import torch
 from torch import Tensor
 
-from orbiflow.density.arguments import check_kind, check_range, points_tensor
+from orbiflow.density.arguments import (
+    check_kind,
+    check_range,
+    points_tensor,
+)
 from orbiflow.density.models.blend import BlendedDensity
 from orbiflow.density.models.kernels import AdaptiveKernels
 from orbiflow.density.models.moving import destination, moved
 from orbiflow.density.models.symmetric import SymmetricDensity, midpoints
-from orbiflow.density.spaces.space import CHART, rectangle
+from orbiflow.density.spaces import CHART, rectangle
 from orbiflow.errors import OrbiflowError
-from orbiflow.fields.splines import padded, spline_sum, symbol
-from orbiflow.threads import one_thread
+from orbiflow.fields import (
+    padded,
+    spline_sum,
+    symbol,
+)
+from orbiflow.runtime import one_thread
 from orbiflow.typed_torch import fft
 
 CHECKED = 4096

@@ -6,8 +6,8 @@ import numpy as np
 import shapely
 from skimage.measure import find_contours
 
+from orbiflow.arrays import Array
 from orbiflow.density.regions.grid import Function
-from orbiflow.symmetry.isometry import Array
 
 TOLERANCE = 1e-3
 """Of the function at a vertex, less the level."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from orbiflow.symmetry.isometry import Array
+from orbiflow.arrays import Array
 
 Function = Callable[[Array], Array]
 """Points (N, 2) to values (N,)."""

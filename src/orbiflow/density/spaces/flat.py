@@ -12,11 +12,11 @@ from numpy.typing import ArrayLike
 from torch import Tensor
 
 from orbiflow.arguments import is_a
+from orbiflow.arrays import Array
 from orbiflow.density.arguments import check_range
 from orbiflow.density.spaces.space import Space, checked_table
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import CrystallographicGroup, identification_group
-from orbiflow.symmetry.isometry import Array
 
 TURN: dict[str, float] = {"radians": 2 * math.pi, "degrees": 360.0, "turns": 1.0}
 """A whole turn in each unit."""

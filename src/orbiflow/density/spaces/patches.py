@@ -26,10 +26,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from orbiflow.arrays import Array
 from orbiflow.density.spaces.flat import whole_turn
 from orbiflow.density.spaces.space import checked_table, such_rows
 from orbiflow.errors import OrbiflowError
-from orbiflow.symmetry.isometry import Array
 
 FLAT = 1e-12
 """Contrast, relative to the largest pixel value, below which a patch has no direction."""

@@ -13,12 +13,16 @@ from numpy.typing import ArrayLike, NDArray
 from torch import Tensor
 
 from orbiflow.arguments import is_a
+from orbiflow.arrays import Array
 from orbiflow.density.arguments import check_kind
 from orbiflow.density.spaces import uniformization
-from orbiflow.density.spaces.space import Space, checked_table, such_rows
+from orbiflow.density.spaces.space import (
+    Space,
+    checked_table,
+    such_rows,
+)
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import CrystallographicGroup, identification_group
-from orbiflow.symmetry.isometry import Array
 from orbiflow.typed_torch import linalg
 
 UNIT_TOLERANCE = 1e-3

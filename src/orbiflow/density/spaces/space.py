@@ -13,10 +13,10 @@ from numpy.typing import ArrayLike
 from torch import Tensor
 
 from orbiflow.arguments import is_a
+from orbiflow.arrays import Array
 from orbiflow.density.arguments import float_tensor
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import CrystallographicGroup, DirichletDomain
-from orbiflow.symmetry.isometry import Array
 from orbiflow.typed_torch import linalg
 
 MEASURES = ("natural", "square", "uniform")

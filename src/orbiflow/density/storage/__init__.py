@@ -1,5 +1,5 @@
 """Densities on disk: safetensors, never pickle."""
 
-from orbiflow.density.storage.files import density_to_bytes, read_density
+import lazy_loader
 
-__all__ = ["density_to_bytes", "read_density"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

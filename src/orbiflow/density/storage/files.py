@@ -8,30 +8,38 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from orbiflow.density.models.bases import Base, UniformBase, VonMisesBase
-from orbiflow.density.models.blend import BlendedDensity
-from orbiflow.density.models.chains import VonMisesChains
-from orbiflow.density.models.kernels import AdaptiveKernels
-from orbiflow.density.models.neural import NeuralFlow
-from orbiflow.density.models.symmetric import SymmetricDensity
-from orbiflow.density.spaces.catalogue import make_space
-from orbiflow.density.spaces.space import Space
-from orbiflow.density.storage.chains import (
+from orbiflow.density.models import (
+    AdaptiveKernels,
+    Base,
+    BlendedDensity,
+    NeuralFlow,
+    SymmetricDensity,
+    UniformBase,
+    VonMisesBase,
+    VonMisesChains,
+)
+from orbiflow.density.spaces import Space, make_space
+from orbiflow.density.storage.components import (
     BESIDE,
     chains_from_header,
     chains_header,
     chains_tensors,
-)
-from orbiflow.density.storage.groups import check_group, group_header, is_same_group
-from orbiflow.density.storage.network import (
     network_from_header,
     network_header,
     network_tensors,
+    neural_from_header,
+    neural_header,
+    neural_tensors,
 )
-from orbiflow.density.storage.neural import neural_from_header, neural_header, neural_tensors
-from orbiflow.density.storage.series import series_from_header, series_parts
+from orbiflow.density.storage.series import (
+    check_group,
+    is_same_group,
+    series_from_header,
+    series_parts,
+)
 from orbiflow.errors import InputFileError, OrbiflowError
-from orbiflow.tensor_files import read_tensors, tensor_bytes
+from orbiflow.runtime import read_tensors, tensor_bytes
+from orbiflow.symmetry import group_header
 
 FORMATS = tuple(f"orbiflow-density/{number}" for number in (1, 2, 3, 4))
 """Read: the first had one smoothness for all segments, and no group; the second no chains beside a

@@ -6,15 +6,78 @@ import math
 from collections.abc import Mapping
 from typing import Any, cast
 
+import numpy as np
 import torch
 from torch import Tensor
 
-from orbiflow.density.spaces.space import Space
-from orbiflow.density.storage.groups import is_same_group
+from orbiflow.density.spaces import Space
 from orbiflow.errors import OrbiflowError
-from orbiflow.fields import FourierField, InvariantField, SplineField
+from orbiflow.fields import (
+    FourierField,
+    InvariantField,
+    SplineField,
+)
 from orbiflow.flows import Flow
-from orbiflow.json_values import is_list
+from orbiflow.runtime import is_list
+from orbiflow.symmetry import CrystallographicGroup, group_header
+
+
+def checked_tensor(
+    name: str, value: Tensor, shape: tuple[int, ...], *, least: float = -1e30
+) -> Tensor:
+    if tuple(value.shape) != tuple(shape):
+        raise OrbiflowError(f"{name} has shape {tuple(value.shape)}, expected {tuple(shape)}")
+    if not value.is_floating_point() or not bool(((value >= least) & (value < 1e30)).all()):
+        raise OrbiflowError(f"{name} has values that are not finite numbers")
+    return value
+
+
+def checked_integer(header: Mapping[str, Any], name: str, most: int) -> int:
+    value = header.get(name)
+    if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= most:
+        raise OrbiflowError(f"{name} must be an integer from 1 to {most}, got {value!r}")
+    return value
+
+
+TOLERANCE = 1e-9
+"""Of matrices and translations that are read as equal."""
+
+
+def is_same_group(one: CrystallographicGroup, other: CrystallographicGroup) -> bool:
+    """Whether lattice *basis* and coset representatives agree.
+
+    Another basis of the same lattice numbers the frequencies otherwise: the same parameters would be
+    another field.
+    """
+    return (
+        one.lattice.shape == other.lattice.shape
+        and one.order == other.order
+        and np.allclose(one.lattice, other.lattice, rtol=0, atol=TOLERANCE)
+        and all(other.contains(coset, TOLERANCE) for coset in one.cosets)
+    )
+
+
+def check_group(header: Any, group: CrystallographicGroup) -> None:
+    """
+    Raises:
+        OrbiflowError: if `header`, from `group_header`, is of another group.
+    """
+    try:
+        tables = [np.array(header[name], dtype=float) for name in group_header(group)]
+        lattice, linear, translations = tables
+        same = (
+            lattice.shape == group.lattice.shape
+            and linear.shape == group.linear_parts.shape
+            and translations.shape == group.translations.shape
+            and np.allclose(lattice, group.lattice, rtol=0, atol=TOLERANCE)
+            and np.allclose(linear, group.linear_parts, rtol=0, atol=TOLERANCE)
+            and np.allclose(translations, group.translations, rtol=0, atol=TOLERANCE)
+        )
+    except (KeyError, TypeError, ValueError, OverflowError):
+        same = False
+    if not same:
+        raise OrbiflowError(f"its group is not {group!r}, which its space has here")
+
 
 MAX_SEGMENTS, MAX_FREQUENCY, MAX_STEPS, MAX_DIM = 256, 128, 4096, 3
 FIELDS: dict[str, type[FourierField | SplineField]] = {

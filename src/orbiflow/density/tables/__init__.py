@@ -1,18 +1,5 @@
 """Tables of numbers in CSV, TSV, whitespace-separated text, `.npy` and Parquet files."""
 
-from orbiflow.density.tables.files import append_column, append_columns, read_table, to_csv
-from orbiflow.density.tables.identifiers import is_identifier
-from orbiflow.density.tables.labels import column_names, read_labels
-from orbiflow.density.tables.table import MissingCellsError, Table
+import lazy_loader
 
-__all__ = [
-    "MissingCellsError",
-    "Table",
-    "append_column",
-    "append_columns",
-    "column_names",
-    "is_identifier",
-    "read_labels",
-    "read_table",
-    "to_csv",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

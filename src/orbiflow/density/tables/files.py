@@ -7,13 +7,22 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from orbiflow.density.tables.binary import read_npy, read_parquet
-from orbiflow.density.tables.table import (
-    Table,
+from orbiflow.density.tables.binary import (
+    npy_names,
+    parquet_labels,
+    parquet_names,
+    read_npy,
+    read_parquet,
 )
-from orbiflow.density.tables.text import read_text, text_lines
+from orbiflow.density.tables.table import Table, find
+from orbiflow.density.tables.text import (
+    layout_of,
+    read_text,
+    split_line,
+    text_lines,
+)
 from orbiflow.errors import InputFileError
 
 MAX_BYTES = 2 * 2**30
@@ -183,3 +192,79 @@ def kind_of_file(path: Path) -> str:
     if b"\0" in head:
         raise InputFileError(f"{path}: binary data, not a table; save it as CSV in UTF-8")
     return "text"
+
+
+def column_names(
+    path: str | Path, *, wanted: Sequence[str] | None = None, has_header: bool | None = None
+) -> tuple[str, ...] | None:
+    """Names of all columns of a file, None where it names none.
+
+    `wanted` and `has_header` are as for `read_table`: they tell a header from a row.
+
+    Raises `InputFileError` for a file that is no table.
+    """
+    path = Path(path)
+    kind = kind_of_file(path)
+    if kind == "text":
+        return layout_of(path, wanted, has_header).header
+    return npy_names(path) if kind == "npy" else parquet_names(path)
+
+
+def read_labels(
+    path: str | Path, column: str, table: Table, *, has_header: bool | None = None
+) -> NDArray[np.str_]:
+    """The cells (N,) of a column, numbers or not, of the rows of a `table` read from the file.
+
+    Raises `InputFileError` for an unknown column, an empty cell, or a file that has changed.
+    """
+    path = Path(path)
+    kind = kind_of_file(path)
+    if kind == "npy":
+        numbers = read_table(path, columns=[column], width=1, drop_missing=True)
+        cells = numbers.values[:, 0].astype(str).tolist()
+        found = dict(zip(numbers.lines.tolist(), cells, strict=True))
+        return _picked(path, column, found, table)
+    if kind == "parquet":
+        cells = parquet_labels(path, column)
+        return _picked(path, column, {k: c for k, c in enumerate(cells, start=1) if c}, table)
+    layout = layout_of(path, [column], has_header)
+    index = find(path, layout.names, column)
+    found: dict[int, str] = {}
+    for number, line, is_comment in text_lines(path):
+        if is_comment:
+            continue
+        cells = split_line(path, number, line, layout.delimiter)
+        cell = cells[index].strip() if index < len(cells) else ""
+        if cell:
+            found[number] = cell
+    return _picked(path, column, found, table)
+
+
+def _picked(path: Path, column: str, found: dict[int, str], table: Table) -> NDArray[np.str_]:
+    """Cells by the numbers of their lines, for the rows of the table."""
+    missing = [line for line in table.lines.tolist() if line not in found]
+    if missing:
+        raise InputFileError(
+            f"{path}: {len(missing)} rows have no {column!r}, the first in line {missing[0]}; fill "
+            "it in"
+        )
+    return np.array([found[line] for line in table.lines.tolist()])
+
+
+NAMES = frozenset({"", "#", "id", "idx", "index", "key", "no", "no.", "nr", "number", "row"})
+"""Of columns that may hold any different whole numbers."""
+
+
+def is_identifier(name: str, values: NDArray[np.float64]) -> bool:
+    """Whether a column (N,) counts the rows, or is named so and has a whole number for each.
+
+    >>> is_identifier("phi", np.arange(5.0)), is_identifier("phi", np.array([1.0, 1.0, 2.0]))
+    (True, False)
+    """
+    if len(values) < 3 or not bool((values == np.round(values)).all()):
+        return False
+    if bool((np.diff(values) == 1).all()):
+        return True
+    word = name.strip().casefold()
+    named = word in NAMES or word.endswith(("_id", " id"))
+    return named and len(np.unique(values)) == len(values)

@@ -5,17 +5,24 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 
-from orbiflow.cancel import Cancel
 from orbiflow.jobs.batch.folder import RESERVED, BatchFolder
 from orbiflow.jobs.batch.inputs import folder_names, listed
 from orbiflow.jobs.batch.items import FileSource, Item
 from orbiflow.jobs.batch.kind import FolderKind
 from orbiflow.jobs.batch.kinds import DENSITIES, TILES
-from orbiflow.jobs.batch.overview import PAGE, TABLE, ContactSheet
+from orbiflow.jobs.batch.overview import (
+    PAGE,
+    TABLE,
+    ContactSheet,
+)
 from orbiflow.jobs.batch.work import go_through
-from orbiflow.jobs.batch_requests import BatchRequest, DensityBatchRequest, ManyRequest
-from orbiflow.jobs.events import Finished
+from orbiflow.jobs.batch_requests import (
+    BatchRequest,
+    DensityBatchRequest,
+    ManyRequest,
+)
 from orbiflow.jobs.run import Sink
+from orbiflow.runtime import Cancel, Finished
 
 
 def batch(request: BatchRequest, tell: Sink, cancel: Cancel) -> Finished:

@@ -13,11 +13,21 @@ from typing import Self
 from filelock import FileLock, Timeout
 
 from orbiflow.errors import OrbiflowError, OutputError
-from orbiflow.files import make_folder, write_atomic, write_set
-from orbiflow.folders import LITTER, ResultFolder
 from orbiflow.jobs.batch.journal import Entry, Journal
 from orbiflow.jobs.batch.kind import Kind
-from orbiflow.jobs.batch.overview import PAGE, TABLE, ContactSheet, Overview
+from orbiflow.jobs.batch.overview import (
+    PAGE,
+    TABLE,
+    ContactSheet,
+    Overview,
+)
+from orbiflow.runtime import (
+    LITTER,
+    ResultFolder,
+    make_folder,
+    write_atomic,
+    write_set,
+)
 
 THUMBNAILS, LOCK = "thumbnails", ".batch.lock"
 RESERVED = (ContactSheet.journal, TABLE, PAGE, THUMBNAILS, LOCK)

@@ -15,10 +15,13 @@ from types import TracebackType
 from typing import Any, Literal, Self
 
 from orbiflow.errors import OutputError
-from orbiflow.files import write_atomic
-from orbiflow.folders import stays_inside
-from orbiflow.jobs.records import Record, RecordError
-from orbiflow.json_values import is_object
+from orbiflow.runtime import (
+    Record,
+    RecordError,
+    is_object,
+    stays_inside,
+    write_atomic,
+)
 
 MOST_BYTES = 2**30
 """Of a journal that is read."""

@@ -5,7 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from orbiflow.jobs.batch.kind import Column, FolderKind, Summary
+from orbiflow.jobs.batch.kind import (
+    Column,
+    FolderKind,
+    Summary,
+)
 
 
 def _best_tile(summary: Summary) -> dict[str, Any]:
@@ -20,7 +24,7 @@ def _tiling(summary: Summary) -> str | None:
 
 
 def _files_of_a_search(folder: Path) -> set[str]:
-    from orbiflow.export.gallery import written_files
+    from orbiflow.tiles import written_files
 
     return written_files(folder)
 
@@ -73,7 +77,7 @@ DENSITIES = FolderKind(
     most_bytes=256 * 2**20,
     reads="data",
     writes="out",
-    modules=("orbiflow.jobs.density_fit", "orbiflow.figures.density_thumbnail"),
+    modules=("orbiflow.jobs.density_fit", "orbiflow.density.pictures.thumbnail"),
     columns=(
         Column("rows", "rows", "d"),
         Column("log_likelihood", "mean log density", ".4f"),

@@ -10,7 +10,11 @@ import html
 from collections.abc import Sequence
 from urllib.parse import quote
 
-from orbiflow.export.web_page import CLOSING, css, opening
+from orbiflow.drawing import (
+    CLOSING,
+    css,
+    opening,
+)
 from orbiflow.jobs.batch.journal import Entry
 from orbiflow.jobs.batch.kind import Column, Kind
 

@@ -9,16 +9,29 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 from orbiflow import __version__
-from orbiflow.cancel import Cancel
 from orbiflow.errors import OrbiflowError
 from orbiflow.jobs.batch.folder import BatchFolder
 from orbiflow.jobs.batch.inputs import code_of
 from orbiflow.jobs.batch.items import Item
 from orbiflow.jobs.batch.journal import Entry
 from orbiflow.jobs.batch.kind import Kind
-from orbiflow.jobs.events import Failed, Finished, ItemDone, Note, Progress, State
-from orbiflow.jobs.executors import Answer, DaskCluster, Executor, LocalProcesses, Parcel
+from orbiflow.jobs.executors import (
+    Answer,
+    DaskCluster,
+    Executor,
+    LocalProcesses,
+    Parcel,
+)
 from orbiflow.jobs.run import Sink
+from orbiflow.runtime import (
+    Cancel,
+    Failed,
+    Finished,
+    ItemDone,
+    Note,
+    Progress,
+    State,
+)
 
 MOST_NAMED = 5
 """Items that a note names."""

@@ -14,15 +14,19 @@ from typing import Any, ClassVar
 import numpy as np
 
 from orbiflow import __version__
-from orbiflow.density.comparing import ModelComparison
-from orbiflow.density.tables import append_columns
+from orbiflow.arrays import Array
+from orbiflow.density import ModelComparison, append_columns
 from orbiflow.errors import InputFileError
 from orbiflow.jobs.batch.journal import Entry
 from orbiflow.jobs.density_cv.page import PageOf, cv_page
-from orbiflow.jobs.density_cv.results import HeldOut, Spread, compared, held_out
+from orbiflow.jobs.density_cv.results import (
+    HeldOut,
+    Spread,
+    compared,
+    held_out,
+)
 from orbiflow.jobs.density_cv.splits import Fit, Split
 from orbiflow.jobs.density_cv_requests import UNIFORM, DensityCvRequest
-from orbiflow.symmetry.isometry import Array
 
 TABLE, ROWS, REPORT, PAGE = "cv.csv", "rows.csv", "report.json", "index.html"
 

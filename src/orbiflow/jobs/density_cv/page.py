@@ -10,15 +10,22 @@ from urllib.parse import quote
 
 import numpy as np
 
-from orbiflow.density.comparing import Difference, ModelComparison
-from orbiflow.export.web_page import CLOSING, css, opening
-from orbiflow.figures.density_axes import space_title
+from orbiflow.arrays import Array
+from orbiflow.density import (
+    Difference,
+    ModelComparison,
+    space_title,
+)
+from orbiflow.drawing import (
+    CLOSING,
+    css,
+    opening,
+)
 from orbiflow.jobs.batch.journal import Entry
 from orbiflow.jobs.density_cv.plot import Strip, strips
 from orbiflow.jobs.density_cv.results import HeldOut
 from orbiflow.jobs.density_cv.splits import Fit, Split
 from orbiflow.jobs.density_cv_requests import UNIFORM, DensityCvRequest
-from orbiflow.symmetry.isometry import Array
 
 HERE = "orbiflow.jobs.density_cv"
 

@@ -11,15 +11,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from orbiflow.density.comparing import ModelComparison, compare_scores
-from orbiflow.density.tables import read_table
+from orbiflow.arrays import Array
+from orbiflow.density import (
+    ModelComparison,
+    compare_scores,
+    read_table,
+)
 from orbiflow.errors import OrbiflowError
 from orbiflow.jobs.batch.journal import Entry
 from orbiflow.jobs.density_cv.splits import Fit, Split
 from orbiflow.jobs.density_cv_requests import UNIFORM, DensityCvRequest
 from orbiflow.jobs.density_fold import SCORES
-from orbiflow.symmetry.isometry import Array
-from orbiflow.threads import one_blas_thread
+from orbiflow.runtime import one_blas_thread
 
 COLUMNS = ("row", "log_prob")
 

@@ -9,21 +9,25 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from orbiflow.density.fitting.folds import LEAST_PLACES, places
-from orbiflow.density.fitting.rows import weighed
-from orbiflow.density.partial import chart_of_observed
-from orbiflow.density.spaces.catalogue import space_class
-from orbiflow.density.spaces.space import Space
-from orbiflow.density.tables import Table, read_labels
+from orbiflow.arrays import Array
+from orbiflow.density import (
+    LEAST_PLACES,
+    Space,
+    Table,
+    chart_of_observed,
+    places,
+    read_labels,
+    space_class,
+    weighed,
+)
 from orbiflow.errors import OrbiflowError
 from orbiflow.jobs.density_cv_requests import DensityCvRequest
 from orbiflow.jobs.density_data import unit_of
 from orbiflow.jobs.density_fit import WIDTH
 from orbiflow.jobs.density_groups import read_beside_groups
 from orbiflow.jobs.density_requests import Unit
-from orbiflow.jobs.events import Note
 from orbiflow.jobs.run import Sink
-from orbiflow.symmetry.isometry import Array
+from orbiflow.runtime import Note
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from orbiflow.density.comparing import cross_validation_folds
+from orbiflow.density import cross_validation_folds
 from orbiflow.errors import InputFileError
 from orbiflow.jobs.batch.inputs import code_of
 from orbiflow.jobs.batch.items import Item

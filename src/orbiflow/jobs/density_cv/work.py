@@ -5,19 +5,27 @@ from __future__ import annotations
 import time
 from typing import Any
 
-from orbiflow.cancel import Cancel
 from orbiflow.jobs.batch.folder import BatchFolder
 from orbiflow.jobs.batch.kind import Column, Kind, Summary
 from orbiflow.jobs.batch.work import go_through
-from orbiflow.jobs.density_cv.overview import PAGE, REPORT, ROWS, TABLE, CvOverview
+from orbiflow.jobs.density_cv.overview import (
+    PAGE,
+    REPORT,
+    ROWS,
+    TABLE,
+    CvOverview,
+)
 from orbiflow.jobs.density_cv.rows import read_rows
-from orbiflow.jobs.density_cv.splits import fits_of, item_of, splits_of
+from orbiflow.jobs.density_cv.splits import (
+    fits_of,
+    item_of,
+    splits_of,
+)
 from orbiflow.jobs.density_cv_requests import DensityCvRequest
 from orbiflow.jobs.density_fold import written_files
-from orbiflow.jobs.events import Finished, Note
 from orbiflow.jobs.place import keep_apart, keep_inputs
 from orbiflow.jobs.run import Sink
-from orbiflow.threads import one_thread
+from orbiflow.runtime import Cancel, Finished, Note, one_thread
 
 
 def _figures(summary: Summary) -> dict[str, Any]:

@@ -19,12 +19,15 @@ from types import TracebackType
 from typing import Any, Self, TypeAlias
 
 from orbiflow import __version__
-from orbiflow.cancel import Cancel
 from orbiflow.errors import OrbiflowError
-from orbiflow.jobs.events import Note
 from orbiflow.jobs.executors.memory import keeping_memory
-from orbiflow.jobs.executors.parcel import Answer, Parcel, carry_out
+from orbiflow.jobs.executors.parcel import (
+    Answer,
+    Parcel,
+    carry_out,
+)
 from orbiflow.jobs.run import Sink
+from orbiflow.runtime import Cancel, Note
 
 Client: TypeAlias = Any
 Future: TypeAlias = Any

@@ -6,9 +6,9 @@ from collections.abc import Generator, Iterable
 from types import TracebackType
 from typing import Protocol, Self
 
-from orbiflow.cancel import Cancel
 from orbiflow.jobs.executors.parcel import Answer, Parcel
 from orbiflow.jobs.run import Sink
+from orbiflow.runtime import Cancel
 
 
 class Executor(Protocol):

@@ -9,10 +9,13 @@ from importlib import import_module
 from types import TracebackType
 from typing import Any, Self
 
-from orbiflow.cancel import Cancel
-from orbiflow.jobs.events import Note
-from orbiflow.jobs.executors.parcel import Answer, Parcel, carry_out
+from orbiflow.jobs.executors.parcel import (
+    Answer,
+    Parcel,
+    carry_out,
+)
 from orbiflow.jobs.run import Sink
+from orbiflow.runtime import Cancel, Note
 
 TRIES = 3
 """Processes that may die of one parcel."""
@@ -53,7 +56,7 @@ class LocalProcesses:
         cancel: Cancel,
     ) -> Generator[Answer, None, None]:
         """As of every `Executor`."""
-        from orbiflow.processes import process_context, work  # with torch
+        from orbiflow.runtime import process_context, work
 
         keys: list[str] = []
 

@@ -11,14 +11,22 @@ from pathlib import Path
 from typing import Any
 
 from orbiflow import __version__
-from orbiflow.cancel import Cancel
 from orbiflow.errors import OrbiflowError
-from orbiflow.folders import stays_inside
-from orbiflow.jobs.events import Event, Failed, Finished, Progress, Written, event_from_json
 from orbiflow.jobs.request import Request
 from orbiflow.jobs.requests import request_from_json
 from orbiflow.jobs.run import run
-from orbiflow.json_values import is_list, is_object
+from orbiflow.runtime import (
+    Cancel,
+    Event,
+    Failed,
+    Finished,
+    Progress,
+    Written,
+    event_from_json,
+    is_list,
+    is_object,
+    stays_inside,
+)
 
 MOST_WRITTEN = 512 * 2**20
 """Bytes that one job may write."""
@@ -97,7 +105,7 @@ def carry_out(header: str, data: bytes, cancel: Cancel) -> tuple[str, dict[str, 
     Returns:
         Events as text, and files, for `Answer.of`. Whatever fails is among the events.
     """
-    from orbiflow.threads import one_thread  # with torch
+    from orbiflow.runtime import one_thread
 
     order = json.loads(header)
     with (

@@ -1,0 +1,91 @@
+"""What ships for the exhibits: nine goals, tiles of EST and ARAP, a silhouette, printed figures."""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+from importlib import resources
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from orbiflow.arrays import Array
+from orbiflow.tiles import Target
+
+KL = {
+    "torus": {"4-gaussian": 0.03, "6-gaussian": 0.45, "checkerboard": 0.67},
+    "sphere": {"4-gaussian": 0.03, "6-gaussian": 0.47, "checkerboard": 0.56},
+}
+"""The paper's table of KL divergences, as printed."""
+
+GROUPS = {
+    "IH1": "p1", "IH2": "pg", "IH3": "pg", "IH4": "p2", "IH5": "pgg", "IH6": "pgg", "IH7": "p3",
+    "IH21": "p6", "IH28": "p4",
+}  # fmt: skip
+"""The paper's table of symmetry groups, as printed."""
+
+
+class PublishedTile(NamedTuple):
+    """A tile of another method: its class, and its polygon (N, 2) laid on the goal."""
+
+    isohedral_class: str
+    polygon: Array
+
+
+class Goal(NamedTuple):
+    """One of the paper's nine goals.
+
+    - `name`: in words. `outline`: (N, 2), y down.
+    - `tiles`: by "est", "arap" (each method's first) and "est_largest", "arap_largest" (of its first
+      twenty the one that overlaps most).
+    - `printed`: the paper's table, by "iou" and "pixel_accuracy", then "paper" and "arap".
+    """
+
+    name: str
+    outline: Array
+    tiles: dict[str, PublishedTile]
+    printed: dict[str, dict[str, float]]
+
+    def target(self) -> Target:
+        """The goal at its true aspect."""
+        return Target.from_polygon(self.outline, y_down=True, source=self.name)
+
+    def squared(self) -> Target:
+        """The goal as the paper had it: each axis stretched to the side of a square."""
+        low, high = self.outline.min(axis=0), self.outline.max(axis=0)
+        outline = 200.0 * (self.outline - low) / (high - low)
+        return Target.from_polygon(outline, y_down=True, source=self.name)
+
+
+@cache
+def goals() -> dict[str, Goal]:
+    """The nine, by name, in the order of the paper's table."""
+    document = json.loads(_data("nine_goals.json").read_text("utf-8"))
+    return {name: _goal(name, row) for name, row in document["goals"].items()}
+
+
+def animal() -> Target:
+    """The silhouette of the exhibits on one animal: a turtle, read from a picture."""
+    with resources.as_file(_data("turtle.png")) as path:
+        target = Target.read(path)
+    return Target(
+        target.outline,
+        target.y_down,
+        target.notes,
+        "turtle.png",
+        target.kind,
+        target.size,
+        target.corner,
+    )
+
+
+def _goal(name: str, row: dict[str, Any]) -> Goal:
+    tiles = {
+        key: PublishedTile(row[key]["class"], np.array(row[key]["tile"]))
+        for key in ("est", "est_largest", "arap", "arap_largest")
+    }
+    return Goal(name, np.array(row["outline"]), tiles, row["table"])
+
+
+def _data(name: str) -> Any:
+    return resources.files("reproduction").joinpath("data", name)

@@ -1,0 +1,161 @@
+"""Doing all exhibits: first the work that they share, then the drawing, each failure kept to itself."""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import time
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from orbiflow.errors import OrbiflowError
+from orbiflow.runtime import (
+    Cancel,
+    Cancelled,
+    one_blas_thread,
+    one_thread,
+    process_context,
+    work,
+)
+from reproduction.canvas import Canvas, Picture
+from reproduction.exhibit import (
+    Draw,
+    Exhibit,
+    Findings,
+    Shown,
+    Work,
+)
+from reproduction.extent import Extent
+
+Progress = Callable[[float, str], None]
+"""Told the share of all that is done, and what was done last."""
+
+DRAWING = 4.0
+"""Seconds or so that a drawing takes: its share in the progress."""
+
+
+class Outcome(NamedTuple):
+    """Of a call: its value, or why there is none; and its seconds."""
+
+    value: Any
+    failure: str
+    seconds: float
+
+
+def reproduce(
+    exhibits: Sequence[Exhibit],
+    extent: Extent,
+    folder: Path,
+    *,
+    workers: int = 1,
+    progress: Progress | None = None,
+    cancel: Cancel | None = None,
+) -> list[Shown]:
+    """Draw exhibits into a folder.
+
+    Work that several exhibits need is done once. What fails is shown with its reason; the others are
+    drawn all the same.
+
+    Args:
+        exhibits: in the order in which they are to be shown.
+        extent: how much work each may be.
+        folder: that is there.
+        workers: processes; 1 stays in this one.
+        progress: told in this thread how far it is.
+        cancel: looked at between steps.
+
+    Returns:
+        One for each exhibit, in their order.
+
+    Raises:
+        Cancelled: if it was told to stop.
+    """
+    cancel = cancel or Cancel()
+    needs = [exhibit.needs(extent) for exhibit in exhibits]
+    chosen = {one.key: one for needed in needs for one in needed}
+    jobs = sorted(chosen.values(), key=lambda one: -one.cost)
+    tell = _Share(progress, sum(one.cost for one in jobs) + DRAWING * len(exhibits))
+    run = functools.partial(_run, workers=workers, cancel=cancel)
+    done: dict[Any, Outcome] = {}
+    for index, outcome in run(_work_done, jobs):
+        done[jobs[index].key] = outcome
+        tell(jobs[index].cost, "working")
+    given = [[done.get(one.key, _LOST) for one in needed] for needed in needs]
+    shown = [Shown(exhibit, failure=_LOST.failure) for exhibit in exhibits]
+    function = functools.partial(_drawn, extent=extent, folder=folder)
+    drawings = [(one.name, one.draw, values) for one, values in zip(exhibits, given, strict=True)]
+    for index, outcome in run(function, drawings):
+        exhibit = exhibits[index]
+        pictures, findings = ((), None) if outcome.failure else outcome.value
+        shown[index] = Shown(exhibit, pictures, findings, outcome.failure, outcome.seconds)
+        tell(DRAWING, f"drawn {exhibit.label}")
+    cancel.check()
+    return shown
+
+
+_LOST = Outcome(None, "the process that worked on it died; was memory short?", 0.0)
+
+
+class _Share:
+    def __init__(self, progress: Progress | None, total: float) -> None:
+        self.progress, self.total, self.done = progress, total, 0.0
+
+    def __call__(self, cost: float, what: str) -> None:
+        self.done += cost
+        if self.progress is not None:
+            self.progress(min(1.0, self.done / self.total), what)
+
+
+def _run(
+    function: Callable[[Any], Any], items: Sequence[Any], *, workers: int, cancel: Cancel
+) -> Iterator[tuple[int, Outcome]]:
+    """Indices and outcomes, as they come; those of processes that die do not."""
+    if min(workers, len(items)) <= 1:
+        for index, item in enumerate(items):
+            cancel.check()
+            yield index, _outcome(function, item, _deaf, cancel)
+        return
+    told = functools.partial(_outcome, function)
+    context = process_context(("orbiflow.tiles.search.searching",))
+    pool = work(told, items, workers, context=context, cancel=cancel)
+    with contextlib.closing(pool), contextlib.suppress(OrbiflowError):
+        for news in pool:
+            yield news.index, news.value
+    cancel.check()
+
+
+def _deaf(_news: Any) -> None:
+    """What is told on the way is of no interest."""
+
+
+def _outcome(
+    function: Callable[[Any], Any], item: Any, _tell: Callable[[Any], None], _cancel: Cancel
+) -> Outcome:
+    begin = time.perf_counter()
+    value, failure = None, ""
+    with one_thread(), one_blas_thread():
+        try:
+            value = function(item)
+        except Cancelled:
+            raise
+        except Exception as error:  # whatever it is: the other exhibits go on, and this one says so
+            mistake = isinstance(error, OrbiflowError)
+            failure = str(error) if mistake else f"{type(error).__name__}: {error}"
+    return Outcome(value, failure, time.perf_counter() - begin)
+
+
+def _work_done(job: Work) -> Any:
+    return job.function(*job.arguments)
+
+
+def _drawn(
+    item: tuple[str, Draw, list[Outcome]], *, extent: Extent, folder: Path
+) -> tuple[tuple[Picture, ...], Findings]:
+    name, draw, given = item
+    for outcome in given:
+        if outcome.failure:
+            raise OrbiflowError(outcome.failure)
+    canvas = Canvas(folder, name)
+    findings = draw(canvas, extent, [outcome.value for outcome in given])
+    return tuple(canvas.pictures), findings

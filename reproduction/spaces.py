@@ -1,0 +1,245 @@
+"""The four identification spaces: the square's edges, the tilings, the surfaces, the symmetrization."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from orbiflow.arrays import Array
+from orbiflow.density import (
+    SPACES,
+    Space,
+    edge_pairs,
+    make_space,
+)
+from orbiflow.drawing import mark_symmetry
+from orbiflow.symmetry import IDENTIFICATION_SPACES, CrystallographicGroup
+from reproduction.canvas import Canvas
+from reproduction.exhibit import (
+    Exhibit,
+    Findings,
+    Table,
+)
+from reproduction.extent import Extent
+from reproduction.nested import nested_error, terms
+from reproduction.panels import (
+    around,
+    caption,
+    grid_box,
+    panel,
+    tiny,
+)
+from reproduction.surface_picture import draw_surface
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+TITLES = {
+    "torus": "torus",
+    "sphere": "sphere",
+    "klein-bottle": "Klein bottle",
+    "projective-plane": "projective plane",
+}
+EDGES = ("#c2410c", "#1d4e79")
+FILLS = ("#f4ecdc", "#c9dcec", "#f2cfa5", "#cfe3d4")
+"""Of cells, by coset."""
+
+CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+LETTER = np.array(
+    [[0, 0], [0, 5], [3, 5], [3, 4], [1, 4], [1, 3], [2.4, 3], [2.4, 2], [1, 2], [1, 0]]
+)
+TURNS = {
+    "torus": (0.5, 0.75),
+    "sphere": (0.6, 0.35),
+    "klein-bottle": (0.3, 0.75),
+    "projective-plane": (0.4, 0.5),
+}
+"""From where the surfaces are seen: yaw and pitch."""
+
+
+def euler_characteristic(group: CrystallographicGroup) -> int:
+    """Vertices minus edges plus one face of the unit square with the edges that the group identifies.
+
+    >>> from orbiflow.symmetry import identification_group
+    >>> [euler_characteristic(identification_group(s)) for s in ("torus", "projective-plane")]
+    [0, 1]
+    """
+    orbits: list[Array] = []
+    for corner in CORNERS:
+        images = group.images(corner)
+        steps = [(images - other) @ group.inverse_lattice.T for other in orbits]
+        if not any((np.abs(s - s.round()).max(axis=-1) < 1e-9).any() for s in steps):
+            orbits.append(corner)
+    return len(orbits) - len(edge_pairs(group)) + 1
+
+
+def orientable(group: CrystallographicGroup) -> bool:
+    """Whether no element of the group turns the plane over."""
+    return all(g.determinant > 0 for g in group.cosets)
+
+
+def _draw_spaces(canvas: Canvas, extent: Extent, _values: list[Any]) -> Findings:
+    figure = canvas.figure(0.80)
+    rows = []
+    for column, name in enumerate(SPACES):
+        space = make_space(name)
+        box = grid_box(0, column, 3, 4, title=0.10, gap=0.02)
+        caption(figure, box, TITLES[name], weight="bold", size=1.1)
+        _draw_square(panel(figure, box, around((0.5, 0.5), 0.72, 0.72)), space.group)
+        box = grid_box(1, column, 3, 4, gap=0.02)
+        _draw_cells(
+            panel(figure, box, around((1.0, 1.0), 2.0, 2.0 * box[3] * 0.8 / box[2])), space.group
+        )
+        axes = figure.add_axes(grid_box(2, column, 3, 4, gap=0.0))
+        draw_surface(axes, space, _checked(space, extent.resolution), turn=TURNS[name])
+        chi, sided = euler_characteristic(space.group), orientable(space.group)
+        rows.append((TITLES[name], space.group.name, str(chi), "yes" if sided else "no"))
+    canvas.add(
+        figure,
+        "Four columns: torus, sphere, Klein bottle, projective plane. Above the square with "
+        "identified edges, in the middle its tiling with a letter F in every cell, below the "
+        "surface.",
+        "Edges of one colour are one edge, in the sense of the arrows. In the tilings one fill "
+        "for each aspect. Klein bottle (figure eight) and projective plane (Boy's surface) pass "
+        "through themselves, as they must in space. They carry the square's chequerboard of 8 by "
+        "8 fields, and its edges.",
+        exact=True,
+    )
+    wanted = {
+        "torus": (0, True),
+        "sphere": (2, True),
+        "klein-bottle": (0, False),
+        "projective-plane": (1, False),
+    }
+    groups = {name: make_space(name).group for name in SPACES}
+    right = all(
+        (euler_characteristic(g), orientable(g)) == wanted[name] for name, g in groups.items()
+    )
+    return Findings(
+        "agrees" if right else "differs",
+        "Each group identifies the square's edges in pairs, and counting vertices, edges and the "
+        "face that are left gives the Euler characteristic: with orientability it proves which "
+        "surface each is.",
+        "The topology agrees, the geometry is more: on the sphere and the projective plane the "
+        "plane's group has rotation centres at the square's corners. There the square's flat "
+        "metric has cone points, of a quarter or half turn, that no symmetric flow can move; a "
+        "density must be taken with respect to the round area to be one on the round sphere.",
+        numbers={name: euler_characteristic(g) for name, g in groups.items()},
+        tables=[
+            Table(
+                "What the identifications make.",
+                ("space", "group", "Euler characteristic", "orientable"),
+                tuple(rows),
+            )
+        ],
+    )
+
+
+def _draw_square(axes: Axes, group: CrystallographicGroup) -> None:
+    axes.fill(*CORNERS.T, facecolor=FILLS[0])
+    for number, pair in enumerate(edge_pairs(group)):
+        for edge in pair:
+            axes.plot(*edge.T, color=EDGES[number], linewidth=3.2, solid_capstyle="round", zorder=4)
+            along = edge[1] - edge[0]
+            across = np.array([-along[1], along[0]])
+            for k in range(number + 1):
+                tip = edge[0] + (0.56 + 0.075 * (k - number / 2)) * along
+                back = tip - 0.11 * along
+                head = np.stack([tip, back + 0.055 * across, back - 0.055 * across])
+                axes.fill(
+                    *head.T, facecolor=EDGES[number], edgecolor="#ffffff", linewidth=0.6, zorder=5
+                )
+    axes.fill(*(0.39 + 0.05 * LETTER).T, facecolor="#16202a")
+
+
+def _draw_cells(axes: Axes, group: CrystallographicGroup) -> None:
+    middle = np.full(2, 0.5)
+    pairs = edge_pairs(group)
+    letter = 0.12 + 0.055 * LETTER
+    for g in group.elements_near(np.ones(2), 4.5, source=middle):
+        aspect = next(i for i, c in enumerate(group.cosets) if np.allclose(c.linear, g.linear))
+        axes.fill(*g(CORNERS).T, facecolor=FILLS[aspect], edgecolor="none", zorder=1)
+        axes.fill(*g(letter).T, facecolor="#16202a", zorder=3)
+        for number, pair in enumerate(pairs):
+            for edge in pair:
+                axes.plot(*g(edge).T, color=EDGES[number], linewidth=1.4, zorder=2)
+    (low_x, high_x), (low_y, high_y) = axes.get_xlim(), axes.get_ylim()
+    mark_symmetry(axes, group, (low_x, low_y, high_x, high_y), size=0.11)
+
+
+def _checked(space: Space, n: int) -> Array:
+    """(n, n, 3) a chequered square with its edges in their colours."""
+    t = (np.arange(n) + 0.5) / n
+    x, y = np.meshgrid(t, t, indexing="ij")
+    odd = ((8 * x).astype(int) + (8 * y).astype(int)) % 2 == 1
+    colours = np.where(odd[..., None], _rgb("#c9dcec"), _rgb("#f4ecdc"))
+    width = 1.6 / 100
+    for number, pair in enumerate(edge_pairs(space.group)):
+        for edge in pair:
+            axis = int(abs(edge[1] - edge[0])[1] < 0.5)  # which coordinate is constant
+            near = np.abs((y if axis else x) - edge[0][axis]) < width
+            colours[near] = _rgb(EDGES[number])
+    return colours
+
+
+def _rgb(colour: str) -> Array:
+    return np.array([int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5)])
+
+
+def _draw_symmetrization(_canvas: Canvas, _extent: Extent, _values: list[Any]) -> Findings:
+    rows, errors = [], []
+    for name in SPACES:
+        row = IDENTIFICATION_SPACES[name]
+        space = make_space(name)
+        operators = [(g, 4 if g.determinant > 0 else 2) for g in row.generators]
+        errors.append(nested_error(space.group, operators))
+        words = {4: "(c, 4)-rotation", 2: "(ℓ, μ)-transflection"}
+        listed = ", ".join(words[k] for _, k in operators) or "B-periodic alone"
+        closure = abs(space.group.order - space.group.cell_volume)
+        size = f"{row.lattice[0][0]:g} × {row.lattice[1][1]:g}"
+        rows.append(
+            (TITLES[name], size, listed, space.group.name, str(space.group.order),
+             str(terms(operators)), tiny(errors[-1]), tiny(closure))
+        )  # fmt: skip
+    closed = all(row[-1] == "0" for row in rows)
+    return Findings(
+        "agrees in part" if max(errors) < 1e-12 and closed else "differs",
+        "The printed lattices and generators close: each group's order is the number of squares "
+        "in its cell. The nested operators equal the mean over the cosets times the number of "
+        f"their terms, to {tiny(max(errors))}.",
+        "The method built on the table needs two corrections. A base that is not invariant under "
+        "the group (the paper's von Mises distribution on the square) makes no density on the "
+        "space: here it is summed over the group. And symmetric fields vanish at the corners of "
+        "sphere and projective plane, so that a flow can never correct a density there: the base "
+        "for these is the round area.",
+        numbers={"nested_error": max(errors)},
+        tables=[
+            Table(
+                "The paper's operators against the mean over the group (Reynolds operator).",
+                ("space", "cell", "generators", "group", "order", "terms of the nested sums",
+                 "difference", "order against |det B|"),
+                tuple(rows),
+            )
+        ],
+    )  # fmt: skip
+
+
+SPACES_FIGURE = Exhibit(
+    "figure-3",
+    "Figure 3",
+    "Four identifications of a square, and their tilings",
+    "Different ways of identification in a template square result in torus, sphere, Klein bottle "
+    "and projective plane. Copies of the square joined by the identification rule result in "
+    "specific tiling patterns.",
+    _draw_spaces,
+)
+SYMMETRIZATION = Exhibit(
+    "table-4",
+    "Table 4",
+    "Symmetrization for identification spaces",
+    "For each space the template, the translational unit B, its symmetries, and the symmetrized "
+    "vector field as nested operators: V = P_B(F) for the torus, R_c(P_B(F)) for the sphere, "
+    "G(P_B(F)) for the Klein bottle, G(G(P_B(F))) for the projective plane.",
+    _draw_symmetrization,
+)

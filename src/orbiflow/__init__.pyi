@@ -1,0 +1,24 @@
+__version__: str
+__all__: list[str]
+
+from .density.estimator import DensityEstimator as DensityEstimator
+from .density.storage.files import read_density as read_density
+from .fields.fourier import FourierField as FourierField
+from .fields.symmetrization import symmetrize as symmetrize
+from .flows.flow import Flow as Flow
+from .loading import load as load
+from .loading import save as save
+from .symmetry.catalogue import wallpaper_group as wallpaper_group
+from .symmetry.equivariance import assert_equivariant as assert_equivariant
+from .symmetry.group import CrystallographicGroup as CrystallographicGroup
+from .tiles.art.scene import draw_art as draw_art
+from .tiles.search.searching import escherize as escherize
+from .tiles.search.settings import BendingSettings as BendingSettings
+from .tiles.search.settings import DescentSettings as DescentSettings
+from .tiles.search.steps import certified_tiles as certified_tiles
+from .tiles.search.steps import fit_tile as fit_tile
+from .tiles.silhouette.target import Target as Target
+from .tiles.tile import EscherTile as EscherTile
+from .tiles.tilings.certificate import certify as certify
+from .tiles.tilings.isohedral import isohedral_class as isohedral_class
+from .tiles.tilings.tiling import Tile as Tile

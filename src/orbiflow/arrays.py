@@ -1,0 +1,38 @@
+"""Types of arrays, and rectangles of the plane."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orbiflow.arguments import numbers
+from orbiflow.errors import OrbiflowError
+
+Array: TypeAlias = NDArray[Any]
+"""A NumPy array of any dtype and shape."""
+
+Complex: TypeAlias = NDArray[np.complex128]
+Integers: TypeAlias = NDArray[np.int64]
+
+Window: TypeAlias = tuple[float, float, float, float]
+"""xmin, ymin, xmax, ymax, in the tile's units."""
+
+
+def checked_window(window: Sequence[float]) -> Window:
+    """`window` as four numbers.
+
+    Raises:
+        OrbiflowError: unless xmin < xmax and ymin < ymax.
+    """
+    try:
+        values = numbers(window, "window", (4,)).tolist()
+    except OrbiflowError:
+        values = [0.0] * 4
+    if not (values[0] < values[2] and values[1] < values[3]):
+        raise OrbiflowError(
+            f"a window is (xmin, ymin, xmax, ymax) with xmin < xmax and ymin < ymax, got {window!r}"
+        )
+    return values[0], values[1], values[2], values[3]

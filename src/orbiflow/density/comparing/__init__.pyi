@@ -1,0 +1,16 @@
+from .data_sets import DataComparison as DataComparison
+from .data_sets import compare_samples as compare_samples
+from .divergence import Divergence as Divergence
+from .divergence import Estimate as Estimate
+from .known_rows import RowSketch as RowSketch
+from .paired import Difference as Difference
+from .paired import ModelComparison as ModelComparison
+from .paired import ModelScore as ModelScore
+from .paired import compare_models as compare_models
+from .paired import compare_scores as compare_scores
+from .paired import density_of as density_of
+from .paired import require_one_space as require_one_space
+from .paired import scores_of as scores_of
+from .resampling import cross_validation_folds as cross_validation_folds
+from .two_samples import TestResult as TestResult
+from .two_samples import mmd_test as mmd_test

@@ -1,0 +1,9 @@
+from .axes import axes_named as axes_named
+from .axes import chart_of_observed as chart_of_observed
+from .axes import check_torus as check_torus
+from .axes import given_named as given_named
+from .derived import conditional as conditional
+from .derived import marginal as marginal
+from .flows import log_kernels as log_kernels
+from .observed import at_observed as at_observed
+from .observed import log_prob_observed as log_prob_observed

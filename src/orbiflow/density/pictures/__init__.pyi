@@ -1,0 +1,15 @@
+from .choice import MODEL as MODEL
+from .choice import PlotSettings as PlotSettings
+from .corner import corner_picture as corner_picture
+from .flow import flow_picture as flow_picture
+from .map_samples import map_samples_picture as map_samples_picture
+from .maps import map_picture as map_picture
+from .page import density_page as density_page
+from .plots import PICTURES as PICTURES
+from .plots import REPORT as REPORT
+from .plots import TABLE as TABLE
+from .plots import THUMBNAIL as THUMBNAIL
+from .plots import Plotted as Plotted
+from .plots import plot_density as plot_density
+from .samples import samples_picture as samples_picture
+from .square import density_picture as density_picture

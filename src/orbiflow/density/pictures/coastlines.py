@@ -1,0 +1,184 @@
+"""Lines that a user has for the globe: GeoJSON, or a table of latitude and longitude."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from orbiflow.arguments import described
+from orbiflow.arrays import Array
+from orbiflow.density.tables import read_table
+from orbiflow.errors import InputFileError
+
+MOST_BYTES = 32_000_000
+MOST_POINTS = 1_000_000
+"""Of a file: Natural Earth's finest coastline has 18 MB and 400,000 points."""
+
+_NESTED = 20
+"""Collections within collections."""
+
+_SHAPES = {"LineString": 1, "MultiLineString": 2, "Polygon": 2, "MultiPolygon": 3}
+"""Depth of the lists of positions in each kind of geometry that has lines."""
+
+_POINTS = ("Point", "MultiPoint")
+_EDGE = 1e-4
+"""Degrees within which a polygon's edge is one along which the globe was cut."""
+
+_SLIP = 1e-3
+"""Degrees beyond a pole that are taken for rounding."""
+
+
+def read_coastlines(path: Path) -> list[Array]:
+    """Lines (M, 2) of latitude and longitude in degrees, from GeoJSON (RFC 7946) or a table.
+
+    Of polygons the rings, without edges along longitude 180 or at a pole: there files cut what is
+    whole on the globe. In a table, a row whose latitude is beyond 90 ends a line.
+
+    Raises:
+        InputFileError: for a file that cannot be read, is too large, or holds no lines in degrees.
+    """
+    try:
+        if path.exists() and not path.is_file():
+            raise InputFileError(f"cannot read {path}: it is not a file")
+        size = path.stat().st_size
+        if size > MOST_BYTES:
+            raise InputFileError(
+                f"{path} has {size / 1e6:.0f} MB, more than {MOST_BYTES / 1e6:.0f}: take coarser lines"
+            )
+        with path.open("rb") as file:
+            start = file.read(4096)
+    except OSError as error:
+        raise InputFileError(f"cannot read {path}: {error.strerror or error}") from error
+    _refuse_binary(path, start)
+    text = start.removeprefix(b"\xef\xbb\xbf").lstrip()
+    lines = _geojson(path) if text.startswith((b"{", b"[")) else _table(path)
+    if not lines:
+        raise InputFileError(f"{path} holds no lines: coastlines need two points or more each")
+    if sum(map(len, lines)) > MOST_POINTS:
+        raise InputFileError(f"{path} has more than {MOST_POINTS} points: take coarser lines")
+    return lines
+
+
+def _refuse_binary(path: Path, start: bytes) -> None:
+    known = {b"\x00\x00\x27\x0a": "a shapefile", b"PK\x03\x04": "a zip archive"}
+    for magic, what in known.items():
+        if start.startswith(magic):
+            raise InputFileError(
+                f"{path} is {what}: make GeoJSON of it, with ogr2ogr -f GeoJSON lines.geojson FILE.shp"
+            )
+
+
+def _table(path: Path) -> list[Array]:
+    values = read_table(path, columns=None, width=2).values
+    parts = np.split(values, np.flatnonzero(abs(values[:, 0]) > 90))
+    found = [part[abs(part[:, 0]) <= 90] for part in parts]
+    for part in found:
+        _check_degrees(path, part)
+    return [part for part in found if len(part) > 1]
+
+
+def _geojson(path: Path) -> list[Array]:
+    try:
+        content = json.loads(path.read_bytes())
+        shapes = list(_geometries(path, content, 0))
+    except (ValueError, RecursionError) as error:  # ValueError: neither JSON nor UTF-8
+        raise InputFileError(f"{path} is not GeoJSON: {error}"[:300]) from error
+    except OSError as error:
+        raise InputFileError(f"cannot read {path}: {error.strerror or error}") from error
+    lines: list[Array] = []
+    for kind, coordinates in shapes:
+        rings = kind.endswith("Polygon")
+        for positions in _flat(path, kind, coordinates, _SHAPES[kind]):
+            line = _positions(path, kind, positions)
+            lines += _without_cuts(line) if rings else [line]
+    return [line for line in lines if len(line) > 1]
+
+
+def _geometries(path: Path, item: Any, depth: int) -> Iterator[tuple[str, Any]]:
+    """Kind and coordinates of every geometry with lines."""
+    kind = item.get("type") if isinstance(item, dict) else None
+    kind = kind if isinstance(kind, str) else None
+    if kind == "Topology":
+        raise InputFileError(
+            f"{path} is TopoJSON: make GeoJSON of it, with ogr2ogr -f GeoJSON lines.geojson {path.name}"
+        )
+    if depth > _NESTED:
+        raise InputFileError(f"{path} has collections more than {_NESTED} deep")
+    if kind in ("FeatureCollection", "GeometryCollection"):
+        inner = item.get("features" if kind == "FeatureCollection" else "geometries")
+        if not isinstance(inner, list):
+            raise InputFileError(f"{path}: a {kind} without a list of them is not GeoJSON")
+        for part in inner:
+            yield from _geometries(path, part, depth + 1)
+    elif kind == "Feature":
+        if item.get("geometry") is not None:
+            yield from _geometries(path, item["geometry"], depth + 1)
+    elif kind in _SHAPES:
+        yield kind, item.get("coordinates")
+    elif kind not in _POINTS:
+        raise InputFileError(
+            f"{path} is not GeoJSON: expected a feature or a geometry, got {described(kind)}"
+        )
+
+
+def _flat(path: Path, kind: str, items: Any, depth: int) -> Iterator[list[Any]]:
+    """Lists of positions, `depth` - 1 lists deep."""
+    if not isinstance(items, list):
+        raise InputFileError(f"{path}: the coordinates of a {kind} must be lists {depth} deep")
+    if depth == 1:
+        yield items
+        return
+    for item in items:
+        yield from _flat(path, kind, item, depth - 1)
+
+
+def _positions(path: Path, kind: str, positions: list[Any]) -> Array:
+    """(M, 2) latitude and longitude; heights are left out."""
+    try:
+        # a position is longitude, latitude
+        line = np.array([(p[1], p[0]) for p in positions], dtype=float).reshape(-1, 2)
+    except (TypeError, ValueError, IndexError, KeyError, OverflowError) as error:
+        raise InputFileError(
+            f"{path}: a {kind} has a position that is not longitude, latitude"
+        ) from error
+    _check_degrees(path, line)
+    line[:, 0] = np.clip(line[:, 0], -90, 90)
+    return line
+
+
+def _check_degrees(path: Path, line: Array) -> None:
+    wrong = ~((abs(line[:, 0]) <= 90 + _SLIP) & (abs(line[:, 1]) <= 360))  # NaN, too
+    if wrong.any():
+        lat, lon = line[wrong.argmax()]
+        raise InputFileError(
+            f"{path}: latitude {lat:g}, longitude {lon:g} is beyond the globe: give degrees (WGS 84), "
+            "in GeoJSON the longitude first"
+        )
+
+
+def _without_cuts(ring: Array) -> list[Array]:
+    """A polygon's ring in pieces, without the edges along which a flat map was cut."""
+    lat, lon = abs(ring).T
+    at_pole, at_cut = abs(lat - 90) < _EDGE, abs(lon - 180) < _EDGE
+    edges = (at_pole[1:] & at_pole[:-1]) | (at_cut[1:] & at_cut[:-1])
+    borders = [0, *(np.flatnonzero(edges) + 1).tolist(), len(ring)]
+    return [ring[first:last] for first, last in pairwise(borders)]
+
+
+def simplified(lines: list[Array], most: int) -> list[Array]:
+    """Lines of at most about `most` points in all, coarser where they must be."""
+    from shapely import LineString
+
+    tolerance = 0.01
+    while sum(map(len, lines)) > most and tolerance < math.inf:
+        lines = [np.array(LineString(line).simplify(tolerance).coords) for line in lines]
+        tolerance *= 2
+        if tolerance > 0.1:  # islands that no one sees
+            lines = [line for line in lines if np.ptp(line, axis=0).max() > tolerance]
+    return lines

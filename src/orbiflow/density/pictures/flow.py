@@ -1,0 +1,187 @@
+"""Picture of the flow that carries a base distribution to a density."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import torch
+from PIL import Image
+from torch import Tensor
+
+from orbiflow.arrays import Array
+from orbiflow.density.models import (
+    BlendedDensity,
+    NeuralFlow,
+    SymmetricDensity,
+)
+from orbiflow.density.pictures.axes import (
+    INK,
+    check_plane,
+    space_title,
+    view_of,
+)
+from orbiflow.density.pictures.frame import (
+    Room,
+    colour_bar,
+    framed,
+)
+from orbiflow.density.pictures.square import COLOURS
+from orbiflow.drawing import (
+    Picture,
+    Sheet,
+    draw_flow,
+    draw_magnitude,
+)
+from orbiflow.errors import OrbiflowError
+from orbiflow.symmetry import CrystallographicGroup
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+SPEED = "speed, sides of the square per unit time"
+SCREEN = Room(1.8, 3.8, 10.8, 2.7, 1.7, 1.5)
+"""With a caption below."""
+
+_TIMES = 16
+"""At which a field that changes with time is averaged."""
+
+
+def flow_png(
+    density: SymmetricDensity,
+    *,
+    cells: int = 3,
+    center: Sequence[float] | None = None,
+    width_px: int = 1600,
+) -> bytes:
+    """PNG of `flow_picture` for a screen, in 256 colours.
+
+    Raises:
+        OrbiflowError: as `flow_picture`, and for a size that cannot be made.
+    """
+    sheet = Sheet.screen(width_px)
+    return few_colours(flow_picture(density, cells=cells, center=center, sheet=sheet).file())
+
+
+def flow_picture(
+    density: SymmetricDensity,
+    *,
+    cells: int = 3,
+    center: Sequence[float] | None = None,
+    sheet: Sheet | None = None,
+) -> Picture:
+    """The time mean of the flow's vector fields, over the canonical square and its images.
+
+    The square is outlined; the letter F in every cell shows how the cell is the square's image. Of a
+    density with kernels beside the flow, the flow's part alone.
+
+    Args:
+        density: on a two-dimensional space.
+        cells: along each side of the picture, 1 to 9.
+        center: of the torus' square; see `orbiflow.figures.density_axes.view_of`.
+        sheet: default a screen of 1600 pixels.
+
+    Raises:
+        OrbiflowError: for a space of another dimension, another number of cells, or a centre that
+            does not fit.
+    """
+    sheet, space = sheet or Sheet.screen(), density.space
+    check_plane(space)
+    if isinstance(cells, bool) or int(cells) != cells or not 1 <= cells <= 9:
+        raise OrbiflowError(f"cells must be an integer from 1 to 9, got {cells!r}")
+    view = view_of(space, center=center)
+    low, high = 0.5 - cells / 2, 0.5 + cells / 2
+    window = (low, low, high, high)
+    frame = framed(sheet, None, SPEED, room=None if sheet.printed else SCREEN)
+    axes = frame.axes
+    axes.set_xlim(low, high)
+    axes.set_ylim(low, high)  # `draw_magnitude` keeps these
+
+    def field(points: Tensor) -> Tensor:
+        return mean_field(density, view.to_chart(points))
+
+    draw_magnitude(axes, field, window)
+    draw_flow(axes, field, space.group, window, pen=sheet.pen)
+    draw_cells(axes, space.group, window, pen=sheet.pen)
+    colour_bar(axes.images[0], frame, sheet, SPEED)
+    axes.set_axis_off()
+    title, signs = _subject(density), "canonical square outlined, its images thin"
+    if not sheet.printed:
+        frame.figure.text(0.03, 0.025, f"{title}: {signs}", fontsize=sheet.text, color=INK)
+    return Picture(frame.figure, sheet, title, f"The {signs}.")
+
+
+def _subject(density: SymmetricDensity) -> str:
+    name = f"the {space_title(density.space)}"
+    if isinstance(density, BlendedDensity):
+        return f"Flow, {100 * float(density.shares[0]):.0f} % of the density on {name}"
+    return f"Flow on {name}"
+
+
+def few_colours(png: bytes) -> bytes:
+    """The same picture of a flow in 256 colours: a third of the bytes."""
+    chart = Image.new("P", (1, 1))
+    chart.putpalette(_palette().tobytes().ljust(768, b"\0"))
+    image = Image.open(io.BytesIO(png)).convert("RGB")
+    buffer = io.BytesIO()
+    # no dither: it would triple the bytes
+    image.quantize(palette=chart, dither=Image.Dither.NONE).save(buffer, "PNG", optimize=True)
+    return buffer.getvalue()
+
+
+def _palette() -> Array:
+    """Colours (N, 3), uint8: the speed's, so finely that no bands are seen; their mixtures with the
+    lines' white, more coarsely; those of outline and letters.
+    """
+    from matplotlib import colormaps
+
+    def speeds(count: int) -> Array:
+        return 255 * colormaps[COLOURS](np.linspace(0, 1, count))[:, :3]
+
+    steps = ((0.15, 24), (0.3, 20), (0.45, 16), (0.6, 16), (0.75, 12), (0.88, 12))
+    mixed = [(1 - white) * speeds(count) + 255 * white for white, count in steps]
+    greys = np.repeat([[17.0], [26.0], [80.0], [128.0], [200.0], [255.0]], 3, axis=1)
+    share = np.linspace(0.2, 1.0, 5)[:, None]
+    outline = (1 - share) * 17.0 + share * (0xFF, 0xD1, 0x66)
+    return np.rint(np.concatenate([speeds(128), *mixed, greys, outline])).astype(np.uint8)
+
+
+@torch.no_grad()
+def mean_field(density: SymmetricDensity, points: Tensor) -> Tensor:
+    """The time mean of the flow's fields (..., d) at chart points (..., d), float64."""
+    flow, like = density.flow, next(iter(density.flow.parameters()), points)
+    if isinstance(flow, NeuralFlow):  # whose field changes with time
+        times = (torch.arange(_TIMES).to(like) + 0.5) / _TIMES
+        vectors = [flow.field(points.to(like), time) for time in times]
+    else:
+        vectors = [field(points.to(like)) for field in flow.segments]
+    return torch.stack(vectors).mean(dim=0).double().cpu()
+
+
+def draw_cells(
+    axes: Axes,
+    group: CrystallographicGroup,
+    window: Any,
+    *,
+    pen: Callable[[float], float] = float,
+) -> None:
+    """The images of the canonical square in a window, a letter F in each, the square outlined."""
+    thin = pen(0.7)
+    for t in np.arange(np.floor(window[0]), np.ceil(window[2]) + 1):
+        axes.axvline(t, color="#ffffff", linewidth=thin, alpha=0.7, zorder=4)
+        axes.axhline(t, color="#ffffff", linewidth=thin, alpha=0.7, zorder=4)
+    square = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]])
+    for colour, width in (("#111111", 3.6), ("#ffd166", 1.8)):
+        axes.plot(*square.T, color=colour, linewidth=pen(width), solid_joinstyle="miter", zorder=5)
+    letter = np.array(
+        [[0, 0], [0, 5], [3, 5], [3, 4], [1, 4], [1, 3], [2.4, 3], [2.4, 2], [1, 2], [1, 0]]
+    )
+    letter = 0.07 + 0.026 * letter
+    middle = np.full(2, 0.5)
+    for g in group.elements_near(middle, window[2] - window[0], source=middle):
+        axes.fill(
+            *g(letter).T, facecolor="#ffd166", edgecolor="#111111", linewidth=pen(0.5),
+            zorder=6,
+        )  # fmt: skip

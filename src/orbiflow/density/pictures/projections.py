@@ -1,0 +1,360 @@
+"""Projections of the sphere onto a map: what all of them do, and lines on them.
+
+Directions are degrees (N, 2) of latitude and longitude, places on the map (N, 2) in radii of the
+sphere.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from orbiflow.arguments import number
+from orbiflow.arrays import Array
+from orbiflow.density.spaces import to_latlon, to_vectors
+from orbiflow.errors import OrbiflowError
+
+FINEST = 1.0
+"""Degrees between points of lines that are drawn, at most: curves look like curves."""
+
+
+@dataclass(frozen=True)
+class Projection(ABC):
+    """A map of directions.
+
+    - `name`: as asked for. `title`: in a sentence.
+    - `is_equal_area`: whether equal areas of the sphere are equal on the map.
+    - `center`: latitude and longitude of the map's middle.
+
+    Raises:
+        OrbiflowError: for a centre that is no direction.
+    """
+
+    name: ClassVar[str]
+    title: ClassVar[str]
+    is_equal_area: ClassVar[bool]
+
+    center: tuple[float, float] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        number(self.center[0], "the centre's latitude", -90, 90)
+        number(self.center[1], "the centre's longitude", -360, 360)
+
+    @abstractmethod
+    def forward(self, latlon: Array) -> Array:
+        """Places of directions."""
+
+    @abstractmethod
+    def inverse(self, places: Array) -> Array:
+        """Directions of places, those next to the outline continued beyond it; longitudes in
+        [-180, 180).
+        """
+
+    @abstractmethod
+    def outline(self) -> Array:
+        """(N, 2) closed ring of places around the map."""
+
+    @abstractmethod
+    def pieces(self, latlon: Array) -> list[Array]:
+        """A line (M, 2) of directions on the map, cut where the map is: places (K, 2), K > 1, each."""
+
+    @abstractmethod
+    def contains(self, latlon: Array) -> Array:
+        """Which directions the map shows, (N,) of bool."""
+
+
+def refined(latlon: Array) -> Array:
+    """A line (M, 2) of directions with points at most `FINEST` degrees apart.
+
+    Straight in latitude and longitude, as GeoJSON has it (RFC 7946, 3.1.1), the short way round.
+    """
+    lon = np.unwrap(latlon[:, 1], period=360.0)
+    steps = np.maximum(abs(np.diff(latlon[:, 0])), abs(np.diff(lon)))
+    counts = np.maximum(np.ceil(steps / FINEST - 1e-9), 1).astype(int)
+    knots = np.concatenate([[0], np.cumsum(counts)])
+    at = np.arange(knots[-1] + 1)
+    lat, lon = (np.interp(at, knots, values) for values in (latlon[:, 0], lon))
+    return np.stack([lat, wrapped(lon)], axis=-1)
+
+
+def wrapped(lon: Array) -> Array:
+    """Longitudes in [-180, 180)."""
+    return (lon + 180.0) % 360.0 - 180.0
+
+
+def of_some_length(lines: list[Array]) -> list[Array]:
+    """Those of lines (M, 2) that are more than a point."""
+    return [line for line in lines if len(line) > 1 and bool((line != line[0]).any())]
+
+
+@dataclass(frozen=True)
+class Azimuthal(Projection):
+    """What is within `radius` degrees of the centre, in its true direction from there.
+
+    Seen from outside, north up, and at the poles the centre's longitude down (north) or up (south).
+
+    - `flipped`: upside down, so that about the north pole longitudes run clockwise from the top: a net
+      of structural geology and palaeomagnetism.
+
+    Raises:
+        OrbiflowError: also for a radius that is not above 0 and at most 90.
+    """
+
+    radius: float = 90.0
+    flipped: bool = False
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        number(self.radius, "the map's radius", 0, 90, above=True)
+
+    @abstractmethod
+    def distance(self, angle: Array) -> Array:
+        """Of a place from the map's middle, of angles in radians from the centre."""
+
+    @abstractmethod
+    def angle(self, distance: Array) -> Array:
+        """The inverse of `distance`."""
+
+    @property
+    def rim(self) -> float:
+        """The map's radius, in radii of the sphere."""
+        return float(self.distance(np.array(math.radians(self.radius))))
+
+    @property
+    def frame(self) -> Array:
+        """(3, 3): unit vectors to the right, upwards and to the centre."""
+        lat, lon = np.radians(self.center)
+        east = np.array([-np.sin(lon), np.cos(lon), 0.0])
+        out = to_vectors([self.center])[0]
+        up = np.array([-np.sin(lat) * np.cos(lon), -np.sin(lat) * np.sin(lon), np.cos(lat)])
+        return np.stack([east, -up if self.flipped else up, out])
+
+    def forward(self, latlon: Array) -> Array:
+        return self._placed(to_vectors(latlon))
+
+    def inverse(self, places: Array) -> Array:
+        distance = np.linalg.norm(places, axis=1)
+        angle = self.angle(distance)
+        flat = places * (np.sin(angle) / np.maximum(distance, 1e-300))[:, None]
+        return to_latlon(np.concatenate([flat, np.cos(angle)[:, None]], axis=1) @ self.frame)
+
+    def outline(self) -> Array:
+        turn = np.linspace(0, 2 * math.pi, 361)
+        return self.rim * np.stack([np.cos(turn), np.sin(turn)], axis=-1)
+
+    def contains(self, latlon: Array) -> Array:
+        return to_vectors(latlon) @ self.frame[2] >= math.cos(math.radians(self.radius)) - 1e-12
+
+    def pieces(self, latlon: Array) -> list[Array]:
+        vectors = to_vectors(refined(latlon))
+        limit = math.cos(math.radians(self.radius))
+        above = vectors @ self.frame[2] - limit
+        inside = above >= 0
+        found: list[Array] = []
+        ends = np.flatnonzero(np.diff(np.concatenate([[False], inside, [False]])))
+        for first, last in ends.reshape(-1, 2):
+            line = [vectors[first:last]]
+            for outer, inner, place in ((first - 1, first, 0), (last, last - 1, 2)):
+                if 0 <= outer < len(vectors):
+                    share = above[inner] / (above[inner] - above[outer])
+                    cut = (1 - share) * vectors[inner] + share * vectors[outer]
+                    line.insert(place, cut[None])
+            found.append(self._placed(np.concatenate(line)))
+        return of_some_length(found)
+
+    def _placed(self, vectors: Array) -> Array:
+        right, up, out = (vectors @ self.frame.T).T
+        across = np.hypot(right, up)
+        size = self.distance(np.arctan2(across, out)) / np.maximum(across, 1e-300)
+        return np.stack([right * size, up * size], axis=-1)
+
+
+class Lambert(Azimuthal):
+    """Lambert's azimuthal projection, of equal areas.
+
+    >>> Lambert((0.0, 0.0)).forward(np.array([[0.0, 90.0]])).round(6).tolist()
+    [[1.414214, 0.0]]
+    """
+
+    name, title = "lambert", "Lambert's azimuthal projection (equal-area)"
+    is_equal_area = True
+
+    def distance(self, angle: Array) -> Array:
+        return 2 * np.sin(angle / 2)
+
+    def angle(self, distance: Array) -> Array:
+        return 2 * np.arcsin(np.clip(distance / 2, 0, 1))
+
+
+class Stereographic(Azimuthal):
+    """The stereographic projection, which keeps angles: circles stay circles."""
+
+    name, title = "stereographic", "the stereographic projection (true angles, not areas)"
+    is_equal_area = False
+
+    def distance(self, angle: Array) -> Array:
+        return 2 * np.tan(angle / 2)
+
+    def angle(self, distance: Array) -> Array:
+        return 2 * np.arctan(distance / 2)
+
+
+_NEWTON = 12
+"""Newton steps: from the starts below, rounding is reached in half as many."""
+
+
+class WorldMap(Projection):
+    """The whole sphere, cut along the meridian opposite the map's own.
+
+    Raises:
+        OrbiflowError: also for a centre off the equator.
+    """
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.center[0]:
+            raise OrbiflowError(
+                f"a map of the whole sphere ({self.name}) is centred on a meridian, not at latitude "
+                f"{self.center[0]:g}: give a longitude alone, or another projection"
+            )
+
+    @abstractmethod
+    def height(self, lat: Array) -> Array:
+        """y of latitudes in radians."""
+
+    @abstractmethod
+    def latitude(self, y: Array) -> Array:
+        """Latitudes in radians of y, those of the poles beyond them."""
+
+    @abstractmethod
+    def stretch(self, y: Array) -> Array:
+        """x per radian of longitude."""
+
+    def forward(self, latlon: Array) -> Array:
+        return self._placed(latlon[:, 0], self._relative(latlon[:, 1]))
+
+    def inverse(self, places: Array) -> Array:
+        x, y = places.T
+        lat = self.latitude(y)
+        lon = x / np.maximum(self.stretch(self.height(lat)), 1e-12)
+        return np.stack([np.degrees(lat), wrapped(np.degrees(lon) + self.center[1])], axis=-1)
+
+    def outline(self) -> Array:
+        up = np.linspace(-90.0, 90.0, 181)
+        side = np.full_like(up, 180.0)
+        right, left = self._placed(up, side), self._placed(up[::-1], -side)
+        return np.concatenate([right, left, right[:1]])
+
+    def pieces(self, latlon: Array) -> list[Array]:
+        latlon = refined(latlon)
+        lat, lon = latlon[:, 0], self._relative(latlon[:, 1])
+        found: list[Array] = []
+        start, head = 0, np.empty((0, 2))
+        for k in np.flatnonzero(abs(np.diff(lon)) > 180):
+            sign = 1.0 if lon[k] > 0 else -1.0
+            beyond = lon[k + 1] + sign * 360
+            share = (sign * 180 - lon[k]) / (beyond - lon[k]) if beyond != lon[k] else 0.0
+            cut = lat[k] + share * (lat[k + 1] - lat[k])
+            line = np.stack([lat[start : k + 1], lon[start : k + 1]], axis=-1)
+            found.append(np.concatenate([head, line, [[cut, sign * 180]]]))
+            start, head = k + 1, np.array([[cut, -sign * 180]])
+        found.append(np.concatenate([head, np.stack([lat[start:], lon[start:]], axis=-1)]))
+        return of_some_length([self._placed(*line.T) for line in found])
+
+    def contains(self, latlon: Array) -> Array:
+        return np.ones(len(latlon), dtype=bool)
+
+    def _relative(self, lon: Array) -> Array:
+        return wrapped(lon - self.center[1])
+
+    def _placed(self, lat: Array, lon: Array) -> Array:
+        """Of longitudes from the map's own meridian, -180 and 180 at its two sides."""
+        y = self.height(np.radians(lat))
+        return np.stack([np.radians(lon) * self.stretch(y), y], axis=-1)
+
+
+class PlateCarree(WorldMap):
+    """Plain latitude and longitude: neither areas nor angles are kept.
+
+    >>> PlateCarree((0.0, 180.0)).forward(np.array([[90.0, 180.0]])).round(4).tolist()
+    [[0.0, 1.5708]]
+    """
+
+    name, title, is_equal_area = "latlon", "plain latitude and longitude (plate carrée)", False
+
+    def height(self, lat: Array) -> Array:
+        return lat
+
+    def latitude(self, y: Array) -> Array:
+        return np.clip(y, -math.pi / 2, math.pi / 2)
+
+    def stretch(self, y: Array) -> Array:
+        return np.ones_like(y)
+
+
+class Mollweide(WorldMap):
+    """An ellipse of equal areas, the poles points.
+
+    With sin theta = y / sqrt 2, 2 theta + sin 2 theta = pi sin lat; in distances from the pole,
+    d = pi / 2 - theta, that is 2 d - sin 2 d = pi (1 - sin lat), which loses no digits there.
+    """
+
+    name, title, is_equal_area = "mollweide", "the Mollweide projection (equal-area)", True
+
+    def height(self, lat: Array) -> Array:
+        rest = 2 * math.pi * np.sin((math.pi / 2 - abs(lat)) / 2) ** 2
+        distance = np.cbrt(0.75 * rest)  # of the first terms
+        for _ in range(_NEWTON):
+            slope = np.maximum(4 * np.sin(distance) ** 2, 1e-300)
+            distance = distance - (2 * distance - np.sin(2 * distance) - rest) / slope
+        return math.sqrt(2) * np.copysign(np.cos(distance), lat)
+
+    def latitude(self, y: Array) -> Array:
+        distance = np.arccos(np.clip(abs(y) / math.sqrt(2), 0, 1))
+        share = np.clip((2 * distance - np.sin(2 * distance)) / (2 * math.pi), 0, 1)
+        return np.copysign(math.pi / 2 - 2 * np.arcsin(np.sqrt(share)), y)
+
+    def stretch(self, y: Array) -> Array:
+        return 2 * math.sqrt(2) / math.pi * np.sqrt(np.clip(1 - y**2 / 2, 0, 1))
+
+
+class EqualEarth(WorldMap):
+    """Equal areas, the poles lines, shapes less squeezed than in an ellipse.
+
+    B. Šavrič, T. Patterson, B. Jenny: The Equal Earth map projection (Int. J. Geogr. Inf. Sci. 33,
+    2019), equations 7 and 8.
+    """
+
+    name, title, is_equal_area = "equal-earth", "the Equal Earth projection (equal-area)", True
+
+    _A = (1.340264, -0.081106, 0.000893, 0.003796)
+
+    def _polynomial(self, theta: Array) -> Array:
+        a1, a2, a3, a4 = self._A
+        square = theta**2
+        return theta * (a1 + square * (a2 + square**2 * (a3 + square * a4)))
+
+    def _slope(self, theta: Array) -> Array:
+        a1, a2, a3, a4 = self._A
+        square = theta**2
+        return a1 + square * (3 * a2 + square**2 * (7 * a3 + square * 9 * a4))
+
+    def _theta(self, y: Array) -> Array:
+        theta = y / self._A[0]
+        for _ in range(_NEWTON):
+            theta = theta - (self._polynomial(theta) - y) / self._slope(theta)
+        return np.clip(theta, -math.pi / 3, math.pi / 3)
+
+    def height(self, lat: Array) -> Array:
+        return self._polynomial(np.arcsin(math.sqrt(3) / 2 * np.sin(lat)))
+
+    def latitude(self, y: Array) -> Array:
+        return np.arcsin(np.clip(2 / math.sqrt(3) * np.sin(self._theta(y)), -1, 1))
+
+    def stretch(self, y: Array) -> Array:
+        theta = self._theta(y)
+        return 2 / math.sqrt(3) * np.cos(theta) / self._slope(theta)

@@ -1,0 +1,180 @@
+"""A density at a glance: a small picture without axes, for a page of many.
+
+Two dimensions: the canonical square, or a map of directions. One angle: the data's histogram and the
+density. A few angles: every pair of samples, and each alone; many: a stripe each.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+from itertools import pairwise
+
+import numpy as np
+import torch
+from numpy.typing import ArrayLike
+from PIL import Image, ImageDraw
+
+from orbiflow.arrays import Array
+from orbiflow.density.models import SymmetricDensity, midpoints
+from orbiflow.density.pictures.axes import view_of
+from orbiflow.density.pictures.map_choice import chosen_map
+from orbiflow.density.pictures.maps import pixels_of
+from orbiflow.density.pictures.scale import (
+    DARKEST,
+    Shade,
+    dark_share,
+    shading,
+)
+from orbiflow.density.pictures.values import density_on_grid, density_on_map
+from orbiflow.density.spaces import RoundSpace, to_vectors
+
+SIZE = (360, 240)
+"""Pixels: half as many again as a page shows."""
+
+PAPER, INK, BARS = "#ffffff", "#1a1a1a", "#b9c4d0"
+COARSE = 120
+"""Places along a side at which a density is evaluated; pixels between them are interpolated."""
+
+MAP_PLACES = 14_000
+SAMPLES, SEED = 4_000, 0
+MOST_PAIRS = 6
+"""Angles whose pairs are drawn; of more there are stripes."""
+
+MARGIN = 6
+
+
+@torch.no_grad()
+def density_thumbnail(density: SymmetricDensity, data: ArrayLike) -> bytes:
+    """PNG of 360 x 240 pixels, the same every time.
+
+    Colours are by logarithms where most of the picture would be dark otherwise.
+
+    Args:
+        density: of any space.
+        data: (N, k) in the space's own units, that it was fitted to; rows that lack angles are left
+            out.
+    """
+    space, table = density.space, np.asarray(data, dtype=np.float64)
+    whole = table[~np.isnan(table).any(axis=1)]
+    if space.is_round:
+        picture = _map(density, whole)
+    elif space.dim == 2:
+        picture = _square(density)
+    elif space.dim == 1:
+        picture = _histogram(density, whole)
+    else:
+        drawn = density.sample((SAMPLES,), torch.Generator().manual_seed(SEED))
+        places = view_of(space).places(drawn)
+        picture = _pairs(places) if space.dim <= MOST_PAIRS else _stripes(places)
+    sheet = Image.new("RGB", SIZE, PAPER)
+    width, height = picture.size
+    sheet.paste(picture, ((SIZE[0] - width) // 2, (SIZE[1] - height) // 2))
+    out = io.BytesIO()
+    sheet.save(out, "PNG", optimize=True)
+    return out.getvalue()
+
+
+def _coloured(places: Array) -> Image.Image:
+    """Places (rows, columns) on the colour bar, the first row above."""
+    from matplotlib import colormaps
+
+    shades = colormaps["viridis"](np.clip(places, 0, 1))[..., :3]
+    return Image.fromarray((255 * shades + 0.5).astype(np.uint8), "RGB")
+
+
+def _shade(values: Array, areas: Array) -> Shade:
+    return shading(values, areas, log=dark_share(values, areas) > DARKEST)
+
+
+def _square(density: SymmetricDensity) -> Image.Image:
+    space, view = density.space, view_of(density.space)
+    middles = (torch.arange(COARSE, dtype=torch.float64) + 0.5) / COARSE
+    values = density_on_grid(density, middles + view.low[0], middles + view.low[1], "natural")
+    areas = space.log_area(midpoints(space, COARSE)).exp().numpy().reshape(COARSE, COARSE)
+    picture = _coloured(_shade(values, areas).places(values).T[::-1])
+    return picture.resize((SIZE[1], SIZE[1]), Image.Resampling.BICUBIC)
+
+
+def _map(density: SymmetricDensity, data: Array) -> Image.Image:
+    space = density.space
+    assert isinstance(space, RoundSpace)
+    projection = chosen_map(space, space.to_chart(data))
+    pixels = pixels_of(projection, MAP_PLACES)
+    points = space.vectors_to_chart(to_vectors(pixels.latlon))
+    values = density_on_map(density, points, "natural", pixels.angle)
+    shade = _shade(values[pixels.within], pixels.areas[pixels.within])
+    places = np.zeros(pixels.shown.shape)
+    places[pixels.shown] = shade.places(values)
+    left, right, below, above = pixels.extent
+    scale = min((SIZE[0] - MARGIN) / (right - left), (SIZE[1] - MARGIN) / (above - below))
+    size = (round(scale * (right - left)), round(scale * (above - below)))
+    picture = _coloured(places[::-1]).resize(size, Image.Resampling.BICUBIC)
+    ring = (projection.outline() - (left, above)) * (scale, -scale)
+    # four times finer: the outline is a curve
+    mask = Image.new("L", (4 * size[0], 4 * size[1]))
+    ImageDraw.Draw(mask).polygon([tuple(place) for place in (4 * ring).tolist()], fill=255)
+    paper = Image.new("RGB", size, PAPER)
+    paper.paste(picture, mask=mask.resize(size, Image.Resampling.BOX))
+    return paper
+
+
+def _histogram(density: SymmetricDensity, data: Array) -> Image.Image:
+    """Bars of the data under the density's line, from minus half a turn to half a turn."""
+    space, view, fine = density.space, view_of(density.space), 4
+    width, height = (fine * (side - 2 * MARGIN) for side in SIZE)
+    bins = min(72, max(12, round(2 * len(data) ** (1 / 3))))
+    bars, _ = np.histogram(view.places(space.to_chart(data))[:, 0], bins, (0, 1), density=True)
+    t = (torch.arange(width, dtype=torch.float64)[:, None] + 0.5) / width
+    line = density.log_prob(view.to_chart(t), measure="square").exp().numpy()
+    top = 1.05 * min(max(float(bars.max()), float(line.max())), 4 * float(bars.max()))
+    picture = Image.new("RGB", (width, height), PAPER)
+    draw = ImageDraw.Draw(picture)
+    edges = np.linspace(0, width, bins + 1)
+    for (left, right), bar in zip(pairwise(edges.tolist()), bars.tolist(), strict=True):
+        draw.rectangle((left + fine / 2, height * (1 - bar / top), right - fine / 2, height), BARS)
+    heights = (height * (1 - np.minimum(line / top, 1.0))).tolist()
+    draw.line(list(enumerate(heights)), INK, width=2 * fine)
+    return picture.resize((width // fine, height // fine), Image.Resampling.BOX)
+
+
+def _pairs(places: Array) -> Image.Image:
+    """Every pair of angles below the diagonal, each alone on it."""
+    count = places.shape[1]
+    side = SIZE[1] // count
+    sheet = Image.new("RGB", (side * count, side * count), PAPER)
+    for row in range(count):
+        for column in range(row + 1):
+            cell = (_bars if row == column else _pair)(places[:, [column, row]], side - 3)
+            sheet.paste(cell, (side * column + 1, side * row + 1))
+    return sheet
+
+
+def _pair(places: Array, side: int) -> Image.Image:
+    bins = max(12, side // 3)
+    counts, _ = np.histogramdd(places, (bins, bins), ((0, 1), (0, 1)))
+    shade = counts / max(1.0, float(np.quantile(counts, 0.995)))
+    # a square root: most cells of many angles are nearly empty
+    return _coloured(np.sqrt(shade).T[::-1]).resize((side, side), Image.Resampling.BICUBIC)
+
+
+def _bars(places: Array, side: int) -> Image.Image:
+    counts, _ = np.histogram(places[:, 0], side // 2, (0, 1))
+    picture = Image.new("RGB", (side, side), PAPER)
+    draw = ImageDraw.Draw(picture)
+    for k, bar in enumerate((counts / max(1, counts.max())).tolist()):
+        draw.rectangle((2 * k, side * (1 - 0.95 * bar), 2 * k + 1, side), BARS)
+    return picture
+
+
+def _stripes(places: Array) -> Image.Image:
+    """An angle a stripe, from above, each as bright as its largest bin."""
+    bins = 90
+    counts = [np.histogram(column, bins, (0, 1))[0] for column in places.T]
+    shades = np.stack([count / max(1, count.max()) for count in counts])
+    height = max(1, math.floor(SIZE[1] / len(shades)))
+    picture = _coloured(shades).resize((SIZE[0], height * len(shades)), Image.Resampling.BOX)
+    draw = ImageDraw.Draw(picture)
+    for k in range(1, len(shades) if height > 6 else 0):
+        draw.line((0, k * height, SIZE[0], k * height), PAPER)
+    return picture

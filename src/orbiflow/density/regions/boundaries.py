@@ -1,0 +1,263 @@
+"""The boundaries of regions in two dimensions, as closed polygons."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import shapely
+import torch
+from shapely.geometry.polygon import orient
+from torch import Tensor
+
+from orbiflow.arrays import Array
+from orbiflow.density.arguments import silent
+from orbiflow.density.models import BlendedDensity, SymmetricDensity
+from orbiflow.density.regions.contours import filled
+from orbiflow.density.regions.grid import LevelGrid, Seeds
+from orbiflow.density.regions.levels import DensityLevels, DensityRegion
+from orbiflow.density.regions.specks import (
+    Window,
+    window_of,
+    with_specks,
+)
+from orbiflow.errors import OrbiflowError
+from orbiflow.runtime import one_thread
+from orbiflow.typed_torch import unique
+
+DOUBLINGS = 3
+"""Of the coarsest grid: cells of a quarter of a degree on the globe."""
+
+BUDGET = 300_000
+"""Evaluations after which no grid gets finer."""
+
+MOST_PEAKS = 30_000
+"""Centres of kernels that are looked at for islands."""
+
+CHECKED = 100_000
+"""New samples by which the mass inside the polygons is measured."""
+
+TOLERANCE = 0.005
+"""Of that mass, beyond what samples leave open; more is said aloud."""
+
+LONGEST = 4.0
+"""Degrees of a side on the globe, so that it hardly matters which lines a reader draws."""
+
+SIMPLIFIED = 0.03
+"""Of a cell: by how much vertices that are left out may lie off the line."""
+
+
+@dataclass(frozen=True, eq=False)
+class Outline:
+    """A region's boundary.
+
+    - `region`: the region. `window`: in which it is drawn.
+    - `shape`: polygons in the window's units, outer rings counter-clockwise, cut at the window's edges.
+    - `size`: area of the polygons in natural measure.
+    - `mass`, `error`: of new samples that lie inside the polygons, and its standard error.
+    - `off`: root mean square of the log density at the vertices, less the threshold, in nats.
+    - `notes`: what the user should know.
+    """
+
+    region: DensityRegion
+    window: Window
+    shape: shapely.MultiPolygon
+    size: float
+    mass: float
+    error: float
+    off: float
+    notes: tuple[str, ...] = ()
+
+    @property
+    def fraction(self) -> float:
+        """Of the space's natural measure."""
+        return self.size / self.region.density.space.volume
+
+    def rings(self) -> list[list[Array]]:
+        """Of each polygon, its outer ring (n, 2), closed, and then its holes."""
+        return [
+            [np.asarray(ring.coords) for ring in (part.exterior, *part.interiors)]
+            for part in self.shape.geoms
+        ]
+
+    def to_json(self) -> dict[str, Any]:
+        """An object for `json.dumps`."""
+        return {
+            **self.region.to_json(),
+            "polygons": [[ring.tolist() for ring in rings] for rings in self.rings()],
+            "polygons_size": self.size,
+            "polygons_fraction": self.fraction,
+            "polygons_mass": self.mass,
+            "polygons_mass_error": self.error,
+            "vertices_off": self.off,
+            "notes": list(self.notes),
+        }
+
+
+@one_thread()
+@torch.no_grad()
+def outlines(
+    levels: DensityLevels,
+    regions: Sequence[DensityRegion],
+    *,
+    budget: int = BUDGET,
+    seed: int = 0,
+    told: Callable[[float, str], None] = silent,
+) -> list[Outline]:
+    """Draw the boundaries of regions of one density of two dimensions.
+
+    A grid is made finer where a threshold is crossed, three times over; samples on the other side of a
+    threshold than all of their cell show islands between its nodes, and get a grid of their own. Each
+    vertex is moved along its cell's side to where the density itself is at the threshold. The mass
+    inside the polygons is measured with new samples.
+
+    Args:
+        regions: of `levels`.
+        budget: evaluations of the density after which no grid gets finer.
+        seed: of the new samples.
+        told: told the share of the work done and what is being done.
+
+    Raises:
+        OrbiflowError: for a density that is not of two dimensions.
+    """
+    density = levels.density
+    window = window_of(density.space)
+    if not regions:
+        return []
+
+    def function(points: Array) -> Array:
+        told(min(0.9, spent / budget), "drawing outlines")
+        return density.log_prob(window.to_chart(points), measure="natural").numpy()
+
+    spent = 0
+    peaks = window.from_chart(_peaks(density))
+    thresholds = np.array([region.log_prob for region in regions])
+    seeds = Seeds(
+        np.concatenate([window.from_chart(levels.points), peaks]),
+        np.concatenate([levels.log_probs, function(peaks)]),
+    )
+    grid = LevelGrid.refined(
+        function, window.low, window.high, window.cells, thresholds, seeds, DOUBLINGS, budget
+    )
+    spent = grid.evaluations + len(peaks)
+    generator = torch.Generator().manual_seed(seed + 1)
+    fresh = window.from_chart(density.sample((CHECKED,), generator).double())
+    found: list[Outline] = []
+    for number, region in enumerate(regions):
+        told(min(0.9, spent / budget), "drawing outlines")
+        shape, off = filled(grid.values, grid.low, grid.step, region.log_prob, function)
+        left = (budget - spent) // (len(regions) - number)
+        shape, more, missed = with_specks(shape, grid, region.log_prob, seeds, function, left)
+        spent += more
+        shape = _polygons(shape, float(grid.step.min()), LONGEST if window.on_globe else np.inf)
+        inside = _share_inside(shape, fresh)
+        error = float(np.sqrt(max(inside * (1 - inside), 1 / CHECKED) / CHECKED))
+        found.append(
+            Outline(
+                region,
+                window,
+                shape,
+                window.area(shape),
+                inside,
+                error,
+                off,
+                _notes(region, inside, error, missed),
+            )
+        )
+    return found
+
+
+def _peaks(density: SymmetricDensity) -> Tensor:
+    """Chart points (P, 2) at which narrow islands may be: centres of kernels."""
+    if not isinstance(density, BlendedDensity):
+        return torch.zeros(0, 2, dtype=torch.float64)
+    places = unique((density.kernels.centers * 1e6).round(), dim=0) / 1e6
+    chosen = torch.randperm(len(places), generator=torch.Generator().manual_seed(0))
+    return places[chosen[:MOST_PEAKS]]
+
+
+def _polygons(shape: shapely.Geometry, step: float, longest: float) -> shapely.MultiPolygon:
+    parts = [p for p in shapely.get_parts(shape) if isinstance(p, shapely.Polygon)]
+    simple = [shapely.simplify(p, SIMPLIFIED * min(step, np.sqrt(p.area))) for p in parts]
+    kept = [orient(p) for p in simple if p.is_valid and p.area > 0]
+    if longest < np.inf:
+        kept = [shapely.segmentize(p, longest) for p in kept]
+    return shapely.MultiPolygon(kept)
+
+
+def _share_inside(shape: shapely.MultiPolygon, points: Array) -> float:
+    """Of points (N, 2) in the polygons."""
+    if shape.is_empty:
+        return 0.0
+    tree = shapely.STRtree(list(shape.geoms))
+    rows, _ = tree.query(shapely.points(points), predicate="intersects")
+    return len(np.unique(rows)) / len(points)
+
+
+def _notes(region: DensityRegion, inside: float, error: float, missed: int) -> tuple[str, ...]:
+    notes: list[str] = []
+    beyond = abs(inside - region.held) - 3 * float(np.hypot(error, region.error))
+    if beyond > TOLERANCE:
+        notes.append(
+            f"the polygons hold {inside:.4f} of the mass, the region {region.held:.4f}: it has islands "
+            "or holes too small to outline; which rows are inside is exact all the same"
+        )
+    if missed:
+        notes.append(f"{missed} islands or holes were not outlined: a larger budget would")
+    return tuple(notes)
+
+
+DIGITS = 7
+"""After the point, of degrees: a centimetre on the ground."""
+
+
+def to_geojson(outlines: Sequence[Outline]) -> dict[str, Any]:
+    """A FeatureCollection, a MultiPolygon a region, for `json.dumps`.
+
+    Coordinates are longitude and latitude in degrees, outer rings counter-clockwise (section 3.1.6);
+    polygons are cut at the antimeridian (3.1.9), and one that holds a pole runs along the edge of the
+    map there. Sides are straight in longitude and latitude (3.1.1). Of axes northern ends are drawn.
+
+    Properties of each: `mass` (asked for, or null), `held` and `held_error` (by samples of the
+    density), `log_prob` (the threshold, nats per steradian) and its interval of 95 %, `area` in
+    steradians, `fraction` of the space, `polygons_mass` and `polygons_mass_error` (of new samples
+    inside the polygons).
+
+    Raises:
+        OrbiflowError: for a space that is not round.
+    """
+    for outline in outlines:
+        if not outline.window.on_globe:
+            space = outline.region.density.space
+            raise OrbiflowError(
+                f"GeoJSON is for places on a globe, not for the angles of a {space.name}: write "
+                ".json or .csv"
+            )
+    return {"type": "FeatureCollection", "features": [_feature(outline) for outline in outlines]}
+
+
+def _feature(outline: Outline) -> dict[str, Any]:
+    region = outline.region
+    return {
+        "type": "Feature",
+        "properties": {
+            "mass": region.mass,
+            "held": region.held,
+            "held_error": region.error,
+            "log_prob": region.log_prob,
+            "log_prob_low": region.log_prob_low,
+            "log_prob_high": region.log_prob_high,
+            "area": outline.size,
+            "fraction": outline.fraction,
+            "polygons_mass": outline.mass,
+            "polygons_mass_error": outline.error,
+        },
+        "geometry": {
+            "type": "MultiPolygon",
+            "coordinates": [
+                [np.round(ring, DIGITS).tolist() for ring in rings] for rings in outline.rings()
+            ],
+        },
+    }

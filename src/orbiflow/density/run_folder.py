@@ -1,0 +1,21 @@
+"""The folder of a density, as a fit and the operations on its model leave it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+
+def written_files(folder: Path) -> set[str]:
+    """Return the names of the files that a fit wrote into a folder, and of pictures of its model."""
+    try:
+        document = json.loads((folder / "report.json").read_text(encoding="utf-8"))
+        ours = "space" in document and "report" in document
+    except (OSError, ValueError, TypeError, RecursionError):
+        ours = False
+    if not ours:
+        return set()
+
+    from orbiflow.density.pictures import MODEL, PICTURES, REPORT, TABLE, THUMBNAIL
+
+    return {MODEL, REPORT, TABLE, THUMBNAIL, *PICTURES}

@@ -1,0 +1,1 @@
+"""Three operations with their settings, as examples until the rooms have their own."""

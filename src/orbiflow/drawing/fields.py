@@ -1,0 +1,255 @@
+"""Picture of a symmetric vector field: magnitude, flow lines, cell and symmetries."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Protocol, TypedDict, Unpack
+
+import numpy as np
+import torch
+
+from orbiflow.arrays import Array, Window
+from orbiflow.drawing.canvas import (
+    mark_symmetry,
+    outline_cell,
+    plane_axes,
+)
+from orbiflow.drawing.sheet import Picture, Sheet
+from orbiflow.errors import OrbiflowError
+from orbiflow.symmetry import CrystallographicGroup, reduced_basis
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_STEPS = 12
+
+
+def symmetric_seeds(group: CrystallographicGroup, spacing: float, *, tries: int = 600) -> Array:
+    """(N, 2) points in the cell, whole orbits, all about `spacing` apart; deterministic.
+
+    Dart throwing: a random orbit is kept if all its points stay `spacing` away from those kept.
+    """
+    darts = np.random.default_rng(0).random((tries, 2)) @ group.lattice.T
+    shifts = np.stack(np.meshgrid([-1, 0, 1], [-1, 0, 1]), axis=-1).reshape(-1, 2) @ group.lattice.T
+    kept = np.empty((0, 2))
+    for dart in darts:
+        orbit = group.wrap(np.stack([g(dart) for g in group.cosets]))
+        others = np.concatenate([kept, orbit[1:]])
+        gaps = np.linalg.norm(others[:, None] + shifts - orbit[0], axis=-1)
+        if gaps.size == 0 or gaps.min() >= spacing:
+            kept = np.concatenate([kept, orbit])
+    return kept
+
+
+def flow_lines(velocity: Callable[[Array], Array], seeds: Array, length: float) -> Array:
+    """(M, 13, 2) flow lines of at most that length, with the seed in the middle.
+
+    Integrated (midpoint rule) at a speed that is near one where the field is strong and goes to
+    zero with the field, so that lines end in a sink and do not jitter about it. Seeds where the
+    field vanishes are left out.
+    """
+    speeds = np.linalg.norm(velocity(seeds), axis=-1)
+    strongest = float(speeds.max(initial=0.0))
+    if strongest == 0.0:
+        return np.empty((0, _STEPS + 1, 2))
+    step = length / _STEPS
+
+    def direction(points: Array) -> Array:
+        vectors = velocity(points)
+        return vectors / (np.linalg.norm(vectors, axis=-1, keepdims=True) + 0.05 * strongest)
+
+    def walk(sign: float) -> list[Array]:
+        points = [seeds]
+        for _ in range(_STEPS // 2):
+            half = points[-1] + 0.5 * sign * step * direction(points[-1])
+            points.append(points[-1] + sign * step * direction(half))
+        return points
+
+    lines = np.stack([*walk(-1.0)[:0:-1], *walk(1.0)], axis=1)
+    return lines[speeds > 1e-9 * strongest]
+
+
+_SAMPLES = 400  # along the longer side
+
+
+class HasPolygon(Protocol):
+    """A tile, as far as a picture of a field needs to know it."""
+
+    @property
+    def polygon(self) -> Array:
+        """Vertices (n, 2)."""
+        ...
+
+    @property
+    def center(self) -> Array:
+        """A point (2,) in the middle."""
+        ...
+
+
+def field_png(
+    velocity: Callable[[Any], Any],
+    group: CrystallographicGroup,
+    tile: HasPolygon | None = None,
+    *,
+    width_px: int = 1200,
+    **options: Unpack[FieldOptions],
+) -> bytes:
+    """PNG of `field_picture` for a screen; the height follows from the window.
+
+    Raises:
+        OrbiflowError: as `field_picture`, and for a size that cannot be made.
+    """
+    return field_picture(velocity, group, tile, sheet=Sheet.screen(width_px), **options).file()
+
+
+class FieldOptions(TypedDict, total=False):
+    """Of `field_picture`."""
+
+    window: Window | None
+    y_down: bool
+    signs: bool
+
+
+def field_picture(
+    velocity: Callable[[Any], Any],
+    group: CrystallographicGroup,
+    tile: HasPolygon | None = None,
+    *,
+    window: Window | None = None,
+    y_down: bool = False,
+    signs: bool = True,
+    sheet: Sheet | None = None,
+) -> Picture:
+    """A vector field: magnitude as colour, short flow lines over it.
+
+    After the paper's figure of results. The lines start at an orbit of the group, so the picture has
+    the symmetry that the field has, and shows it where the field has not.
+
+    Args:
+        velocity: from points (..., 2) to vectors (..., 2); called with a torch tensor, float64 or of
+            the module's dtype. For a NumPy field f give `lambda points: f(points.numpy())`.
+        group: whose lattice cell is outlined, and whose rotation centres and lines are marked.
+        tile: drawn on top, if given.
+        window: default about four cells around the tile or the origin.
+        y_down: whether the y axis points down, as in images.
+        signs: whether to mark rotation centres and lines.
+        sheet: default a screen of 1200 pixels.
+
+    Raises:
+        OrbiflowError: if the field does not return finite vectors of the points' shape.
+    """
+    sheet = sheet or Sheet.screen(1200)
+    middle = np.zeros(2) if tile is None else tile.center
+    window = window or _about_four_cells(group, middle)
+    figure = sheet.figure(sheet.width * (window[3] - window[1]) / (window[2] - window[0]))
+    axes = plane_axes(figure, window, y_down=y_down)
+    draw_magnitude(axes, velocity, window)
+    draw_flow(axes, velocity, group, window, pen=sheet.pen)
+    outline_cell(axes, group, middle, pen=sheet.pen)
+    if tile is not None:
+        ring = np.concatenate([tile.polygon, tile.polygon[:1]])
+        axes.plot(*ring.T, color="#111111", linewidth=sheet.pen(2.6), zorder=5)
+        axes.plot(*ring.T, color="#ffd166", linewidth=sheet.pen(1.5), zorder=5)
+    if signs:
+        size = 0.03 * np.sqrt(group.cell_volume)
+        mark_symmetry(axes, group, window, size=size, pen=sheet.pen)
+    return Picture(figure, sheet, "Vector field", "Colour is the field's magnitude.")
+
+
+def draw_magnitude(
+    axes: Axes, velocity: Callable[[Any], Any], window: Window, *, samples: int | None = None
+) -> None:
+    """Colour a window by a field's magnitude, at so many points along its longer side (default 400)."""
+    longer = max(window[2] - window[0], window[3] - window[1])
+    counts = [
+        max(2, round((samples or _SAMPLES) * (window[i + 2] - window[i]) / longer)) for i in (0, 1)
+    ]
+    x, y = (np.linspace(window[i], window[i + 2], counts[i]) for i in (0, 1))
+    points = np.stack(np.meshgrid(x, y), axis=-1)
+    vectors = evaluate(velocity, points)
+    limits = axes.get_ylim()
+    speed = np.linalg.norm(vectors, axis=-1)
+    extent = (window[0], window[2], window[1], window[3])
+    axes.imshow(
+        speed, extent=extent, origin="lower", cmap="viridis", interpolation="bicubic", aspect="auto"
+    )
+    axes.set_xlim(window[0], window[2])  # imshow moves the limits
+    axes.set_ylim(*limits)
+    axes.set_aspect("equal")
+
+
+def draw_flow(
+    axes: Axes,
+    velocity: Callable[[Any], Any],
+    group: CrystallographicGroup,
+    window: Window,
+    *,
+    pen: Callable[[float], float] = float,
+) -> None:
+    """Lines with heads and fading tails; `pen` gives the width in points of a line as wide as its
+    argument on a screen.
+    """
+    from matplotlib.collections import LineCollection, PolyCollection
+
+    scale = np.sqrt((window[2] - window[0]) * (window[3] - window[1]))
+    lines = flow_lines(
+        lambda points: evaluate(velocity, points),
+        _in_window(symmetric_seeds(group, 0.028 * scale), group, window, 0.05 * scale),
+        0.075 * scale,
+    )
+    # fading tails say which way the flow goes
+    segments = np.stack([lines[:, :-1], lines[:, 1:]], axis=2).reshape(-1, 2, 2)
+    alpha = np.tile(np.linspace(0.05, 0.9, lines.shape[1] - 1), len(lines))
+    colours = np.concatenate([np.ones((len(segments), 3)), alpha[:, None]], axis=1)
+    axes.add_collection(
+        LineCollection(list(segments), colors=colours, linewidths=pen(0.9), zorder=2)
+    )
+    # heads at the seeds, which keep their distance; at the ends they would pile up in every sink
+    middle = lines.shape[1] // 2
+    along = lines[:, middle + 1] - lines[:, middle - 1]
+    along = 0.009 * scale * along / np.maximum(np.linalg.norm(along, axis=1), 1e-300)[:, None]
+    across = 0.4 * along[:, ::-1] * (-1.0, 1.0)
+    seeds = lines[:, middle]
+    heads = np.stack([seeds + along, seeds + across, seeds - across], axis=1)
+    axes.add_collection(
+        PolyCollection(list(heads), facecolors="#ffffff", edgecolors="none", zorder=3)
+    )
+
+
+def _in_window(seeds: Array, group: CrystallographicGroup, window: Window, margin: float) -> Array:
+    """All translates of the seeds by lattice vectors that lie in the window or near it."""
+    low, high = np.array(window[:2]) - margin, np.array(window[2:]) + margin
+    corners = np.array([low, high, (low[0], high[1]), (high[0], low[1])]) @ group.inverse_lattice.T
+    ranges = [np.arange(np.floor(c.min()) - 1, np.ceil(c.max()) + 1) for c in corners.T]
+    shifts = np.stack(np.meshgrid(*ranges), axis=-1).reshape(-1, 1, 2) @ group.lattice.T
+    points = (seeds + shifts).reshape(-1, 2)
+    return points[((points >= low) & (points <= high)).all(axis=1)]
+
+
+def evaluate(velocity: Callable[[Any], Any], points: Array) -> Array:
+    """The field, written in torch, at NumPy points (..., 2).
+
+    Raises:
+        OrbiflowError: if it does not return finite vectors of the points' shape.
+    """
+    dtype = torch.float64
+    if isinstance(velocity, torch.nn.Module):
+        dtype = next((p.dtype for p in velocity.parameters()), dtype)
+    with torch.no_grad():
+        vectors = velocity(torch.as_tensor(points, dtype=dtype))
+    values = np.asarray(vectors, dtype=float)
+    if values.shape != points.shape or not np.isfinite(values).all():
+        raise OrbiflowError(
+            f"the field has to return finite vectors of shape {points.shape}, got {values.shape}"
+        )
+    return values
+
+
+def _about_four_cells(group: CrystallographicGroup, middle: Array) -> Window:
+    """A window of the area of some four cells, in the proportions of the cell within reason."""
+    sides = np.abs(reduced_basis(group.lattice)).sum(axis=1)
+    aspect = float(np.clip(sides[0] / sides[1], 2 / 3, 3 / 2))
+    area = 4.6 * group.cell_volume
+    half = np.sqrt(area * np.array([aspect, 1 / aspect])) / 2
+    low, high = middle - half, middle + half
+    return float(low[0]), float(low[1]), float(high[0]), float(high[1])

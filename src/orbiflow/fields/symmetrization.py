@@ -1,0 +1,194 @@
+"""Symmetrization: any vector field made to commute with a crystallographic group.
+
+The mean over coset representatives (Reynolds operator, design point 2) and the paper's three
+operators (equations for P_B, R_c^K and G_l^mu of section 3), which are unnormalised sums.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import ArrayLike
+from torch import Tensor, nn
+
+from orbiflow.fields.protocol import (
+    VectorField,
+    is_time_dependent,
+    prepared_with_divergence,
+)
+from orbiflow.symmetry import (
+    CrystallographicGroup,
+    Isometry,
+    Line,
+    checked_group,
+    identity,
+    rotation,
+    transflection,
+)
+from orbiflow.typed_torch import linalg
+
+
+class Symmetrized(nn.Module):
+    """The field V(p) = 1/|G| sum_i R_i^-1 V0(R_i p + t_i), V0 made periodic first.
+
+    See `symmetrize`. Keeps `field` as a submodule if it is one, so its parameters are trained.
+    """
+
+    def __init__(
+        self, field: Callable[..., Tensor], group: CrystallographicGroup, *, periodic: bool = False
+    ) -> None:
+        super().__init__()
+        self.field = field
+        self.group = checked_group(group)
+        self.periodic = periodic
+        self.time_dependent = is_time_dependent(field)
+
+    def forward(self, points: Tensor, *time: Tensor) -> Tensor:
+        """V at points (..., d), and at a time () if the field is time-dependent."""
+        images = self.group.images(points)
+        field = _at_time(self.field, time)
+        values = field(images) if self.periodic else blend(field, self.group.lattice, images)
+        return self._mean(values, points)
+
+    def with_divergence(self, points: Tensor, *time: Tensor) -> tuple[Tensor, Tensor]:
+        """V (..., d) and its divergence (...,): the mean of the given field's own at the images.
+
+        Derivatives are asked of the given field alone, not of what symmetrizes it: R^-1 J R has the
+        trace of J.
+        """
+        images = self.group.images(points)
+        joint = _at_time(prepared_with_divergence(self.field), time)
+        if not self.periodic:
+            values, divergence = blend_with_divergence(joint, self.group.lattice, images)
+        else:
+            values, divergence = joint(images)
+        return self._mean(values, points), divergence.mean(dim=0)
+
+    def divergence(self, points: Tensor, *time: Tensor) -> Tensor:
+        """Trace of the Jacobian at points (..., d), as (...,)."""
+        return self.with_divergence(points, *time)[1]
+
+    def bound_with_divergence(self) -> Callable[[Tensor], tuple[Tensor, Tensor]]:
+        """V and its divergence together, see `with_divergence`."""
+        return self.with_divergence
+
+    def _mean(self, values: Tensor, points: Tensor) -> Tensor:
+        linear = torch.tensor(self.group.linear_parts, dtype=values.dtype, device=values.device)
+        # the inverse of R acts on row vectors as multiplication by R
+        flat = values.reshape(self.group.order, -1, self.group.dim) @ linear
+        return flat.mean(dim=0).reshape(points.shape)
+
+    def extra_repr(self) -> str:
+        return f"{self.group!r}, periodic={self.periodic}"
+
+
+def _at_time(field: Callable[..., Any], time: tuple[Tensor, ...]) -> Callable[[Tensor], Any]:
+    return (lambda points: field(points, *time)) if time else field
+
+
+def symmetrize(
+    field: Callable[..., Tensor], group: CrystallographicGroup, *, periodic: bool = False
+) -> Symmetrized:
+    """Make any field commute with `group`: V(g p) = R_g V(p).
+
+    Args:
+        field: any callable from points (..., d) to vectors of the same shape: a torch module, a
+            function, a lambda, or a `TimeDependentField`. It need not be periodic: translates of it
+            are blended smoothly over neighbouring cells (2^d evaluations). A field that commutes
+            already is left unchanged.
+        group: of R^d.
+        periodic: set it if `field` is known to be periodic under the group's lattice (for instance a
+            network behind `PeriodicFeatures`): skips the blending.
+
+    Raises:
+        OrbiflowError: if `group` is no group, or, when called, for points of another dimension.
+
+    >>> import torch
+    >>> from orbiflow.symmetry import wallpaper_group
+    >>> group = wallpaper_group("p3")
+    >>> field = symmetrize(lambda p: torch.tanh(p), group)
+    >>> p = torch.tensor([0.3, -0.2], dtype=torch.float64)
+    >>> g = group.cosets[1]
+    >>> bool(torch.allclose(field(g(p)), g.push(field(p))))
+    True
+    """
+    return Symmetrized(field, group, periodic=periodic)
+
+
+def blend(field: VectorField, lattice: ArrayLike, points: Tensor) -> Tensor:
+    """A periodic field from any field: sum over n of w(u - n) field(B (u - n)), u = B^-1 p.
+
+    w(u) = prod cos^2(pi u_i / 2) on [-1, 1]^d sums to one over the translates, so a periodic field is
+    unchanged and a smooth field stays continuously differentiable.
+    """
+    shifted, at = _translates(lattice, points)
+    weight = torch.cos(shifted * (torch.pi / 2)).square().prod(dim=-1, keepdim=True)
+    return (weight * field(at)).sum(dim=0)
+
+
+def blend_with_divergence(
+    joint: Callable[[Tensor], tuple[Tensor, Tensor]], lattice: ArrayLike, points: Tensor
+) -> tuple[Tensor, Tensor]:
+    """As `blend` for a field that gives V and its divergence, both: div(w V) = w div V + grad w . V."""
+    shifted, at = _translates(lattice, points)
+    values, divergence = joint(at)
+    single = torch.cos(shifted * (torch.pi / 2)).square()
+    weight = single.prod(dim=-1)
+    slopes: list[Tensor] = []
+    for axis in range(points.shape[-1]):
+        others = [i for i in range(points.shape[-1]) if i != axis]
+        along = -torch.pi / 2 * torch.sin(torch.pi * shifted[..., axis])
+        slopes.append(along * single[..., others].prod(dim=-1))
+    gradient = torch.stack(slopes, dim=-1) @ _inverse(lattice, points)
+    total = weight * divergence + (gradient * values).sum(dim=-1)
+    return (weight[..., None] * values).sum(dim=0), total.sum(dim=0)
+
+
+def _translates(lattice: ArrayLike, points: Tensor) -> tuple[Tensor, Tensor]:
+    """u - n for the 2^d corners n of the cell, fractional (2^d, ..., d), and as points."""
+    basis = torch.as_tensor(np.array(lattice), dtype=points.dtype, device=points.device)
+    u = points @ _inverse(lattice, points).mT
+    u = u - u.detach().floor()
+    corners = itertools.product((0.0, 1.0), repeat=basis.shape[0])
+    shifted = torch.stack([u - u.new_tensor(corner) for corner in corners])
+    return shifted, shifted @ basis.mT
+
+
+def _inverse(lattice: ArrayLike, like: Tensor) -> Tensor:
+    return linalg.inv(torch.as_tensor(np.array(lattice), dtype=like.dtype, device=like.device))
+
+
+def periodic_operator(field: VectorField, lattice: ArrayLike) -> VectorField:
+    """P_B(V) = B o V o B^-1: a field with period 1 on each axis becomes B-periodic (eq. P_B)."""
+    basis = torch.as_tensor(np.array(lattice), dtype=torch.float64)
+
+    def operated(points: Tensor) -> Tensor:
+        b = basis.to(points)
+        return field(points @ linalg.inv(b).mT) @ b.mT
+
+    return operated
+
+
+def rotation_operator(field: VectorField, center: ArrayLike, order: int) -> VectorField:
+    """R_c^K(V) = sum over k = 1..K of R_o^-k o V o R_c^k (eq. R_c^K): a sum, not a mean."""
+    turn = rotation(center, order)
+    powers = [identity(2)]
+    for _ in range(order - 1):
+        powers.append(turn @ powers[-1])
+    return _summed(field, powers)
+
+
+def transflection_operator(field: VectorField, line: Line, mu: float) -> VectorField:
+    """G_l^mu(V) = V + M_l0 o V o T_l^mu o M_l (eq. G_l^mu): a sum, not a mean."""
+    return _summed(field, [identity(2), transflection(line, mu)])
+
+
+def _summed(field: VectorField, elements: list[Isometry]) -> VectorField:
+    def operated(points: Tensor) -> Tensor:
+        return torch.stack([g.inverse().push(field(g(points))) for g in elements]).sum(dim=0)
+
+    return operated

@@ -1,0 +1,207 @@
+"""What was saved, loaded again: `load` finds out what a folder or file holds."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeAlias, cast
+
+from orbiflow.arguments import path as as_path
+from orbiflow.density import (
+    MODEL,
+    REPORT,
+    DensityEstimator,
+    read_density,
+    report_from_json,
+)
+from orbiflow.errors import (
+    CertificationError,
+    InputFileError,
+    OrbiflowError,
+)
+from orbiflow.runtime import is_list
+from orbiflow.tiles import (
+    RESULT,
+    TILE_MODEL,
+    EscherTile,
+    TileMap,
+    folder_names,
+    read_document,
+    read_result,
+    save_tiles,
+)
+
+MOST_BYTES = 64 * 2**20
+"""The largest report that is read."""
+
+
+@dataclass(frozen=True, eq=False)
+class LoadedRun:
+    """The folder of `orbiflow escherize`: its tiles, best first, and its result.json."""
+
+    folder: Path
+    tiles: tuple[EscherTile, ...]
+    document: dict[str, Any]
+
+    @property
+    def best(self) -> EscherTile:
+        """The best tile."""
+        return self.tiles[0]
+
+    def __len__(self) -> int:
+        return len(self.tiles)
+
+    def __iter__(self) -> Iterator[EscherTile]:
+        return iter(self.tiles)
+
+    def __getitem__(self, which: str | int) -> EscherTile:
+        """Return a tile by class, such as "IH4" (its best tile), or by rank from 1.
+
+        Raises:
+            OrbiflowError: if there is no such tile.
+        """
+        for tile in self.tiles:
+            if which in (tile.isohedral_class, tile.rank):
+                return tile
+        names = ", ".join(dict.fromkeys(tile.isohedral_class for tile in self.tiles))
+        raise OrbiflowError(
+            f"{self.folder} holds no tile {which!r}; there are {names}, and ranks 1 to {len(self)}"
+        )
+
+
+Loaded: TypeAlias = DensityEstimator | LoadedRun | EscherTile | TileMap
+
+
+def load(path: str | Path, *, uncertified: bool = False) -> Loaded:
+    """Return what was saved in a folder or file.
+
+    - a folder of `orbiflow density fit`, or its density.safetensors: the fitted `DensityEstimator`,
+      with `report_` and `feature_names_in_`;
+    - a folder of `orbiflow escherize`, or its result.json: a `LoadedRun`, whose tiles are certified
+      anew;
+    - the folder of one of its tiles, such as `out/turtle/IH4`: the `EscherTile`;
+    - a tile's model.safetensors without the run around it: its maps, a `TileMap`.
+
+    Args:
+        path: The folder or file.
+        uncertified: Return tiles that do not tile, too; their `certificate` says what is wrong.
+
+    Raises:
+        InputFileError: if nothing is there, a folder holds neither or both, or a file is damaged.
+        CertificationError: for a tile that does not tile, unless it may be uncertified.
+    """
+    path = as_path(path, "the folder")
+    if path.is_dir():
+        has = {name: (path / name).is_file() for name in (MODEL, RESULT, TILE_MODEL)}
+    elif path.is_file():
+        has = {name: name == path.name for name in (MODEL, RESULT, TILE_MODEL)}
+        has[MODEL] |= path.suffix == ".safetensors" and not has[TILE_MODEL]
+    else:
+        raise InputFileError(
+            f"{path}: no such folder; give what orbiflow density fit or orbiflow escherize wrote"
+        )
+    found = [name for name, there in has.items() if there]
+    if len(found) > 1:
+        raise InputFileError(
+            f"{path} holds {' and '.join(found)}, of two commands: give the file that you mean"
+        )
+    if not found:
+        raise InputFileError(
+            f"{path} holds no {MODEL} and no {RESULT}: give the folder that orbiflow density fit or "
+            "orbiflow escherize wrote, or that of a tile in it"
+        )
+    if found == [MODEL]:
+        return _estimator(path)
+    if found == [RESULT]:
+        return _run(path, uncertified)
+    return _tile_folder(path if path.is_dir() else path.parent, uncertified)
+
+
+def save(what: EscherTile | Sequence[EscherTile] | LoadedRun, path: str | Path) -> Path:
+    """Save tiles so that `load` returns them again.
+
+    Args:
+        what: A tile, or tiles of one search, best first.
+        path: The folder to write.
+
+    Raises:
+        OutputError: if the folder holds anything else, or cannot be written.
+    """
+    return save_tiles([what] if isinstance(what, EscherTile) else list(what), path)
+
+
+def _estimator(path: Path) -> DensityEstimator:
+    file = path / MODEL if path.is_dir() else path
+    density, extra = read_density(file)
+    report, settings = None, {}
+    beside = file.with_name(REPORT)
+    document = _json(beside) if file.name == MODEL and beside.is_file() else {}
+    try:
+        if "settings" in document:  # a marginal or a conditional was not fitted
+            report = report_from_json(document["report"])
+            settings = _settings(dict(document["settings"]))
+        return DensityEstimator.fitted(density, report, extra.get("columns"), **settings)
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputFileError(f"{beside}: not the report of a density: {error}") from error
+
+
+def _settings(settings: dict[str, Any]) -> dict[str, Any]:
+    """Of a request, as the estimator has them."""
+    parts = settings.get("parts")
+    own = ("repeats", "missing", "detail", "segments", "kernels", "seed")
+    known = {name: settings[name] for name in own if name in settings}
+    return known | {"parts": "auto" if parts is None else ",".join(parts)}
+
+
+def _json(file: Path) -> dict[str, Any]:
+    try:
+        if file.stat().st_size > MOST_BYTES:
+            raise InputFileError(f"{file}: too large for a report")
+        document = json.loads(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputFileError(f"{file}: cannot be read: {error.strerror or error}") from error
+    except (ValueError, RecursionError) as error:
+        if isinstance(error, OrbiflowError):
+            raise
+        raise InputFileError(f"{file}: not JSON: {error}") from error
+    if not isinstance(document, dict):
+        raise InputFileError(
+            f"{file}: not a report: {type(document).__name__} instead of an object"
+        )
+    return cast(dict[str, Any], document)
+
+
+def _run(path: Path, uncertified: bool) -> LoadedRun:
+    file, document = read_document(path)
+    entries = document["tiles"]
+    if not is_list(entries) or not entries:
+        raise InputFileError(f"{file}: the run found no tile")
+    tiles = [_tile(file, rank, uncertified) for rank in range(1, len(entries) + 1)]
+    return LoadedRun(file.parent, tuple(tiles), document)
+
+
+def _tile_folder(folder: Path, uncertified: bool) -> EscherTile | TileMap:
+    result = folder.resolve().parent / RESULT
+    if not result.is_file():
+        return TileMap.read(folder / TILE_MODEL)
+    file, document = read_document(result)
+    try:
+        names = folder_names([str(entry["class"]) for entry in document["tiles"]])
+    except (KeyError, TypeError) as error:
+        raise InputFileError(f"{file}: not a result of orbiflow escherize: {error}") from error
+    name = folder.resolve().name
+    if name not in names:
+        raise InputFileError(f"{file} tells of {', '.join(names)}, not of {name}")
+    return _tile(file, names.index(name) + 1, uncertified)
+
+
+def _tile(file: Path, rank: int, uncertified: bool) -> EscherTile:
+    tile = read_result(file, rank)
+    if not tile.certificate.valid and not uncertified:
+        raise CertificationError(
+            f"{file}: tile {rank}, {tile.name}, does not tile the plane: "
+            f"{'; '.join(tile.certificate.reasons)}; load(..., uncertified=True) gives it all the same"
+        )
+    return tile

@@ -1,0 +1,220 @@
+"""What an operation tells while it runs.
+
+`Started` comes first; then `Note`, `Progress`, `Preview` (at most one, before any `TileFound`),
+`TileFound`, `ClassFailed`, `ItemDone` and `Written` as they happen; last `Finished` or `Failed`. The
+`share` of `Progress` never falls, nor does its `class_share` within a class. Each class of a search has
+exactly one outcome after its last `Progress`: `TileFound` or `ClassFailed`. `ItemDone` comes when the
+folder of an item has its final name, and `Written` when a file has.
+
+All events come in the thread that called the operation, or from `Process.events`.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import typing
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any, ClassVar, Literal, Self
+
+from orbiflow.arguments import described
+from orbiflow.errors import SettingError, literal
+from orbiflow.runtime.files import is_object
+from orbiflow.settings import Field, check_names, make_field
+
+
+class Event:
+    """Base of all events."""
+
+    KIND: ClassVar[str]
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the event as JSON has it; `event_from_json` restores an equal one."""
+        values = {
+            name: str(value) if isinstance(value, Path) else value
+            for name, value in vars(self).items()
+        }
+        return {"kind": self.KIND, **values}
+
+    @classmethod
+    def from_fields(cls, document: Mapping[str, Any]) -> Self:
+        """Return an event of this class with the fields of a JSON object.
+
+        Raises:
+            SettingError: If a field is unknown, missing or not allowed.
+        """
+        fields = _fields(cls)
+        check_names(document, fields.values(), cls.KIND)
+        return cls(**{name: _read(fields[name], value) for name, value in document.items()})
+
+
+@dataclass(frozen=True)
+class Started(Event):
+    """An operation of this name has begun."""
+
+    KIND = "started"
+
+    operation: str
+
+
+@dataclass(frozen=True)
+class Note(Event):
+    """Something that the user should know, in words."""
+
+    KIND = "note"
+
+    text: str
+
+
+@dataclass(frozen=True)
+class Progress(Event):
+    """How far the operation is.
+
+    - `share`: The share of the work that is done, from 0 to 1.
+    - `what`: What is being done.
+    - `class_name`: In a search, the class that moved on.
+    - `class_share`: How far this class is.
+    - `loss`: Its best result so far in the method's own measure (for the descent 1 - IoU); None if it
+      is not known.
+    """
+
+    KIND = "progress"
+
+    share: float
+    what: str
+    class_name: str | None = None
+    class_share: float | None = None
+    loss: float | None = None
+
+
+@dataclass(frozen=True)
+class Preview(Event):
+    """A first certified tile, `seconds` after the start; the search is going to improve on it."""
+
+    KIND = "preview"
+
+    class_name: str
+    iou: float
+    seconds: float
+
+
+@dataclass(frozen=True)
+class TileFound(Event):
+    """The best tile of a class."""
+
+    KIND = "tile-found"
+
+    class_name: str
+    iou: float
+    score: float
+    certified: bool
+
+
+@dataclass(frozen=True)
+class ClassFailed(Event):
+    """A class that gave no tile, or was interrupted."""
+
+    KIND = "class-failed"
+
+    class_name: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class ItemDone(Event):
+    """An item of a batch has finished.
+
+    - `name`: The name of its folder among the results.
+    - `what`: Its result, or why it has none, in words.
+    """
+
+    KIND = "item-done"
+
+    name: str
+    state: Literal["done", "nothing found", "failed"]
+    what: str
+
+
+@dataclass(frozen=True)
+class Written(Event):
+    """A file is complete and has its final name."""
+
+    KIND = "written"
+
+    path: Path
+
+
+State = Literal["done", "nothing found", "cancelled"]
+
+
+@dataclass(frozen=True)
+class Finished(Event):
+    """The end of an operation.
+
+    - `state`: "cancelled" if it was told to stop; what was found by then is written.
+    - `summary`: What was done, as JSON has it; each operation has its own.
+    """
+
+    KIND = "finished"
+
+    state: State
+    summary: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Failed(Event):
+    """The end of an operation without a result.
+
+    - `failure`: "mistake" for what the user can mend, "error" for a fault of orbiflow, "died" for a
+      process that ended without a word.
+    """
+
+    KIND = "failed"
+
+    message: str
+    failure: Literal["mistake", "error", "died"]
+
+
+EVENTS: dict[str, type[Event]] = {event.KIND: event for event in Event.__subclasses__()}
+
+
+def event_from_json(document: object) -> Event:
+    """Return the event that a JSON object of `Event.to_json` describes.
+
+    Raises:
+        SettingError: If it is not such an object.
+
+    >>> event_from_json({"kind": "note", "text": "dark on light"})
+    Note(text='dark on light')
+    """
+    if not is_object(document):
+        raise SettingError(f"an event is a JSON object, got {literal(described(document))}")
+    kind = document.get("kind")
+    if not isinstance(kind, str) or kind not in EVENTS:
+        raise SettingError(
+            f"unknown kind of event {literal(described(kind))}; there are {', '.join(EVENTS)}"
+        )
+    return EVENTS[kind].from_fields({k: v for k, v in document.items() if k != "kind"})
+
+
+@cache
+def _fields(event: type[Event]) -> dict[str, Field]:
+    hints = typing.get_type_hints(event)
+    return {
+        entry.name: make_field(entry.name, hints[entry.name], entry.default, str)
+        for entry in dataclasses.fields(typing.cast(Any, event))
+    }
+
+
+def _read(field: Field, value: Any) -> Any:
+    if field.name != "summary":
+        return field.read(value)
+    try:
+        if is_object(value):
+            return json.loads(json.dumps(value, allow_nan=False))
+    except (TypeError, ValueError):
+        pass
+    raise SettingError(f"{{summary}} must be a JSON object, got {literal(described(value))}")

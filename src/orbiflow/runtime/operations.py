@@ -1,0 +1,353 @@
+"""Operations: public functions from which a command line, a JSON form and a reference are derived.
+
+**To add an operation**, write a function in a light module (heavy libraries are imported inside it)
+and name it in `orbiflow.operations`::
+
+    @operation("export")
+    def export(
+        result: Path,
+        settings: ExportSettings = ExportSettings(),
+        *,
+        out: Annotated[Path | None, Option("-o"), DefaultText("named after the tile")] = None,
+        on_event: Sink = ignore,
+        cancel: Cancel = NEVER,
+    ) -> Outcome:
+        \"\"\"Write a tiling in real size.
+
+        Args:
+            result: A search's folder, or its result.json.
+            out: The file.
+        \"\"\"
+
+Parameters are paths, simple values and settings classes, annotated like the fields of those; a
+parameter that can be given by position and has no default is an argument of the command, every other
+one an option. Settings are flattened, so names must be unique within an operation. The body is
+read, call, write; it returns an `Outcome`, and raises `SettingError` for a mistake, before it imports
+anything heavy where that is possible.
+
+When called, arguments are checked; `on_event` gets `Started`, then what the body tells, then
+`Finished` or `Failed`.
+"""
+
+from __future__ import annotations
+
+import inspect
+import re
+import typing
+from collections.abc import Callable, Mapping
+from dataclasses import MISSING, dataclass, field
+from functools import cache, cached_property, wraps
+from importlib import import_module
+from typing import Any, Literal, ParamSpec, TypeVar, cast
+
+from orbiflow.arguments import as_instance, described, meant
+from orbiflow.errors import OrbiflowError, SettingError, literal
+from orbiflow.runtime.cancel import Cancel, Cancelled
+from orbiflow.runtime.events import Event, Failed, Finished, Started
+from orbiflow.settings import Field, Settings, check_names, check_rules, fields_of, make_field
+
+SCHEMA_VERSION = 2
+SCHEMA = "https://json-schema.org/draft/2020-12/schema"
+OWN = ("on_event", "cancel")
+"""Parameters that every operation may have and no user sets by name."""
+
+Sink = Callable[[Event], None]
+P = ParamSpec("P")
+R = TypeVar("R", bound="Outcome")
+
+
+def ignore(_event: Event) -> None:
+    """Ignore an event."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came of an operation.
+
+    - `summary`: What was done, as JSON has it.
+    - `state`: "done", "nothing found", or "cancelled" if it was stopped and kept what it had.
+    - `failed`: The number of items, of many, that have no result.
+    """
+
+    summary: dict[str, Any] = field(default_factory=dict[str, Any])
+    state: Literal["done", "nothing found", "cancelled"] = "done"
+    failed: int = 0
+
+    @property
+    def exit_status(self) -> int:
+        """The status with which the command ends."""
+        return {"done": int(self.failed > 0), "nothing found": 1, "cancelled": 130}[self.state]
+
+
+@dataclass(frozen=True, eq=False)
+class Operation:
+    """A public function that is known by name.
+
+    - `name`: What the command line and JSON call it; a space separates a group from its command.
+    - `function`: The function as it was written.
+    - `keeps_partial`: Whether it can be stopped and keeps what it has.
+    - `starts_processes`: Whether it forks, so that no thread may run beside it.
+    """
+
+    name: str
+    function: Callable[..., Outcome]
+    keeps_partial: bool = False
+    starts_processes: bool = False
+
+    @cached_property
+    def fields(self) -> tuple[Field, ...]:
+        """All parameters, settings flattened, in the order of the signature."""
+        found = [entry for part in self._parts.values() for entry in _flat(part)]
+        names = [entry.name for entry in found]
+        if len(set(names)) < len(names):
+            raise TypeError(f"settings of {self.name} share a name: {sorted(names)}")
+        return tuple(found)
+
+    @cached_property
+    def _parts(self) -> dict[str, Field | type[Settings]]:
+        """A field for each simple parameter, its class for each that is of settings."""
+        hints = typing.get_type_hints(self.function, include_extras=True)
+        parts: dict[str, Field | type[Settings]] = {}
+        for name, parameter in inspect.signature(self.function).parameters.items():
+            if name in OWN:
+                continue
+            hint = hints[name]
+            if isinstance(hint, type) and issubclass(hint, Settings):
+                parts[name] = hint
+                continue
+            required = parameter.default is parameter.empty
+            parts[name] = make_field(
+                name,
+                hint,
+                MISSING if required else parameter.default,
+                lambda name=name: self._argument_docs.get(name, ""),
+                positional=required and parameter.kind is parameter.POSITIONAL_OR_KEYWORD,
+            )
+        return parts
+
+    @cached_property
+    def doc(self) -> str:
+        """The description in the docstring, without its sections."""
+        return re.split(r"\n(?:Args|Returns|Raises):\n", inspect.getdoc(self.function) or "")[
+            0
+        ].strip()
+
+    @cached_property
+    def _argument_docs(self) -> dict[str, str]:
+        text = inspect.getdoc(self.function) or ""
+        found = re.search(r"\nArgs:\n((?:    .*\n?|\n)*)", text)
+        entries = re.split(r"^    (?=\w+: )", found[1] if found else "", flags=re.MULTILINE)
+        return dict(entry.split(": ", 1) for entry in entries if ": " in entry)
+
+    def call(self, given: Mapping[str, Any]) -> Call:
+        """Return a call with these parameters and settings, all in one mapping, checked.
+
+        Raises:
+            SettingError: If one is unknown, missing or not allowed.
+        """
+        check_names(given, self.fields, self.name)
+        arguments: dict[str, Any] = {}
+        for name, part in self._parts.items():
+            if isinstance(part, Field):
+                arguments[name] = part.read(given[name]) if name in given else part.default
+            else:
+                own = {entry.name for entry in fields_of(part)}
+                arguments[name] = part(**{key: given[key] for key in given if key in own})
+        call = Call(self, arguments, frozenset(given))
+        self._check_rules(call)
+        return call
+
+    def run(self, arguments: Mapping[str, Any], on_event: Sink, cancel: Cancel) -> Outcome:
+        """Check the function's arguments, run it and tell the events."""
+        checked = self._checked(arguments)
+        tell = _Teller(on_event)
+        tell(Started(self.name))
+        try:
+            outcome = self.function(**checked, on_event=tell, cancel=cancel)
+        except Cancelled:
+            tell(Finished("cancelled", {}))
+            raise
+        except OrbiflowError as error:
+            tell.failed(Failed(str(error), "mistake"))
+            raise
+        except Exception as error:
+            tell.failed(Failed(f"{type(error).__name__}: {error}", "error"))
+            raise
+        tell(Finished(outcome.state, outcome.summary))
+        return outcome
+
+    def _checked(self, arguments: Mapping[str, Any]) -> dict[str, Any]:
+        checked = dict(arguments)
+        given: set[str] = set()
+        for name, part in self._parts.items():
+            if name not in arguments:
+                continue
+            if isinstance(part, Field):
+                checked[name] = part.read(arguments[name])
+                given.add(name)
+            else:
+                given |= as_instance(arguments[name], part, name).fields_given
+        self._check_rules(Call(self, checked, frozenset(given)))
+        return checked
+
+    def _check_rules(self, call: Call) -> None:
+        simple = [part for part in self._parts.values() if isinstance(part, Field)]
+        defaults = {entry.name: entry.default for entry in simple}
+        check_rules(simple, {**defaults, **call.flat}, call.given)
+
+    @property
+    def schema(self) -> dict[str, Any]:
+        """The JSON form as JSON Schema."""
+        return {
+            "$schema": SCHEMA,
+            "title": self.name,
+            "description": self.doc,
+            "type": "object",
+            "properties": {
+                "schema_version": {"const": SCHEMA_VERSION},
+                "operation": {"const": self.name},
+                **{entry.name: entry.schema for entry in self.fields},
+            },
+            "required": [
+                "schema_version",
+                "operation",
+                *(entry.name for entry in self.fields if entry.required),
+            ],
+            "additionalProperties": False,
+        }
+
+
+@dataclass(frozen=True)
+class Call:
+    """An operation with its arguments, checked: what can be run, written down and sent elsewhere.
+
+    - `arguments`: Those of the function.
+    - `given`: The names of parameters and settings that were given.
+    """
+
+    operation: Operation
+    arguments: dict[str, Any]
+    given: frozenset[str]
+
+    def run(self, on_event: Sink = ignore, cancel: Cancel | None = None) -> Outcome:
+        """Run the operation."""
+        return self.operation.run(self.arguments, on_event, cancel or Cancel())
+
+    @property
+    def flat(self) -> dict[str, Any]:
+        """All parameters and settings by name, whether given or not."""
+        flat: dict[str, Any] = {}
+        for name, value in self.arguments.items():
+            if isinstance(value, Settings):
+                flat |= {entry.name: getattr(value, entry.name) for entry in fields_of(type(value))}
+            else:
+                flat[name] = value
+        return flat
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the JSON form, with what was given; `call_from_json` restores an equal call."""
+        flat = self.flat
+        return {
+            "schema_version": SCHEMA_VERSION,
+            "operation": self.operation.name,
+            **{
+                entry.name: entry.kind.plain(flat[entry.name])
+                for entry in self.operation.fields
+                if entry.name in self.given
+            },
+        }
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return call_from_json, (self.to_json(),)
+
+
+def operation(
+    name: str, *, keeps_partial: bool = False, starts_processes: bool = False
+) -> Callable[[Callable[P, R]], Callable[P, R]]:
+    """Make a function an operation: its arguments are checked and its events told.
+
+    Args:
+        name: The name by which `orbiflow.operations` knows it.
+        keeps_partial: Whether it can be stopped and keeps what it has.
+        starts_processes: Whether it forks, so that no thread may run beside it.
+    """
+
+    def decorate(function: Callable[P, R]) -> Callable[P, R]:
+        made = Operation(name, function, keeps_partial, starts_processes)
+        signature = inspect.signature(function)
+
+        @wraps(function)
+        def checked(*args: P.args, **kwargs: P.kwargs) -> R:
+            arguments = dict(signature.bind(*args, **kwargs).arguments)
+            on_event: Any = arguments.pop("on_event", ignore)
+            cancel: Any = arguments.pop("cancel", None)
+            return cast(R, made.run(arguments, on_event, cancel or Cancel()))
+
+        checked.__dict__["operation"] = made
+        return checked
+
+    return decorate
+
+
+@cache
+def find(name: str) -> Operation:
+    """Return the operation of a name in `orbiflow.operations`, importing its module.
+
+    Raises:
+        SettingError: If there is none.
+    """
+    from orbiflow.operations import OPERATIONS
+
+    if name not in OPERATIONS:
+        hint = meant(name, list(OPERATIONS)) or f"there are {', '.join(OPERATIONS)}"
+        raise SettingError(f"unknown operation {literal(described(name))}; {literal(hint)}")
+    module, function = OPERATIONS[name].split(":")
+    return getattr(import_module(module), function).operation
+
+
+def all_operations() -> tuple[Operation, ...]:
+    """Return all operations of `orbiflow.operations`."""
+    from orbiflow.operations import OPERATIONS
+
+    return tuple(map(find, OPERATIONS))
+
+
+def call_from_json(document: object) -> Call:
+    """Return the call that a JSON object of `Call.to_json` describes.
+
+    Raises:
+        SettingError: If it is not such an object, or a setting in it is not allowed.
+    """
+    if not isinstance(document, dict):
+        raise SettingError(f"expected a JSON object, got {literal(described(document))}")
+    given = dict(cast(dict[str, Any], document))
+    version, name = given.pop("schema_version", None), given.pop("operation", None)
+    if version != SCHEMA_VERSION:
+        raise SettingError(
+            f"{{schema_version}} must be {SCHEMA_VERSION}, got {literal(described(version))}; "
+            "write the file again with this version of orbiflow"
+        )
+    if not isinstance(name, str):
+        raise SettingError(f"{{operation}} must be a name, got {literal(described(name))}")
+    return find(name).call(given)
+
+
+def _flat(part: Field | type[Settings]) -> tuple[Field, ...]:
+    return (part,) if isinstance(part, Field) else fields_of(part)
+
+
+class _Teller:
+    """A sink that is not told of its own failure."""
+
+    def __init__(self, sink: Sink) -> None:
+        self.sink = sink
+        self.broken = False
+
+    def __call__(self, event: Event) -> None:
+        self.broken = True
+        self.sink(event)
+        self.broken = False
+
+    def failed(self, event: Event) -> None:
+        if not self.broken:
+            self(event)

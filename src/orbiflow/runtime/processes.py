@@ -1,0 +1,308 @@
+"""Worker processes: how they start, what they say, how they end."""
+
+from __future__ import annotations
+
+import contextlib
+import multiprocessing
+import pickle
+import signal
+import threading
+import time
+import traceback
+import warnings
+from collections import deque
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from multiprocessing.connection import Connection, wait
+from typing import Any
+
+import torch
+
+from orbiflow.errors import OrbiflowError
+from orbiflow.runtime.cancel import Cancel, Cancelled
+
+Function = Callable[[Any, Callable[[Any], None], Cancel], Any]
+"""What a worker does: it is given an item, what takes its news, and the token to look at."""
+
+POLL = 0.05
+"""Seconds between looks at the token while no worker says anything."""
+
+GRACE = 2.0
+"""Seconds that workers have to end by themselves once they are told to."""
+
+
+@dataclass(frozen=True, eq=False)
+class News:
+    """From a worker.
+
+    - `index`: of the item that it works on.
+    - `value`: what it tells, or the result.
+    - `done`: whether it is the result.
+    - `died`: whether there is none, since every worker that was given the item died; `done`, too.
+    """
+
+    index: int
+    value: Any
+    done: bool
+    died: bool = False
+
+
+def process_context(preload: Sequence[str] = ("torch",)) -> Any:
+    """How workers start: forked where that is safe, which saves them two seconds of imports.
+
+    A fork is safe as long as this process has no other thread and torch has not been allowed any.
+    Elsewhere they are forked from a server, where there is one, which begins with importing the modules
+    of `preload`; there is one server a process, and its first call decides.
+    """
+    methods = multiprocessing.get_all_start_methods()
+    if "fork" in methods and torch.get_num_threads() == 1 and threading.active_count() == 1:
+        return multiprocessing.get_context("fork")
+    context = multiprocessing.get_context("forkserver" if "forkserver" in methods else "spawn")
+    if context.get_start_method() == "forkserver":
+        context.set_forkserver_preload(list(preload))
+    return context
+
+
+def work(
+    function: Function,
+    items: Iterable[Any],
+    workers: int,
+    *,
+    context: Any = None,
+    cancel: Cancel | None = None,
+    tries: int | None = None,
+) -> Generator[News, None, None]:
+    """Do `function(item, tell, cancel)` for each item, in processes; yield their news in this thread.
+
+    Workers run torch on one thread and take no notice of Ctrl-C: this process decides. They end when
+    the generator is closed, and also when this process dies. Told to stop, they have two seconds to
+    say what they have found; the generator then ends without the other results.
+
+    Args:
+        function: of a module, or a `functools.partial` of one; it is handed to each worker once.
+        items: taken in order, one at a time, by whichever worker is free.
+        workers: processes at most.
+        context: of `process_context`.
+        cancel: looked at between news; workers are given a token that follows it.
+        tries: workers that may die of an item. Each is replaced by a new one; an item that has had
+            so many is done with, its news say `died`. None: no worker may die.
+
+    Raises:
+        OrbiflowError: if a worker dies without `tries`; and whatever `function` raises.
+    """
+    pool = _Pool(function, items, context or process_context(), cancel or Cancel(), tries)
+    try:
+        pool.start(workers)
+        yield from pool.news()
+    finally:
+        pool.close()
+
+
+@dataclass(frozen=True)
+class _Order:
+    index: int
+    item: Any
+    tried: int  # workers that have died of it
+
+
+@dataclass(eq=False)
+class _Worker:
+    process: Any
+    order: _Order | None = None
+
+
+class _Pool:
+    def __init__(
+        self,
+        function: Function,
+        items: Iterable[Any],
+        context: Any,
+        cancel: Cancel,
+        tries: int | None,
+    ) -> None:
+        self.function, self.context, self.cancel, self.tries = function, context, cancel, tries
+        self.items = enumerate(items)
+        self.again: deque[_Order] = deque()
+        self.workers: dict[Connection, _Worker] = {}
+        self.ended: list[Any] = []
+        self.stop_by: float | None = None
+
+    def start(self, count: int) -> None:
+        first = [order for order in (self._next() for _ in range(count)) if order is not None]
+        channels = [self._new_worker() for _ in first]
+        for channel, order in zip(channels, first, strict=True):
+            self._feed(channel, order)
+
+    def news(self) -> Iterator[News]:
+        while self._go_on():
+            for channel in wait(list(self.workers), POLL):
+                assert isinstance(channel, Connection)
+                order = self.workers[channel].order
+                assert order is not None
+                try:
+                    what, value = channel.recv()
+                except (EOFError, OSError) as error:
+                    given_up = self._lost(channel, order, error)
+                    if given_up:
+                        yield News(order.index, None, True, died=True)
+                    continue
+                if what == "raised":
+                    raise value
+                news = News(order.index, value, what == "done")
+                self._listen()
+                if news.done:
+                    self._feed(channel, self._next())
+                yield news
+
+    def close(self) -> None:
+        """Without waiting for what workers are at."""
+        for channel in list(self.workers):
+            self._ended(channel)
+        for process in self.ended:
+            process.terminate()
+        for process in self.ended:
+            process.join()
+
+    def _next(self) -> _Order | None:
+        """What is to be done next, nothing once this is the end."""
+        if self.stop_by is not None:
+            return None
+        if self.again:
+            return self.again.popleft()
+        index, item = next(self.items, (None, None))
+        return None if index is None else _Order(index, item, 0)
+
+    def _new_worker(self) -> Connection:
+        ours, theirs = self.context.Pipe()
+        # a fork inherits our ends: a worker would never learn that this process has gone
+        method = self.context.get_start_method()
+        inherited = (ours, *self.workers) if method == "fork" else ()
+        process = self.context.Process(
+            target=_serve, args=(theirs, inherited, self.function), daemon=True
+        )
+        # a fork server would hand the blocked signal on to other people's processes
+        shielded = contextlib.nullcontext() if method == "forkserver" else _without_interrupts()
+        with _quiet_fork(), shielded:
+            process.start()
+        theirs.close()
+        self.workers[ours] = _Worker(process)
+        return ours
+
+    def _go_on(self) -> bool:
+        self._listen()
+        return bool(self.workers) and (self.stop_by is None or time.monotonic() < self.stop_by)
+
+    def _listen(self) -> None:
+        """Tell the workers, once, that this is the end."""
+        if self.cancel.cancelled and self.stop_by is None:
+            self.stop_by = time.monotonic() + GRACE
+            for channel, worker in self.workers.items():
+                if worker.order is not None:
+                    _send(channel, None)
+
+    def _feed(self, channel: Connection, order: _Order | None) -> None:
+        """The next item to a free worker, or its end."""
+        self.workers[channel].order = order
+        _send(channel, None if order is None else (order.item,))
+        if order is None:
+            self._ended(channel)
+
+    def _lost(self, channel: Connection, order: _Order, error: Exception) -> bool:
+        """Whether the item that a worker died of is given up; else another one is to try."""
+        self._listen()  # Ctrl-C may have ended a worker that was only just starting
+        if self.stop_by is None and self.tries is None:
+            raise OrbiflowError(
+                "a worker process died: was memory short, or is the script that called this "
+                'without `if __name__ == "__main__":`? Try workers=1'
+            ) from error
+        self._ended(channel)
+        if self.stop_by is not None or self.tries is None:
+            return False
+        given_up = order.tried + 1 >= self.tries
+        if not given_up:
+            self.again.append(replace(order, tried=order.tried + 1))
+        following = self._next()
+        if following is not None:
+            self._feed(self._new_worker(), following)
+        return given_up
+
+    def _ended(self, channel: Connection) -> None:
+        self.ended.append(self.workers.pop(channel).process)
+        channel.close()
+
+
+def _serve(channel: Connection, inherited: Iterable[Connection], function: Function) -> None:
+    """The life of a worker."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    if hasattr(signal, "pthread_sigmask"):
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+    for other in inherited:
+        other.close()
+    torch.set_num_threads(1)
+    cancel = _Asked(channel)
+    with contextlib.suppress(EOFError, OSError, Cancelled):  # nobody listens any more
+        while (order := channel.recv()) is not None:
+            try:
+                answer = (
+                    "done",
+                    function(order[0], lambda news: channel.send(("told", news)), cancel),
+                )
+            except Exception as error:
+                if isinstance(error, Cancelled):
+                    raise
+                answer = "raised", _portable(error)
+            channel.send(answer)
+
+
+def _portable(error: Exception) -> Exception:
+    """With its traceback as a note, and as a plain error if it would not survive the journey."""
+    error.add_note("in a worker process:\n" + traceback.format_exc())
+    try:
+        pickle.loads(pickle.dumps(error))
+    except Exception:
+        return RuntimeError("\n".join([f"{type(error).__name__}: {error}", *error.__notes__]))
+    return error
+
+
+class _Asked(Cancel):
+    """In a worker: any word while it works means stop, and so does the death of its parent."""
+
+    def __init__(self, channel: Connection) -> None:
+        super().__init__()
+        self._channel = channel
+
+    @property
+    def cancelled(self) -> bool:
+        if not self._told:
+            try:
+                self._told = self._channel.poll()
+            except OSError:
+                self._told = True
+        return self._told
+
+
+def _send(channel: Connection, value: Any) -> None:
+    with contextlib.suppress(OSError):  # a worker that has died is noticed when it is read from
+        channel.send(value)
+
+
+@contextlib.contextmanager
+def _quiet_fork() -> Generator[None]:
+    """Newer Pythons warn of every fork beside a numerical library."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)
+        yield
+
+
+@contextlib.contextmanager
+def _without_interrupts() -> Generator[None]:
+    """Ctrl-C waits while a process starts, until it takes no notice of it."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)

@@ -1,0 +1,467 @@
+"""Settings classes: typed, frozen, checked once, the same from Python, JSON and the command line.
+
+**To write a settings class**, derive from `Settings` and give each field a type, a default and one
+sentence, in a string under it::
+
+    class SampleSettings(Settings, group="Samples"):
+        count: Annotated[int, Range(1, 1_000_000), Option("-n")] = 1000
+        \"\"\"How many samples are drawn.\"\"\"
+
+        kerf: Annotated[LengthOrZero, OnlyWith(cut="pieces"), Group("Pieces")] = 0.0
+        \"\"\"Width that the tool burns away.\"\"\"
+
+The class becomes a frozen dataclass whose fields are keywords. A field without default is required.
+Types are those of `orbiflow.kinds` and `orbiflow.units`: `bool`, `int`, `float`, `str`, `Path`,
+`Literal`, tuples, unions with None, `Length`, `Size`, ...; `Annotated` adds:
+
+- `Range(1, 100)`, `Range(above=0)`, `Unit("s")`: which numbers, in which unit.
+- `Option("-n", "--count", off="--no-count")`: what the command line calls the field, where that is
+  not just `--field-name`. `Repeated()`: a tuple given by repeating the option. `Hidden()`: no option.
+- `Group("Pieces")`: its heading in the help. `DefaultText("one per core")`: what None means.
+- `OnlyWith(cut="pieces")`, `Needs("emphasis")`, `NotWith("parts")`: rules about other fields. They
+  apply to fields that were given (`settings.fields_given`), so a default never offends.
+  `because=...` adds a reason to the message, with names of fields in braces.
+- `Parsed(function, "a length such as 40mm")`: text is read by a function.
+
+What rules cannot say goes into a method `check`, which raises a `SettingError` with the names of
+fields in braces. A default that depends on other fields goes into a method `defaults`, which returns
+values for fields that were not given; so a preset is a field like any other.
+
+Use `settings.replace(...)`, not `dataclasses.replace`, to change fields: it remembers which were given.
+
+**To add an operation**, see `orbiflow.runtime.operations`. **To add an option** to one: add a field to
+its settings class, and use it. The command line, JSON, JSON Schema and reference page follow.
+"""
+
+from __future__ import annotations
+
+import ast
+import dataclasses
+import inspect
+import types
+import typing
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import MISSING, dataclass, field
+from functools import cache, cached_property
+from typing import Any, ClassVar, Self, cast, dataclass_transform
+
+from orbiflow.arguments import Range, described, meant, one_of, placeholder, refusal
+from orbiflow.errors import SettingError, literal
+from orbiflow.kinds import Kind, Parsed, Refused, Repeated, Unit, kind_of
+
+__all__ = [
+    "DefaultText",
+    "Field",
+    "Group",
+    "Hidden",
+    "Needs",
+    "NotWith",
+    "OnlyWith",
+    "Option",
+    "Parsed",
+    "Range",
+    "Repeated",
+    "SettingError",
+    "Settings",
+    "Unit",
+    "check_names",
+    "check_rules",
+    "fields_of",
+    "make_field",
+]
+
+
+class Option:
+    """What the command line calls a field.
+
+    Args:
+        names: Names such as "-n" or "--for". Without a long one, `--field-name` is added.
+        off: The name that sets a flag to false, such as "--whole". Default: none for a flag that is
+            false anyway, `--no-field-name` for others.
+    """
+
+    def __init__(self, *names: str, off: str = "") -> None:
+        self.names = names
+        self.off = off
+
+
+@dataclass(frozen=True)
+class Group:
+    """The heading in the help under which a field stands."""
+
+    name: str
+
+
+@dataclass(frozen=True)
+class Hidden:
+    """A field that Python and JSON can set, and the command line cannot."""
+
+
+@dataclass(frozen=True)
+class DefaultText:
+    """What None means, in a few words, such as "one per core"."""
+
+    text: str
+
+
+class OnlyWith:
+    """A field that applies only where other fields have one of these values.
+
+    A value may be a tuple of several. `because` is a reason, for the message.
+    """
+
+    def __init__(self, *, because: str = "", **others: Any) -> None:
+        self.others: dict[str, tuple[Any, ...]] = {
+            name: value if isinstance(value, tuple) else (value,) for name, value in others.items()
+        }
+        self.because = because
+
+    def check(self, name: str, values: Mapping[str, Any]) -> None:
+        """Refuse the field where another has a value that it does not apply to."""
+        for other, allowed in self.others.items():
+            value = values[other]
+            if value in allowed:
+                continue
+            here = "" if isinstance(value, bool) else f", not to {literal(_word(value))}"
+            raise SettingError(
+                f"{{{name}}} applies only to {_condition(other, allowed)}{here}"
+                f"{_reason(self.because)}; leave {{{name}}} out or change {{{other}}}"
+            )
+
+    def __str__(self) -> str:
+        return " and ".join(_condition(*other) for other in self.others.items())
+
+
+class Needs:
+    """A field that applies only where another is given, too."""
+
+    def __init__(self, other: str, *, because: str = "") -> None:
+        self.other = other
+        self.because = because
+
+    def check(self, name: str, values: Mapping[str, Any]) -> None:
+        """Refuse the field where the other is missing."""
+        if not values[self.other]:
+            raise SettingError(
+                f"{{{name}}} needs {{{self.other}}}{_reason(self.because)}; give both or neither"
+            )
+
+    def __str__(self) -> str:
+        return f"{{{self.other}}}"
+
+
+class NotWith:
+    """A field that excludes others."""
+
+    def __init__(self, *others: str, because: str = "") -> None:
+        self.others = others
+        self.because = because
+
+    def check(self, name: str, values: Mapping[str, Any]) -> None:
+        """Refuse the field where one of the others is given, too."""
+        for other in self.others:
+            if values[other] not in (None, False, ()):
+                raise SettingError(
+                    f"{{{name}}} and {{{other}}} exclude each other{_reason(self.because)}; "
+                    "give one of them"
+                )
+
+    def __str__(self) -> str:
+        return ""
+
+
+Rule = OnlyWith | Needs | NotWith
+
+
+@dataclass(frozen=True)
+class Field:
+    """A setting of a class, or a parameter of an operation: all that is known of it.
+
+    - `name`: The name in Python and JSON.
+    - `annotation`: The type as written.
+    - `default`: The default, or `dataclasses.MISSING` if it is required.
+    - `doc`: Its sentence.
+    - `group`: Its heading in the help, "" for the command's own.
+    - `positional`: Whether the command line takes it as an argument rather than an option.
+    """
+
+    name: str
+    annotation: Any
+    default: Any = MISSING
+    find_doc: Callable[[], str] = field(default=str, compare=False)
+    group: str = ""
+    positional: bool = False
+
+    @cached_property
+    def kind(self) -> Kind:
+        """What values it may have."""
+        return kind_of(self.annotation)
+
+    @cached_property
+    def doc(self) -> str:
+        """Its sentence."""
+        return " ".join(self.find_doc().split())
+
+    @property
+    def required(self) -> bool:
+        """Whether it has no default."""
+        return self.default is MISSING
+
+    @cached_property
+    def metadata(self) -> tuple[Any, ...]:
+        """What `Annotated` adds to its type."""
+        is_annotated = typing.get_origin(self.annotation) is typing.Annotated
+        return typing.get_args(self.annotation)[1:] if is_annotated else ()
+
+    @cached_property
+    def alternatives(self) -> set[Any]:
+        """The types of its values, None apart."""
+        annotation = self.annotation
+        if self.metadata:
+            annotation = typing.get_args(annotation)[0]
+        is_union = typing.get_origin(annotation) in (typing.Union, types.UnionType)
+        parts = typing.get_args(annotation) if is_union else (annotation,)
+        return {part for part in parts if part is not type(None)}
+
+    @property
+    def rules(self) -> tuple[Rule, ...]:
+        """Its rules about other fields."""
+        return tuple(entry for entry in self.metadata if isinstance(entry, Rule))
+
+    @cached_property
+    def option(self) -> Option:
+        """What the command line calls it, always with a long name."""
+        found = self.of_class(Option) or Option()
+        long = any(name.startswith("--") for name in found.names)
+        names = found.names if long else (f"--{self.name.replace('_', '-')}", *found.names)
+        off = found.off
+        if not off and bool in self.alternatives and self.default is not False:
+            off = f"--no-{self.name.replace('_', '-')}"
+        return Option(*names, off=off)
+
+    @property
+    def default_text(self) -> str:
+        """The default in words, "" for none and for flags."""
+        found = self.of_class(DefaultText)
+        if found is not None:
+            return found.text
+        if self.required or self.default is None or self.default is False or self.default == ():
+            return ""
+        return f"{_word(self.kind.plain(self.default))} {self.kind.unit}".strip()
+
+    def of_class(self, kind: type[Any]) -> Any:
+        """Return the first entry of its metadata that is of a class, or None."""
+        return next((entry for entry in self.metadata if isinstance(entry, kind)), None)
+
+    def read(self, value: Any, *, text: bool = False) -> Any:
+        """Return a value as it will be used; with `text`, from the command line.
+
+        Raises:
+            SettingError: If it is not allowed.
+        """
+        try:
+            return self.kind.parse(value) if text else self.kind.read(value)
+        except Refused as error:
+            if error.reason:
+                raise SettingError(f"{placeholder(self.name)}: {literal(error.reason)}") from error
+            wanted = error.wanted or self.kind.wanted
+            raise refusal(self.name, wanted, value, error.hint) from None
+
+    def parse(self, words: Sequence[str]) -> Any:
+        """Return the value that the command line gives in one word, or several if it is repeated."""
+        parts = [self.read(word, text=True) for word in words]
+        return tuple(entry for part in parts for entry in part) if self.kind.repeated else parts[-1]
+
+    @property
+    def schema(self) -> dict[str, Any]:
+        """The field as JSON Schema."""
+        schema = {**self.kind.schema, "description": self.doc}
+        if self.kind.unit:
+            schema["x-unit"] = self.kind.unit
+        if not self.required:
+            schema["default"] = self.kind.plain(self.default)
+        return schema
+
+
+@dataclass_transform(frozen_default=True, kw_only_default=True)
+class Settings:
+    """Base of all settings classes; see the top of this module.
+
+    Raises:
+        SettingError: If a setting is unknown, missing or not allowed.
+    """
+
+    default_group: ClassVar[str] = ""
+    """The heading in the help of fields without one of their own (of a class)."""
+    fields_given: ClassVar[frozenset[str]] = frozenset()
+    """The names of the fields that were given, rather than left at their defaults (of an object)."""
+
+    def __init_subclass__(cls, *, group: str = "", **others: Any) -> None:
+        super().__init_subclass__(**others)
+        taken = [name for name in vars(cls).get("__annotations__", {}) if hasattr(Settings, name)]
+        if taken:
+            raise TypeError(f"a field of {cls.__name__} cannot be called {taken[0]}")
+        cls.default_group = group
+        dataclass(frozen=True, kw_only=True)(cls)
+
+    def __new__(cls, *positional: Any, **given: Any) -> Self:
+        """Make an object, once its fields are known to exist."""
+        if positional:
+            raise SettingError(f"{cls.__name__} takes keywords only, got {len(positional)} values")
+        check_names(given, fields_of(cls), cls.__name__)
+        made = super().__new__(cls)
+        object.__setattr__(made, "fields_given", frozenset(given))
+        return made
+
+    def __getnewargs_ex__(self) -> tuple[tuple[()], dict[str, Any]]:
+        return (), {name: getattr(self, name) for name in self.fields_given}
+
+    def __post_init__(self) -> None:
+        known = {entry.name: entry for entry in fields_of(type(self))}
+        for name in known:
+            if name in self.fields_given:
+                object.__setattr__(self, name, known[name].read(getattr(self, name)))
+        for name, value in self.defaults().items():
+            if name not in self.fields_given:
+                object.__setattr__(self, name, known[name].read(value))
+        check_rules(known.values(), vars(self), self.fields_given)
+        self.check()
+
+    def defaults(self) -> Mapping[str, Any]:
+        """Return defaults that depend on other fields, for those that were not given."""
+        return {}
+
+    def check(self) -> None:
+        """Check what types and rules cannot say.
+
+        Raises:
+            SettingError: If a setting is not allowed, with its name in braces.
+        """
+
+    def replace(self, **changes: Any) -> Self:
+        """Return a copy with other values of some fields."""
+        return type(self)(
+            **{**{name: getattr(self, name) for name in self.fields_given}, **changes}
+        )
+
+    def values(self) -> dict[str, Any]:
+        """Return all fields as JSON has them, whether given or not."""
+        return {f.name: f.kind.plain(getattr(self, f.name)) for f in fields_of(type(self))}
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the fields that were given, as JSON has them; `from_json` restores an equal object."""
+        return {name: value for name, value in self.values().items() if name in self.fields_given}
+
+    @classmethod
+    def from_json(cls, document: Mapping[str, Any]) -> Self:
+        """Return settings from a JSON object.
+
+        Raises:
+            SettingError: If a setting is unknown, missing or not allowed.
+        """
+        return cls(**document)
+
+
+@cache
+def fields_of(cls: type[Settings]) -> tuple[Field, ...]:
+    """Return the fields of a settings class, in the order in which they were written."""
+    hints = typing.get_type_hints(cls, include_extras=True)
+    return tuple(
+        make_field(
+            entry.name,
+            hints[entry.name],
+            entry.default,
+            _doc_finder(cls, entry.name),
+            cls.default_group,
+        )
+        for entry in dataclasses.fields(cast(Any, cls))
+    )
+
+
+def make_field(
+    name: str,
+    annotation: Any,
+    default: Any,
+    find_doc: Callable[[], str],
+    group: str = "",
+    *,
+    positional: bool = False,
+) -> Field:
+    """Return a field; a `Group` in its annotation goes before `group`."""
+    made = Field(name, annotation, default, find_doc, group, positional)
+    own = made.of_class(Group)
+    return made if own is None else dataclasses.replace(made, group=own.name)
+
+
+def check_names(given: Iterable[str], known: Iterable[Field], what: str) -> None:
+    """Refuse names that are not known, and missing ones that are required.
+
+    Raises:
+        SettingError: For the first of them.
+    """
+    fields = {entry.name: entry for entry in known}
+    for name in given:
+        if name not in fields:
+            hint = meant(name, list(fields)) or f"there are {', '.join(fields)}"
+            raise SettingError(
+                f"{literal(what)} has no setting {literal(described(name))}; {literal(hint)}"
+            )
+    for name, entry in fields.items():
+        if entry.required and name not in given:
+            raise SettingError(f"{{{name}}} is missing; give {literal(entry.kind.wanted)}")
+
+
+def check_rules(fields: Iterable[Field], values: Mapping[str, Any], given: Iterable[str]) -> None:
+    """Apply the rules of all fields that were given and have an effect.
+
+    Raises:
+        SettingError: For the first rule that is broken.
+    """
+    for entry in fields:
+        value = values[entry.name]
+        if entry.name in given and (value or value != entry.default):
+            for rule in entry.rules:
+                rule.check(entry.name, values)
+
+
+def _doc_finder(cls: type, name: str) -> Callable[[], str]:
+    return lambda: next(filter(None, (_docs(base).get(name, "") for base in cls.__mro__)), "")
+
+
+@cache
+def _docs(cls: type) -> dict[str, str]:
+    """The strings under the fields of a class, from its source."""
+    if cls in (object, Settings):
+        return {}
+    (found,) = ast.parse(inspect.cleandoc("\n" + inspect.getsource(cls))).body
+    assert isinstance(found, ast.ClassDef)
+    docs: dict[str, str] = {}
+    for before, after in zip(found.body, found.body[1:], strict=False):
+        if isinstance(before, ast.AnnAssign) and isinstance(before.target, ast.Name):
+            match after:
+                case ast.Expr(value=ast.Constant(value=str(text))):
+                    docs[before.target.id] = text
+                case _:
+                    pass
+    return docs
+
+
+def _condition(name: str, allowed: tuple[Any, ...]) -> str:
+    """What must hold of another field, such as "{cut} none or skeleton"; True goes without saying."""
+    words = [_word(value) for value in allowed if value is not None and value is not True]
+    return f"{{{name}}} {literal(one_of(words))}" if words else f"{{{name}}}"
+
+
+def _word(value: Any) -> str:
+    """A value as a user writes it."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, float):
+        return f"{value:g}"
+    if isinstance(value, list | tuple):
+        return ",".join(map(_word, cast(Sequence[Any], value)))
+    return "nothing" if value is None else str(value)
+
+
+def _reason(because: str) -> str:
+    return f" ({because})" if because else ""

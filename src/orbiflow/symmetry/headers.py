@@ -1,0 +1,103 @@
+"""A group as JSON, number for number: saved parameters are coordinates in its basis."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import lru_cache, wraps
+from typing import Any, Concatenate, ParamSpec, TypeVar
+
+import numpy as np
+
+from orbiflow.errors import GroupError
+from orbiflow.symmetry.group import CrystallographicGroup
+from orbiflow.symmetry.isometry import Isometry
+
+MAX_ORDER, MAX_DIM, MAX_NAME = 2048, 64, 200
+
+
+def group_header(group: CrystallographicGroup) -> dict[str, Any]:
+    """Lattice (columns are basis vectors) and coset representatives, ready for JSON."""
+    return {
+        "lattice": group.lattice.tolist(),
+        "linear": group.linear_parts.tolist(),
+        "translations": group.translations.tolist(),
+    }
+
+
+def group_from_header(header: Mapping[str, Any], name: str = "") -> CrystallographicGroup:
+    """The group of `group_header`, with the same basis and representatives, bit for bit.
+
+    Raises:
+        GroupError: for what is no group.
+    """
+    try:
+        lattice, linear, shifts = (
+            np.array(header[key], dtype=np.float64) for key in ("lattice", "linear", "translations")
+        )
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
+        raise GroupError(f"a group without its numbers: {error}") from error
+    d, order = len(np.atleast_1d(lattice)), len(np.atleast_1d(linear))
+    shapes = (lattice.shape, linear.shape, shifts.shape)
+    if shapes != ((d, d), (order, d, d), (order, d)) or not (d <= MAX_DIM and order <= MAX_ORDER):
+        raise GroupError(f"a group of tables {', '.join(map(str, shapes))}")
+    cosets = tuple(Isometry(*parts) for parts in zip(linear, shifts, strict=True))
+    if not order or not cosets[0].is_close(Isometry(np.eye(d), np.zeros(d))):
+        raise GroupError("a group whose first coset is not the identity's")
+    closed = CrystallographicGroup.generate(lattice)
+    chosen: list[Isometry] = []
+    for coset in cosets:  # each that is new at least doubles the order
+        if not closed.contains(coset):
+            chosen.append(coset)
+            closed = CrystallographicGroup.generate(lattice, chosen, max_order=order)
+    if closed.order != order:
+        raise GroupError(f"{order} cosets, of which {closed.order} differ")
+    return CrystallographicGroup(closed.lattice, cosets, str(name)[:MAX_NAME])
+
+
+Rest = ParamSpec("Rest")
+Result = TypeVar("Result")
+
+
+class _Written:
+    """A group that equals another one only if their numbers are the same, bit for bit."""
+
+    def __init__(self, group: CrystallographicGroup) -> None:
+        self.group = group
+        tables = group.lattice, group.linear_parts, group.translations
+        self._key = tuple((table.shape, table.tobytes()) for table in tables)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Written) and other._key == self._key
+
+    def __hash__(self) -> int:
+        return hash(self._key)
+
+
+def cached_as_written(
+    maxsize: int,
+) -> Callable[
+    [Callable[Concatenate[CrystallographicGroup, Rest], Result]],
+    Callable[Concatenate[CrystallographicGroup, Rest], Result],
+]:
+    """As `lru_cache`, for functions of a group whose result depends on its basis and cosets.
+
+    Groups are equal by value: Fourier coefficients of one are not those of an equal group in another
+    basis, so that `lru_cache` would hand out wrong ones.
+    """
+
+    def decorate(
+        function: Callable[Concatenate[CrystallographicGroup, Rest], Result],
+    ) -> Callable[Concatenate[CrystallographicGroup, Rest], Result]:
+        @lru_cache(maxsize=maxsize)
+        def kept(written: _Written, /, *args: Rest.args, **kwargs: Rest.kwargs) -> Result:
+            return function(written.group, *args, **kwargs)
+
+        @wraps(function)
+        def call(
+            group: CrystallographicGroup, /, *args: Rest.args, **kwargs: Rest.kwargs
+        ) -> Result:
+            return kept(_Written(group), *args, **kwargs)
+
+        return call
+
+    return decorate

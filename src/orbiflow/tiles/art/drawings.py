@@ -1,0 +1,322 @@
+"""A drawing over the silhouette, in curves: an SVG read within bounds and carried onto the tile."""
+
+from __future__ import annotations
+
+from itertools import groupby
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+import shapely
+import svgelements
+from shapely.errors import GEOSException
+
+from orbiflow.arguments import path as as_path
+from orbiflow.arrays import Array
+from orbiflow.errors import InputFileError
+from orbiflow.tiles.art.pictures import Picture, read_picture
+from orbiflow.tiles.art.raster import Grid, Paint
+from orbiflow.tiles.art.source import covered_area
+from orbiflow.tiles.exporting import (
+    INK,
+    Curve,
+    Motif,
+    Part,
+    Style,
+    curves_path,
+)
+from orbiflow.tiles.geometry import orient, polygons_in
+from orbiflow.tiles.silhouette import (
+    MAX_BYTES,
+    MAX_POINTS,
+    Drawing,
+    DrawnShape,
+    SubPath,
+    TooManyPoints,
+    TooTangled,
+    check_file,
+    fill,
+    parse_xml,
+    read_bytes,
+    read_head,
+)
+from orbiflow.tiles.tile import EscherTile
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+SAME_ASPECT = 0.01
+FLATNESS = 1 / 4000
+"""How far flattened curves may be from the drawing's, in sizes of the silhouette."""
+
+LONGEST = 1 / 150
+"""Longest straight piece before it is carried, in sizes of the silhouette: lines bend with the tile."""
+
+MOST_CARRIED = 400_000
+"""Points in all that are carried."""
+
+FARTHEST = 1e6
+"""How far out a drawing may reach, in sizes of the silhouette."""
+
+
+class TooFar(Exception):
+    """A path reaches beyond `FARTHEST`."""
+
+
+def read_drawing(path: Path, tile: EscherTile) -> tuple[Motif, tuple[str, ...]]:
+    """The drawing in an SVG file, carried onto the tile, in its units; and notes.
+
+    Fills and strokes are kept, gradients become one colour; texts, pictures and clips are left out.
+    `currentColor`, where no `color` is said, is the ink that shows on each tile.
+
+    Args:
+        tile: with a map.
+
+    Raises:
+        InputFileError: for a file over 16 MB, one that is no SVG or cannot be understood, one of
+            another aspect than the silhouette's, and one that draws nothing.
+    """
+    check_file(path)
+    drawing = Drawing(path, parse_xml(path, read_bytes(path, MAX_BYTES)))
+    drawing.collect()
+    linear, offset = _onto(path, drawing, tile)
+    size = float(np.sqrt(abs(tile.tile.signed_area)))
+    carry = _Carry(tile, linear, offset, size)
+    parts: list[Part] = []
+    for shape in drawing.shapes:
+        try:
+            parts += _parts(shape, drawing, carry)
+        except TooFar as error:
+            raise InputFileError(
+                f"{path}: a path reaches much too far beyond the page; delete or shorten it"
+            ) from error
+        except (TooManyPoints, TooTangled, GEOSException) as error:
+            raise InputFileError(
+                f"{path}: the drawing is too intricate to be carried, or much too long; simplify it"
+            ) from error
+    if not parts:
+        raise InputFileError(f"{path}: draws nothing that is filled or stroked")
+    left = [f"{count} {name}" for name, count in drawing.others.items()]
+    notes = (f"left out {' and '.join(left)} of the drawing",) if left else ()
+    return Motif(tuple(parts)), notes
+
+
+def _onto(path: Path, drawing: Drawing, tile: EscherTile) -> tuple[Array, Array]:
+    """From the drawing's user units to the silhouette's coordinates."""
+    covered = covered_area(tile)
+    if drawing.box is None:
+        return np.eye(2), np.zeros(2)
+    low, high = np.array(drawing.box[:2]), np.array(drawing.box[2:])
+    own, there = high - low, covered.high - covered.low
+    if abs(own[0] * there[1] / (own[1] * there[0]) - 1) > SAME_ASPECT:
+        raise InputFileError(
+            f"{path}: the drawing is {own[0]:.6g} x {own[1]:.6g} and {covered.name} is "
+            f"{there[0]:.6g} x {there[1]:.6g}; a drawing covers all of that and must have its aspect "
+            "within 1 %, so draw over a copy of it"
+        )
+    flip = np.array([1.0, 1.0 if tile.y_down else -1.0])
+    scale = there / own * flip
+    start = covered.low if tile.y_down else np.array([covered.low[0], covered.high[1]])
+    return np.diag(scale), start - scale * low
+
+
+class _Carry:
+    """From the drawing to the tile, point by point."""
+
+    def __init__(self, tile: EscherTile, linear: Array, offset: Array, size: float) -> None:
+        self.tile, self.linear, self.offset, self.size = tile, linear, offset, size
+        self.scale = float(np.sqrt(abs(np.linalg.det(linear))))
+        self.tolerance = FLATNESS * size / self.scale
+        self.count = 0
+
+    def check(self, points: Array) -> None:
+        """Raises `TooFar` for points of the drawing that nobody sees."""
+        if not (np.abs(points) < FARTHEST * self.size / self.scale).all():  # NaN, too
+            raise TooFar
+
+    def __call__(self, points: Array, *, closed: bool) -> Array:
+        here = points @ self.linear.T + self.offset
+        line = shapely.LinearRing(here) if closed else shapely.LineString(here)
+        # before any is made
+        if line.length / (LONGEST * self.size) > MOST_CARRIED:
+            raise TooManyPoints
+        fine = shapely.get_coordinates(shapely.segmentize(line, LONGEST * self.size))
+        self.count += len(fine)
+        if self.count > MOST_CARRIED:
+            raise TooManyPoints
+        return self.tile.forward(fine[:-1] if closed else fine)
+
+
+def _parts(shape: DrawnShape, drawing: Drawing, carry: _Carry) -> list[Part]:
+    paint = shape.paint
+    if paint.get("visibility") in ("hidden", "collapse"):
+        return []
+    reach = np.concatenate([path.reach() for path in shape.paths] or [np.zeros((1, 2))])
+    carry.check(reach)
+    lines = [(path.flatten(carry.tolerance), path) for path in shape.paths]
+    if sum(len(points) for points, _ in lines) > MAX_POINTS:
+        raise TooManyPoints
+    found = []
+    filled, share = _colour(paint.get("fill", "#000000"), paint, drawing)
+    if filled is not None:
+        region = fill([points for points, _ in lines if len(points) > 2], shape.fill_rule)
+        curves = [
+            _ring(carry, ring, outer=k == 0)
+            for polygon in polygons_in(region)
+            for k, ring in enumerate([polygon.exterior, *polygon.interiors])
+        ]
+        opacity = shape.opacity * share * _number(paint.get("fill-opacity"), 1.0)
+        if curves and opacity > 0:
+            found.append(Part(tuple(curves), Style(filled), opacity))
+    stroked, share = _colour(paint.get("stroke", "none"), paint, drawing)
+    width = _number(paint.get("stroke-width"), 1.0) * shape.scale * carry.scale
+    opacity = shape.opacity * share * _number(paint.get("stroke-opacity"), 1.0)
+    if stroked is not None and width > 0 and opacity > 0:
+        curves = [_line(carry, points, path) for points, path in lines if len(points) > 1]
+        found.append(Part(tuple(curves), Style(None, stroked, width), opacity))
+    return found
+
+
+def _ring(carry: _Carry, ring: shapely.LinearRing, *, outer: bool) -> Curve:
+    points = carry(shapely.get_coordinates(ring)[:-1], closed=True)
+    # holes run the other way: they are holes under every rule
+    return Curve.polyline(orient(points, counter_clockwise=outer), closed=True)
+
+
+def _line(carry: _Carry, points: Array, path: SubPath) -> Curve:
+    closed = path.closed and len(points) > 2
+    if closed and np.allclose(points[0], points[-1]):
+        points = points[:-1]
+    closed = closed and len(points) > 2
+    return Curve.polyline(carry(points, closed=closed), closed=closed)
+
+
+def _colour(text: str, paint: object, drawing: Drawing) -> tuple[str | None, float]:
+    """A paint as #rrggbb or `INK`, None for none; and how opaque it is."""
+    text = text.strip()
+    if text.lower() in ("none", "transparent", ""):
+        return None, 0.0
+    if text.lower() == "currentcolor":
+        text = str(paint.get("color", INK)) if isinstance(paint, dict) else INK
+        # no colour is said: the one that shows on the tile
+        if text.lower() == INK.lower():
+            return INK, 1.0
+    if text.startswith("url("):
+        return _gradient(text, drawing)
+    try:
+        colour = svgelements.Color(text[:60])
+        red, green, blue = (int(getattr(colour, name)) for name in ("red", "green", "blue"))
+        return f"#{red:02x}{green:02x}{blue:02x}", float(colour.opacity or 0.0)
+    except (ValueError, TypeError, AttributeError):
+        return "#000000", 1.0
+
+
+def _gradient(text: str, drawing: Drawing) -> tuple[str | None, float]:
+    """The mean of a gradient's stops."""
+    element = drawing.by_id.get(text[4:].split(")")[0].strip("'\"# "))
+    for _ in range(5):  # gradients may refer to each other for their stops
+        if element is None or any(child.tag == "stop" for child in element):
+            break
+        element = drawing.by_id.get(element.get("href", "").strip().removeprefix("#"))
+    if element is None:
+        return None, 0.0
+    stops = [drawing.styles.properties(child) for child in element if child.tag == "stop"]
+    colours = [_colour(stop.get("stop-color", "#000000"), {}, drawing)[0] for stop in stops]
+    plain = [colour for colour in colours if colour not in (None, INK)]
+    known = [[int(str(colour)[i : i + 2], 16) for i in (1, 3, 5)] for colour in plain]
+    if not known:
+        return None, 0.0
+    red, green, blue = np.mean(known, axis=0).round().astype(int)
+    return f"#{red:02x}{green:02x}{blue:02x}", 1.0
+
+
+def _number(text: str | None, usual: float) -> float:
+    """A length in user units or a share; what cannot be read is the usual one."""
+    if text is None:
+        return usual
+    try:
+        value = float(svgelements.Length(text.strip()[:40]).value(ppi=96, relative_length=1.0))
+    except (ValueError, TypeError, AttributeError):
+        return usual
+    return value if np.isfinite(value) and 0 <= value < 1e6 else usual
+
+
+class Over(NamedTuple):
+    """One of the two, and what was decided for the user."""
+
+    picture: Picture | None = None
+    drawing: Motif | None = None
+    notes: tuple[str, ...] = ()
+
+
+def read_over(path: str | Path, tile: EscherTile) -> Over:
+    """The picture or drawing in a file, by its content.
+
+    Raises:
+        InputFileError: as `read_picture` and `read_drawing`.
+        OrbiflowError: for a tile without a map.
+    """
+    tile.require_map()
+    path = as_path(path, "the picture's file")
+    check_file(path)
+    head = read_head(path, 4096).lstrip(b"\xef\xbb\xbf \t\r\n")
+    if head.startswith(b"<") or (path.suffix.lower() == ".svg" and b"\0" not in head[:64]):
+        drawing, notes = read_drawing(path, tile)
+        return Over(None, drawing, notes)
+    picture = read_picture(path, tile)
+    return Over(picture, None, picture.notes)
+
+
+DOTS = 100
+
+
+def paint_motif(paint: Paint, motif: Motif) -> None:
+    """Draw it, antialiased, on what is there."""
+    grid = paint.grid
+    placed = motif.moved(grid.density * np.eye(2), -grid.density * grid.corner)
+    for inked, parts in groupby(placed.parts, key=lambda part: part.inked):
+        canvas = _canvas(list(parts), grid)
+        alpha = canvas[..., 3]
+        if inked:
+            paint.ink(alpha)
+        else:
+            paint.lay(canvas[..., :3] * alpha[..., None], alpha)
+
+
+def _canvas(parts: list[Part], grid: Grid) -> Array:
+    """(height, width, 4) RGBA, straight, 0 to 1."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.collections import PathCollection
+
+    figure, axes = _axes(grid)
+    for part in parts:
+        fill, stroke = (
+            "#000000" if colour == INK else colour
+            for colour in (part.style.fill, part.style.stroke)
+        )
+        collection = PathCollection(
+            [curves_path(part.curves)],
+            facecolors=fill or "none",
+            edgecolors=stroke or "none",
+            linewidths=part.style.width * 72 / DOTS if stroke else 0,
+            alpha=part.opacity if part.opacity < 1 else None,
+            joinstyle="round",
+            capstyle="round",
+        )
+        axes.add_collection(collection, autolim=False)
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    return np.asarray(canvas.buffer_rgba(), dtype=np.float32) / 255
+
+
+def _axes(grid: Grid) -> tuple[Figure, Axes]:
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(grid.width / DOTS, grid.height / DOTS), dpi=DOTS)
+    figure.patch.set_alpha(0)
+    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    axes.set_axis_off()
+    axes.set_xlim(0, grid.width)
+    axes.set_ylim(grid.height, 0)
+    return figure, axes

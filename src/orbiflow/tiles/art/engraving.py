@@ -1,0 +1,343 @@
+"""Lines inside a tile that has no picture: hatching, echoes of the outline, feathers; and eyes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+import shapely
+from scipy.ndimage import distance_transform_edt, gaussian_filter, map_coordinates, median_filter
+
+from orbiflow.arrays import Array
+from orbiflow.drawing import Palette
+from orbiflow.errors import OrbiflowError
+from orbiflow.tiles.art.raster import Grid
+from orbiflow.tiles.art.settings import Strokes
+from orbiflow.tiles.art.source import silhouette_outline
+from orbiflow.tiles.exporting import (
+    INK,
+    Curve,
+    Part,
+    Style,
+)
+from orbiflow.tiles.geometry import (
+    arc_lengths,
+    best_similarity,
+    complex_points,
+    resampled,
+    signed_area,
+)
+from orbiflow.tiles.tile import EscherTile
+
+FINE = 420.0
+"""Cells of the raster along the square root of the area."""
+
+LIGHT = np.array([-0.6, -0.8])
+"""Where it comes from, in units with y down: above, from the left."""
+
+
+class Along:
+    """Places along the outline: `points`, inward `normals` and half-thickness `half`; (n, ...)."""
+
+    def __init__(self, body: Body, count: int) -> None:
+        ring = body.ring
+        self.points = resampled(ring, count)
+        step = np.roll(self.points, -1, axis=0) - np.roll(self.points, 1, axis=0)
+        inward = np.stack([-step[:, 1], step[:, 0]], axis=1) * np.sign(signed_area(ring))
+        inward = gaussian_filter(inward, (2, 0), mode="wrap")
+        self.normals = inward / np.maximum(np.linalg.norm(inward, axis=1), 1e-12)[:, None]
+        self.half = body.half_thickness(self.points, self.normals)
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A tile at area 1, y down.
+
+    - `ring`: (N, 2).
+    """
+
+    ring: Array
+
+    @cached_property
+    def _grid(self) -> Grid:
+        return Grid.over(self.ring, FINE, 1)
+
+    @cached_property
+    def _depth(self) -> Array:
+        grid = self._grid
+        return np.asarray(distance_transform_edt(grid.inside(self.ring))) / grid.density
+
+    @cached_property
+    def _slope(self) -> tuple[Array, Array]:
+        # along x, along y
+        smooth = gaussian_filter(self._depth, 6.0)
+        return np.gradient(smooth, axis=1), np.gradient(smooth, axis=0)
+
+    def depth(self, points: Array) -> Array:
+        """(...) how far inside points (..., 2) lie; 0 outside."""
+        return self._at(self._depth, points)
+
+    def inward(self, points: Array) -> Array:
+        """(..., 2) unit vectors away from the nearest part of the outline."""
+        vector = np.stack([self._at(part, points) for part in self._slope], axis=-1)
+        return vector / np.maximum(np.linalg.norm(vector, axis=-1, keepdims=True), 1e-12)
+
+    def half_thickness(self, points: Array, normals: Array) -> Array:
+        """(n,) how far one can go inwards from the outline before it comes nearer again."""
+        steps = np.linspace(0, float(self._depth.max()) * 1.05, 90)
+        depth = self.depth(points[:, None] + steps[None, :, None] * normals[:, None])
+        ahead = depth >= 0.85 * steps[None] - 0.004
+        return steps[np.argmin(np.column_stack([ahead, np.zeros(len(points), bool)]), axis=1) - 1]
+
+    @cached_property
+    def axis(self) -> Array:
+        """(2,) its longest direction, to the right or down."""
+        points = resampled(self.ring, 400)
+        _, _, ways = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)
+        way = ways[0]
+        return way * np.sign(way @ (1.0, 0.5))
+
+    @cached_property
+    def thickest(self) -> float:
+        """Greatest depth."""
+        return float(self._depth.max())
+
+    def _at(self, values: Array, points: Array) -> Array:
+        place = self._grid.texels(points) - 0.5
+        flat = place.reshape(-1, 2)
+        found = map_coordinates(values, [flat[:, 1], flat[:, 0]], order=1, mode="nearest")
+        return found.reshape(points.shape[:-1])
+
+
+def shade(normals: Array) -> Array:
+    """(n,) how dark it is where the outline has these inward normals: 0 in the light, 1 away."""
+    toward = normals @ (LIGHT / np.linalg.norm(LIGHT))
+    return np.clip(0.5 + 0.5 * toward, 0, 1)
+
+
+def stroke(points: Array, widths: Array) -> Array:
+    """(2 n, 2) the outline of a line through points (n, 2) as wide as `widths` (n,) at each."""
+    step = np.gradient(points, axis=0)
+    across = np.stack([-step[:, 1], step[:, 0]], axis=1)
+    across /= np.maximum(np.linalg.norm(across, axis=1), 1e-12)[:, None]
+    side = across * widths[:, None] / 2
+    return np.concatenate([points + side, (points - side)[::-1]])
+
+
+USUAL_EYE = 0.032
+"""Radius of an eye in square roots of the tile's area."""
+
+CLEAR = 1.7
+"""Radii about an eye that lines keep out of."""
+
+STEP, SHORTEST = 0.008, 12
+"""Of an echo in square roots of the tile's area, and how many steps a piece of it has at least."""
+
+
+class Eye(NamedTuple):
+    """An eye on the tile: its middle, radius and what is drawn, in the tile's units."""
+
+    middle: Array
+    radius: float
+    parts: tuple[Part, ...]
+
+
+def eyes(
+    tile: EscherTile, given: tuple[tuple[float, ...], ...], palette: Palette
+) -> tuple[Eye, ...]:
+    """Eyes where the silhouette has them, carried onto the tile, round.
+
+    Args:
+        tile: with a map, if any are given.
+        given: (x, y) or (x, y, radius) in the silhouette's coordinates.
+        palette: whose paper and outline they are drawn in.
+
+    Raises:
+        OrbiflowError: for one outside the silhouette.
+    """
+    return tuple(_eye(tile, eye, palette) for eye in given)
+
+
+def _eye(tile: EscherTile, given: tuple[float, ...], palette: Palette) -> Eye:
+    x, y = given[:2]
+    outline = shapely.Polygon(silhouette_outline(tile))
+    if not outline.contains(shapely.Point(x, y)):
+        left, top, right, bottom = outline.bounds
+        raise OrbiflowError(
+            f"the eye at {x:g},{y:g} lies outside the silhouette, which reaches from "
+            f"{left:.4g},{top:.4g} to {right:.4g},{bottom:.4g}"
+        )
+    polygon = shapely.Polygon(tile.tile.polygon)
+    size = float(np.sqrt(polygon.area))
+    here = np.array([x, y])
+    middle = tile.forward(here)
+    room = 0.75 * float(polygon.exterior.distance(shapely.Point(middle)))
+    reach = 0.5 * USUAL_EYE * size
+    around = reach * np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]])
+    moved = tile.forward(here + around) - middle
+    # which way it looks, and how much larger things are there
+    factor = complex(best_similarity(complex_points(around), complex_points(moved)))
+    radius = USUAL_EYE * size if len(given) < 3 else given[2] * abs(factor)
+    radius = min(radius, room)
+    up = -1.0 if tile.y_down else 1.0
+    glint = np.array([-0.3, 0.35 * up])
+    turn = factor / abs(factor)
+    spot = complex(*glint) * turn
+    disc = _circle(middle, radius)
+    pupil = _circle(middle, 0.58 * radius)
+    light = _circle(middle + radius * np.array([spot.real, spot.imag]) * 0.9, 0.2 * radius)
+    edge = Style(palette.paper, palette.outline, 0.2 * radius)
+    parts = (
+        Part((disc,), edge),
+        Part((pupil,), Style(palette.outline)),
+        Part((light,), Style(palette.paper)),
+    )
+    return Eye(middle, radius, parts)
+
+
+def _circle(middle: Array, radius: float) -> Curve:
+    turns = 2 * np.pi * np.arange(48) / 48
+    ring = middle + radius * np.stack([np.cos(turns), np.sin(turns)], axis=1)
+    return Curve.polyline(ring, closed=True)
+
+
+def engraved(tile: EscherTile, strokes: Strokes, around: tuple[Eye, ...] = ()) -> tuple[Part, ...]:
+    """Lines of one kind in ink, thin where it is deep or light, that keep clear of the eyes."""
+    polygon = tile.tile.polygon
+    size = float(np.sqrt(abs(tile.tile.signed_area)))
+    flip = np.array([1.0, 1.0 if tile.y_down else -1.0])
+    body = Body(polygon * flip / size)
+    rings = {"hatch": _hatch, "echoes": _echoes, "feathers": _feathers}[strokes](body)
+    rings = [ring * flip * size for ring in rings]
+    for eye in around:
+        far = CLEAR * eye.radius
+        rings = [ring for ring in rings if np.hypot(*(ring - eye.middle).T).min() > far]
+    return (Part(tuple(Curve.polyline(ring, closed=True) for ring in rings), Style(INK)),)
+
+
+def _hatch(body: Body, reach: float = 0.32, spacing: float = 0.017) -> list[Array]:
+    """Ticks inwards from the outline as on a woodcut: long in the shade, short in the light.
+
+    None is longer than `reach`.
+    """
+    count = int(arc_lengths(body.ring)[-1] / spacing)
+    along = Along(body, count)
+    dark = shade(along.normals)
+    half = median_filter(along.half, 9, mode="wrap")  # no single spikes out of notches
+    length = np.minimum(half, 1.15 * along.half) * (0.22 + 0.62 * dark)
+    # around a point of a neighbour they fan out: short, or they make a star
+    bend = np.roll(along.normals, -1, axis=0) - np.roll(along.normals, 1, axis=0)
+    length /= 1 + 0.05 * np.hypot(*bend.T) / (2 * spacing)
+    length = np.minimum(length, reach) * (0.82 + 0.18 * _wobble(count, 1))
+    lean = np.deg2rad(24 + 6 * _wobble(count, 2))
+    cos, sin = np.cos(lean), np.sin(lean)
+    n = along.normals
+    way = np.stack([cos * n[:, 0] - sin * n[:, 1], sin * n[:, 0] + cos * n[:, 1]], axis=1)
+    share = np.linspace(0, 1, 9)
+    found = []
+    for k in range(count):
+        if length[k] < 0.016:
+            continue
+        # bends towards the normal on its way in
+        path = along.points[k] + length[k] * (
+            share[:, None] * way[k] + 0.35 * (share**2)[:, None] * (n[k] - way[k])
+        )
+        if body.depth(path[2:]).min() <= 0.002:
+            continue
+        width = (0.0045 + 0.0065 * dark[k]) * (1 - share) ** 0.8 + 0.0006
+        found.append(stroke(path, width))
+    return found
+
+
+def _echoes(body: Body) -> list[Array]:
+    """The outline again, farther and farther in: thick in the shade, fading in the light."""
+    found: list[Array] = []
+    shape = shapely.Polygon(body.ring)
+    depth, gap = 0.018, 0.017
+    while depth < 0.92 * body.thickest:
+        inner = shape.buffer(-depth, join_style="round", quad_segs=6)
+        for part in shapely.get_parts(inner):
+            found += _echo(body, part, depth)
+        depth, gap = depth + gap, gap * 1.13
+    return found
+
+
+def _echo(body: Body, part: shapely.Polygon, depth: float) -> list[Array]:
+    ring = shapely.get_coordinates(part.exterior)[:-1]
+    total = arc_lengths(ring)[-1] if len(ring) > 2 else 0.0
+    if total < 0.12:
+        return []
+    count = max(24, int(total / STEP))
+    points = resampled(ring, count)
+    fade = 1 - depth / body.thickest
+    dark = shade(body.inward(points))
+    # in the light only the first lines run on
+    width = 0.0085 * fade**0.7 * np.clip(1.25 * dark + 1.1 * fade - 0.85, 0, 1)
+    width = _smooth(width, 5)
+    # shorter ones look like strays
+    arcs = [own for own in _arcs(width > 0.0012) if len(own) >= min(SHORTEST, count)]
+    return [stroke(points[own], width[own]) for own in arcs]
+
+
+def _feathers(body: Body) -> list[Array]:
+    """Rows of scallops that follow the body from one end to the other."""
+    found = []
+    axis = body.axis
+    across = np.array([-axis[1], axis[0]])
+    place = body.ring @ np.stack([axis, across], axis=1)
+    low, high = place.min(axis=0), place.max(axis=0)
+    row, column = 0.062, 0.072
+    for i, u in enumerate(np.arange(low[0], high[0], row)):
+        for v in np.arange(low[1] + (i % 2) * column / 2, high[1], column):
+            point = u * axis + v * across
+            found += _scallop(body, point, column)
+    return found + _hatch(body, reach=0.035, spacing=0.022)
+
+
+def _scallop(body: Body, point: Array, size: float) -> list[Array]:
+    depth = float(body.depth(point))
+    if depth < 0.02:
+        return []
+    # along the outline near it, along the body deep inside
+    normal = body.inward(point)
+    tangent = np.array([-normal[1], normal[0]])
+    tangent *= np.sign(tangent @ body.axis) or 1.0
+    deep = min(depth / body.thickest, 1.0)
+    way = tangent * (1 - deep) + body.axis * (0.35 + deep)
+    way /= np.linalg.norm(way)
+    side = np.array([-way[1], way[0]])
+    radius = min(0.52 * size, 1.1 * depth)
+    turns = np.deg2rad(np.linspace(-82, 82, 15))
+    path = point + radius * (0.9 * np.cos(turns)[:, None] * way + np.sin(turns)[:, None] * side)
+    dark = float(shade(normal[None])[0]) * (1 - deep) + 0.5 * deep
+    width = (0.0035 + 0.0065 * dark) * np.cos(turns * 0.98) ** 0.7 + 0.0008
+    if body.depth(path).min() < 0.006:
+        return []
+    quill = point + np.linspace(-0.25, 0.55, 5)[:, None] * radius * way
+    thin = (0.002 + 0.003 * dark) * np.linspace(1, 0.2, 5)
+    return [stroke(path, width), stroke(quill, thin)]
+
+
+def _wobble(count: int, seed: int) -> Array:
+    """(count,) numbers from -1 to 1 that look like a hand's, the same every time."""
+    k = np.arange(count) + 1000.0 * seed
+    return 2 * np.modf(np.abs(np.sin(12.9898 * k) * 43758.5453))[0] - 1
+
+
+def _smooth(values: Array, reach: int) -> Array:
+    kernel = np.hanning(2 * reach + 3)
+    padded = np.concatenate([values[-reach - 1 :], values, values[: reach + 1]])
+    return np.convolve(padded, kernel / kernel.sum(), mode="valid")
+
+
+def _arcs(kept: np.ndarray) -> list[np.ndarray]:
+    """Indices of each run of true entries round a ring, in order; all of it twice-closed if whole."""
+    count = len(kept)
+    if kept.all():
+        return [np.append(np.arange(count), 0)]
+    start = int(np.argmin(kept))
+    order = (np.arange(count) + start) % count
+    change = np.flatnonzero(np.diff(kept[order].astype(int), prepend=0, append=0))
+    return [order[a:b] for a, b in zip(change[::2], change[1::2], strict=True) if b - a >= 4]

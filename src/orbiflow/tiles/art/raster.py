@@ -1,0 +1,323 @@
+"""A page of copies as pixels: each sample looked up in the tile's raster."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from scipy.ndimage import binary_dilation
+
+from orbiflow.arrays import Array, Integers
+from orbiflow.drawing import Palette
+from orbiflow.runtime import Cancel
+from orbiflow.tiles.art.page import ArtPage
+
+NOWHERE = -1
+"""Label of samples that lie in no region."""
+
+NUDGE = 3.1415926e-7
+"""How far down rows of samples lie from where they should, in samples: vertices that a symmetric
+placement puts exactly on a row would else be decided by rounding."""
+
+
+class Runs(NamedTuple):
+    """Samples of some rows in one region each, row by row, from left to right.
+
+    - `label`: (R,) the region, or `NOWHERE`.
+    - `row`: (R,) counted from 0.
+    - `start`: (R,) first column.
+    - `length`: (R,) samples; those of a row come to its width.
+    """
+
+    label: Integers
+    row: Integers
+    start: Integers
+    length: Integers
+
+    def spread(self, values: NDArray) -> NDArray:
+        """One value a sample, (rows x width,), from one a run."""
+        return np.repeat(values, self.length)
+
+
+class Sides(NamedTuple):
+    """Sides of regions, each with the region to its right, at larger x.
+
+    - `start`, `end`: (S, 2) in samples, y down: sample (i, j) lies at (j + 1/2, i + 1/2).
+    - `label`: (S,)
+    """
+
+    start: Array
+    end: Array
+    label: Integers
+
+
+def ring_sides(rings: Array) -> Sides:
+    """The sides of rings (M, N, 2) that have the inside to their right; ring m has label m."""
+    ahead = np.roll(rings, -1, axis=1)
+    area = (rings[..., 0] * ahead[..., 1] - rings[..., 1] * ahead[..., 0]).sum(axis=1)
+    entering = (ahead[..., 1] - rings[..., 1]) * np.sign(area)[:, None] < 0
+    return Sides(rings[entering], ahead[entering], np.nonzero(entering)[0])
+
+
+def polygon_sides(ring: Array) -> Sides:
+    """All sides of one ring (N, 2): 0 where they enter it, `NOWHERE` where they leave it."""
+    ahead = np.roll(ring, -1, axis=0)
+    area = (ring[:, 0] * ahead[:, 1] - ring[:, 1] * ahead[:, 0]).sum()
+    entering = (ahead[:, 1] - ring[:, 1]) * np.sign(area) < 0
+    return Sides(ring, ahead, np.where(entering, 0, NOWHERE))
+
+
+def triangle_sides(points: Array, triangles: Integers) -> Sides:
+    """The sides of triangles (M, 3) that none of them folds over, and of what lies around them."""
+    corners = points[triangles]
+    inner = ring_sides(corners)
+    # a side of one triangle alone is the border: beyond it is nowhere
+    pairs = np.concatenate([triangles[:, [k, (k + 1) % 3]] for k in range(3)])
+    keys = np.sort(pairs, axis=1) @ np.array([len(points), 1])
+    _, first, count = np.unique(keys, return_index=True, return_counts=True)
+    border = pairs[first[count == 1]]
+    own = np.tile(np.arange(len(triangles)), 3)[first[count == 1]]
+    start, end = points[border[:, 0]], points[border[:, 1]]
+    u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    sense = np.sign(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
+    leaving = (end - start)[:, 1] * sense[own] > 0
+    return Sides(
+        np.concatenate([inner.start, start[leaving]]),
+        np.concatenate([inner.end, end[leaving]]),
+        np.concatenate([inner.label, np.full(int(leaving.sum()), NOWHERE)]),
+    )
+
+
+def runs(sides: Sides, top: int, rows: int, width: int) -> Runs:
+    """The runs of `rows` rows of `width` samples from row `top`; rows are counted from there.
+
+    Each side is crossed by the rows between its ends, and a sample belongs to the region entered at
+    the last crossing to its left. A side that two regions share enters one of them: so every sample
+    of a partition is in exactly one.
+
+    >>> square = np.array([[[1.0, 0.0], [3.0, 0.0], [3.0, 2.0], [1.0, 2.0]]])
+    >>> left = square - (2.0, 0.0)
+    >>> found = runs(ring_sides(np.concatenate([left, square])), 0, 2, 3)
+    >>> found.label[found.length > 0].tolist(), found.length[found.length > 0].tolist()
+    ([0, 1, 0, 1], [1, 2, 1, 2])
+    """
+    low = np.minimum(sides.start[:, 1], sides.end[:, 1])
+    high = np.maximum(sides.start[:, 1], sides.end[:, 1])
+    middle = 0.5 + NUDGE
+    first = np.clip(np.ceil(low - middle).astype(np.int64), top, top + rows)
+    last = np.clip(np.ceil(high - middle).astype(np.int64), top, top + rows)
+    count = last - first
+    own = np.repeat(np.arange(len(count)), count)
+    row = np.arange(len(own)) - np.repeat(np.cumsum(count) - count, count) + first[own]
+    start, end = sides.start[own], sides.end[own]
+    share = (row + middle - start[:, 1]) / (end[:, 1] - start[:, 1])
+    x = start[:, 0] + share * (end[:, 0] - start[:, 0])
+    row -= top
+    # every row begins nowhere
+    row = np.concatenate([np.arange(rows), row])
+    x = np.concatenate([np.full(rows, -np.inf), x])
+    label = np.concatenate([np.full(rows, NOWHERE), sides.label[own]])
+    order = np.lexsort((x, row))
+    row, x, label = row[order], x[order], label[order]
+    begin = np.ceil(np.clip(x, 0, width + 1) - 0.5).clip(0, width).astype(np.int64)
+    stop = np.append(begin[1:], width)
+    stop[np.append(row[1:] != row[:-1], True)] = width
+    return Runs(label, row, begin, stop - begin)
+
+
+MARGIN = 3
+"""Texels around the tile."""
+
+MOST_TEXELS = 20_000_000
+"""Of the rasters of all colours together."""
+
+
+_AROUND = ((-1, -1), (-1, 1), (1, -1), (1, 1), (-1, 0), (1, 0), (0, -1), (0, 1))
+"""The neighbours of a texel, those that share a side last: theirs is what counts."""
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """Texels over a tile: texel (i, j) lies at corner + (j + 1/2, i + 1/2) / density.
+
+    - `corner`: (2,) in the tile's units. `density`: texels a unit.
+    - `width`, `height`: in texels.
+    """
+
+    corner: Array
+    density: float
+    width: int
+    height: int
+
+    @classmethod
+    def over(cls, ring: Array, density: float, colours: int) -> Grid:
+        """Over a ring (N, 2), at most as dense as `MOST_TEXELS` allow for so many colours."""
+        size = np.ptp(ring, axis=0)
+        most = float(np.sqrt(MOST_TEXELS / colours / size.prod()))
+        density = min(density, most)
+        width, height = np.ceil(size * density).astype(int) + 2 * MARGIN
+        return cls(ring.min(axis=0) - MARGIN / density, density, int(width), int(height))
+
+    def texels(self, points: Array) -> Array:
+        """Where points (..., 2) of the tile's units lie."""
+        return (points - self.corner) * self.density
+
+    def inside(self, ring: Array) -> NDArray[np.bool_]:
+        """(height, width) which texels have their middle in the ring."""
+        found = runs(polygon_sides(self.texels(ring)), 0, self.height, self.width)
+        return found.spread(found.label >= 0).reshape(self.height, self.width)
+
+
+class Paint:
+    """Five channels (height, width, 5) of a tile: how each texel's colour is mixed.
+
+    Red, green and blue, 0 to 1, already times their share; then the share of the tile's own colour
+    and of its ink: colour = rgb + own * tile + ink * ink's.
+    """
+
+    def __init__(self, grid: Grid) -> None:
+        self.grid = grid
+        self.values = np.zeros((grid.height, grid.width, 5), dtype=np.float32)
+        self.values[..., 3] = 1.0
+
+    def lay(self, rgb: Array, alpha: Array) -> None:
+        """Colours over all: rgb (height, width, 3) times alpha already, alpha (height, width)."""
+        self.values *= (1 - alpha)[..., None]
+        self.values[..., :3] += rgb
+
+    def ink(self, alpha: Array) -> None:
+        """Ink over all, (height, width)."""
+        self.values *= (1 - alpha)[..., None]
+        self.values[..., 4] += alpha
+
+    def line(self, colour: str, alpha: Array) -> None:
+        """One colour over all, (height, width)."""
+        self.lay(alpha[..., None] * rgb_of(colour).astype(np.float32), alpha)
+
+    def bleed(self, inside: NDArray[np.bool_]) -> None:
+        """The texels around become what lies next to them inside: all that lookups blend in."""
+        known = inside.copy()
+        for _ in range(MARGIN - 1):
+            wider = np.asarray(binary_dilation(known, np.ones((3, 3), dtype=int)), dtype=bool)
+            rows, columns = np.nonzero(wider & ~known)
+            for down, right in _AROUND:
+                there = rows + down, columns + right
+                near = known[there]
+                own = rows[near], columns[near]
+                self.values[own] = self.values[there[0][near], there[1][near]]
+            known[rows, columns] = True
+
+    def coloured(self, palette: Palette, colours: int) -> Array:
+        """(colours, height, width, 3) the raster in each colour of the palette."""
+        rgb, own, ink = self.values[..., :3], self.values[..., 3:4], self.values[..., 4:]
+        return np.stack(
+            [
+                rgb
+                + own * rgb_of(palette.fill(k)).astype(np.float32)
+                + ink * rgb_of(palette.ink(k)).astype(np.float32)
+                for k in range(colours)
+            ]
+        )
+
+
+def rgb_of(colour: str) -> Array:
+    """(3,) of #rrggbb, 0 to 1."""
+    return np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)]) / 255
+
+
+BAND = 2_000_000
+"""Samples that are worked on at a time."""
+
+
+def render_page(
+    page: ArtPage,
+    grid: Grid,
+    coloured: Array,
+    paper: str,
+    *,
+    samples: int,
+    cancel: Cancel | None = None,
+) -> np.ndarray:
+    """The picture (height, width, 3), 8 bits.
+
+    Every sample belongs to exactly one copy of the tile; a pixel is the mean of its samples.
+
+    Args:
+        grid, coloured: the tile's raster (colours, height, width, 3), see `Paint.coloured`.
+        paper: colour where there is no tile.
+        samples: along each side of a pixel.
+    """
+    cancel = cancel or Cancel()
+    look = _Lookup(page, grid, coloured, paper, samples)
+    rings = page.rings() * samples
+    low, high = rings[..., 1].min(axis=1), rings[..., 1].max(axis=1)
+    result = np.empty((page.height, page.width, 3), dtype=np.uint8)
+    step = max(1, BAND // (page.width * samples * samples))
+    for top in range(0, page.height, step):
+        cancel.check()
+        rows = min(step, page.height - top)
+        first = top * samples
+        near = np.flatnonzero((high > first) & (low < first + rows * samples))
+        found = runs(ring_sides(rings[near]), first, rows * samples, page.width * samples)
+        named = found._replace(label=np.where(found.label < 0, -1, near[found.label]))
+        colours = look(named, first).reshape(1, 3, rows * samples, page.width * samples)
+        mean = torch.nn.functional.avg_pool2d(colours, samples)[0].permute(1, 2, 0)
+        result[top : top + rows] = (mean * 255 + 0.5).clamp_(0, 255).byte().numpy()
+    return result
+
+
+class _Lookup:
+    """From samples in a copy each to the raster's colours."""
+
+    def __init__(
+        self, page: ArtPage, grid: Grid, coloured: Array, paper: str, samples: int
+    ) -> None:
+        copies = page.copies
+        count, height, width = coloured.shape[:3]
+        # all colours in one tall raster, and a strip of paper under them
+        strip = np.broadcast_to(rgb_of(paper).astype(np.float32), (8, width, 3))
+        tall = np.concatenate([coloured.reshape(count * height, width, 3), strip])
+        self.raster = torch.from_numpy(np.ascontiguousarray(tall.transpose(2, 0, 1)))[None]
+        self.size = np.array([width, len(tall)], dtype=np.float64)
+        self.width = page.width * samples
+        # from samples to texels: linear @ sample + offset, one a copy
+        to_page = copies.group.linear_parts[copies.cosets]
+        forward = page.linear @ to_page * samples
+        shift = (copies.translations @ page.linear.T + page.offset) * samples
+        inverse = np.linalg.inv(forward)
+        self.linear = inverse * grid.density
+        start = -np.einsum("mij,mj->mi", inverse, shift) - grid.corner
+        self.offset = start * grid.density
+        self.offset[:, 1] += page.colours * height
+        # nowhere, the last: the middle of the strip
+        self.linear = np.concatenate([self.linear, np.zeros((1, 2, 2))])
+        self.offset = np.concatenate([self.offset, [[width / 2, count * height + 4.0]]])
+
+    def __call__(self, found: Runs, top: int) -> torch.Tensor:
+        """(3, samples) colours, row by row."""
+        kept = found.length > 0
+        own = Runs(*(part[kept] for part in found))
+        linear, offset = self.linear[own.label], self.offset[own.label]
+        y = own.row + top + 0.5
+        # texel = start + step * column; normalised to -1 .. 1
+        start = offset + linear[:, :, 1] * y[:, None] + linear[:, :, 0] * (own.start + 0.5)[:, None]
+        start = start / self.size * 2 - 1
+        step = linear[:, :, 0] / self.size * 2
+        length = torch.from_numpy(own.length)
+        total = int(own.length.sum())
+        first = np.cumsum(own.length) - own.length
+        along = torch.arange(total) - torch.repeat_interleave(torch.from_numpy(first), length)
+        at = torch.from_numpy(np.concatenate([start, step], axis=1).astype(np.float32))
+        spread = torch.repeat_interleave(at, length, dim=0)
+        grid = spread[:, :2] + along[:, None].float() * spread[:, 2:]
+        colours = torch.nn.functional.grid_sample(
+            self.raster,
+            grid[None, None],
+            mode="bilinear",
+            padding_mode="border",
+            align_corners=False,
+        )
+        return colours[0, :, 0]

@@ -1,0 +1,381 @@
+"""The densest of some simple lattice arrangements of a piece, and how many of it a sheet holds.
+
+Three kinds of start: the tile's own tiling spread apart, which is dense wherever the gap is small; a
+lattice of pieces all one way up; and a lattice of pairs, one of each turned by 180 degrees. Each is
+drawn tight and then bettered by small random changes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from scipy.signal import fftconvolve
+
+from orbiflow.arrays import Array
+from orbiflow.tiles.tilings import Tile
+
+
+@dataclass(frozen=True, eq=False)
+class Arrangement:
+    """A pieces in each cell of a lattice.
+
+    - `lattice`: (2, 2), basis vectors as columns, in mm.
+    - `linear`: (A, 2, 2) how each piece of a cell is turned or mirrored.
+    - `offsets`: (A, 2) where it is: a point p of the piece goes to linear p + offset.
+    """
+
+    lattice: Array
+    linear: Array
+    offsets: Array
+
+    def scaled(self, stretch: Array, middle: Array) -> Arrangement:
+        """The pieces' middles moved by the linear map `stretch` (2, 2), the pieces kept."""
+        centers = self.linear @ middle + self.offsets
+        return Arrangement(
+            stretch @ self.lattice,
+            self.linear,
+            self.offsets + centers @ (stretch - np.eye(2)).T,
+        )
+
+    def turned(self, angle: float) -> Arrangement:
+        """All of it turned about the origin by an angle in radians."""
+        turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+        return Arrangement(turn @ self.lattice, turn @ self.linear, self.offsets @ turn.T)
+
+    @cached_property
+    def cell_area(self) -> float:
+        """Area of the sheet that one piece takes."""
+        return float(abs(np.linalg.det(self.lattice))) / len(self.linear)
+
+    def clear(self, ring: Array, gap: float) -> bool:
+        """Whether no two pieces with the outline `ring` come closer than `gap`."""
+        pieces = self._own(ring)
+        reach = float(np.linalg.norm(ring - _middle(ring), axis=1).max())
+        centers = self.linear @ _middle(ring) + self.offsets
+        steps = self._steps(2 * reach + gap, centers)
+        shifts = steps @ self.lattice.T
+        for first, piece in enumerate(pieces):
+            shapely.prepare(piece)
+            for second in range(first, len(pieces)):
+                moved = centers[second] + shifts - centers[first]
+                near = np.hypot(*moved.T) <= 2 * reach + gap
+                if second == first:  # one of each pair of opposite shifts, and not the piece itself
+                    near &= (steps[:, 0] > 0) | ((steps[:, 0] == 0) & (steps[:, 1] > 0))
+                if near.any() and self._touched(piece, pieces[second], shifts[near], gap):
+                    return False
+        return True
+
+    def _own(self, ring: Array) -> list[shapely.Polygon]:
+        return [
+            shapely.Polygon(ring @ linear.T + offset)
+            for linear, offset in zip(self.linear, self.offsets, strict=True)
+        ]
+
+    def _steps(self, reach: float, centers: Array) -> Array:
+        """Integer coordinates of all lattice vectors that can bring two pieces together."""
+        far = reach + float(np.ptp(centers, axis=0).max()) * 1.5
+        bound = np.ceil(far * np.linalg.norm(np.linalg.inv(self.lattice), axis=1)).astype(int)
+        bound = np.minimum(bound, 40)
+        ranges = [np.arange(-b, b + 1) for b in bound]
+        return np.stack(np.meshgrid(*ranges, indexing="ij"), axis=-1).reshape(-1, 2)
+
+    @staticmethod
+    def _touched(piece: shapely.Polygon, other: shapely.Polygon, shifts: Array, gap: float) -> bool:
+        points = np.asarray(other.exterior.coords)
+        moved = shapely.polygons(points + shifts[:, None, :])
+        return bool(shapely.dwithin(piece, moved, gap).any())
+
+
+def tightened(start: Arrangement, ring: Array, gap: float, *, most: float = 4.0) -> Arrangement:
+    """The arrangement, its pieces' middles moved apart (or together) evenly until just clear."""
+    middle = _middle(ring)
+    low, high = 0.0, 1.0
+    while not start.scaled(high * np.eye(2), middle).clear(ring, gap):
+        low, high = high, 1 + 2 * (high - 1) + 0.02
+        if high > most:
+            return start.scaled(most * np.eye(2), middle)
+    if low == 0.0:
+        low = 0.9
+        if start.scaled(low * np.eye(2), middle).clear(ring, gap):
+            return start.scaled(low * np.eye(2), middle)
+    while high - low > 5e-4:
+        between = (low + high) / 2
+        if start.scaled(between * np.eye(2), middle).clear(ring, gap):
+            high = between
+        else:
+            low = between
+    return start.scaled(high * np.eye(2), middle)
+
+
+def _middle(ring: Array) -> Array:
+    return (ring.min(axis=0) + ring.max(axis=0)) / 2
+
+
+Mask = NDArray[np.bool_]
+
+CELLS = 48
+"""Raster cells along a piece."""
+
+DIRECTIONS = 30
+"""Of a lattice's first vector that are tried."""
+
+PAIRS = 24
+"""Places of the turned piece of a pair that are tried."""
+
+KEPT_LATTICES = 3
+"""Best lattices that are handed on, to be drawn tight exactly."""
+
+
+def lattice_starts(ring: Array, gap: float) -> list[Arrangement]:
+    """Dense lattices of the piece, roughly."""
+    raster = _Raster(ring, gap)
+    found = raster.lattices(raster.same, 1)
+    still = np.eye(2)[None]
+    return [Arrangement(lattice, still, np.zeros((1, 2))) for _, lattice in found[:KEPT_LATTICES]]
+
+
+def pair_starts(ring: Array, gap: float) -> list[Arrangement]:
+    """Dense lattices of pairs of the piece and the piece turned by 180 degrees, roughly."""
+    raster = _Raster(ring, gap)
+    found = []
+    for place in raster.edge_of(raster.turned):
+        # the pair's no-fit region: like with like, and unlike either way round
+        there = _shifted(raster.turned, -place)
+        pair = raster.same | there | there[::-1, ::-1]
+        found += [(area, lattice, place) for area, lattice in raster.lattices(pair, 2)[:1]]
+    found.sort(key=lambda item: item[0])
+    turns = np.stack([np.eye(2), -np.eye(2)])
+    center = raster.center
+    return [
+        # q = c - (p - c) + w in the raster's frame, whose origin is the piece's centre c
+        Arrangement(lattice, turns, np.stack([np.zeros(2), 2 * center + place * raster.cell]))
+        for _, lattice, place in found[:KEPT_LATTICES]
+    ]
+
+
+class _Raster:
+    """The piece, its no-fit regions with itself and with itself turned, on square cells."""
+
+    def __init__(self, ring: Array, gap: float) -> None:
+        self.center = (ring.min(axis=0) + ring.max(axis=0)) / 2
+        extent = float(np.ptp(ring, axis=0).max()) + gap
+        self.cell = extent / CELLS
+        polygon = shapely.Polygon(ring - self.center).buffer(gap / 2)
+        reach = CELLS // 2 + 1
+        axis = np.arange(-reach, reach + 1) * self.cell
+        mask = np.asarray(shapely.contains_xy(polygon, *np.meshgrid(axis, axis, indexing="ij")))
+        piece = mask.astype(np.float64)
+        self.covered = int(mask.sum())
+        # the translation zero is in the middle; beyond twice the piece there is room for pairs
+        pad = 2 * reach
+        self.same = np.pad(fftconvolve(piece[::-1, ::-1], piece) > 0.5, pad)
+        self.turned = np.pad(fftconvolve(piece, piece) > 0.5, pad)
+        self.half = (len(self.same) - 1) // 2
+
+    def edge_of(self, region: Mask) -> list[NDArray[np.int64]]:
+        """Translations (2,) in cells just outside a region, in all directions."""
+        found = []
+        for angle in np.arange(PAIRS) * 2 * np.pi / PAIRS:
+            found.append(self._first_outside(region, angle))
+        return found
+
+    def _first_outside(self, region: Mask, angle: float) -> NDArray[np.int64]:
+        way = np.array([np.cos(angle), np.sin(angle)])
+        steps = np.round(np.arange(1, self.half + 2)[:, None] * way).astype(int)
+        free = np.logical_not(_looked_up(region, steps))
+        return steps[int(np.argmax(free))]
+
+    def lattices(self, region: Mask, pieces: int) -> list[tuple[float, Array]]:
+        """(area, lattice) in mm of lattices whose vectors lie outside a region, densest first.
+
+        Vectors further on may still lie in it; a cell smaller than so many `pieces` is no lattice.
+        """
+        half = (len(region) - 1) // 2
+        axis = np.arange(-half, half + 1)
+        grid = np.stack(np.meshgrid(axis, axis, indexing="ij"), axis=-1)
+        found = []
+        for angle in np.arange(DIRECTIONS) * np.pi / DIRECTIONS:
+            first = self._first_outside(region, angle)
+            blocked = np.zeros_like(region)
+            most = 1 + int(2 * half / max(1.0, float(np.hypot(*first))))
+            for k in range(-most, most + 1):
+                blocked |= _shifted(region, k * first)
+            area = np.abs(grid[..., 0] * first[1] - grid[..., 1] * first[0]).astype(float)
+            area[blocked | (area < pieces * self.covered)] = np.inf
+            place = np.unravel_index(int(area.argmin()), area.shape)
+            if np.isfinite(area[place]):
+                second = grid[place]
+                lattice = np.stack([first, second], axis=1) * self.cell
+                found.append((float(area[place]) * self.cell**2, lattice))
+        found.sort(key=lambda item: item[0])
+        return found
+
+
+def _looked_up(region: Mask, steps: NDArray[np.int64]) -> Mask:
+    half = (np.array(region.shape) - 1) // 2
+    index = steps + half
+    known = np.asarray(((index >= 0) & (index < region.shape)).all(axis=1))
+    index = np.where(known[:, None], index, 0)
+    return known & region[index[:, 0], index[:, 1]]
+
+
+def _shifted(region: Mask, step: NDArray[np.int64]) -> Mask:
+    """The region moved by whole cells; what comes from beyond the raster is free."""
+    moved = np.zeros_like(region)
+    rows, columns = region.shape
+    i, j = int(step[0]), int(step[1])
+    if abs(i) < rows and abs(j) < columns:
+        moved[max(i, 0) : rows + min(i, 0), max(j, 0) : columns + min(j, 0)] = region[
+            max(-i, 0) : rows + min(-i, 0), max(-j, 0) : columns + min(-j, 0)
+        ]
+    return moved
+
+
+TRIALS = 400
+"""Random changes of each kind of start."""
+
+KEPT = 4
+"""Densest arrangements that are tried on a sheet."""
+
+ANGLES = 36
+"""Turns of an arrangement that are tried on a sheet."""
+
+
+@dataclass(frozen=True, eq=False)
+class Placed:
+    """N pieces on a sheet: a point p of the piece goes to linear[n] p + offsets[n].
+
+    - `aspects`: (N,) which piece of the arrangement's cell each is.
+    """
+
+    linear: Array
+    offsets: Array
+    aspects: NDArray[np.int64]
+
+    def __len__(self) -> int:
+        return len(self.linear)
+
+    def rings(self, ring: Array) -> Array:
+        """(N, M, 2) images of a ring."""
+        return np.einsum("nij,mj->nmi", self.linear, ring) + self.offsets[:, None]
+
+    def first(self, count: int) -> Placed:
+        """The first `count`."""
+        return Placed(self.linear[:count], self.offsets[:count], self.aspects[:count])
+
+
+def dense_arrangements(tile: Tile, ring: Array, gap: float, *, seed: int = 0) -> list[Arrangement]:
+    """Arrangements of pieces with the outline `ring`, at least `gap` apart; the densest first.
+
+    Args:
+        tile: in the same coordinates.
+        ring: (M, 2) the line that is cut, in mm.
+        gap: above 0, in mm.
+        seed: of the small changes; the same seed gives the same arrangements.
+    """
+    rng = np.random.default_rng(seed)
+    coarse = _simplified(ring, gap)
+    group = tile.group
+    own = Arrangement(group.lattice, group.linear_parts, group.translations)
+    starts = [own, *lattice_starts(coarse, gap), *pair_starts(coarse, gap)]
+    tight = sorted((tightened(start, coarse, gap) for start in starts), key=_area)
+    clear = [found for found in tight if found.clear(ring, gap)]
+    bettered = [_bettered(found, coarse, gap, rng) for found in clear[:3]]
+    best = sorted((*bettered, *clear), key=_area)[:KEPT]
+    # the coarse ring holds the fine one, so there is a little room left
+    exact = (tightened(found, ring, gap) for found in best)
+    return sorted((found for found in exact if found.clear(ring, gap)), key=_area)
+
+
+def _area(arrangement: Arrangement) -> float:
+    return arrangement.cell_area
+
+
+def _simplified(ring: Array, gap: float) -> Array:
+    """A ring with fewer vertices that holds the given one."""
+    slack = max(0.05 * gap, 0.002 * float(np.ptp(ring, axis=0).max()))
+    polygon = shapely.Polygon(ring).buffer(slack, join_style="mitre", mitre_limit=2)
+    return shapely.get_coordinates(shapely.get_exterior_ring(polygon.simplify(0.8 * slack)))[:-1]
+
+
+def _bettered(start: Arrangement, ring: Array, gap: float, rng: np.random.Generator) -> Arrangement:
+    best, size = start, 0.04
+    extent = float(np.ptp(ring, axis=0).max())
+    for _ in range(TRIALS):
+        stretch = np.eye(2) + size * rng.normal(size=(2, 2))
+        moved = Arrangement(
+            stretch @ best.lattice,
+            best.linear,
+            best.offsets @ stretch.T + 0.3 * size * extent * rng.normal(size=best.offsets.shape),
+        )
+        # only what would be denser is worth a closer look
+        moved = moved.scaled(
+            np.sqrt(0.998 * best.cell_area / moved.cell_area) * np.eye(2), 0 * ring[0]
+        )
+        if moved.clear(ring, gap):
+            best = tightened(moved, ring, gap)
+        else:
+            size = max(0.93 * size, 0.004)
+    return best
+
+
+def on_sheet(
+    arrangements: Sequence[Arrangement], ring: Array, width: float, height: float
+) -> Placed:
+    """As many pieces as fit into a rectangle from the origin, in rows from the top.
+
+    Whichever arrangement, turned and shifted as suits the rectangle best; the first where others are
+    no better. A single piece goes in whichever way it fits.
+    """
+    best = Placed(np.zeros((0, 2, 2)), np.zeros((0, 2)), np.zeros(0, dtype=np.int64))
+    turns = [(found, angle) for found in arrangements for angle in _angles(found, ring)]
+    for arrangement, angle in turns:
+        turned = arrangement.turned(angle)
+        rings = np.einsum("aij,mj->ami", turned.linear, ring) + turned.offsets[:, None]
+        low, high = rings.min(axis=1), rings.max(axis=1)
+        for shift in _shifts(low):
+            placed = _within(turned, low + shift, high + shift, shift, width, height)
+            if len(placed) > len(best):
+                best = placed
+    return best
+
+
+def _angles(arrangement: Arrangement, ring: Array) -> list[float]:
+    box = shapely.get_coordinates(shapely.oriented_envelope(shapely.MultiPoint(ring)))
+    sides = [*arrangement.lattice.T, box[1] - box[0]]
+    along = [-np.arctan2(y, x) + turn for x, y in sides for turn in (0, np.pi / 2)]
+    even = np.arange(ANGLES) * np.pi / ANGLES
+    return sorted({round(float(a % np.pi), 9) for a in (*along, *even)})
+
+
+def _shifts(low: Array) -> list[Array]:
+    """Those that bring one piece to the left edge and one to the top."""
+    # a hair inside
+    return [np.array([1e-6 - x, 1e-6 - y]) for x in low[:, 0] for y in low[:, 1]]
+
+
+def _within(
+    turned: Arrangement, low: Array, high: Array, shift: Array, width: float, height: float
+) -> Placed:
+    inverse = np.linalg.inv(turned.lattice)
+    corners = np.array([[x, y] for x in (0, width) for y in (0, height)])
+    steps = (corners - low.mean(axis=0)) @ inverse.T
+    margin = 2 + np.abs(inverse).sum() * float((high - low).max())
+    ranges = [
+        np.arange(np.floor(steps[:, k].min() - margin), np.ceil(steps[:, k].max() + margin) + 1)
+        for k in (0, 1)
+    ]
+    grid = np.stack(np.meshgrid(*ranges, indexing="ij"), axis=-1).reshape(-1, 2)
+    moves = grid @ turned.lattice.T
+    least, most = low[:, None] + moves, high[:, None] + moves
+    fits = (least >= 0).all(axis=2) & (most <= (width, height)).all(axis=2)
+    aspects, numbers = np.nonzero(fits)
+    order = np.lexsort((least[aspects, numbers, 0], np.round(least[aspects, numbers, 1], 3)))
+    aspects, numbers = aspects[order], numbers[order]
+    offsets = turned.offsets[aspects] + shift + moves[numbers]
+    return Placed(turned.linear[aspects], offsets, aspects)

@@ -1,0 +1,258 @@
+"""A tile's outline in smooth curves: one fit an edge class, its partner's the exact image."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import shapely
+
+from orbiflow.arrays import Array
+from orbiflow.errors import OrbiflowError
+from orbiflow.tiles.exporting.curves import Curve
+from orbiflow.tiles.tilings import (
+    EdgeImage,
+    Edges,
+    Tile,
+    edge_classes,
+    edges,
+)
+
+CORNER = np.radians(30.0)
+"""A vertex where the polyline turns by more stays a corner."""
+
+_SAMPLES, _ROUNDS = 48, 4
+
+
+def fitted(points: Array, tolerance: float) -> Curve:
+    """Smooth pieces along the polyline `points` (n, 2), n >= 2.
+
+    Args:
+        tolerance: no point of the curve is farther from the polyline, nor one of the polyline from the
+            curve, in the points' units. Where no smooth piece keeps it, the sides themselves do.
+
+    Returns:
+        A curve from the first point to the last; a polyline's corners are ends of its pieces.
+
+    >>> turns = np.linspace(0, np.pi, 40)
+    >>> arc = fitted(np.stack([np.cos(turns), np.sin(turns)], axis=1), 3e-2)
+    >>> len(arc.pieces)
+    1
+    """
+    turn = np.abs(turning(points))
+    corners = [0, *(np.flatnonzero(turn > CORNER) + 1), len(points) - 1]
+    found: list[tuple[Array, bool]] = []
+    for first, last in pairwise(corners):
+        run = points[first : last + 1]
+        found += _run(run, tolerance)
+    return Curve(np.stack([piece for piece, _ in found]), np.array([flat for _, flat in found]))
+
+
+def turning(points: Array) -> Array:
+    """(n - 2,) angle by which a polyline turns at each inner vertex, in radians."""
+    steps = np.diff(points, axis=0)
+    before, after = steps[:-1], steps[1:]
+    cross = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
+    return np.arctan2(cross, (before * after).sum(axis=1))
+
+
+def _run(run: Array, tolerance: float) -> list[tuple[Array, bool]]:
+    """Pieces along a polyline without corners, and whether each is straight."""
+    tangents = _tangents(run)
+    pieces: list[tuple[Array, bool]] = []
+    todo = [(0, len(run) - 1)]
+    while todo:
+        first, last = todo.pop()
+        part = run[first : last + 1]
+        piece, worst = _cubic(part, tangents[first], tangents[last], tolerance)
+        if piece is not None:
+            pieces.append((piece, False))
+        elif last - first == 1:
+            pieces.append((_line(part[0], part[1]), True))
+        else:
+            middle = first + worst
+            todo += [(middle, last), (first, middle)]
+    return pieces
+
+
+def _line(start: Array, end: Array) -> Array:
+    step = (end - start) / 3
+    return np.stack([start, start + step, end - step, end])
+
+
+def _tangents(run: Array) -> Array:
+    """(n, 2) unit tangents at the vertices, of the parabola through each three in a row."""
+    steps = np.diff(run, axis=0)
+    lengths = np.maximum(np.linalg.norm(steps, axis=1), 1e-300)[:, None]
+    slopes = steps / lengths
+    if len(run) == 2:
+        return np.repeat(slopes, 2, axis=0)
+    before, after = lengths[:-1], lengths[1:]
+    inner = (slopes[:-1] * after + slopes[1:] * before) / (before + after)
+    first, last = 2 * slopes[:1] - inner[:1], 2 * slopes[-1:] - inner[-1:]
+    tangents = np.concatenate([first, inner, last])
+    return tangents / np.maximum(np.linalg.norm(tangents, axis=1), 1e-300)[:, None]
+
+
+def _cubic(part: Array, start: Array, end: Array, tolerance: float) -> tuple[Array | None, int]:
+    """The cubic along a polyline, or None and the vertex where it had better be parted."""
+    samples = _samples(part)
+    share = _arc_shares(samples)
+    piece = _least_squares(samples, share, start, end)
+    for _ in range(_ROUNDS):
+        share = _closer(piece, samples, share)
+        piece = _least_squares(samples, share, start, end)
+    error = np.linalg.norm(_points(piece, share) - samples, axis=1)
+    if error.max() <= tolerance and _deviation(piece, part) <= tolerance:
+        return piece, 0
+    inner = part[1:-1]
+    if not len(inner):
+        return None, 0
+    off = shapely.distance(
+        shapely.points(inner), shapely.LineString(_points(piece, np.linspace(0, 1, 40)))
+    )
+    balance = np.minimum(np.arange(1, len(part) - 1), np.arange(len(part) - 2, 0, -1))
+    # the farthest vertex, but no slivers
+    return None, int(np.argmax(off * np.minimum(balance / len(part), 0.2))) + 1
+
+
+def _deviation(piece: Array, part: Array) -> float:
+    samples = shapely.points(_points(piece, np.linspace(0, 1, 4 * min(len(part), 24) + 9)))
+    return float(shapely.distance(samples, shapely.LineString(part)).max())
+
+
+def _samples(part: Array) -> Array:
+    """The vertices, and points on long sides: a fit to vertices alone sways between them."""
+    lengths = np.linalg.norm(np.diff(part, axis=0), axis=1)
+    count = np.maximum(1, np.ceil(lengths / max(lengths.sum() / _SAMPLES, 1e-300))).astype(int)
+    own = np.repeat(np.arange(len(count)), count)
+    share = (np.arange(count.sum()) - (np.cumsum(count) - count)[own]) / count[own]
+    points = part[own] + share[:, None] * (part[own + 1] - part[own])
+    return np.concatenate([points, part[-1:]])
+
+
+def _arc_shares(samples: Array) -> Array:
+    knots = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(samples, axis=0), axis=1))])
+    return knots / max(knots[-1], 1e-300)
+
+
+def _least_squares(samples: Array, share: Array, start: Array, end: Array) -> Array:
+    """The cubic with tangents `start` and `end` nearest to the samples at these parameters."""
+    first, last = samples[0], samples[-1]
+    t = share[:, None]
+    u = 1 - t
+    left, right = 3 * u**2 * t * start, -3 * u * t**2 * end
+    rest = samples - (u**3 + 3 * u**2 * t) * first - (t**3 + 3 * u * t**2) * last
+    matrix = np.array(
+        [[(left**2).sum(), (left * right).sum()], [(left * right).sum(), (right**2).sum()]]
+    )
+    goal = np.array([(left * rest).sum(), (right * rest).sum()])
+    chord = float(np.linalg.norm(last - first))
+    determinant = matrix[0, 0] * matrix[1, 1] - matrix[0, 1] ** 2
+    lengths = np.full(2, chord / 3)
+    if determinant > 1e-12 * matrix[0, 0] * matrix[1, 1]:
+        solved = np.linalg.solve(matrix, goal)
+        if (solved > 1e-3 * chord).all() and (solved < 4 * chord).all():
+            lengths = solved
+    return np.stack([first, first + lengths[0] * start, last - lengths[1] * end, last])
+
+
+def _points(piece: Array, share: Array) -> Array:
+    t = share[:, None]
+    u = 1 - t
+    return u**3 * piece[0] + 3 * u**2 * t * piece[1] + 3 * u * t**2 * piece[2] + t**3 * piece[3]
+
+
+def _closer(piece: Array, samples: Array, share: Array) -> Array:
+    """One step of Newton's method towards the parameters nearest to the samples."""
+    t = share[:, None]
+    u = 1 - t
+    first = np.diff(piece, axis=0)
+    second = np.diff(piece, n=2, axis=0)
+    slope = 3 * (u**2 * first[0] + 2 * u * t * first[1] + t**2 * first[2])
+    bend = 6 * (u * second[0] + t * second[1])
+    off = _points(piece, share) - samples
+    top = (off * slope).sum(axis=1)
+    bottom = (slope**2).sum(axis=1) + (off * bend).sum(axis=1)
+    step = np.where(np.abs(bottom) > 1e-300, top / np.where(bottom == 0, 1, bottom), 0.0)
+    moved = np.clip(share - step, 0, 1)
+    moved[0], moved[-1] = 0.0, 1.0
+    return moved if (np.diff(moved) >= 0).all() else share
+
+
+_SHARES = (0.6, 0.15, 0.04)  # of the tolerance; the finer ones where a curve would cross another
+
+
+@dataclass(frozen=True, eq=False)
+class Outline:
+    """The curves of a tile.
+
+    - `tile`: whose they are.
+    - `edges`: how it falls into edges; None where that is not known (`note` says why).
+    - `curves`: one an edge, end to end; or a single closed one.
+    - `note`: what is to be said about it, or "".
+    """
+
+    tile: Tile
+    edges: Edges | None
+    curves: tuple[Curve, ...]
+    note: str = ""
+
+    @property
+    def closed(self) -> Curve:
+        """All of it."""
+        return Curve.joined(self.curves, closed=True)
+
+
+def outline(tile: Tile, tolerance: float) -> Outline:
+    """Smooth curves along the tile's polygon that tile the plane as exactly as it does.
+
+    One of each class of identified edges is fitted and the others are its images; an edge that is its
+    own image, by a half-turn or a mirror across it, is fitted up to the middle. Where curves would
+    touch each other within the tolerance they are fitted more closely, at worst along the polygon
+    itself.
+
+    Args:
+        tolerance: from the polygon, in the tile's units.
+    """
+    try:
+        own = edges(tile)
+    except OrbiflowError as error:
+        plain = Curve.polyline(tile.polygon, closed=True)
+        return Outline(tile, None, (plain,), f"the outline is left as it is: {error}")
+    for share in _SHARES:
+        curves = _curves(own, share * tolerance)
+        ring = Curve.joined(curves, closed=True).flattened(tolerance / 20)
+        if shapely.Polygon(ring).is_valid:
+            return Outline(tile, own, curves)
+    plain_edges = [Curve.polyline(own.points(k)) for k in range(len(own.starts))]
+    return Outline(tile, own, tuple(plain_edges))
+
+
+def _curves(own: Edges, tolerance: float) -> tuple[Curve, ...]:
+    found: dict[int, Curve] = {}
+    for kind in edge_classes(own):
+        points = own.points(kind.edge)
+        if kind.straight:
+            curve = Curve.polyline(points)
+        elif kind.folds:
+            curve = _folded(points, kind.folds[0], tolerance)
+        else:
+            curve = fitted(points, tolerance)
+        found[kind.edge] = curve
+        for image in kind.images:
+            moved = curve.moved(image.isometry.linear, image.isometry.translation)
+            found[image.edge] = moved.reversed() if image.reversed else moved
+    return tuple(found[k] for k in range(len(own)))
+
+
+def _folded(points: Array, fold: EdgeImage, tolerance: float) -> Curve:
+    """An edge that is its own image, turned or mirrored: half of it, and the half's image."""
+    middle, odd = divmod(len(points) - 1, 2)
+    half = points[: middle + 1]
+    if odd:  # the centre lies on a side
+        half = np.concatenate([half, points[middle : middle + 2].mean(axis=0)[None]])
+    curve = fitted(half, tolerance)
+    image = curve.moved(fold.isometry.linear, fold.isometry.translation).reversed()
+    return Curve.joined([curve, image])

@@ -1,0 +1,219 @@
+"""What is too large for a machine's bed, on several sheets that overlap, with marks to align them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from orbiflow.errors import OrbiflowError
+from orbiflow.tiles.exporting.curves import Curve
+from orbiflow.tiles.exporting.layouts import STRIP
+from orbiflow.tiles.exporting.scene import (
+    Box,
+    Layer,
+    PlacedTile,
+    Scene,
+    Style,
+    Uses,
+    clipped_line,
+    clipped_region,
+)
+
+OVERLAP = 12.0
+"""Width in mm of the strip that two neighbouring sheets have in common; it holds the crosses."""
+
+ARM = 4.0
+"""Half the width of a cross, in mm."""
+
+MOST_SHEETS = 400
+
+BLUE = Style(None, "#0000ff", 0.1)
+
+
+def split(scene: Scene, bed: tuple[float, float], tolerance: float) -> list[Scene]:
+    """The scene on sheets of at most the bed's size, row by row; itself if the bed holds it.
+
+    Neighbouring sheets overlap by `OVERLAP`; what is drawn changes from one to the next in the middle
+    of the strip, where both have the same crosses. No line is on two sheets.
+
+    Args:
+        bed: width and height in mm.
+        tolerance: of what is cut where sheets meet.
+
+    Raises:
+        OrbiflowError: for a bed too small to have overlapping sheets, or too many sheets.
+    """
+    if scene.width <= bed[0] and scene.height <= bed[1]:
+        return [scene]
+    columns, rows = _parts(scene.width, bed[0]), _parts(scene.height, bed[1])
+    if len(columns) * len(rows) > MOST_SHEETS:
+        raise OrbiflowError(
+            f"the page of {scene.width:g} x {scene.height:g} mm needs {len(columns) * len(rows)} "
+            f"sheets of {bed[0]:g} x {bed[1]:g} mm; the most is {MOST_SHEETS}"
+        )
+    crosses = _crosses(columns, rows)
+    total = len(columns) * len(rows)
+    return [
+        _sheet(
+            scene,
+            (left, top, right, bottom),
+            crosses,
+            tolerance,
+            f"{i * len(columns) + j + 1} of {total}",
+        )
+        for i, (top, bottom) in enumerate(rows)
+        for j, (left, right) in enumerate(columns)
+    ]
+
+
+def _parts(length: float, bed: float) -> list[tuple[float, float]]:
+    """Overlapping intervals of at most `bed`, all of one length, that cover 0 to `length`."""
+    if length <= bed:
+        return [(0.0, length)]
+    if bed < 3 * OVERLAP:
+        raise OrbiflowError(
+            f"a bed of {bed:g} mm is too narrow for sheets that overlap by {OVERLAP:g} mm; give one "
+            f"of at least {3 * OVERLAP:g} mm"
+        )
+    count = math.ceil((length - OVERLAP) / (bed - OVERLAP))
+    part = (length + (count - 1) * OVERLAP) / count
+    return [(k * (part - OVERLAP), k * (part - OVERLAP) + part) for k in range(count)]
+
+
+def _seams(parts: list[tuple[float, float]]) -> list[float]:
+    return [(end + start) / 2 for (_, end), (start, _) in pairwise(parts)]
+
+
+def _crosses(
+    columns: list[tuple[float, float]], rows: list[tuple[float, float]]
+) -> list[tuple[float, float]]:
+    """Two on each stretch of seam that two sheets have in common."""
+    found = [
+        (x, top + share * (bottom - top))
+        for x in _seams(columns)
+        for top, bottom in rows
+        for share in (0.2, 0.8)
+    ]
+    found += [
+        (left + share * (right - left), y)
+        for y in _seams(rows)
+        for left, right in columns
+        for share in (0.2, 0.8)
+    ]
+    return found
+
+
+def _sheet(
+    scene: Scene,
+    bounds: tuple[float, float, float, float],
+    crosses: list[tuple[float, float]],
+    tolerance: float,
+    number: str,
+) -> Scene:
+    page = Box(*bounds)
+    half = OVERLAP / 2
+    # each side that is not the scene's own border is a seam
+    seams = Box(
+        page.left + (half if page.left > 0 else 0.0),
+        page.top + (half if page.top > 0 else 0.0),
+        page.right - (half if page.right < scene.width - 1e-9 else 0.0),
+        page.bottom - (half if page.bottom < scene.height - 1e-9 else 0.0),
+    )
+    window = Box(
+        max(seams.left, scene.clip.left),
+        max(seams.top, scene.clip.top),
+        min(seams.right, scene.clip.right),
+        min(seams.bottom, scene.clip.bottom),
+    )
+    back = -np.array([page.left, page.top])
+    layers = [_part(layer, scene, seams, window, back, tolerance) for layer in scene.layers]
+    marks = [
+        _line([[x - dx, y - dy], [x + dx, y + dy]], back)
+        for x, y in crosses
+        if page.left < x - ARM
+        and x + ARM < page.right
+        and page.top < y - ARM
+        and y + ARM < page.bottom
+        for dx, dy in ((ARM, 0.0), (0.0, ARM))
+    ]
+    layers.append(Layer("registration", "mark", BLUE, tuple(marks)))
+    return replace(
+        scene,
+        width=page.width,
+        height=page.height,
+        layers=tuple(layers),
+        window=Box(
+            window.left - page.left,
+            window.top - page.top,
+            window.right - page.left,
+            window.bottom - page.top,
+        ),
+        tiles=_tiles(scene, seams, back),
+        notes=(*scene.notes, f"Sheet {number}; crosses are common to neighbouring sheets."),
+    )
+
+
+def _part(
+    layer: Layer, scene: Scene, seams: Box, window: Box, back: np.ndarray, tolerance: float
+) -> Layer:
+    """What of a layer a sheet shows, in the sheet's own coordinates."""
+    still = np.eye(2)
+    items: list[Curve | Uses] = []
+    for item in layer.items:
+        if isinstance(item, Uses):
+            images = item.images(scene.symbols[item.symbol].pieces.reshape(-1, 2))
+            low, high = images.min(axis=1), images.max(axis=1)
+            near = (high > window[:2]).all(axis=1) & (low < window[2:]).all(axis=1)
+            items.append(
+                Uses(item.symbol, item.linear, item.which[near], item.offsets[near] + back)
+            )
+        elif layer.role == "paper":
+            items += [part.moved(still, back) for part in clipped_region(item, seams, tolerance)]
+        else:
+            items += [part.moved(still, back) for part in clipped_line(item, seams, tolerance)]
+    clipped = layer.clipped or any(isinstance(item, Uses) for item in items)
+    return replace(layer, items=tuple(items), clipped=clipped)
+
+
+def _tiles(scene: Scene, seams: Box, back: np.ndarray) -> tuple[PlacedTile, ...]:
+    if scene.prototile is None:
+        return ()
+    kept: dict[int, PlacedTile] = {}
+    for number, tile in enumerate(scene.tiles):
+        ring = scene.prototile @ tile.linear.T + tile.offset
+        low, high = ring.min(axis=0), ring.max(axis=0)
+        if (high > seams[:2]).all() and (low < seams[2:]).all():
+            whole = tile.whole and bool((low >= seams[:2]).all() and (high <= seams[2:]).all())
+            kept[number] = replace(tile, offset=tile.offset + back, whole=whole)
+    new = {number: k for k, number in enumerate(kept)}
+    return tuple(
+        replace(tile, neighbours=tuple(new[k] for k in tile.neighbours if k in new))
+        for tile in kept.values()
+    )
+
+
+def _line(points: list[list[float]], back: np.ndarray) -> Curve:
+    return Curve.polyline(np.array(points) + back)
+
+
+def calibrated(scene: Scene) -> Scene:
+    """The scene with a mark exactly 100 mm long at its foot, on a layer of its own.
+
+    Raises:
+        OrbiflowError: for a page narrower than 110 mm.
+    """
+    if scene.width < 110:
+        raise OrbiflowError(
+            f"the calibration mark is 100 mm long and needs a page at least 110 mm wide, got "
+            f"{scene.width:g} mm"
+        )
+    y, left = scene.height - STRIP / 2, (scene.width - 100) / 2
+    still = np.zeros(2)
+    lines = [[[left, y], [left + 100, y]]]
+    lines += [[[x, y - 2.5], [x, y + 2.5]] for x in (left, left + 50, left + 100)]
+    marks = tuple(_line(line, still) for line in lines)
+    layer = Layer("calibration 100 mm", "mark", BLUE, marks)
+    return replace(scene, layers=(*scene.layers, layer))

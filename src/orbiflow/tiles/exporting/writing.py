@@ -1,0 +1,217 @@
+"""From a tile to files: scenes, then each in the format that was asked for."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from orbiflow import __version__
+from orbiflow.arguments import path as as_path
+from orbiflow.drawing import palette
+from orbiflow.errors import (
+    OrbiflowError,
+    OutputError,
+)
+from orbiflow.runtime import write_atomic
+from orbiflow.tiles.exporting.layouts import Layout, layout
+from orbiflow.tiles.exporting.pieces import pieces_scenes, place_on
+from orbiflow.tiles.exporting.scene import Scene
+from orbiflow.tiles.exporting.settings import FORMATS, ExportSettings
+from orbiflow.tiles.exporting.sheets import calibrated, split
+from orbiflow.tiles.exporting.svg_writer import write_svg
+from orbiflow.tiles.exporting.tiling_scenes import skeleton_scene, tiling_scene
+from orbiflow.tiles.exporting.writers import (
+    write_dxf,
+    write_json,
+    write_pdf,
+    write_png,
+)
+from orbiflow.tiles.likeness import narrowest_neck
+from orbiflow.tiles.tile import EscherTile, TileSource
+from orbiflow.tiles.tilings import Certificate, colouring
+
+VISIBLE = 0.05
+"""Width in mm of a line that one sees on a screen."""
+
+
+@dataclass(frozen=True, eq=False)
+class Exported:
+    """What came of an export.
+
+    - `files`: that were written, one a sheet.
+    - `scenes`: what is on each.
+    - `notes`: what the user should know, in words.
+    """
+
+    files: tuple[Path, ...]
+    scenes: tuple[Scene, ...]
+    notes: tuple[str, ...]
+
+    @property
+    def tiles(self) -> int:
+        """On all sheets; one that is cut where sheets meet counts on each."""
+        return sum(len(scene.tiles) for scene in self.scenes)
+
+    def _repr_png_(self) -> bytes:
+        """What a notebook shows: the first sheet, some 600 pixels wide."""
+        sheet = self.scenes[0]
+        return write_png(sheet, dpi=600 * 25.4 / max(sheet.width, sheet.height))
+
+
+def export(
+    tile: TileSource,
+    out: str | Path,
+    settings: ExportSettings | None = None,
+    *,
+    force: bool = False,
+) -> Exported:
+    """Write a tiling, its lines or its pieces in real size.
+
+    Args:
+        tile: in memory, or a run's folder; see `read_result`.
+        out: the file; with several sheets its name gets a number. An ending of a known format, such as
+            .pdf, decides the format.
+        settings: see `ExportSettings`; their format counts for other endings, which are refused
+            without them.
+        force: export a tile that is not certified; the file says so.
+
+    Raises:
+        CertificationError: for a tile that is not certified.
+        OrbiflowError: for settings that cannot be met, in words.
+        OutputError: if a file cannot be written, or nothing says its format.
+    """
+    out = as_path(out, "the file to export to")
+    settings = _for_file(settings, out)
+    found, notes = scenes(tile, settings, force=force)
+    # all contents before the first file
+    contents = [write_scene(scene, settings) for scene in found]
+    names = sheet_names(out, len(contents))
+    files = [write_atomic(name, content) for name, content in zip(names, contents, strict=True)]
+    return Exported(tuple(files), tuple(found), notes)
+
+
+def _for_file(settings: ExportSettings | None, out: Path) -> ExportSettings:
+    ending = out.suffix.lower().lstrip(".")
+    known = next((form for form in FORMATS if form == ending), None)
+    if settings is None and ending and known is None:
+        raise OutputError(
+            f"{out.name} ends in .{ending}; give ExportSettings with a format, or end it in "
+            f".{', .'.join(FORMATS)}"
+        )
+    settings = settings or ExportSettings()
+    return replace(settings, format=known or settings.format)
+
+
+def scenes(
+    tile: TileSource, settings: ExportSettings, *, force: bool = False
+) -> tuple[list[Scene], tuple[str, ...]]:
+    """The sheets, and what the user should know.
+
+    Raises:
+        As `export`.
+    """
+    given = EscherTile.of(tile)
+    certificate = given.require_certified(
+        force=force, otherwise="so it is not exported; --force exports it, marked so"
+    )
+    placed = layout(given.tile, settings, y_down=given.y_down)
+    notes = (*placed.notes, *_neck_notes(placed), *_colour_notes(given, settings))
+    made = [_described(scene, given, settings, certificate) for scene in _made(placed, settings)]
+    if settings.calibrate:
+        # the strip at the foot is the last sheet's; pieces have one on each
+        first = 0 if settings.cut == "pieces" else len(made) - 1
+        made[first:] = [calibrated(scene) for scene in made[first:]]
+    return made, notes
+
+
+def _made(placed: Layout, settings: ExportSettings) -> list[Scene]:
+    if settings.cut == "pieces":
+        return pieces_scenes(placed, fine=settings.format not in ("dxf", "json"))
+    scene = skeleton_scene(placed) if settings.cut == "skeleton" else tiling_scene(placed)
+    return [scene] if settings.bed is None else split(scene, settings.bed, settings.deviation / 4)
+
+
+def _described(
+    scene: Scene, given: EscherTile, settings: ExportSettings, certificate: Certificate
+) -> Scene:
+    tile = given.tile
+    title, notes = given.name, [*scene.notes]
+    if not certificate.valid:
+        title += ", NOT CERTIFIED"
+        notes.insert(0, f"NOT CERTIFIED: {'; '.join(certificate.reasons)}.")
+    what = " ".join(part for part in (tile.isohedral_class, tile.group.name) if part)
+    notes.append(
+        f"{what or 'A tile'}, tiles of {settings.tile_size:g} mm, made with orbiflow {__version__}; "
+        "one unit is one millimetre."
+    )
+    facts = {
+        "class": tile.isohedral_class or None,
+        "group": tile.group.name or None,
+        "rank": given.rank,
+        "certified": certificate.valid,
+        "cut": settings.cut,
+        "tile_size": settings.tile_size,
+        "kerf": settings.kerf,
+        "clearance": settings.clearance,
+        "tolerance": settings.deviation,
+    }
+    return replace(scene, title=title, notes=tuple(notes), facts=facts)
+
+
+def _colour_notes(given: EscherTile, settings: ExportSettings) -> tuple[str, ...]:
+    if settings.cut == "none":
+        return palette(settings.palette).shortage(colouring(given.tile).count)
+    width = settings.stroke_width
+    if width is None or width >= VISIBLE:
+        return ()
+    return (f"its lines of {width:g} mm hardly show on a screen; a cutter follows them",)
+
+
+def _neck_notes(placed: Layout) -> list[str]:
+    limit = placed.settings.warn_neck
+    if limit is None:
+        return []
+    try:
+        neck = narrowest_neck(placed.tile.polygon)
+    except OrbiflowError as error:  # a forced tile may cross itself
+        return [f"its necks cannot be measured: {error}"]
+    if neck.width >= limit:
+        return []
+    return [
+        f"the tile is thinner than {limit:g} mm: {neck.width:.2f} mm "
+        f"{place_on(placed.tile.polygon, neck)}"
+    ]
+
+
+def write_scene(scene: Scene, settings: ExportSettings) -> str | bytes:
+    """The file's content.
+
+    Raises:
+        OrbiflowError: for a PNG of too many pixels.
+    """
+    fine = settings.deviation / 4
+    match settings.format:
+        case "svg":
+            # what rounding moves is far below the tolerance
+            return write_svg(scene, decimals=max(3, math.ceil(-math.log10(fine / 5))))
+        case "pdf":
+            return write_pdf(scene)
+        case "png":
+            return write_png(scene, dpi=settings.dpi)
+        case "dxf":
+            return write_dxf(scene, tolerance=fine)
+        case "json":
+            return write_json(scene, tolerance=fine)
+
+
+def sheet_names(out: Path, count: int) -> list[Path]:
+    """One name a sheet: numbered if there are several.
+
+    >>> [path.name for path in sheet_names(Path("cut.svg"), 2)]
+    ['cut-1.svg', 'cut-2.svg']
+    """
+    if count == 1:
+        return [out]
+    digits = len(str(count))
+    return [out.with_name(f"{out.stem}-{k:0{digits}d}{out.suffix}") for k in range(1, count + 1)]

@@ -1,0 +1,402 @@
+"""A silhouette as an elastic body: what it costs to deform it, and the shape of least cost.
+
+As rigid as possible (Sorkine and Alexa, As-Rigid-As-Possible Surface Modeling, SGP 2007; a distance
+for Escher tiles since Nagata and Imahori, 2021): with points x at rest, moved to z, and a rotation r_i
+of each, the energy is the sum over all pairs of w_ij |(z_i - z_j) - r_i (x_i - x_j)|^2. Cotangent
+weights measure the strain of areas; weights along the outline measure strain by length, so that
+small parts count: an ear has little area and much outline. To these comes what it costs to bend the
+outline as a rod: the square of the change of its curvature, so that straight parts stay straight and
+corners stay corners. Points are complex numbers x + iy; a batch of C shapes is (N, C).
+"""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import scipy.linalg
+import scipy.sparse
+from numpy.typing import NDArray
+
+from orbiflow.arrays import Complex
+from orbiflow.errors import OrbiflowError
+from orbiflow.tiles.geometry import (
+    best_similarity,
+    complex_points,
+    plane_points,
+    signed_area,
+)
+from orbiflow.tiles.silhouette import (
+    Mesh,
+    local_thickness,
+    triangulate,
+)
+
+Array = NDArray[np.float64]
+
+COTANGENTS = (0.05, 40.0)
+"""Bounds of the areas' weights: obtuse triangles have negative ones."""
+
+THICK = 0.25
+"""Radius of a part that is not thin, in square roots of the area; a disc has 0.56."""
+
+SALIENT = (0.25, 8.0)
+"""Bounds of what thinness may multiply weights by."""
+
+
+POSE = 4.0
+"""What a displacement weighs beside the energy, in the order of shapes."""
+
+REWEIGHTINGS = 50
+"""Steps to the rotations of least forgiving energy, at most."""
+
+
+@dataclass(frozen=True)
+class Stiffness:
+    """What deforming costs, in a silhouette of area 1.
+
+    - `stretch`: of the outline, per unit of its length and squared strain.
+    - `bend`: of the outline, per unit of its length and squared change of curvature.
+    - `salience`: power of the thinness by which areas of thin parts weigh more: with 0 a leg of half
+      the width weighs half as much a length, with 1 the same; below 0 thin parts give way first.
+    - `pose`: of the mean squared distance from the silhouette's best similar copy.
+    - `forgiven`: strain, and angle of a kink in radians, beyond which `forgiving_energy` forgives.
+    """
+
+    stretch: float = 0.2
+    bend: float = 0.0003
+    salience: float = 0.5
+    pose: float = 3.0
+    forgiven: tuple[float, float] = (0.1, 0.15)
+
+
+class Elastic:
+    """A triangulated silhouette of area about 1 and its energies.
+
+    Args:
+        ring: (n, 2) outline, counter-clockwise; the first n points of the body.
+        stiffness: what deforming costs.
+        stiff: (n,) or (N,) factors of the stiffness at the points, if some may deform less.
+        mesh: of the ring, if it is at hand.
+
+    Raises:
+        OrbiflowError: for a ring that cannot be triangulated.
+    """
+
+    def __init__(
+        self,
+        ring: Array,
+        stiffness: Stiffness | None = None,
+        *,
+        stiff: Array | None = None,
+        mesh: Mesh | None = None,
+    ) -> None:
+        self.mesh = mesh or triangulate(ring)
+        self.stiffness = stiffness or Stiffness()
+        self.size = len(ring)
+        self.rest = complex_points(self.mesh.points)
+        pairs = self._pairs(stiff)
+        self._i, self._j = pairs.row.astype(np.int64), pairs.col.astype(np.int64)
+        self._d = self.rest[self._i] - self.rest[self._j]
+        self._rod, rod_cost = self._bending(stiff)
+        self._curved = self._rod @ self.rest[: self.size]
+        self._weigh(pairs.data, rod_cost)
+
+    def _weigh(self, pair_weights: Array, rod_cost: Array) -> None:
+        shape = (len(self), len(self))
+        self._w, self._rod_cost = pair_weights, rod_cost
+        self._weights = scipy.sparse.csr_matrix((self._w, (self._i, self._j)), shape=shape)
+        self._sums: scipy.sparse.csr_matrix = scipy.sparse.csr_matrix(
+            (self._w * self._d, (self._i, self._j)), shape=shape
+        )
+        self._conjugate: scipy.sparse.csr_matrix = self._sums.conjugate().tocsr()
+        self._own = np.asarray(self._sums.sum(axis=1)).ravel()
+        self._own_conjugate = np.conj(self._own)
+        self._solvers: dict[float, Array] = {}
+
+    def __len__(self) -> int:
+        return len(self.rest)
+
+    def rotations(self, z: Complex) -> Complex:
+        """The rotations (N, C), complex units, that suit shapes (N, C) best."""
+        n = self.size
+        sums = self._own_conjugate[:, None] * z - self._conjugate @ z
+        sums[:n] += (self._rod_cost * np.conj(self._curved))[:, None] * (self._rod @ z[:n])
+        return sums / np.maximum(abs(sums), 1e-300)
+
+    def energy(self, z: Complex) -> Array:
+        """Energies (C,) of shapes (N, C) without the pose's."""
+        r = self.rotations(z)
+        strain, bent = self._misfits(z, r)
+        return self._w @ _squares(strain) + self._rod_cost @ _squares(bent)
+
+    def forgiving_energy(self, z: Complex) -> Array:
+        """Energies (C,) that grow only in proportion to strains and kinks once these are large.
+
+        2 f^2 (sqrt(1 + (s / f)^2) - 1) in place of s^2 (Charbonnier et al., 1994), with f the
+        stiffness' `forgiven` strain and angle: a joint that bends, or a toe that is lost, costs
+        less than the same spread over all of the outline.
+        """
+        return self._forgiven(*self._forgiven_misfits(z))
+
+    def cost(self, z: Complex) -> Array:
+        """(C,) what shapes (N, C) cost: `forgiving_energy` in their areas, and the displacement."""
+        area = signed_area(plane_points(z[: self.size].T))
+        return self.forgiving_energy(z) / area + POSE * self.displacement(z)
+
+    def lenient_energy(self, z: Complex) -> Array:
+        """`forgiving_energy` (C,) at the rotations of least plain energy: never less, and quick."""
+        return self._forgiven(*self._relative(z, self.rotations(z)))
+
+    def _forgiven(self, strain: Array, kinks: Array) -> Array:
+        f, g = self.stiffness.forgiven
+        stretched, bent = (2 * (np.sqrt(1 + misfits) - 1) for misfits in (strain, kinks))
+        return (self._w * (f * abs(self._d)) ** 2) @ stretched + (self._rod_cost * g**2) @ bent
+
+    def forgiving(self, z: Complex) -> Elastic:
+        """The body whose energy touches `forgiving_energy` at a shape (N,) or (N, 1) from above.
+
+        Minimising with it, anew and anew, minimises that energy (iteratively reweighted least
+        squares).
+        """
+        strain, bent = self._forgiven_misfits(z.reshape(-1, 1))
+        body = copy.copy(self)
+        for name in ("matrix", "condensed"):
+            body.__dict__.pop(name, None)
+        body._weigh(self._w / np.sqrt(1 + strain[:, 0]), self._rod_cost / np.sqrt(1 + bent[:, 0]))
+        return body
+
+    def _forgiven_misfits(self, z: Complex) -> tuple[Array, Array]:
+        """What is forgiven, see `_relative`, at the rotations of least forgiving energy."""
+        n = self.size
+        turned = np.conj(self._d)[:, None] * (z[self._i] - z[self._j])
+        curved = np.conj(self._curved)[:, None] * (self._rod @ z[:n])
+        r = self.rotations(z)
+        misfits = self._relative(z, r)
+        for _ in range(REWEIGHTINGS - 1):
+            weights = (self._w[:, None] / np.sqrt(1 + misfits[0])) * turned
+            sums = self._gather @ weights
+            sums[:n] += self._rod_cost[:, None] / np.sqrt(1 + misfits[1]) * curved
+            before, r = r, sums / np.maximum(abs(sums), 1e-300)
+            if abs(r - before).max() < 1e-9:
+                break
+            misfits = self._relative(z, r)
+        return misfits
+
+    def _relative(self, z: Complex, r: Complex) -> tuple[Array, Array]:
+        """Squared strains of pairs and squared kinks, in units of the stiffness' `forgiven`.
+
+        Strains are the mean of both ends', so that weights stay symmetric.
+        """
+        f, g = self.stiffness.forgiven
+        strain, bent = self._misfits(z, r)
+        relative = _squares(strain) / (f * abs(self._d[:, None])) ** 2
+        return (relative + relative[self._mates]) / 2, _squares(bent) / g**2
+
+    @cached_property
+    def _mates(self) -> NDArray[np.int64]:
+        """For each pair, the same pair from its other end."""
+        own = self._i * len(self) + self._j
+        order = np.argsort(own)
+        return order[np.searchsorted(own[order], self._j * len(self) + self._i)]
+
+    @cached_property
+    def _gather(self) -> scipy.sparse.csr_matrix:
+        """(N, P): sums over the pairs of each point."""
+        count = len(self._i)
+        at = (self._i, np.arange(count))
+        return scipy.sparse.csr_matrix((np.ones(count), at), shape=(len(self), count))
+
+    def _misfits(self, z: Complex, r: Complex) -> tuple[Complex, Complex]:
+        strain = (z[self._i] - z[self._j]) - r[self._i] * self._d[:, None]
+        bent = self._rod @ z[: self.size] - r[: self.size] * self._curved[:, None]
+        return strain, bent
+
+    def displacement(self, z: Complex) -> Array:
+        """(C,) mean squared distance from the best similar copy, in areas of the copy."""
+        copy, factor = self.copies(z)
+        size = np.maximum(abs(factor) ** 2, 1e-12)
+        return (abs(z - copy) ** 2).mean(axis=0) / size
+
+    def forces(self, z: Complex) -> Complex:
+        """What the rotations and the pose of shapes (N, C) pull towards: b of matrix z = b."""
+        r = self.rotations(z)
+        copy, _ = self.copies(z)
+        pull = r * self._own[:, None] + self._sums @ r
+        bends = (self._rod_cost * self._curved)[:, None] * r[: self.size]
+        pull[: self.size] += self._rod.T @ bends
+        return pull + self.stiffness.pose / len(self) * copy
+
+    @cached_property
+    def matrix(self) -> Array:
+        """(N, N) dense stiffness matrix, the pose's part included."""
+        degree = np.asarray(self._weights.sum(axis=1)).ravel()
+        pose = self.stiffness.pose / len(self)
+        matrix = np.diag(2 * degree + pose) - 2 * self._weights.toarray()
+        rod = self._rod.T @ scipy.sparse.diags(self._rod_cost) @ self._rod
+        matrix[: self.size, : self.size] += rod.toarray()
+        return matrix
+
+    def pulled(self, z: Complex, towards: Complex, strength: float, rounds: int) -> Complex:
+        """Let the outline (n, C) be pulled towards other points, as a spring a point would.
+
+        Args:
+            z: shapes (N, C) to start from.
+            towards: (n, C).
+            strength: of all springs together, in the unit of the energy.
+            rounds: of choosing rotations and solving.
+        """
+        mu = strength / self.size
+        solve = self._pulled_solver(mu)
+        for _ in range(rounds):
+            right = self.forces(z)
+            right[: self.size] += mu * towards
+            z = _times(solve, right)
+        return z
+
+    @cached_property
+    def condensed(self) -> Condensed:
+        """The inner points solved for: a matrix of the outline alone."""
+        n = self.size
+        inner = self.matrix[n:, n:]
+        if not len(inner):
+            none = np.zeros((0, n))
+            return Condensed(self.matrix, none, none[:, :0])
+        inverse = _inverse(inner)
+        follow = -inverse @ self.matrix[n:, :n]
+        return Condensed(self.matrix[:n, :n] + self.matrix[:n, n:] @ follow, follow, inverse)
+
+    def _pulled_solver(self, mu: float) -> Array:
+        solver = self._solvers.get(mu)  # looked up once: another thread may clear them
+        if solver is None:
+            matrix = self.matrix.copy()
+            matrix[np.arange(self.size), np.arange(self.size)] += mu
+            solver = _inverse(matrix)
+            if len(self._solvers) >= 16:
+                self._solvers.clear()
+            self._solvers[mu] = solver
+        return solver
+
+    def copies(self, z: Complex) -> tuple[Complex, Complex]:
+        """Best similar copies (N, C) of the body at rest, and the similarities' factors (C,)."""
+        center = z.mean(axis=0)
+        factor = best_similarity(self.rest, z)
+        return center + (self.rest - self.rest.mean())[:, None] * factor, factor
+
+    def _pairs(self, stiff: Array | None) -> Any:
+        triangles, count, n = self.mesh.triangles, len(self), self.size
+        factors = self._salience()
+        rows: list[NDArray[np.int64]] = []
+        columns: list[NDArray[np.int64]] = []
+        values: list[Array] = []
+        for k in range(3):
+            i, j, apex = triangles[:, k], triangles[:, k - 2], triangles[:, k - 1]
+            u = np.conj(self.rest[i] - self.rest[apex]) * (self.rest[j] - self.rest[apex])
+            rows.append(i)
+            columns.append(j)
+            cotangent = np.clip(u.real / np.maximum(abs(u.imag), 1e-300), -5.0, 5.0)
+            values.append(factors * cotangent / 2)
+        areas = _symmetric(rows, columns, values, count)
+        areas.data = np.clip(areas.data, *COTANGENTS)
+        own = np.arange(n)
+        after = (own + 1) % n
+        # each side counts twice, with either end's rotation
+        sides = self.stiffness.stretch / np.maximum(abs(self.rest[after] - self.rest[own]), 1e-6)
+        total = (areas + _symmetric([own], [after], [sides], count)).tocoo()
+        if stiff is not None:
+            factors = self._everywhere(stiff)
+            total.data = total.data * np.sqrt(factors[total.row] * factors[total.col])
+        return total
+
+    def _salience(self) -> Array:
+        if not self.stiffness.salience:
+            return np.ones(len(self.mesh.triangles))
+        thinness = THICK / local_thickness(self.mesh)
+        return np.clip(thinness**self.stiffness.salience, *SALIENT)
+
+    def _bending(self, stiff: Array | None) -> tuple[scipy.sparse.csr_matrix, Array]:
+        """The difference of unit steps at each of the outline's points (n, n), and its cost (n,)."""
+        n, rest = self.size, self.rest[: self.size]
+        own, after = np.arange(n), (np.arange(n) + 1) % n
+        length = np.maximum(abs(rest[after] - rest), 1e-6)
+        before = np.roll(length, 1)
+        values = np.concatenate([1 / length, -1 / length - 1 / before, 1 / before])
+        columns = np.concatenate([after, own, (own - 1) % n])
+        matrix = scipy.sparse.csr_matrix((values, (np.tile(own, 3), columns)), shape=(n, n))
+        cost = 2 * self.stiffness.bend / (length + before)
+        return matrix, cost if stiff is None else cost * self._everywhere(stiff)[:n]
+
+    def _everywhere(self, stiff: Array) -> Array:
+        factors = np.asarray(stiff, dtype=np.float64)
+        if factors.shape not in ((self.size,), (len(self),)) or not (factors > 0).all():
+            raise OrbiflowError(
+                f"stiff needs ({self.size},) or ({len(self)},) positive factors, "
+                f"got shape {factors.shape}"
+            )
+        return np.concatenate([factors, np.ones(len(self) - len(factors))])
+
+
+@dataclass(frozen=True, eq=False)
+class Condensed:
+    """A body whose inner points follow its outline.
+
+    - `outline`: (n, n) stiffness matrix of the outline.
+    - `follow`: (N - n, n) where the inner points go with it.
+    - `inverse`: (N - n, N - n) of the inner points' own matrix.
+    """
+
+    outline: Array
+    follow: Array
+    inverse: Array
+
+    @property
+    def low(self) -> Complex | None:
+        """(n, k), or None: the outline's matrix is `outline` less this times its adjoint."""
+        return None
+
+    def forces(self, forces: Complex) -> Complex:
+        """Forces (N, C) as forces (n, C) on the outline."""
+        n = len(self.outline)
+        return forces[:n] + _times(self.follow.T, forces[n:])
+
+    def whole(self, outline: Complex, forces: Complex) -> Complex:
+        """All points (N, C), from the outline (n, C) and the forces (N, C)."""
+        n = len(self.outline)
+        inner = _times(self.follow, outline) + _times(self.inverse, forces[n:])
+        return np.concatenate([outline, inner])
+
+
+def _times(matrix: Array, z: Complex) -> Complex:
+    """A real matrix times complex columns, without making it complex."""
+    z = np.ascontiguousarray(z)
+    return (matrix @ z.view(np.float64)).view(np.complex128)
+
+
+def _inverse(matrix: Array) -> Array:
+    """Of a positive definite matrix, by Cholesky: a third of the work of a general one."""
+    functions: Any = scipy.linalg.get_lapack_funcs(("potrf", "potri"), (matrix,))
+    factorize, invert = functions
+    factor, failed = factorize(matrix, lower=True)
+    inverse, missing = invert(factor, lower=True)
+    if failed or missing:
+        raise OrbiflowError("the silhouette's stiffness has no inverse: is a part without width?")
+    lower: Array = inverse
+    return np.tril(lower) + np.tril(lower, -1).T
+
+
+def _squares(z: Complex) -> Array:
+    return z.real**2 + z.imag**2
+
+
+def _symmetric(
+    rows: list[NDArray[np.int64]],
+    columns: list[NDArray[np.int64]],
+    values: list[Array],
+    count: int,
+) -> scipy.sparse.csr_matrix:
+    i, j, v = np.concatenate(rows), np.concatenate(columns), np.concatenate(values)
+    both = (np.concatenate([v, v]), (np.concatenate([i, j]), np.concatenate([j, i])))
+    return scipy.sparse.csr_matrix(both, shape=(count, count))

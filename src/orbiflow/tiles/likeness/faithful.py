@@ -1,0 +1,227 @@
+"""How much of a silhouette is left in its bent outline, as eyes see it: pose-blind, point by point.
+
+What people say of bent silhouettes goes with six things, most of which do not mind where a limb points
+(docs/likeness.md has the evidence), and a seventh keeps threads away that no cutter can make:
+
+- `pieces`: how well pieces of the outline are kept, each compared after its own best motion
+  (Procrustes; Gower, 1975), by the mean of the roots: a few pieces may be lost, the rest is to be
+  exact. Small pieces tell of corners and toes, middle ones of limbs and heads, large ones of the whole;
+  a piece counts by the root of the body's thickness there, a head more than a leg.
+- `notches`: where the space outside has become narrower than it was: slits, notches and folds that
+  the silhouette does not have. The width is that of the largest disc outside that touches the outline
+  (the outer medial axis; found as by Ma, Bae and Choi, 3D medial axis point approximation, 2012).
+- `narrowed`: the same inside: limbs and bodies grown thin.
+- `cost`: of bending (`Elastic.cost`): energy, and displacement from the pose.
+- `necks`: how much narrower the inside has become at its worst place beyond half: threads.
+
+Outlines are given point by point: this compares a shape with what it was bent from, not any two.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from orbiflow.arguments import numbers
+from orbiflow.arrays import Complex
+from orbiflow.tiles.geometry import (
+    centroid,
+    complex_points,
+    orient,
+    plane_points,
+    signed_area,
+)
+from orbiflow.tiles.likeness.elastic import Elastic
+from orbiflow.tiles.likeness.laid import laid_on
+from orbiflow.tiles.likeness.metrics import as_region
+from orbiflow.tiles.likeness.overlap import Overlap, overlaid
+from orbiflow.tiles.silhouette import sampled
+
+Array = NDArray[np.float64]
+
+PIECES = (0.04, 0.15, 0.4)
+"""Lengths of the pieces, as shares of the outline."""
+
+CLEAR = 0.02
+"""Added to widths, in square roots of the area: below it, differences matter little."""
+
+USUAL = (0.12, 0.16, 0.13, 0.3, 0.037, 0.25)
+"""Of the pieces, of notches, of what is narrowed, of the cost: in a tile of middling likeness."""
+
+WEIGHTS = (6.5, 6.5, 6.5, 2.6, 2.3, 6.5)
+"""Of their logarithms: one over how much these differ between tiles of one silhouette."""
+
+LITTLE = 0.3
+"""Share of the usual values below which differences matter little."""
+
+
+@dataclass(frozen=True)
+class Fidelity:
+    """What bending left of an outline; all values from 0, smaller is better, but for `score`.
+
+    - `pieces`: of three lengths, small to large.
+    - `notches`, `narrowed`, `necks`, `cost`: see the module.
+    """
+
+    pieces: tuple[float, float, float]
+    notches: float
+    narrowed: float
+    necks: float
+    cost: float
+
+    @property
+    def damage(self) -> float:
+        """About 0 for a tile of middling likeness, smaller is better.
+
+        The sum of `necks` and of the others' logarithms, each relative to its usual value,
+        with `LITTLE` added, and weighted.
+        """
+        values = (*self.pieces, self.notches, self.narrowed, self.cost)
+        relative = [value / usual for value, usual in zip(values, USUAL, strict=True)]
+        parts = [math.log((LITTLE + value) / (LITTLE + 1)) for value in relative]
+        return self.necks + float(np.dot(WEIGHTS, parts))
+
+    @property
+    def score(self) -> float:
+        """From 0 to 1, larger is better; 0.5 for a tile of middling likeness, 1 for no change.
+
+        1 / (1 + exp(damage / 4)).
+        """
+        return 1 / (1 + math.exp(min(self.damage / 4, 700.0)))
+
+
+def fidelity(rest: Complex, bent: Complex, cost: float) -> Fidelity:
+    """Compare an outline with what it was bent from.
+
+    Args:
+        rest, bent: (n,) x + iy, counter-clockwise, nearly evenly spaced; point k of the one became
+            point k of the other.
+        cost: of bending, `Elastic.cost`.
+
+    >>> square = np.array([0, 1, 2, 2 + 1j, 2 + 2j, 1 + 2j, 2j, 1j])
+    >>> fidelity(square, 3 * square * 1j + 7, 0.0).score > 0.999
+    True
+    """
+    rest, bent = (z / np.sqrt(abs(signed_area(plane_points(z)))) for z in (rest, bent))
+    weight = abs(np.roll(rest, -1) - rest)
+    weight /= weight.sum()
+    outside = np.log(_clearance(rest) / _clearance(bent))
+    thick = _clearance(rest, inside=True)
+    inside = np.log(thick / _clearance(bent, inside=True))
+    small, middle, large = (
+        float(np.average(np.sqrt(_misfits(rest, bent, length)), weights=np.sqrt(thick)))
+        for length in PIECES
+    )
+    return Fidelity(
+        (small, middle, large),
+        float((weight * np.maximum(outside, 0) ** 2).sum()),
+        float((weight * np.maximum(inside, 0) ** 2).sum()),
+        max(0.0, float(inside.max()) - math.log(2.0)),
+        cost,
+    )
+
+
+def _misfits(rest: Complex, bent: Complex, length: float) -> Array:
+    """(n,) of the piece about each point: squared distance after the best motion, relative, 0 to 1."""
+    n = len(rest)
+    half = min(max(3, round(length * n / 2)), (n - 1) // 2)
+    index = (np.arange(n)[:, None] + np.arange(-half, half + 1)) % n
+    a, b = rest[index], bent[index]
+    a, b = a - a.mean(axis=1, keepdims=True), b - b.mean(axis=1, keepdims=True)
+    sizes = (abs(a) ** 2).sum(axis=1) + (abs(b) ** 2).sum(axis=1)
+    common = abs((np.conj(a) * b).sum(axis=1))
+    return np.maximum(1 - 2 * common / sizes, 0.0)
+
+
+def _clearance(z: Complex, *, inside: bool = False) -> Array:
+    """(n,) radius of the largest disc outside that touches the outline at each point, at most 1."""
+    z = z[::-1] if inside else z
+    n = len(z)
+    along = np.roll(z, -1) - np.roll(z, 1)
+    inward = 1j * along / np.maximum(abs(along), 1e-300)
+    apart = z[None, :] - z[:, None]
+    depth = -(np.conj(inward)[:, None] * apart).real
+    with np.errstate(divide="ignore"):
+        radius = np.where(depth > 1e-9, abs(apart) ** 2 / (2 * np.maximum(depth, 1e-9)), np.inf)
+    own = np.arange(n)
+    for near in range(-2, 3):
+        radius[own, (own + near) % n] = np.inf
+    least = np.minimum(radius.min(axis=1), 1.0)
+    smooth = (np.roll(least, 1) + 2 * least + np.roll(least, -1)) / 4 + CLEAR
+    return smooth[::-1] if inside else smooth
+
+
+TURNS = 24
+"""Turns of either hand that are tried, of which the best `TRIED` are worked out."""
+
+TRIED = 3
+
+
+def faithfulness(silhouette: ArrayLike, shape: ArrayLike, *, mirror: bool = True) -> Fidelity:
+    """What bending a silhouette into a shape would leave of it.
+
+    Some tenths of a second; the silhouette's triangulation is kept for the next shape.
+
+    Args:
+        silhouette: (n, 2) its outline, a simple polygon in either sense.
+        shape: (m, 2) another one, in any place, size and turn.
+        mirror: whether the shape's mirror image is as good.
+
+    Returns:
+        The `Fidelity` of the best laying that is found; its `score` is 1 for the same shape, near
+        0.5 for a tile of middling likeness.
+
+    Raises:
+        OrbiflowError: for a polygon that crosses itself, has no area, or is too thin to sample.
+
+    >>> bar = [[0.0, 0.0], [4.0, 0.0], [4.0, 1.0], [0.0, 1.0]]
+    >>> faithfulness(bar, [[5.0, 0.0], [5.0, 8.0], [3.0, 8.0], [3.0, 0.0]]).score > 0.99
+    True
+    """
+    own, other = _ring(silhouette, "the silhouette"), _ring(shape, "the shape")
+    body, overlap = _body(own.tobytes())
+    turns = np.exp(2j * np.pi * np.arange(TURNS) / TURNS).tolist()
+    rough = [
+        _Laying(overlap.iou(plane_points(turn * ring))[0], turn, ring)
+        for ring in _hands(other, mirror=mirror)
+        for turn in turns
+    ]
+    rough.sort(key=lambda laying: -laying.iou)
+    found: list[tuple[float, Complex]] = []
+    for laying in rough[:TRIED]:
+        factor, middle, _ = overlaid(laying.ring, overlap, laying.turn)
+        z = laid_on(body, plane_points(factor * laying.ring + middle))[:, None]
+        found.append((float(body.cost(z)[0]), z[: body.size, 0]))
+    cost, outline = min(found, key=lambda one: one[0])
+    return fidelity(body.rest[: body.size], outline, cost)
+
+
+class _Laying(NamedTuple):
+    """A ring (m,) about the origin, of area 1, turned by `turn`, and its IoU with the silhouette."""
+
+    iou: float
+    turn: complex
+    ring: Complex
+
+
+def _hands(ring: Array, *, mirror: bool) -> list[Complex]:
+    z = complex_points(ring)
+    return [z, np.conj(z[::-1])] if mirror else [z]
+
+
+def _ring(points: ArrayLike, what: str) -> Array:
+    """(n, 2) counter-clockwise about the origin, of area 1."""
+    as_region(points, what)
+    ring = orient(numbers(points, what, ("N", 2)), counter_clockwise=True)
+    return np.ascontiguousarray((ring - centroid(ring)) / np.sqrt(signed_area(ring)))
+
+
+@lru_cache(maxsize=4)
+def _body(outline: bytes) -> tuple[Elastic, Overlap]:
+    ring = np.frombuffer(outline).reshape(-1, 2).copy()
+    return Elastic(sampled(ring).fine), Overlap(ring)

@@ -1,0 +1,233 @@
+"""A silhouette laid onto a given outline: how it bends least, if its outline is to be that one.
+
+For shapes that were not found by bending. Points of the silhouette's outline slide along the other one
+and the energy is minimised: linear equations in how far each slides, and in the size of the other
+outline, in turn with the choice of rotations, as in `escher.co_deformation`. That starts from the
+correspondence of `corresponding`, so the outlines must lie over each other; what it ends with is a
+local minimum, and the energy an upper bound of the least one.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import scipy.linalg
+
+from orbiflow.arrays import Complex
+from orbiflow.tiles.geometry import (
+    arc_lengths,
+    complex_points,
+    plane_points,
+    points_along,
+    resampled,
+)
+from orbiflow.tiles.likeness.elastic import Array, Elastic
+
+FINER = 6
+"""Places on the second outline for each point of the first."""
+
+LONGEST = 6
+"""Times its usual length that a step may have."""
+
+FIRST = 6
+"""Places that are tried for the first point."""
+
+
+def corresponding(
+    own: Array, other: Array, near: float = 0.4, stretch: float = 1.0, count: int = 96
+) -> Array:
+    """Where on another outline the points of one belong.
+
+    Args:
+        own: (n, 2) of area about 1, counter-clockwise.
+        other: (M, 2) laid over it, counter-clockwise.
+        near: distance, in square roots of the area, that costs as much as running at right angles.
+        stretch: what stretching or shrinking a step by a factor of e costs.
+        count: points of `own` that are matched; those between follow in proportion.
+
+    Returns:
+        (n,) arc lengths along `other` from its first vertex, increasing by less than its length from
+        first to last; they may be beyond its length.
+
+    >>> square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+    >>> corresponding(square, np.roll(square, 1, axis=0)).round(9) % 4
+    array([1., 2., 3., 0.])
+    """
+    along = arc_lengths(own)
+    points = resampled(own, count)
+    places = count * FINER
+    cost = _differences(points, resampled(other, places), near)
+    first = int(cost.min(axis=1).argmin())
+    cost = np.roll(cost, -first, axis=0)
+    steps = _best_of(cost, _begin(cost[0]), stretch)
+    at = np.append(steps, steps[0] + places) / places * arc_lengths(other)[-1]
+    # the k-th matched point lies at (first + k) / count of the own length
+    known = (first + np.arange(count + 1)) / count * along[-1]
+    knots = np.concatenate([known[:-1] - along[-1], known])
+    values = np.concatenate([at[:-1] - arc_lengths(other)[-1], at])
+    return np.interp(along[:-1], knots, values)
+
+
+def _differences(points: Array, places: Array, near: float) -> Array:
+    """(n, m) what it costs to take a point for a place."""
+    x, y = complex_points(points), complex_points(places)
+    own, other = (np.roll(z, -k) - np.roll(z, k) for z, k in ((x, 1), (y, FINER)))
+    own, other = (step / np.maximum(abs(step), 1e-12) for step in (own, other))
+    apart = abs(x[:, None] - y[None]) ** 2 / near**2
+    return apart + 1 - (np.conj(own)[:, None] * other[None]).real
+
+
+def _begin(cost: Array) -> list[int]:
+    """Places for the first point, no two of them side by side."""
+    chosen: list[int] = []
+    for place in np.argsort(cost, kind="stable").tolist():
+        gaps = [abs(place - other) for other in chosen]
+        if all(min(gap, len(cost) - gap) > FINER for gap in gaps):
+            chosen.append(place)
+        if len(chosen) == FIRST:
+            break
+    return chosen
+
+
+def _best_of(cost: Array, begin: list[int], stretch: float) -> Array:
+    """(n,) the best places, increasing, for points whose first is at one of the given places."""
+    n, m = cost.shape
+    length = np.arange(1, LONGEST * FINER + 1)
+    price = stretch * np.log(length / FINER) ** 2
+    best, least = np.zeros(n), np.inf
+    for start in begin:
+        turned = np.roll(cost, -start, axis=1)
+        total = np.full(m + 1, np.inf)
+        total[0] = turned[0, 0]
+        came = np.zeros((n + 1, m + 1), dtype=np.int64)
+        for i in range(1, n + 1):
+            last = i == n  # the first point again
+            padded = np.concatenate([np.full(len(length), np.inf), total])
+            windows = np.lib.stride_tricks.sliding_window_view(padded, len(length))[: m + 1]
+            sums = windows[:, ::-1] + price
+            came[i] = sums.argmin(axis=1)
+            total = sums[np.arange(m + 1), came[i]]
+            total = total + (0.0 if last else np.append(turned[i], turned[i, 0]))
+        if total[m] < least:
+            least, place, path = float(total[m]), m, np.zeros(n)
+            for i in range(n, 0, -1):
+                place -= int(length[came[i, place]])
+                path[i - 1] = place
+            best = path + start
+    return best
+
+
+STARTS = ((0.15, 0.5), (0.4, 1.0), (0.8, 2.0), (0.4, 4.0))
+"""Correspondences that are tried: `near` and `stretch` of `corresponding`."""
+
+TRIED, ROUNDS, SOFTENINGS, SOFT_ROUNDS = 3, 20, 4, 5
+"""Steps of each start, and of the best: with the energy, then with the one that forgives."""
+
+FAR = 2.0
+"""Spacings that a point may slide in one step."""
+
+CLOSE = 0.02
+"""Least distance along the outline of two points in a row, in spacings."""
+
+
+def laid_on(body: Elastic, ring: Array) -> Complex:
+    """The body bent so that its outline's points lie on a ring, in order.
+
+    Args:
+        body: the silhouette.
+        ring: (M, 2) simple, counter-clockwise, laid over the silhouette as it is.
+
+    Returns:
+        (N,) points of the body; the outline's lie on a copy of the ring about the origin whose size
+        suits the body best.
+    """
+    tried = [_begun(body, ring, near, stretch) for near, stretch in STARTS]
+    slide, z = min(tried, key=lambda shape: _objective(body, shape[1]))
+    for _ in range(ROUNDS):
+        slide, z = _step(body, slide, z)
+    for _ in range(SOFTENINGS):
+        soft = body.forgiving(z)
+        for _ in range(SOFT_ROUNDS):
+            slide, z = _step(soft, slide, z)
+    return z[:, 0]
+
+
+class _Slide(NamedTuple):
+    """Points at arc lengths `at` (n,) of a ring, which is made larger by `scale`."""
+
+    ring: Array
+    at: Array
+    scale: float
+
+    def points(self) -> Complex:
+        return self.scale * complex_points(points_along(self.ring, self.at))
+
+    def tangents(self) -> Complex:
+        sides = np.roll(self.ring, -1, axis=0) - self.ring
+        unit = complex_points(sides / np.linalg.norm(sides, axis=1, keepdims=True))
+        knots = arc_lengths(self.ring)
+        at: Array = self.at % knots[-1]
+        side = np.searchsorted(knots, at, side="right") - 1
+        return unit[np.clip(side, 0, len(unit) - 1)]
+
+
+def _begun(body: Elastic, ring: Array, near: float, stretch: float) -> tuple[_Slide, Complex]:
+    at = corresponding(plane_points(body.rest[: body.size]), ring, near, stretch)
+    slide = _Slide(ring, _parted(at, arc_lengths(ring)[-1]), 1.0)
+    z = body.pulled(body.rest[:, None], slide.points()[:, None], 600.0, 4)
+    for _ in range(TRIED):
+        slide, z = _step(body, slide, z)
+    return slide, z
+
+
+def _step(body: Elastic, slide: _Slide, z: Complex) -> tuple[_Slide, Complex]:
+    """Slide once, by half the way or less where all of it would cost more; the inside follows."""
+    condensed, forces = body.condensed, body.forces(z)
+    p, along = slide.points(), slide.scale * slide.tangents()
+    pull = condensed.forces(forces)[:, 0]
+    matrix, low = condensed.outline, condensed.low
+    product = matrix @ p.real + 1j * (matrix @ p.imag)
+    own = np.empty((len(p) + 1, len(p) + 1))
+    own[:-1, :-1] = matrix * (np.conj(along)[:, None] * along[None]).real
+    own[:-1, -1] = own[-1, :-1] = (np.conj(along) * product).real
+    own[-1, -1] = np.vdot(p, product).real
+    if low is not None:
+        less = low.conj().T @ np.concatenate([np.diag(along), p[:, None]], axis=1)
+        own -= (less.conj().T @ less).real
+        product -= low @ (low.conj().T @ p)
+    gap = pull - product
+    right = np.append((np.conj(along) * gap).real, np.vdot(p, gap).real)
+    own[np.diag_indices_from(own)] += 1e-8 * np.trace(own) / len(own)
+    way = scipy.linalg.solve(own, right, assume_a="pos", check_finite=False)
+    size = arc_lengths(slide.ring)[-1]
+    reach = FAR * size / len(p)
+    stay = condensed.whole(p[:, None], forces)
+    least = _objective(body, stay)
+    for share in (1.0, 0.5, 0.2, 0.05):
+        further = _Slide(
+            slide.ring,
+            _parted(slide.at + share * np.clip(way[:-1], -reach, reach), size),
+            slide.scale * (1 + share * float(np.clip(way[-1], -0.2, 0.2))),
+        )
+        moved = condensed.whole(further.points()[:, None], forces)
+        if _objective(body, moved) < least:
+            return further, moved
+    return slide, stay
+
+
+def _objective(body: Elastic, z: Complex) -> float:
+    """What the steps lower: the energy and the pose's."""
+    copy, _ = body.copies(z)
+    return float(body.energy(z)[0] + body.stiffness.pose * (abs(z - copy) ** 2).mean())
+
+
+def _parted(at: Array, size: float) -> Array:
+    """Places (n,) on a closed line, moved as little as it takes to be in order and some way apart."""
+    n = len(at)
+    spaced = np.arange(n) * (CLOSE * size / n)
+    turn = size - n * (CLOSE * size / n)  # what is left of a round
+    three = np.concatenate([at - spaced - turn, at - spaced, at - spaced + turn])
+    up = np.maximum.accumulate(three)
+    down = np.minimum.accumulate(three[::-1])[::-1]
+    return ((up + down) / 2)[n : 2 * n] + spaced

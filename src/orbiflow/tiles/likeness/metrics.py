@@ -1,0 +1,258 @@
+"""How far one shape is from another: areas and distances of polygons, exact, not counted in pixels.
+
+Nothing here moves a shape: bring both into one frame first. A shape is a ring (N, 2) or a shapely
+polygon or multipolygon.
+"""
+
+from dataclasses import asdict, dataclass
+
+import numpy as np
+import shapely
+from numpy.typing import ArrayLike, NDArray
+from shapely.geometry import MultiPolygon, Polygon, box
+
+from orbiflow.arguments import numbers
+from orbiflow.errors import OrbiflowError
+from orbiflow.typed_shapely import ufuncs
+
+# Of the diagonal of the box around both curves.
+TOLERANCE = 1e-6
+
+
+def hausdorff_distance(
+    a: NDArray[np.float64], b: NDArray[np.float64], *, tolerance: float
+) -> float:
+    """Hausdorff distance between the unions of the segments `a` and `b`, each (M, 2, 2).
+
+    Too small by at most `tolerance` (in the unit of the coordinates), never too large.
+    """
+    forth = _directed(a, b, tolerance)
+    return max(forth, _directed(b, a, tolerance, at_least=forth))
+
+
+def _directed(
+    a: NDArray[np.float64], b: NDArray[np.float64], tolerance: float, at_least: float = 0.0
+) -> float:
+    """Greatest distance from a point of `a` to the nearest point of `b`."""
+    tree = shapely.STRtree(list(np.asarray(shapely.linestrings(b), dtype=object)))
+    start, end = a[:, 0], a[:, 1]
+    best = at_least
+    (d0, e0), (d1, e1) = _nearest(tree, start), _nearest(tree, end)
+    while len(start):
+        best = max(best, float(d0.max()), float(d1.max()))
+        length = np.hypot(*(end - start).T)
+        via0 = np.maximum(d0, _distance(end, b[e0]))
+        via1 = np.maximum(d1, _distance(start, b[e1]))
+        bound = np.minimum(np.minimum(via0, via1), (d0 + d1 + length) / 2)
+        go = bound > best + tolerance
+        start, end, d0, d1, e0, e1 = (item[go] for item in (start, end, d0, d1, e0, e1))
+        middle = (start + end) / 2
+        dm, em = _nearest(tree, middle)
+        start, end = np.concatenate([start, middle]), np.concatenate([middle, end])
+        d0, d1 = np.concatenate([d0, dm]), np.concatenate([dm, d1])
+        e0, e1 = np.concatenate([e0, em]), np.concatenate([em, e1])
+    return best
+
+
+def _nearest(
+    tree: shapely.STRtree, points: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+    """Distance to, and index of, the edge of `tree` nearest to each of `points` (P, 2)."""
+    pairs, distance = tree.query_nearest(
+        shapely.points(points), return_distance=True, all_matches=False
+    )
+    return distance, pairs[1]
+
+
+def _distance(points: NDArray[np.float64], edges: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Distance of each of `points` (P, 2) to the edge (P, 2, 2) of the same index."""
+    origin, along = edges[:, 0], edges[:, 1] - edges[:, 0]
+    length2 = np.maximum((along**2).sum(axis=1), np.finfo(float).tiny)
+    t = np.clip(((points - origin) * along).sum(axis=1) / length2, 0.0, 1.0)
+    return np.hypot(*(points - origin - t[:, None] * along).T)
+
+
+WINDOW_MARGIN = 0.10
+
+Shape = ArrayLike | Polygon | MultiPolygon
+Region = Polygon | MultiPolygon
+
+
+@dataclass(frozen=True)
+class ShapeMetrics:
+    """Agreement of a tile with its target. Areas are exact; `hausdorff` has no unit, see below.
+
+    - `iou`: area of the intersection over area of the union, 0 to 1.
+    - `dice`: twice the area of the intersection over the sum of the areas, 0 to 1.
+    - `pixel_accuracy`: share of `window` on which both agree; it depends on the window.
+    - `window`: (xmin, ymin, xmax, ymax) of that window, in the shapes' own units.
+    - `hausdorff`: distance between the two boundaries, in units of the square root of the target's
+      area.
+    """
+
+    iou: float
+    dice: float
+    pixel_accuracy: float
+    window: tuple[float, float, float, float]
+    hausdorff: float
+
+    def as_dict(self) -> dict[str, float | list[float]]:
+        """The same values, ready for JSON."""
+        return asdict(self) | {"window": list(self.window)}
+
+
+def iou(a: Shape, b: Shape) -> float:
+    """Intersection over union (the Jaccard index) of two shapes, 0 to 1.
+
+    Raises `OrbiflowError` naming the argument that is not a valid polygon.
+
+    >>> iou([[0, 0], [2, 0], [2, 2], [0, 2]], [[1, 0], [3, 0], [3, 2], [1, 2]])
+    0.3333333333333333
+    """
+    return _iou(as_region(a, "a"), as_region(b, "b"))
+
+
+def dice(a: Shape, b: Shape) -> float:
+    """Dice coefficient of two shapes, 0 to 1: twice the shared area over the sum of the areas.
+
+    Raises `OrbiflowError` naming the argument that is not a valid polygon.
+
+    >>> dice([[0, 0], [2, 0], [2, 2], [0, 2]], [[1, 0], [3, 0], [3, 2], [1, 2]])
+    0.5
+    """
+    return _dice(as_region(a, "a"), as_region(b, "b"))
+
+
+def pixel_accuracy(a: Shape, b: Shape, window: Shape | None = None) -> float:
+    """Share of `window` on which `a` and `b` agree: both there or both absent. 0 to 1.
+
+    The limit, as pixels shrink, of the share of pixels classified alike. The value depends on the
+    window: the more background it takes in, the nearer 1. `window` is a shape or four numbers
+    (xmin, ymin, xmax, ymax); by default it is `default_window(b)`, with `b` the target.
+
+    Raises `OrbiflowError` naming the argument that is not a valid polygon or box.
+
+    >>> pixel_accuracy([[0, 0], [1, 0], [1, 1], [0, 1]], [[0, 0], [2, 0], [2, 1], [0, 1]], (0, 0, 2, 2))
+    0.75
+    """
+    target = as_region(b, "b")
+    view = default_window(target) if window is None else _window(window)
+    return _pixel_accuracy(as_region(a, "a"), target, view)
+
+
+def default_window(target: Shape) -> Polygon:
+    """The bounding box of `target`, enlarged by 10% of its width and height on every side.
+
+    >>> default_window([[0, 0], [10, 0], [0, 20]]).bounds
+    (-1.0, -2.0, 11.0, 22.0)
+    """
+    xmin, ymin, xmax, ymax = as_region(target, "target").bounds
+    dx, dy = WINDOW_MARGIN * (xmax - xmin), WINDOW_MARGIN * (ymax - ymin)
+    return box(xmin - dx, ymin - dy, xmax + dx, ymax + dy)
+
+
+def hausdorff(a: Shape, b: Shape) -> float:
+    """Hausdorff distance between the boundaries of two shapes, in the shapes' own units.
+
+    The distance between the curves, not between their vertices: the greatest distance from a point
+    of one boundary to the nearest point of the other. It is too small by at most 1e-6 of the
+    diagonal of the box around both shapes, never too large.
+
+    Raises `OrbiflowError` naming the argument that is not a valid polygon.
+
+    >>> hausdorff([[0, 0], [4, 0], [4, 4], [0, 4]], [[0, 0], [4, 0], [4, 1], [0, 1]])
+    3.0
+    """
+    return _hausdorff(as_region(a, "a"), as_region(b, "b"))
+
+
+def compare(tile: Shape, target: Shape, window: Shape | None = None) -> ShapeMetrics:
+    """All metrics of `tile` against `target`, both in one frame.
+
+    `window` is as in `pixel_accuracy`; `hausdorff` is in units of the square root of the target's
+    area. Raises `OrbiflowError` naming the argument that is not a valid polygon.
+
+    >>> square = [[0, 0], [4, 0], [4, 4], [0, 4]]
+    >>> compare([[0, 0], [4, 0], [4, 1], [0, 1]], square).hausdorff
+    0.75
+    """
+    own, goal = as_region(tile, "tile"), as_region(target, "target")
+    view = default_window(goal) if window is None else _window(window)
+    xmin, ymin, xmax, ymax = view.bounds
+    return ShapeMetrics(
+        iou=_iou(own, goal),
+        dice=_dice(own, goal),
+        pixel_accuracy=_pixel_accuracy(own, goal, view),
+        window=(xmin, ymin, xmax, ymax),
+        hausdorff=_hausdorff(own, goal) / float(np.sqrt(goal.area)),
+    )
+
+
+def _iou(a: Region, b: Region) -> float:
+    shared = a.intersection(b).area
+    return _share(shared / (a.area + b.area - shared))
+
+
+def _dice(a: Region, b: Region) -> float:
+    return _share(2 * a.intersection(b).area / (a.area + b.area))
+
+
+def _pixel_accuracy(a: Region, b: Region, window: Region) -> float:
+    return _share(1 - a.symmetric_difference(b).intersection(window).area / window.area)
+
+
+def _hausdorff(a: Region, b: Region) -> float:
+    xmin, ymin, xmax, ymax = ufuncs.total_bounds([a, b])
+    return hausdorff_distance(
+        _edges(a), _edges(b), tolerance=TOLERANCE * float(np.hypot(xmax - xmin, ymax - ymin))
+    )
+
+
+def _share(value: float) -> float:
+    # Rounding in the overlay can step outside by an ulp.
+    return min(max(float(value), 0.0), 1.0)
+
+
+def _edges(region: Region) -> NDArray[np.float64]:
+    """Boundary segments of `region`, (M, 2 ends, 2 coordinates)."""
+    polygons = region.geoms if isinstance(region, MultiPolygon) else [region]
+    rings = [ring for part in polygons for ring in (part.exterior, *part.interiors)]
+    coords = [np.asarray(ring.coords, dtype=np.float64)[:, :2] for ring in rings]
+    return np.concatenate([np.stack([xy[:-1], xy[1:]], axis=1) for xy in coords])
+
+
+def _window(window: Shape) -> Region:
+    if not isinstance(window, Polygon | MultiPolygon) and np.shape(window) == (4,):
+        bounds = np.asarray(window, dtype=np.float64)
+        if not np.isfinite(bounds).all():
+            raise OrbiflowError("window: (xmin, ymin, xmax, ymax) must be finite numbers")
+        return as_region(box(*bounds), "window")
+    return as_region(window, "window")
+
+
+def as_region(shape: Shape, name: str) -> Region:
+    """`shape` as a valid polygon of positive area, else an error naming the argument."""
+    if not isinstance(shape, Polygon | MultiPolygon):
+        shape = _ring_polygon(shape, name)
+    if not np.isfinite(shapely.get_coordinates(shape)).all():
+        raise OrbiflowError(f"{name}: every coordinate must be a finite number")
+    if not shape.is_valid:
+        raise OrbiflowError(
+            f"{name}: not a valid polygon: {shapely.is_valid_reason(shape)}; "
+            "a shape must not cross or touch itself"
+        )
+    if not shape.area > 0:
+        raise OrbiflowError(f"{name}: the shape encloses no area")
+    return shape
+
+
+def _ring_polygon(ring: ArrayLike, name: str) -> Polygon:
+    try:
+        points = numbers(ring, name, (...,), finite=False)
+    except OrbiflowError as exc:
+        raise OrbiflowError(f"{name}: not a polygon; give an array of shape (N, 2)") from exc
+    if points.ndim != 2 or points.shape[1] != 2 or len(points) < 3:
+        raise OrbiflowError(f"{name}: needs shape (N, 2) with N at least 3, got {points.shape}")
+    if not np.isfinite(points).all():
+        raise OrbiflowError(f"{name}: every coordinate must be a finite number")
+    return Polygon(points)

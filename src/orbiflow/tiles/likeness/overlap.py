@@ -1,0 +1,186 @@
+"""The exact overlap of polygons with a region, and its exact gradient in the vertices."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+
+import numpy as np
+import scipy.optimize
+import shapely
+
+from orbiflow.arguments import numbers
+from orbiflow.arrays import Array, Complex
+from orbiflow.errors import OrbiflowError
+from orbiflow.tiles.geometry import (
+    centroid,
+    complex_points,
+    orient,
+    plane_points,
+    signed_area,
+)
+from orbiflow.tiles.likeness.ranking import Similarity
+from orbiflow.typed_shapely import ufuncs
+
+MANY, COARSE = 1500, 2e-3
+"""Vertices beyond which a region is simplified, and by how much of its size (area 1)."""
+
+
+def prepared_region(ring: Array) -> shapely.Polygon:
+    """The region of a ring (N, 2) of area about 1, prepared; simplified if its vertices are many.
+
+    For choosing among candidates: intersections with thousands of vertices cost seconds. What is
+    reported is measured with the ring itself.
+    """
+    ring = numbers(ring, "the region's ring", ("N", 2))
+    if len(ring) < 3:
+        raise OrbiflowError(f"the region's ring needs 3 vertices at least, got {len(ring)}")
+    region = shapely.Polygon(ring)
+    if len(ring) > MANY:
+        simpler = region.simplify(COARSE)
+        if isinstance(simpler, shapely.Polygon) and simpler.is_valid and not simpler.is_empty:
+            region = simpler
+    shapely.prepare(region)
+    return region
+
+
+def boundary_iou(goal: shapely.Polygon, boundaries: Array) -> Array:
+    """IoU (S,) of rings (S, N, 2) with a polygon; -1 for those that cross themselves."""
+    polygons = np.asarray(shapely.polygons(boundaries))
+    good = np.asarray(shapely.is_valid(polygons))
+    scores = np.full(len(polygons), -1.0)
+    common = ufuncs.area(shapely.intersection(polygons[good], goal))
+    scores[good] = common / (ufuncs.area(polygons[good]) + goal.area - common)
+    return scores
+
+
+class Overlap:
+    """Overlap of rings with one region.
+
+    The area of P and T common changes at the rate of the normal speed integrated over the part of
+    P's boundary inside T; along a side the speed is linear between its ends.
+
+    Args:
+        target: (M, 2) ring of the region, simple, in either sense; see `prepared_region`.
+    """
+
+    def __init__(self, target: Array) -> None:
+        self.region = prepared_region(target)
+
+    def iou(self, ring: Array) -> tuple[float, Array]:
+        """IoU of a simple ring (N, 2) with the region and its gradient (N, 2).
+
+        >>> square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+        >>> value, gradient = Overlap(square).iou(0.5 * square + 0.25)
+        >>> value, gradient[:, 0].round(12).tolist()
+        (0.25, [-0.25, 0.25, 0.25, -0.25])
+        """
+        ring = numbers(ring, "the ring", ("N", 2))
+        try:
+            common = float(shapely.Polygon(ring).intersection(self.region).area)
+        except (shapely.errors.GEOSException, ValueError) as error:
+            raise OrbiflowError(f"ring or region is not a simple polygon: {error}") from error
+        inside = self.area_gradient(ring)
+        sign = 1.0 if signed_area(ring) > 0 else -1.0
+        area = float(abs(signed_area(ring)))
+        sides = np.roll(ring, -1, axis=0) - np.roll(ring, 1, axis=0)
+        whole = sign * np.stack([sides[:, 1], -sides[:, 0]], axis=-1) / 2
+        union = area + self.region.area - common
+        return common / union, ((union + common) * inside - common * whole) / union**2
+
+    def area_gradient(self, ring: Array) -> Array:
+        """Gradient (N, 2) of the area of the ring's part inside the region."""
+        ends = np.roll(ring, -1, axis=0)
+        sides = ends - ring
+        lines = shapely.linestrings(np.stack([ring, ends], axis=1))
+        pieces, owner = shapely.get_parts(
+            shapely.intersection(lines, self.region), return_index=True
+        )
+        lengths = ufuncs.length(pieces)
+        pieces, owner = pieces[lengths > 0], owner[lengths > 0]  # not where they only touch
+        first, last = (
+            shapely.get_coordinates(ufuncs.get_point(pieces, index)) for index in (0, -1)
+        )
+        square = np.maximum((sides**2).sum(axis=1), 1e-300)[owner]
+        start, stop = (
+            ((p - ring[owner]) * sides[owner]).sum(axis=1) / square for p in (first, last)
+        )
+        low, high = np.minimum(start, stop), np.maximum(start, stop)
+        late = np.bincount(owner, (high**2 - low**2) / 2, minlength=len(ring))
+        early = np.bincount(owner, high - low, minlength=len(ring)) - late
+        sign = 1.0 if signed_area(ring) > 0 else -1.0
+        normal = sign * np.stack([sides[:, 1], -sides[:, 0]], axis=-1)
+        return early[:, None] * normal + np.roll(late[:, None] * normal, 1, axis=0)
+
+
+def overlaid(
+    ring: Complex, overlap: Overlap, factor: complex = 1.0, middle: complex = 0.0
+) -> tuple[complex, complex, float]:
+    """Lay a ring over a region by the similarity of largest IoU near a first one.
+
+    By L-BFGS on exact gradients.
+
+    Args:
+        ring: (n,) x + iy about the origin.
+        overlap: with the region.
+        factor, middle: of the first similarity, z -> factor z + middle.
+
+    Returns:
+        Factor and middle of the best one, and its IoU.
+    """
+
+    def loss(x: Array) -> tuple[float, Array]:
+        own = factor * complex(np.exp(x[0] + 1j * x[1])) * ring
+        place = own + middle + x[2] + 1j * x[3]
+        value, slope = overlap.iou(plane_points(place))
+        pull = complex_points(slope)
+        turned = np.conj(own) * pull
+        gradient = [turned.real.sum(), turned.imag.sum(), pull.real.sum(), pull.imag.sum()]
+        return -value, -np.array(gradient)
+
+    found = scipy.optimize.minimize(
+        loss, np.zeros(4), jac=True, method="L-BFGS-B", options={"maxiter": 40}
+    )
+    best = complex(factor * np.exp(found.x[0] + 1j * found.x[1]))
+    return best, complex(middle + found.x[2] + 1j * found.x[3]), -float(found.fun)
+
+
+CLOSER = 0.15
+"""IoU that laying one tile over the other better is taken to add at most."""
+
+
+def mutual_iou(tiles: Sequence[Array], decisive: float = 0.9) -> Similarity:
+    """Mutual IoU of tiles by their indices, for `diverse`.
+
+    The better overlay is looked for only where it may decide: between pairs whose IoU, as they lie
+    and with equal areas and centroids, is at most `CLOSER` below `decisive`.
+
+    Args:
+        tiles: (n,) simple rings (N, 2), all laid over one silhouette.
+        decisive: what the IoU is compared with.
+
+    >>> square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+    >>> turned = square @ [[0.98, 0.2], [-0.2, 0.98]] * 3 + 7
+    >>> round(mutual_iou([square, turned])(0, 1), 3)
+    1.0
+    """
+    rings = [_unit(tile) for tile in tiles]
+
+    @cache
+    def region(index: int) -> Overlap:
+        return Overlap(rings[index])
+
+    @cache
+    def alike(i: int, j: int) -> float:
+        shared = shapely.Polygon(rings[i]).intersection(shapely.Polygon(rings[j])).area
+        plain = float(min(shared / (2 - shared), 1.0))
+        if not decisive - CLOSER <= plain < decisive:
+            return plain
+        return max(plain, overlaid(complex_points(rings[i]), region(j))[2])
+
+    return lambda i, j: alike(min(i, j), max(i, j))
+
+
+def _unit(ring: Array) -> Array:
+    ring = orient(np.asarray(ring, dtype=np.float64), counter_clockwise=True)
+    return (ring - centroid(ring)) / np.sqrt(signed_area(ring))

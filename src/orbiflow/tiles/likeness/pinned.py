@@ -1,0 +1,243 @@
+"""An elastic body some parts of which keep their shape: pinned parts.
+
+A part costs, for each of its points, the squared distance from the nearest similar copy a x + b of
+the part x at rest, with complex a and b (shape matching: Mueller et al., Meshless Deformations Based
+on Shape Matching, 2005). Stiffer springs would do the same, but with them a part turns, in each step
+of choosing rotations and solving, only by the ratio of the stiffnesses; a and b are solved for
+together with the points, so that a part goes where it likes at once. To this comes what it costs a to
+differ from a rotation at the whole body's size or, where parts keep their angle, from the whole
+body's own rotation.
+
+With a and b eliminated the stiffness matrix is a real one less W W^H, with two complex columns a
+part: all equations are solved with the real matrix and corrected (Sherman, Morrison, Woodbury).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orbiflow.arrays import Complex, Integers
+from orbiflow.tiles.geometry import best_similarity
+from orbiflow.tiles.likeness.elastic import (
+    Array,
+    Condensed,
+    Elastic,
+    Stiffness,
+)
+from orbiflow.tiles.silhouette import Mesh
+
+PINNED = 1e5
+"""Weight of the mean over all points of the body of the squared distance from similar copies."""
+
+SIZE = 30.0
+"""Weight of a part's growing or shrinking, for the whole body."""
+
+ANGLE = 3e4
+"""Weight of a part's turning for the whole body, if it is to keep its angle."""
+
+FEWEST = 3
+"""Points of a part at least: a similarity takes any two points anywhere."""
+
+
+class Pinned(Elastic):
+    """A triangulated silhouette with parts that keep their shape.
+
+    `energy` and `lenient_energy` hold what the parts cost; `forgiving_energy` is the body's without
+    them, so that it compares with that of bodies which are pinned elsewhere or nowhere.
+
+    Args:
+        ring: (n, 2) outline, counter-clockwise; the first n points of the body.
+        parts: indices of the points of each; those of fewer than three points are left out.
+        keep_angle: whether parts turn only with the whole body.
+        stiffness, stiff, mesh: as of `Elastic`.
+
+    Raises:
+        OrbiflowError: for a ring that cannot be triangulated.
+    """
+
+    def __init__(
+        self,
+        ring: Array,
+        parts: Sequence[Integers],
+        stiffness: Stiffness | None = None,
+        *,
+        keep_angle: bool = False,
+        stiff: Array | None = None,
+        mesh: Mesh | None = None,
+    ) -> None:
+        super().__init__(ring, stiffness, stiff=stiff, mesh=mesh)
+        self.keep_angle = keep_angle
+        # what is stiffer all over holds its parts no less
+        unit = (1.0 if stiff is None else float(np.mean(stiff))) / len(self)
+        held = unit * (ANGLE if keep_angle else SIZE)
+        self.parts = [
+            _Part(self.rest, index, PINNED * unit, held * len(index))
+            for index in parts
+            if len(index) >= FEWEST
+        ]
+        self._low = np.zeros((len(self), 2 * len(self.parts)), dtype=complex)
+        for k, part in enumerate(self.parts):
+            self._low[part.index, 2 * k : 2 * k + 2] = part.columns
+
+    def energy(self, z: Complex) -> Array:
+        """Energies (C,) of shapes (N, C) without the pose's, with the parts'."""
+        return super().energy(z) + self._held(z)
+
+    def lenient_energy(self, z: Complex) -> Array:
+        """As of `Elastic`, with the parts': placements that hold them are to be preferred."""
+        return super().lenient_energy(z) + self._held(z)
+
+    def _held(self, z: Complex) -> Array:
+        """What the parts cost (C,)."""
+        goals = zip(self.parts, self._goals(z), strict=True)
+        return np.sum([part.cost(z, goal) for part, goal in goals], axis=0)
+
+    def misfit(self, outline: Complex) -> float | None:
+        """How far the worst part of an outline (n,) is from similar to what it was, 0 to 1.
+
+        The root of the mean squared distance after the best similarity over that from the part's
+        middle (Procrustes); None if no part has three points of the outline.
+        """
+        found: list[float] = []
+        for part in self.parts:
+            index = part.index[part.index < self.size]
+            if len(index) >= FEWEST:
+                rest: Complex = self.rest[index] - self.rest[index].mean()
+                bent: Complex = outline[index] - outline[index].mean()
+                sizes = np.vdot(rest, rest).real * np.vdot(bent, bent).real
+                found.append(np.sqrt(max(0.0, 1 - abs(np.vdot(rest, bent)) ** 2 / sizes)))
+        return float(max(found)) if found else None
+
+    def forces(self, z: Complex) -> Complex:
+        """As of `Elastic`, the parts' pull to their sizes or angles included."""
+        pull = super().forces(z)
+        for part, goal in zip(self.parts, self._goals(z), strict=True):
+            pull[part.index] += part.pull[:, None] * goal
+        return pull
+
+    def _goals(self, z: Complex) -> list[Complex]:
+        """What each part's a is drawn to, (C,) each."""
+        whole = best_similarity(self.rest, z)
+        if self.keep_angle:
+            return [whole] * len(self.parts)
+        turns = [part.factor(z) for part in self.parts]
+        return [abs(whole) * a / np.maximum(abs(a), 1e-300) for a in turns]
+
+    @cached_property
+    def matrix(self) -> Array:
+        """(N, N) stiffness matrix, but for what the parts' similar copies take away from it."""
+        spring = np.zeros(len(self))
+        for part in self.parts:
+            spring[part.index] += part.weight
+        return super().matrix + np.diag(spring)
+
+    @cached_property
+    def condensed(self) -> PinnedCondensed:
+        """The inner points solved for: a matrix of the outline alone."""
+        plain, n = super().condensed, self.size
+        low = self._low
+        spread = _complex(plain.inverse @ low[n:])
+        return PinnedCondensed(
+            plain.outline,
+            plain.follow,
+            plain.inverse,
+            coupling=_complex(low[:n] + plain.follow.T @ low[n:]),
+            spread=spread,
+            solve=_complex(np.linalg.inv(_one_less(low[n:], spread))),
+        )
+
+    def pulled(self, z: Complex, towards: Complex, strength: float, rounds: int) -> Complex:
+        """As of `Elastic`: let the outline be pulled towards other points."""
+        mu = strength / self.size
+        solve = self._pulled_solver(mu)
+        spread = _complex(solve @ self._low)
+        small = np.linalg.inv(_one_less(self._low, spread))
+        for _ in range(rounds):
+            right = self.forces(z)
+            right[: self.size] += mu * towards
+            z = solve @ right.real + 1j * (solve @ right.imag)
+            z += spread @ (small @ (spread.conj().T @ right))
+        return z
+
+
+@dataclass(frozen=True, eq=False)
+class PinnedCondensed(Condensed):
+    """A pinned body whose inner points, and the parts' similar copies, follow its outline.
+
+    The outline's matrix is `outline` less `low` times its adjoint.
+
+    - `coupling`: (n, k) of the outline and the copies.
+    - `spread`: (N - n, k) where the inner points go with the copies.
+    - `solve`: (k, k) inverse of the copies' own matrix.
+    """
+
+    coupling: Complex
+    spread: Complex
+    solve: Complex
+
+    @property
+    def low(self) -> Complex:
+        """(n, k) what is taken away from the outline's matrix, as one factor."""
+        return self.coupling @ np.linalg.cholesky(self.solve)
+
+    def forces(self, forces: Complex) -> Complex:
+        """Forces (N, C) as forces (n, C) on the outline."""
+        inner = self.spread.conj().T @ forces[len(self.outline) :]
+        return super().forces(forces) + self.coupling @ (self.solve @ inner)
+
+    def whole(self, outline: Complex, forces: Complex) -> Complex:
+        """All points (N, C), from the outline (n, C) and the forces (N, C)."""
+        n = len(self.outline)
+        z = super().whole(outline, forces)
+        pull = self.coupling.conj().T @ outline + self.spread.conj().T @ forces[n:]
+        z[n:] += self.spread @ (self.solve @ pull)
+        return z
+
+
+class _Part:
+    """Points that keep their shape.
+
+    Args:
+        rest: (N,) of the body.
+        index: of the part's points.
+        weight: of each point's squared distance from the part's similar copy.
+        held: of |a - goal|^2.
+    """
+
+    def __init__(self, rest: Complex, index: Integers, weight: float, held: float) -> None:
+        self.index, self.weight = index, weight
+        self.rest = rest[index] - rest[index].mean()
+        self.moment = float((abs(self.rest) ** 2).sum())
+        both = weight * self.moment + held
+        self.stays = weight * self.moment * held / both
+        self.pull: Complex = weight * held / both * self.rest
+        """Force on each point for a unit of the goal."""
+        middle = np.full(len(index), np.sqrt(weight / len(index)))
+        self.columns: Complex = np.stack([weight / np.sqrt(both) * self.rest, middle], axis=1)
+
+    def factor(self, z: Complex) -> Complex:
+        """(C,) the a of the similar copies nearest to shapes (N, C)."""
+        return np.conj(self.rest) @ z[self.index] / self.moment
+
+    def cost(self, z: Complex, goal: Complex) -> Array:
+        """(C,) of shapes."""
+        own = z[self.index] - z[self.index].mean(axis=0)
+        a = self.factor(z)
+        apart = (abs(own - self.rest[:, None] * a) ** 2).sum(axis=0)
+        return self.weight * apart + self.stays * abs(a - goal) ** 2
+
+
+def _complex(array: NDArray[Any]) -> Complex:
+    return np.asarray(array, dtype=np.complex128)
+
+
+def _one_less(low: Complex, spread: Complex) -> Complex:
+    """1 - W^H S W, made Hermitian."""
+    product = low.conj().T @ spread
+    return np.eye(low.shape[1]) - (product + product.conj().T) / 2

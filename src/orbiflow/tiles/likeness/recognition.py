@@ -1,0 +1,218 @@
+"""How well people would know a target in a tile: its outline found again, limb by limb.
+
+Areas reward blobs: a limb has little area, and a smooth body that fills the middle of the target
+scores well without any. Here the target's outline is compared with the tile's, point by point and
+one to one. Two points go together as far as they agree in place, in direction and in how thick the
+shape is there, and each point can be used only once, so that two neighbouring legs are not both
+found in a single one. A lost limb costs its share of the target's outline, a spurious one its share
+of the tile's.
+
+Place and direction as in oriented chamfer matching (Shotton, Blake, Cipolla, 2008), one to one as
+in the boundary F-measure (Martin, Fowlkes, Malik, 2004); thickness is that of the medial axis
+(Blum, 1967), found at a boundary point as by Ma, Bae, Choi (2012). Definition, evidence and limits:
+docs/recognisability.md.
+"""
+
+from dataclasses import asdict, dataclass
+from typing import NamedTuple
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from scipy.optimize import linear_sum_assignment
+from scipy.spatial.distance import cdist
+from shapely.geometry.polygon import orient
+
+from orbiflow.tiles.geometry import (
+    points_along,
+    polygons_in,
+    ring_length,
+)
+from orbiflow.tiles.likeness.metrics import (
+    Region,
+    Shape,
+    as_region,
+)
+
+POINTS = 256  # on the target's outline, and as dense on the tile's
+MOST_POINTS = 4 * POINTS  # on a tile's outline, however long it is
+FEWEST_POINTS = 8  # on each ring
+
+# Lengths in units of the square root of the target's area. Two points that are this far from each
+# other in one respect, and alike in the others, agree by 1/e.
+PLACE = 0.35
+DIRECTION = 0.85  # between unit vectors: 50 degrees
+THICKNESS = float(np.log(1.5))
+THIN = 0.05  # added to a thickness: what is thinner than this differs little
+WINDOW = 0.05  # of arc length to either side, over which a direction is taken
+THICKEST = 1.0
+
+
+@dataclass(frozen=True)
+class Recognisability:
+    """How much of the target is found again in a tile. All values from 0 to 1, larger is better.
+
+    - `score`: harmonic mean of `kept` and `clean`.
+    - `kept`: share of the target's outline that is found in the tile; lost limbs lower it.
+    - `clean`: share of the tile's outline that is found in the target; what the tile has besides,
+      spurious limbs, slits and hairs, lowers it.
+    - `limbs`: `kept` with each point weighted by how thin the target is there. It tells what became
+      of the limbs and has no part in the score.
+    """
+
+    score: float
+    kept: float
+    clean: float
+    limbs: float
+
+    def as_dict(self) -> dict[str, float]:
+        """The same values, ready for JSON."""
+        return asdict(self)
+
+
+class Recogniser:
+    """Compares many tiles with one target, whose outline is prepared once.
+
+    `target` is a ring (N, 2) or a shapely polygon or multipolygon. Tiles are compared as they lie,
+    in the target's frame: nothing is aligned.
+
+    Raises `OrbiflowError` for a target, or a tile, that is not a valid polygon.
+
+    >>> plus = [[1, 0], [2, 0], [2, 1], [3, 1], [3, 2], [2, 2], [2, 3], [1, 3], [1, 2], [0, 2],
+    ...         [0, 1], [1, 1]]
+    >>> recognise = Recogniser(plus)
+    >>> without_arm = plus[:3] + plus[5:]
+    >>> recognise(plus).score, round(recognise(without_arm).kept, 2)
+    (1.0, 0.74)
+    """
+
+    def __init__(self, target: Shape) -> None:
+        region = as_region(target, "target")
+        self._unit = float(np.sqrt(region.area))
+        self._origin = np.array(region.centroid.coords[0])
+        rings = self._rings(region)
+        corners = np.concatenate(rings)
+        # Outlines are run through from about here, so that the same outline gives the same points.
+        self._start = corners[np.argmax((corners**2).sum(axis=1))]
+        self._spacing = sum(ring_length(ring) for ring in rings) / POINTS
+        self._target = _features(rings, self._spacing, self._start)
+        weights = 1 / (self._target.thickness + THIN)
+        self._limb_weights = weights / weights.sum()
+
+    def __call__(self, tile: Shape) -> Recognisability:
+        """Compare `tile`, in the target's frame, with the target."""
+        own = _features(self._rings(as_region(tile, "tile")), self._spacing, self._start)
+        agreement = _agreement(self._target, own)
+        goal_points, own_points = linear_sum_assignment(agreement, maximize=True)
+        found = agreement[goal_points, own_points]
+        total = float(found.sum())
+        return Recognisability(
+            score=_share(2 * total / sum(agreement.shape)),
+            kept=_share(total / agreement.shape[0]),
+            clean=_share(total / agreement.shape[1]),
+            limbs=_share(float(self._limb_weights[goal_points] @ found)),
+        )
+
+    def _rings(self, region: Region) -> list[NDArray[np.float64]]:
+        """Rings (M, 2) of `region` in units of the target, the inside on their left."""
+        polygons = [orient(polygon) for polygon in polygons_in(region)]
+        rings = [ring for part in polygons for ring in (part.exterior, *part.interiors)]
+        return [(shapely.get_coordinates(r)[:-1] - self._origin) / self._unit for r in rings]
+
+
+def recognisability(tile: Shape, target: Shape) -> Recognisability:
+    """How much of `target` is found again in `tile`, both in one frame; see `Recognisability`.
+
+    Invariant under a similarity of both shapes. To compare many tiles with one target, make a
+    `Recogniser`. Raises `OrbiflowError` naming the argument that is not a valid polygon.
+
+    >>> square = [[0, 0], [2, 0], [2, 2], [0, 2]]
+    >>> recognisability(square, square).score
+    1.0
+    """
+    return Recogniser(target)(tile)
+
+
+class _Features(NamedTuple):
+    """Points on an outline.
+
+    - `lifted`: (P, 5), place, direction and thickness, each divided by its tolerance.
+    - `thickness`: (P,), the radius of the disk inscribed at each point.
+    - `before`, `after`: (P,), indices of each point's neighbours on its ring.
+    """
+
+    lifted: NDArray[np.float64]
+    thickness: NDArray[np.float64]
+    before: NDArray[np.intp]
+    after: NDArray[np.intp]
+
+
+def _agreement(goal: _Features, own: _Features) -> NDArray[np.float64]:
+    """How far each point of the target (P,) agrees with each of the tile (Q,): (P, Q), 0 to 1.
+
+    A point of the tile stands for its piece of the outline, a third of the way to its neighbours,
+    so that it does not matter where on an outline the first point falls.
+    """
+    squared = cdist(goal.lifted, own.lifted, "sqeuclidean")
+    for neighbour in (own.before, own.after):
+        third = own.lifted + (own.lifted[neighbour] - own.lifted) / 3
+        np.minimum(squared, cdist(goal.lifted, third, "sqeuclidean"), out=squared)
+    # Flat at the top: what is moved a little is found all the same.
+    return np.exp(-squared * squared)
+
+
+def _features(
+    rings: list[NDArray[np.float64]], spacing: float, start: NDArray[np.float64]
+) -> _Features:
+    spacing = max(spacing, sum(ring_length(ring) for ring in rings) / MOST_POINTS)
+    samples = [_sample(ring, spacing, start) for ring in rings]
+    points = np.concatenate([xy for xy, _ in samples])
+    normals = np.concatenate([normal for _, normal in samples])
+    ends = np.cumsum([len(xy) for xy, _ in samples])[:-1]
+    by_ring = np.split(np.arange(len(points)), ends)
+    before = np.concatenate([np.roll(ring, 1) for ring in by_ring])
+    after = np.concatenate([np.roll(ring, -1) for ring in by_ring])
+    thickness = _inscribed_radius(points, normals)
+    level = np.log(thickness + THIN)
+    level = (level[before] + 2 * level + level[after]) / 4
+    lifted = np.column_stack([points / PLACE, normals / DIRECTION, level / THICKNESS])
+    return _Features(lifted, thickness, before, after)
+
+
+def _sample(
+    ring: NDArray[np.float64], spacing: float, start: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Evenly spaced points (P, 2) of a closed ring, and the outward normal around each.
+
+    The normal is the mean of the unit normals within `WINDOW`: shorter than 1 at a bend, so that a
+    corner and its rounding are alike.
+    """
+    length = ring_length(ring)
+    count = max(round(length / spacing), FEWEST_POINTS)
+    first = shapely.LinearRing(ring).project(shapely.Point(start))
+    at = np.linspace(first, first + length, count, endpoint=False) + 0.5 * length / count
+    window = min(WINDOW, length / 4)
+    tangent = (points_along(ring, at + window) - points_along(ring, at - window)) / (2 * window)
+    return points_along(ring, at), np.column_stack([tangent[:, 1], -tangent[:, 0]])
+
+
+def _inscribed_radius(
+    points: NDArray[np.float64], normals: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Radius (P,) of the largest disk that touches the outline at each point from the inside.
+
+    The disk through p, tangent there, and through q has curvature 2 n . (p - q) / |q - p|^2; the
+    largest disk that holds no other point of the outline has the largest of these curvatures.
+    """
+    # The mean normal vanishes where the outline turns back on itself, at the tip of a hair.
+    unit = normals / np.maximum(np.hypot(*normals.T), 1e-9)[:, None]
+    planes = np.column_stack([-unit, (points * unit).sum(axis=1)])
+    depth = planes @ np.vstack([points.T, np.ones(len(points))])
+    squared = cdist(points, points, "sqeuclidean")
+    np.fill_diagonal(squared, np.inf)
+    depth /= np.maximum(squared, 1e-18, out=squared)
+    return 1 / np.maximum(2 * depth.max(axis=1), 1 / THICKEST)
+
+
+def _share(value: float) -> float:
+    return min(max(value, 0.0), 1.0)

@@ -1,0 +1,341 @@
+"""From one tile of a class to another through tiles: no frame overlaps, however limbs are bent.
+
+Both tiles fall into triangles that correspond. Every vertex of the tiling is a mean of its neighbours,
+with positive weights (mean value coordinates; Floater, 2003); and on a torus any such weights give a
+plane drawing again (Tutte, 1963; Gortler, Gotsman and Thurston, 2006). So the weights are interpolated,
+not the places (Floater and Gotsman, How to morph tilings injectively, 1999), and the places solved for:
+two unknowns an orbit of vertices, for weights that the group leaves as they are give such places.
+
+Where the group has no rotation, walks by such weights may drift, and the torus would have to change.
+There weights along the drift are tilted, by an exponential, until it stops: they stay positive.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from scipy.sparse import bmat, coo_array, csc_array
+from scipy.sparse.linalg import spsolve
+
+from orbiflow.arrays import Array
+from orbiflow.errors import OrbiflowError
+from orbiflow.symmetry import Isometry, identity
+from orbiflow.tiles.search import OwnFrame
+from orbiflow.tiles.silhouette import triangulate
+
+
+@dataclass(frozen=True, eq=False)
+class Orbits:
+    """Of each of N vertices: vertex i is linear[i] p + shift[i] of p, the vertex `source[i]`.
+
+    - `source`: (N,) a vertex that is its own source.
+    - `linear`, `shift`: (N, 2, 2) and (N, 2), isometries of the own frame's group.
+    - `fixed`: (N,) whether the vertex lies on a centre of rotation and cannot move.
+    """
+
+    source: NDArray[np.int64]
+    linear: Array
+    shift: Array
+    fixed: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, own: OwnFrame) -> Orbits:
+        """Of the vertices of a polygon."""
+        links = _links(own)
+        count = len(own.points)
+        elements: list[Isometry | None] = [None] * count
+        source, fixed = np.arange(count), np.zeros(count, dtype=bool)
+        for root in range(count):
+            if elements[root] is not None:
+                continue
+            elements[root] = identity(2)
+            orbit = [root]
+            for i in orbit:  # grows while it is walked
+                for j, link in links[i]:
+                    reached = link @ (elements[i] or identity(2))
+                    known = elements[j]
+                    if known is None:
+                        elements[j], source[j] = reached, root
+                        orbit.append(j)
+                    elif not known.is_close(reached, 1e-6):
+                        fixed[root] = True  # two ways there: an element leaves it where it is
+            fixed[orbit] = fixed[root]
+        found = [element or identity(2) for element in elements]
+        linear, shift = (np.stack(part) for part in zip(*map(_parts, found), strict=True))
+        return cls(source, linear, shift, fixed)
+
+    def with_inner(self, count: int) -> Orbits:
+        """And `count` vertices more, each its own source."""
+        n = len(self.source)
+        return Orbits(
+            np.concatenate([self.source, np.arange(n, n + count)]),
+            np.concatenate([self.linear, np.broadcast_to(np.eye(2), (count, 2, 2))]),
+            np.concatenate([self.shift, np.zeros((count, 2))]),
+            np.concatenate([self.fixed, np.zeros(count, dtype=bool)]),
+        )
+
+    def spread(self, points: Array) -> Array:
+        """(N, 2) vertices; those that are sources, or fixed, are taken from `points` (N, 2)."""
+        images = np.einsum("nij,nj->ni", self.linear, points[self.source]) + self.shift
+        return np.where(self.fixed[:, None], points, images)
+
+
+def _parts(element: Isometry) -> tuple[Array, Array]:
+    return element.linear, element.translation
+
+
+def _links(own: OwnFrame) -> list[list[tuple[int, Isometry]]]:
+    """For each vertex i the vertices j and elements g with p_j = g p_i, one for each edge it is on."""
+    count = len(own.points)
+    links: list[list[tuple[int, Isometry]]] = [[] for _ in range(count)]
+    bounds = [*own.starts, count]
+    for pair in own.kind.identified_edges:
+        element = pair.isometry
+        back = element.inverse()
+        first = np.arange(bounds[pair.first], bounds[pair.first + 1] + 1) % count
+        second = np.arange(bounds[pair.second], bounds[pair.second + 1] + 1) % count
+        if pair.reversed:
+            second = second[::-1]
+        for i, j in zip(first.tolist(), second.tolist(), strict=True):
+            links[i].append((j, element))
+            links[j].append((i, back))
+    return links
+
+
+ROUNDS = 12
+"""Times that sides of the outline are halved for the triangulation."""
+
+STIFF = 1e4
+"""How much more the edges pull than the inside where they are to be straight."""
+
+TILTS, BALANCED, TINY = 12, 1e-9, 1e-4
+"""Steps in which weights are tilted until nothing drifts; what counts as that; a step to learn by."""
+
+EVEN = 24
+"""Places at which the other way is measured, so that all moves evenly."""
+
+CHECKED = 96
+"""Places between the two tiles at which the straight way is looked at."""
+
+
+class Morph:
+    """The way from a tile's template to the tile.
+
+    The straight way where that stays simple, and else that of the weights.
+
+    Args:
+        own: the tile.
+
+    Raises:
+        OrbiflowError: for a tile that cannot be triangulated.
+    """
+
+    def __init__(self, own: OwnFrame) -> None:
+        self.end, self.start = own, own.straight()
+        self._weights: _Weights | None = None
+        shares = np.linspace(0, 1, CHECKED + 1)
+        if not all(_is_simple(self._straight_way(float(s))) for s in shares):
+            self._weights = _Weights.of(own)
+            self.end = self._weights.own
+            self.start = replace(self.end.straight(), points=self._weights.points(0.0))
+            self._even = _evenly(self._weights)
+
+    @property
+    def is_straight(self) -> bool:
+        """Whether every vertex runs along a straight line, in the own frame."""
+        return self._weights is None
+
+    def at(self, share: float) -> OwnFrame:
+        """The tile at 0 (the template) to 1 (the tile)."""
+        if share >= 1:
+            return self.end
+        if share <= 0:
+            return self.start
+        if self._weights is None:
+            points = self._straight_way(share)
+        else:
+            s = float(np.interp(share, self._even, np.linspace(0, 1, len(self._even))))
+            points = self._weights.points(s)
+        linear = (1 - share) * self.start.linear + share * self.end.linear
+        return replace(self.end, points=points, linear=linear)
+
+    def _straight_way(self, share: float) -> Array:
+        return (1 - share) * self.start.points + share * self.end.points
+
+
+@dataclass(frozen=True, eq=False)
+class _Weights:
+    """What the places are solved for from.
+
+    - `own`: the tile, with as many vertices as the triangles need; the first n of the points.
+    - `orbits`: of all points.
+    - `sides`: (E, 2) each side of a triangle from either end.
+    - `first`, `last`: (E,) weights of template and tile, those of each orbit adding up to one.
+    - `guess`: (N, 2) points of the tile.
+    """
+
+    own: OwnFrame
+    orbits: Orbits
+    sides: NDArray[np.int64]
+    first: Array
+    last: Array
+    guess: Array
+
+    @classmethod
+    def of(cls, own: OwnFrame) -> _Weights:
+        for _ in range(ROUNDS):
+            mesh = triangulate(own.points)
+            if not len(mesh.sides):
+                break
+            own = own.refined(set(mesh.sides.tolist()))
+        else:
+            raise OrbiflowError("the tile is too thin somewhere to be animated")
+        orbits = Orbits.of(own).with_inner(len(mesh.points) - mesh.size)
+        sides = _sides(mesh.triangles)
+        first, last = (
+            weights / _sums(weights, sides, orbits)
+            for weights in (
+                _stiff_edges(own, sides),
+                _mean_values(mesh.points, mesh.triangles, sides),
+            )
+        )
+        return cls(own, orbits, sides, first, last, mesh.points)
+
+    def points(self, share: float) -> Array:
+        """(n, 2) the outline at a share of the way."""
+        weights = self.first ** (1 - share) * self.last**share
+        ways = _open_ways(self.own)
+        i, j = self.sides.T
+        along = (self.guess[j] - self.guess[i]) @ ways.T
+        tilt = np.zeros(len(ways))
+        solution, force = self._solved(weights, ways)
+        steps: Array | None = None
+        for _ in range(TILTS):
+            if np.abs(force).max(initial=0.0) < BALANCED:
+                break
+            if steps is None:
+                nearby = [
+                    self._solved(weights * np.exp(along @ (tilt + way)), ways)[1] - force
+                    for way in TINY * np.eye(len(ways))
+                ]
+                steps = np.linalg.inv(np.stack(nearby, axis=1) / TINY)
+            tilt = tilt - steps @ force
+            solution, force = self._solved(weights * np.exp(along @ tilt), ways)
+        return self.orbits.spread(solution)[: len(self.own.points)]
+
+    def _solved(self, weights: Array, ways: Array) -> tuple[Array, Array]:
+        """(N, 2) places in which each orbit is the mean of its neighbours, but for a force.
+
+        The force (k,), along the ways that the group leaves open, is what such weights lack to keep
+        the whole in its place: walks by them drift. It is the same on all, none where all balances.
+        """
+        weights = weights / _sums(weights, self.sides, self.orbits)
+        guess, orbits = self.guess, self.orbits
+        i, j = self.sides.T
+        free = np.flatnonzero((orbits.source == np.arange(len(orbits.source))) & ~orbits.fixed)
+        number = np.full(len(orbits.source), -1)
+        number[free] = np.arange(len(free))
+        keep = ~orbits.fixed[i]
+        i, j, weights = i[keep], j[keep], weights[keep]
+        back = weights[:, None, None] * np.swapaxes(orbits.linear[i], 1, 2)
+        row, column = number[orbits.source[i]], number[orbits.source[j]]
+        moves = ~orbits.fixed[j]
+        blocks = np.concatenate(
+            [(back @ orbits.linear[j])[moves], -weights[:, None, None] * np.eye(2)]
+        )
+        rows = np.concatenate([row[moves], row])
+        columns = np.concatenate([column[moves], row])
+        there = np.where(moves[:, None], orbits.shift[j], guess[j])
+        right = np.zeros((len(free), 2))
+        np.add.at(right, row, -np.einsum("eij,ej->ei", back, there - orbits.shift[i]))
+        matrix = _block_matrix(blocks, rows, columns, len(free))
+        solution = guess.copy()
+        solution[free], force = _bordered(matrix, right, guess[free], ways)
+        return solution, force
+
+
+def _bordered(matrix: csc_array, right: Array, guess: Array, ways: Array) -> tuple[Array, Array]:
+    """The solution whose mean, along the ways (k, 2) that the group leaves open, is the guess's.
+
+    And the force (k,) on all that this takes.
+    """
+    size, border = right.size, np.tile(ways, (1, len(right)))
+    whole, value = matrix, right.ravel()
+    if len(ways):
+        blocks: Any = [[matrix, border.T], [border, None]]
+        whole = bmat(blocks, format="csc")
+        value = np.concatenate([value, border @ guess.ravel()])
+    solved = np.asarray(spsolve(csc_array(whole), value))
+    return solved[:size].reshape(-1, 2), solved[size:]
+
+
+def _block_matrix(blocks: Array, rows: Array, columns: Array, count: int) -> csc_array:
+    """(2 count, 2 count), of blocks (E, 2, 2) in block rows and columns (E,), those that meet added."""
+    r = 2 * rows[:, None] + (0, 0, 1, 1)
+    c = 2 * columns[:, None] + (0, 1, 0, 1)
+    entries = (blocks.ravel(), (r.ravel(), c.ravel()))
+    return csc_array(coo_array(entries, shape=(2 * count, 2 * count)))
+
+
+def _open_ways(own: OwnFrame) -> Array:
+    """(k, 2) orthonormal directions in which the whole may be shifted: the group keeps them."""
+    rows = [np.eye(2) - g.linear for g in own.kind.group().cosets]
+    _, sizes, ways = np.linalg.svd(np.concatenate(rows))
+    return ways[sizes < 1e-6]
+
+
+def _sides(triangles: NDArray[np.int64]) -> NDArray[np.int64]:
+    ends = np.concatenate([triangles[:, [a, b]] for a in range(3) for b in range(3) if a != b])
+    return np.unique(ends, axis=0)
+
+
+def _sums(weights: Array, sides: NDArray[np.int64], orbits: Orbits) -> Array:
+    """(E,) of each side the weights' sum over all sides at the same orbit."""
+    own = orbits.source[sides[:, 0]]
+    return np.bincount(own, weights, minlength=len(orbits.source))[own]
+
+
+def _stiff_edges(own: OwnFrame, sides: NDArray[np.int64]) -> Array:
+    """(E,) weights whose solution is a tile with straight edges, but for a little: `STIFF` times less.
+
+    An edge pulls alike however many sides it has.
+    """
+    n = len(own.points)
+    weights = np.ones(len(sides))
+    along = (sides < n).all(axis=1)  # no side crosses the inside from outline to outline
+    behind = np.where((sides[:, 0] + 1) % n == sides[:, 1], sides[:, 0], sides[:, 1])[along]
+    edge = np.searchsorted(own.starts, behind, side="right") - 1
+    weights[along] = STIFF * np.array(own.counts)[edge]
+    return weights
+
+
+def _mean_values(points: Array, triangles: NDArray[np.int64], sides: NDArray[np.int64]) -> Array:
+    """(E,) weights: tangents of half the angles beside a side, over its length."""
+    total = np.zeros(len(sides))
+    codes = sides[:, 0] * len(points) + sides[:, 1]
+    for k in range(3):
+        at, one, other = (triangles[:, (k + m) % 3] for m in range(3))
+        u, v = points[one] - points[at], points[other] - points[at]
+        lengths = np.linalg.norm(u, axis=1), np.linalg.norm(v, axis=1)
+        cross, dot = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0], (u * v).sum(axis=1)
+        half = (lengths[0] * lengths[1] - dot) / cross  # tan of half the angle
+        for end, length in zip((one, other), lengths, strict=True):
+            np.add.at(total, np.searchsorted(codes, at * len(points) + end), half / length)
+    return total
+
+
+def _evenly(weights: _Weights) -> Array:
+    """How far the outline has moved, 0 to 1, at even shares of the weights' way."""
+    found = [weights.points(float(s)) for s in np.linspace(0, 1, EVEN + 1)]
+    steps = [np.sqrt(((b - a) ** 2).sum(axis=1).mean()) for a, b in pairwise(found)]
+    far = np.concatenate([[0], np.cumsum(steps)])
+    return far / far[-1]
+
+
+def _is_simple(ring: Array) -> bool:
+    return bool(shapely.is_valid(shapely.Polygon(ring)))

@@ -1,0 +1,276 @@
+"""An animation in pixels: a GIF by Pillow, an MP4 by ffmpeg where it is installed."""
+
+from __future__ import annotations
+
+import io
+import re
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from itertools import accumulate
+from pathlib import Path
+from xml.sax.saxutils import escape
+
+import numpy as np
+from PIL import Image
+
+from orbiflow.arrays import Array
+from orbiflow.drawing import (
+    Palette,
+    Raster,
+    limited,
+)
+from orbiflow.errors import OrbiflowError
+from orbiflow.tiles.motion.kinds import (
+    MOVE,
+    REST,
+    SHOW,
+    Frame,
+    Motion,
+    Places,
+    eased,
+)
+
+OUTLINE = 0.0016
+"""Width of outlines, as a share of the picture's."""
+
+Told = Callable[[float], None]
+
+
+def picture(motion: Motion, palette: Palette, progress: float) -> Raster:
+    """One frame."""
+    window = (0.0, 0.0, float(motion.width), float(motion.height))
+    raster = Raster(window, motion.width, y_down=True, paper=palette.paper)
+    rings = list(motion.rings(progress))
+    width = max(1.0, OUTLINE * motion.width)
+    for ring, colour, whole in rings:  # what grows is below what is there
+        if not whole:
+            raster.fill([ring], palette.fill(colour))
+            raster.line(ring, palette.outline, width, closed=True)
+    for ring, colour, whole in rings:
+        if whole:
+            raster.fill([ring], palette.fill(colour))
+    for ring, _, whole in rings:
+        if whole:
+            raster.line(ring, palette.outline, width, closed=True)
+    return raster
+
+
+def write_gif(motion: Motion, palette: Palette, frames: list[Frame], told: Told) -> bytes:
+    """A GIF that repeats for ever; all frames have one palette.
+
+    Args:
+        frames: of the loop.
+        told: told the share of the work done.
+    """
+    fills = [palette.fill(k) for k in range(int(motion.colours.max(initial=0)) + 1)]
+    colours = (palette.paper, *fills, palette.outline)
+    # few mixtures: each costs bytes in every frame
+    shown = list(_shown(motion, palette, frames, told, lambda image: limited(image, colours, 3)))
+    # a GIF counts in hundredths of a second
+    ends = [round(100 * end) for end in accumulate(frame.seconds for frame in frames)]
+    lasting = np.maximum(np.diff([0, *ends]), 2) * 10
+    buffer = io.BytesIO()
+    shown[0].save(
+        buffer,
+        "GIF",
+        save_all=True,
+        append_images=shown[1:],
+        duration=lasting.tolist(),
+        loop=0,
+        disposal=1,
+        optimize=False,
+    )
+    return buffer.getvalue()
+
+
+def require_ffmpeg() -> str:
+    """Path of ffmpeg.
+
+    Raises:
+        OrbiflowError: if it is not installed.
+    """
+    found = shutil.which("ffmpeg")
+    if found is None:
+        raise OrbiflowError(
+            "an MP4 needs ffmpeg, which is not installed (or not on the PATH); install it, or choose "
+            "a .gif or .svg"
+        )
+    return found
+
+
+def write_mp4(
+    motion: Motion, palette: Palette, frames: list[Frame], fps: float, told: Told
+) -> bytes:
+    """An MP4 (H.264) of one loop, that every player and browser shows.
+
+    Raises:
+        OrbiflowError: if ffmpeg is not installed or fails.
+    """
+    ffmpeg = require_ffmpeg()
+    with tempfile.TemporaryDirectory() as folder:
+        out = Path(folder) / "loop.mp4"
+        command = [ffmpeg, "-loglevel", "error", "-nostdin", "-y", "-f", "rawvideo"]
+        command += ["-pix_fmt", "rgb24", "-s", f"{motion.width}x{motion.height}", "-r", f"{fps:g}"]
+        command += ["-i", "-", "-an", "-c:v", "libx264", "-pix_fmt", "yuv420p", "-crf", "18"]
+        command += ["-movflags", "+faststart", str(out)]
+        content = b"".join(
+            image.tobytes() * max(1, round(frame.seconds * fps))
+            for image, frame in zip(
+                _shown(motion, palette, frames, told, lambda image: image), frames, strict=True
+            )
+        )
+        done = subprocess.run(command, input=content, capture_output=True, check=False)
+        if done.returncode or not out.is_file():
+            said = done.stderr.decode(errors="replace").strip().splitlines()
+            raise OrbiflowError(f"ffmpeg failed: {said[-1] if said else 'without a word'}")
+        return out.read_bytes()
+
+
+def _shown(
+    motion: Motion,
+    palette: Palette,
+    frames: list[Frame],
+    told: Told,
+    made: Callable[[Image.Image], Image.Image],
+) -> Iterator[Image.Image]:
+    """The pictures of a loop; none is drawn twice."""
+    known: dict[float, Image.Image] = {}
+    count = len({frame.progress for frame in frames})
+    for frame in frames:
+        if frame.progress not in known:
+            known[frame.progress] = made(picture(motion, palette, frame.progress).image())
+            told(len(known) / count)
+        yield known[frame.progress]
+
+
+_EASE, _EVEN = "0.42 0 0.58 1", "0 0 1 1"
+
+
+def write_motion_svg(
+    motion: Motion, palette: Palette, *, seconds: float, name: str, title: str = ""
+) -> str:
+    """The SVG document.
+
+    Args:
+        motion: a steady one.
+        palette: of the fills.
+        seconds: of the loop.
+        name: in front of all ids and classes, so that several can be in one page.
+        title: in words.
+    """
+    key = re.sub(r"[^A-Za-z0-9]+", "-", name).strip("-").lower() or "tile"
+    width, height = motion.width, motion.height
+    still = motion.places(1.0)
+    # what grows is below what is there
+    order = reversed(_all(motion))
+    moving = [_copy(motion, still, k, f"{key}-moving", palette, seconds) for k in order]
+    fixed = [_still_copy(still, k, f"{key}-still", palette, motion) for k in _all(motion)]
+    stroke = f'stroke="{palette.outline}" stroke-width="{0.0016 * width:.2f}"'
+    return f"""<?xml version="1.0" encoding="UTF-8"?>
+<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" \
+width="{width}" height="{height}" role="img" class="{key}">
+<title>{escape(title or motion.what)}</title>
+<style>
+.{key} .still {{ display: none }}
+@media (prefers-reduced-motion: reduce) {{
+.{key} .moving {{ display: none }}
+.{key} .still {{ display: inline }}
+}}
+</style>
+<defs>
+<clipPath id="{key}-page"><rect width="{width}" height="{height}"/></clipPath>
+<path id="{key}-still" d="{_path(motion.outline(1.0))}"/>
+<path id="{key}-moving" d="{_path(motion.outline(1.0))}">{_changing(motion, seconds)}</path>
+</defs>
+<g clip-path="url(#{key}-page)" {stroke} stroke-linejoin="round">
+<rect width="{width}" height="{height}" fill="{palette.paper}" stroke="none"/>
+<g class="moving">
+{"".join(moving)}</g>
+<g class="still">
+{"".join(fixed)}</g>
+</g>
+</svg>
+"""
+
+
+def _all(motion: Motion) -> range:
+    return range(len(motion.colours))
+
+
+def _path(ring: Array) -> str:
+    return "M" + " ".join(f"{_number(x)},{_number(y)}" for x, y in ring.tolist()) + "Z"
+
+
+def _number(value: float, decimals: int = 1) -> str:
+    text = f"{value:.{decimals}f}".rstrip("0").rstrip(".")
+    return "0" if text in ("-0", "") else text
+
+
+def _matrix(linear: Array) -> str:
+    return ",".join(_number(value, 5) for value in linear.T.ravel())
+
+
+def _changing(motion: Motion, seconds: float) -> str:
+    outlines = [motion.outline(key) for key in motion.keys]
+    if all(np.array_equal(outlines[0], other) for other in outlines[1:]):
+        return ""
+    return _animate(
+        "animate", 'attributeName="d"', motion.keys, [_path(r) for r in outlines], seconds
+    )
+
+
+def _copy(
+    motion: Motion, places: Places, k: int, symbol: str, palette: Palette, seconds: float
+) -> str:
+    linear, (x, y) = places.linear[k], places.offset[k].tolist()
+    use = f'<use href="#{symbol}" fill="{palette.fill(int(motion.colours[k]))}"'
+    start, end = motion.births[k].tolist()
+    if end <= 0:
+        return f'{use} transform="matrix({_matrix(linear)},{_number(x)},{_number(y)})"/>\n'
+    keys = [0.0, start, *np.linspace(start, end, 5)[1:-1].tolist(), end, 1.0]
+    sizes = [_number(eased(float(np.clip((t - start) / (end - start), 0, 1))), 3) for t in keys]
+    grows = _animate(
+        "animateTransform", 'attributeName="transform" type="scale"', keys, sizes, seconds
+    )
+    return (
+        f'<g transform="translate({_number(x)},{_number(y)})"><g>{grows}'
+        f'{use} transform="matrix({_matrix(linear)},0,0)"/></g></g>\n'
+    )
+
+
+def _still_copy(places: Places, k: int, symbol: str, palette: Palette, motion: Motion) -> str:
+    x, y = places.offset[k].tolist()
+    return (
+        f'<use href="#{symbol}" fill="{palette.fill(int(motion.colours[k]))}" '
+        f'transform="matrix({_matrix(places.linear[k])},{_number(x)},{_number(y)})"/>\n'
+    )
+
+
+def _animate(
+    element: str, what: str, keys: Sequence[float], values: Sequence[str], seconds: float
+) -> str:
+    """There and back, with rests: `values` at these values of the progress, 0 to 1."""
+    direct = len(keys) == 2
+    there = [REST + MOVE * _time(key) for key in keys]
+    back = [REST + 2 * MOVE + SHOW - MOVE * _time(key) for key in reversed(keys)]
+    times = [0.0, *there, *back, 1.0]
+    times[-2:] = [1.0] if times[-2] >= 1 - 1e-9 else times[-2:]
+    shown = [values[0], *values, *reversed(values), values[0]][: len(times)]
+    way = [_EASE if direct else _EVEN] * (len(keys) - 1)
+    splines = [_EVEN, *way, _EVEN, *way, _EVEN][: len(times) - 1]
+    mode = f'calcMode="spline" keySplines="{";".join(splines)}"' if direct else 'calcMode="linear"'
+    return (
+        f'<{element} {what} dur="{seconds:g}s" repeatCount="indefinite" {mode} '
+        f'keyTimes="{";".join(_number(t, 4) for t in times)}" values="{";".join(shown)}"/>'
+    )
+
+
+def _time(progress: float) -> float:
+    """When, 0 to 1 of a way, the eased progress is reached: the inverse of `eased`.
+
+    >>> [round(_time(eased(t)), 9) for t in (0.0, 0.2, 0.5, 1.0)]
+    [0.0, 0.2, 0.5, 1.0]
+    """
+    return float(0.5 - np.sin(np.arcsin(1 - 2 * progress) / 3))

@@ -1,0 +1,5 @@
+from .index import index_page as index_page
+from .overview import overview_png as overview_png
+from .run_folder import write_gallery as write_gallery
+from .run_folder import write_run as write_run
+from .tile_folder import write_tile_folder as write_tile_folder

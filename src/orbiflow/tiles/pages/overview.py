@@ -1,0 +1,259 @@
+"""`overview.png`: all tiles of a search on one sheet, for a first look."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from pathlib import PurePath
+from typing import NamedTuple
+
+from PIL import Image, ImageDraw
+
+from orbiflow.arrays import Window
+from orbiflow.drawing import (
+    Raster,
+    font,
+    window_of,
+)
+from orbiflow.tiles.pictures import (
+    bending_raster,
+    overlay_raster,
+    tiling_raster,
+)
+from orbiflow.tiles.search import ClassFailure
+from orbiflow.tiles.silhouette import Target
+from orbiflow.tiles.tile import EscherTile
+from orbiflow.tiles.tilings import Colouring
+
+
+class Measure(NamedTuple):
+    """A number and what it says: its `name`, `value` as text, `words` for it, and its `meaning`."""
+
+    name: str
+    value: str
+    words: str
+    meaning: str
+
+
+def measures(result: EscherTile) -> list[Measure]:
+    """Of a tile, what counts most first; those that were not taken are left out."""
+    found = [_score(result)]
+    if result.deformation is not None:
+        found.append(
+            Measure(
+                "Deformation",
+                f"{result.deformation:.3f}",
+                _word(
+                    result.deformation,
+                    (0.1, "bent a little"),
+                    (0.2, "bent somewhat"),
+                    (0.35, "bent much"),
+                    "bent very much",
+                ),
+                "What bending the silhouette into the tile costs; 0 is the silhouette itself.",
+            )
+        )
+    found += [
+        Measure(
+            "Overlap (IoU)",
+            f"{result.metrics.iou:.3f}",
+            f"{100 * result.metrics.dice:.0f} % of their areas in common",
+            "Area common to tile and silhouette, as it is, over the area of both together.",
+        ),
+        Measure(
+            "Recognised",
+            f"{result.recognisability.score:.2f}",
+            f"limbs {result.recognisability.limbs:.2f}",
+            "Share of the outlines that is found again, point by point; 1 is all.",
+        ),
+    ]
+    if result.thinnest is not None:
+        thin = result.thinnest.share < max(result.min_neck, 0.02)
+        found.append(
+            Measure(
+                "Thinnest neck",
+                f"{100 * result.thinnest.share:.1f} %",
+                "thin: mind it when you cut" if thin else "sound",
+                "Its width, in hundredths of the square root of the tile's area.",
+            )
+        )
+    if result.pinned is not None:
+        found.append(
+            Measure(
+                "Pinned parts",
+                f"{result.pinned:.4f}",
+                "as they were" if result.pinned < 0.01 else "changed",
+                "How far the worst of them is from similar to what it was; 0 is the same shape.",
+            )
+        )
+    return found
+
+
+POOR_MATCH, POOR_LIKENESS = 0.4, 0.2
+"""Scores up to which a tile is called poor, after a search for overlap and for likeness."""
+
+
+def is_poor(result: EscherTile) -> bool:
+    """Whether nobody would know the silhouette in it."""
+    return result.score <= (POOR_MATCH if result.fidelity is None else POOR_LIKENESS)
+
+
+def _score(result: EscherTile) -> Measure:
+    if result.fidelity is None:
+        words = _word(
+            -result.score,
+            (-0.8, "a close match"),
+            (-0.6, "a fair match"),
+            (-POOR_MATCH, "a loose match"),
+            "a poor match",
+        )
+        meaning = "Overlap and recognisability together, 0 to 1; tiles are ranked by it."
+    else:
+        words = _word(
+            -result.score,
+            (-0.6, "a good likeness"),
+            (-0.4, "a middling likeness"),
+            (-POOR_LIKENESS, "a loose likeness"),
+            "a poor likeness",
+        )
+        meaning = "How much of the outline's shape bending left, 0 to 1; tiles are ranked by it."
+    return Measure("Score", f"{result.score:.2f}", words, meaning)
+
+
+def _word(value: float, *scale: tuple[float, str] | str) -> str:
+    """The word of the first bound that the value is below; the last has none."""
+    for step in scale:
+        if isinstance(step, str):
+            return step
+        if value < step[0]:
+            return step[1]
+    return ""
+
+
+INK, FAINT, WARNING = "#1a1a1a", "#5b6570", "#b0413e"
+
+# pixels of a sheet 1920 wide: at 1440, a laptop's width, the smallest words are 19 high
+_WIDTH, _MARGIN, _GAP = 1920, 40, 36
+_HEADER, _FOOT = 190, 176
+_TITLE, _NAME, _WORDS = 46, 34, 26
+_THUMB = 156
+
+
+class _Place(NamedTuple):
+    left: int
+    top: int
+    width: int
+
+
+def overview_png(
+    results: Sequence[EscherTile],
+    target: Target,
+    colours: Sequence[Colouring] | None = None,
+    *,
+    failures: Sequence[ClassFailure] = (),
+) -> bytes:
+    """PNG of all tiles, best first: each one's tiling, large, and beside its name what bent.
+
+    1920 pixels wide (1320 for a single tile), legible at 1440.
+
+    Args:
+        results: of one search, at least one.
+        target: of the search.
+        colours: of each tiling, if they are at hand.
+        failures: classes without a tile, to be named.
+    """
+    columns = {1: 1, 2: 2, 4: 2}.get(len(results), 3)
+    width = 1320 if columns == 1 else _WIDTH
+    cell = (width - 2 * _MARGIN - (columns - 1) * _GAP) // columns
+    height = round(cell / 1.5) + _FOOT
+    rows = -(-len(results) // columns)
+    sheet = Image.new("RGB", (width, _HEADER + rows * (height + _GAP)), "white")
+    pen = ImageDraw.Draw(sheet)
+    _header(sheet, pen, target, len(results), [failure.name for failure in failures])
+    for k, result in enumerate(results):
+        row, column = divmod(k, columns)
+        place = _Place(_MARGIN + column * (cell + _GAP), _HEADER + row * (height + _GAP), cell)
+        _write_words(pen, result, place, k + 1)
+        own = colours[k] if colours else None
+        tiling = tiling_raster(
+            result.tile, width_px=cell, colours=own, outline_px=1.4, y_down=target.y_down
+        )
+        sheet.paste(tiling.image(), (place.left, place.top))
+        thumb = _thumbnail(_small(result, target))
+        sheet.paste(thumb, (place.left + (_THUMB - thumb.width) // 2, _below(place)))
+    buffer = io.BytesIO()
+    sheet.save(buffer, "PNG", compress_level=4)
+    return buffer.getvalue()
+
+
+def verdict(result: EscherTile) -> str:
+    """How far a tile is from its silhouette, in a few words.
+
+    After a search for likeness what bending cost; else how well the silhouette is recognised.
+    """
+    if result.deformation is None:
+        how = f"recognised {result.recognisability.score:.2f}"
+    else:
+        how = f"bent {result.deformation:.2f}"
+    return f"{how}    IoU {result.metrics.iou:.2f}    score {result.score:.2f}"
+
+
+def _header(
+    sheet: Image.Image, pen: ImageDraw.ImageDraw, target: Target, count: int, failed: list[str]
+) -> None:
+    window = window_of([target.outline])
+    small = Raster(window, _fitting(window), y_down=target.y_down)
+    small.fill([target.outline], INK)
+    picture = _thumbnail(small)
+    sheet.paste(picture, (_MARGIN, (_HEADER - picture.height) // 2))
+    left, middle = _MARGIN + picture.width + 28, _HEADER // 2
+    name = PurePath(target.source).name
+    pen.text((left, middle - 6), name, INK, font(_TITLE), anchor="ls")
+    tiles = "1 tile: its" if count == 1 else f"{count} tiles, best first: each one's"
+    text = f"{tiles} tiling, and below it the silhouette in its place"
+    pen.text((left, middle + 40), text, FAINT, font(_WORDS), anchor="ls")
+    if failed:
+        text = f"No tile of {', '.join(failed)}"
+        pen.text((left, middle + 76), text, WARNING, font(_WORDS), anchor="ls")
+
+
+def _below(place: _Place) -> int:
+    """Where the part below the tiling begins."""
+    return place.top + round(place.width / 1.5) + 14
+
+
+def _write_words(pen: ImageDraw.ImageDraw, result: EscherTile, place: _Place, rank: int) -> None:
+    below = _below(place)
+    left = place.left + _THUMB + 22
+    name = f"{rank}.  {result.isohedral_class}  ({result.group_name})"
+    pen.text((left, below + 34), name, INK, font(_NAME), anchor="ls")
+    pen.text((left, below + 76), verdict(result), INK, font(_WORDS), anchor="ls")
+    valid = result.certificate.valid
+    likeness = next(m.words for m in measures(result) if m.name == "Score")
+    words = f"{likeness}, certified" if valid else "NOT CERTIFIED"
+    if result.front is not None:
+        words = f"for {result.objective}, {words.split(', ')[-1]}"
+    colour = FAINT if valid else WARNING
+    pen.text((left, below + 114), words, colour, font(_WORDS), anchor="ls")
+
+
+def _small(result: EscherTile, target: Target) -> Raster:
+    """A tile and its silhouette, without a legend."""
+    tile, y_down = result.tile, target.y_down
+    if result.bent is None or result.rest is None:
+        width = _fitting(window_of([tile.polygon, target.outline]))
+        return overlay_raster(tile, target.outline, width_px=width, y_down=y_down)
+    width = _fitting(window_of([result.rest, result.bent, tile.polygon]))
+    return bending_raster(tile, result.rest, result.bent, width_px=width, y_down=y_down, thick=3.5)
+
+
+def _fitting(window: Window) -> int:
+    """The width in pixels at which a window fits beside its words; more if it is very long."""
+    aspect = (window[2] - window[0]) / (window[3] - window[1])
+    return max(16, round(_THUMB * min(1.0, aspect)), round(17 * aspect))
+
+
+def _thumbnail(raster: Raster) -> Image.Image:
+    picture = raster.image()
+    picture.thumbnail((_THUMB, _THUMB))
+    return picture

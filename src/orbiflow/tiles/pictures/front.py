@@ -1,0 +1,185 @@
+"""Picture of a choice between two aims: tiles by their deformation and their overlap."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from orbiflow.arrays import Array
+from orbiflow.drawing import blank_figure, png_bytes
+from orbiflow.errors import OrbiflowError
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+INK, PALE, GRID = "#1a1a1a", "#c4ccd4", "#eceff2"
+COLOURS = {"likeness": "#1d4e79", "overlap": "#c8702a"}
+NAMES = {"likeness": "found for likeness", "overlap": "found for overlap"}
+
+SIZE, SMALL = 0.075, 0.03
+"""Height of a listed tile's little picture, and of another's, as a share of the width."""
+
+PUSHES = 400
+"""Steps in which the little pictures make room for each other."""
+
+
+class FrontPoint(NamedTuple):
+    """A tile in the picture.
+
+    - `deformation`, `iou`: where it stands.
+    - `polygon`: (N, 2), in the input's coordinates.
+    - `label`: beside it, such as its class.
+    - `objective`: "likeness" or "overlap": what it was found for.
+    - `listed`: whether it is in the list; others are pale.
+    - `front`: whether no other beats it in both.
+    """
+
+    deformation: float
+    iou: float
+    polygon: Array
+    label: str
+    objective: str
+    listed: bool
+    front: bool
+
+
+def front_png(points: Sequence[FrontPoint], *, width_px: int = 1600, y_down: bool = False) -> bytes:
+    """PNG of tiles by deformation (to the right) and overlap (upwards), each a little silhouette.
+
+    Listed tiles are large and coloured by what they were found for, with a line to where they stand
+    if they had to make room; full colour says that no other beats them. Others are pale, and the
+    dashed steps are the border of what is beaten.
+
+    Args:
+        points: of all tiles that were found.
+        width_px: the height is seven tenths of it.
+        y_down: whether the y axis of the polygons points down, as in images.
+
+    Raises:
+        OrbiflowError: for no points, and sizes that cannot be made.
+    """
+    if not points:
+        raise OrbiflowError("a picture of a front needs a tile at least")
+    figure = blank_figure(width_px, round(0.7 * width_px))
+    axes = _axes(figure, points)
+    _steps(axes, points)
+    corner = axes.transAxes.transform((0, 0)), axes.transAxes.transform((1, 1))
+    anchors = axes.transData.transform([(p.deformation, p.iou) for p in points])
+    listed = np.array([p.listed for p in points])
+    for point, anchor in zip(points, anchors, strict=True):
+        if not point.listed:
+            _silhouette(axes, point, anchor, SMALL * width_px, y_down, PALE, zorder=2)
+    places = _apart(anchors[listed], 1.25 * SIZE * width_px, corner)
+    chosen = [point for point in points if point.listed]
+    for point, anchor, place in zip(chosen, anchors[listed], places, strict=True):
+        colour = COLOURS[point.objective]
+        if np.hypot(*(place - anchor)) > 2:
+            axes.plot(*_in(axes, [anchor, place]), color=colour, linewidth=0.6, zorder=3)
+        axes.plot(*_in(axes, [anchor]), "o", color=colour, markersize=3.2, zorder=6)
+        alpha = 1.0 if point.front else 0.55
+        _silhouette(axes, point, place, SIZE * width_px, y_down, colour, zorder=4, alpha=alpha)
+        below = place - (0, 0.52 * SIZE * width_px)
+        (x,), (y,) = _in(axes, [below])
+        axes.text(x, y, point.label, ha="center", va="top", fontsize=6.5, color=INK, zorder=7)
+    return png_bytes(figure)
+
+
+def _axes(figure: object, points: Sequence[FrontPoint]) -> Axes:
+    from matplotlib.lines import Line2D
+
+    axes: Axes = figure.add_axes((0.075, 0.1, 0.9, 0.82))  # pyright: ignore[reportAttributeAccessIssue]
+    values = np.array([(p.deformation, p.iou) for p in points])
+    # what is far from all that is listed would press the rest into a corner
+    listed = np.array([p.listed for p in points])
+    near = values[listed] if listed.any() else values
+    low, high = near.min(axis=0), near.max(axis=0)
+    room = np.maximum(0.18 * (high - low), (0.02, 0.01))
+    axes.set_xlim(max(0.0, low[0] - room[0]), high[0] + 2 * room[0])
+    axes.set_ylim(low[1] - 2 * room[1], min(1.0, high[1] + 1.2 * room[1]))
+    axes.set_xlabel("deformation: what bending the silhouette costs", fontsize=8.5, color=INK)
+    axes.set_ylabel("overlap with the silhouette as it is (IoU)", fontsize=8.5, color=INK)
+    axes.tick_params(labelsize=7.5, colors=INK, length=2.5, width=0.6)
+    axes.grid(color=GRID, linewidth=0.6, zorder=0)
+    axes.set_axisbelow(True)
+    for side, spine in axes.spines.items():
+        spine.set_visible(side in ("left", "bottom"))
+        spine.set_color("#8a949e")
+        spine.set_linewidth(0.7)
+    kinds = [kind for kind in COLOURS if any(p.objective == kind for p in points)]
+    marks = [
+        Line2D([], [], marker="o", ls="", ms=5, color=COLOURS[k], label=NAMES[k]) for k in kinds
+    ]
+    marks.append(
+        Line2D(
+            [],
+            [],
+            marker="o",
+            ls="",
+            ms=5,
+            color=PALE,
+            label="left out: beaten, or much like one that is shown",
+        )
+    )
+    axes.legend(
+        handles=marks, fontsize=7.5, frameon=False, ncols=3, loc="lower left", bbox_to_anchor=(0, 1)
+    )
+    return axes
+
+
+def _steps(axes: Axes, points: Sequence[FrontPoint]) -> None:
+    """The border of what is beaten by others."""
+    x: list[float] = []
+    y: list[float] = []
+    for point in sorted(points, key=lambda p: (p.deformation, -p.iou)):
+        if not y or point.iou > y[-1]:
+            x.append(point.deformation)
+            y.append(point.iou)
+    x.append(axes.get_xlim()[1])
+    y.append(y[-1])
+    axes.step(x, y, where="post", color="#8a949e", linewidth=0.8, linestyle="--", zorder=1)
+
+
+def _silhouette(
+    axes: Axes,
+    point: FrontPoint,
+    place: Array,
+    size: float,
+    y_down: bool,
+    colour: str,
+    *,
+    zorder: int,
+    alpha: float = 1.0,
+) -> None:
+    from matplotlib.patches import Polygon
+
+    ring = point.polygon * (1.0, -1.0 if y_down else 1.0)
+    low, high = ring.min(axis=0), ring.max(axis=0)
+    pixels = place + (ring - (low + high) / 2) * (size / float((high - low).max()))
+    patch = Polygon(pixels, closed=True, facecolor=colour, edgecolor="white", linewidth=0.5)
+    patch.set_transform(None)
+    patch.set_alpha(alpha)
+    patch.set_zorder(zorder)
+    inside = axes.transAxes.inverted().transform(place)
+    if (inside > 0.01).all() and (inside < 0.99).all():
+        axes.figure.add_artist(patch)
+
+
+def _in(axes: Axes, pixels: Sequence[Array]) -> tuple[Array, Array]:
+    """x and y of pixels in the axes' own units."""
+    values = axes.transData.inverted().transform(np.array(pixels))
+    return values[:, 0], values[:, 1]
+
+
+def _apart(anchors: Array, gap: float, corner: tuple[Array, Array]) -> Array:
+    """Places (n, 2) near the anchors, no two of them closer than `gap`, inside the corners' box."""
+    turns = 2.4 * np.arange(len(anchors))  # the golden angle: equal ones part in all directions
+    places = anchors + np.stack([np.cos(turns), np.sin(turns)], axis=-1)
+    low, high = corner[0] + gap / 2, corner[1] - gap / 3
+    for _ in range(PUSHES):
+        ways = places[:, None] - places[None]
+        far = np.linalg.norm(ways, axis=2) + np.eye(len(places)) * 2 * gap
+        push = np.maximum(gap - far, 0)[..., None] * ways / far[..., None]
+        places = np.clip(places + 0.4 * push.sum(axis=1) + 0.02 * (anchors - places), low, high)
+    return places

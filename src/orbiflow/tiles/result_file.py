@@ -1,0 +1,285 @@
+"""`result.json`: the tiles of a run, written and read (schema: docs/result.schema.json)."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from orbiflow.arguments import path as as_path
+from orbiflow.arrays import Array
+from orbiflow.errors import InputFileError, OrbiflowError
+from orbiflow.runtime import ResultFolder, is_list, is_object, make_folder, write_atomic
+from orbiflow.symmetry import (
+    CrystallographicGroup,
+    Isometry,
+    checked_lattice,
+)
+from orbiflow.tiles.likeness import Fidelity, Recognisability, ShapeMetrics, Thinnest
+from orbiflow.tiles.tile import EscherTile
+from orbiflow.tiles.tilings import (
+    CLASSES,
+    Tile,
+    isohedral_class,
+)
+
+RESULT, TILE_MODEL = "result.json", "model.safetensors"
+MOST_BYTES = 256 * 2**20
+SCHEMA_VERSION = 1
+
+
+def read_result(path: str | Path, which: str | int = 1) -> EscherTile:
+    """Return a tile of a run.
+
+    Args:
+        path: The run's folder, or its result.json.
+        which: A class, such as "IH4" (its best tile), or a rank from 1, the best.
+
+    Raises:
+        InputFileError: if there is no such file, it is none of orbiflow's, or holds no such tile.
+    """
+    file, document = read_document(path)
+    names, source, silhouette = _contents(file, document)
+    index = _index(names, which, file)
+    entry = document["tiles"][index]
+    try:
+        tile = _tile(entry)
+        found = EscherTile(
+            tile,
+            name=f"{source}-{names[index]}",
+            y_down=bool(silhouette["y_down"]),
+            rank=index + 1,
+            silhouette=silhouette,
+            **_measurements(entry),
+        )
+    except (KeyError, TypeError, ValueError, IndexError) as error:
+        raise InputFileError(f"{file}: tile {index + 1} cannot be read: {error}") from error
+    if not tile.isohedral_class:
+        return found  # folders are named after classes: an unknown name leads nowhere
+    return found.changed(map_source=file.parent / folder_names(names)[index] / TILE_MODEL)
+
+
+def _contents(file: Path, document: dict[str, Any]) -> tuple[list[str], str, dict[str, Any]]:
+    """Return the classes of a run's tiles, the silhouette's name, and what is said of it."""
+    try:
+        names = [str(entry["class"]) for entry in document["tiles"]]
+        silhouette = document["input"]
+        _ = silhouette["y_down"]
+        return names, Path(str(silhouette["source"])).stem, silhouette
+    except (KeyError, TypeError) as error:
+        missing = f"it lacks {error}" if isinstance(error, KeyError) else str(error)
+        raise InputFileError(f"{file}: not a result of orbiflow escherize: {missing}") from error
+
+
+def folder_names(classes: Iterable[str]) -> list[str]:
+    """Of results of these classes; further tiles of a class are IH4-2, IH4-3 and so on.
+
+    >>> folder_names(["IH4", "IH6", "IH4"])
+    ['IH4', 'IH6', 'IH4-2']
+    """
+    seen: Counter[str] = Counter()
+    names = []
+    for name in classes:
+        seen[name] += 1
+        names.append(name if seen[name] == 1 else f"{name}-{seen[name]}")
+    return names
+
+
+def read_document(path: str | Path) -> tuple[Path, dict[str, Any]]:
+    """The result.json of a run, and what it holds: an object with `tiles`.
+
+    Args:
+        path: the run's folder, or its result.json.
+
+    Raises:
+        InputFileError: if there is no such file, or it is none of orbiflow's.
+    """
+    given = as_path(path, "the result")
+    file = given / RESULT if given.is_dir() else given
+    try:
+        if file.stat().st_size > MOST_BYTES:
+            raise InputFileError(f"{file}: {file.stat().st_size:,} bytes is too large for a result")
+        document = json.loads(file.read_bytes())
+    except FileNotFoundError as error:
+        if given.is_dir():
+            what = f"{given} holds no {RESULT}; give the folder that orbiflow escherize wrote"
+        else:
+            what = f"{given}: no such file or folder; give what orbiflow escherize wrote"
+        raise InputFileError(what) from error
+    except OSError as error:
+        raise InputFileError(f"{file}: cannot be read: {error.strerror or error}") from error
+    except (ValueError, RecursionError) as error:
+        raise InputFileError(f"{file}: not JSON: {error}") from error
+    if not isinstance(document, dict) or "tiles" not in document:
+        raise InputFileError(f"{file}: not a result of orbiflow escherize: it names no tiles")
+    return file, document
+
+
+def _index(names: list[str], which: str | int, file: Path) -> int:
+    if not names:
+        raise InputFileError(f"{file}: the run found no tile, so there is none to export")
+    text = str(which).strip()
+    if text.isdecimal():
+        if not 1 <= int(text) <= len(names):
+            raise InputFileError(
+                f"{file}: there is no tile of rank {text}; there are 1 to {len(names)}: "
+                f"{', '.join(names)}"
+            )
+        return int(text) - 1
+    name = isohedral_class(text).name
+    if name not in names:
+        raise InputFileError(f"{file}: holds no tile of {name}; there are {', '.join(names)}")
+    return names.index(name)
+
+
+def save_tiles(tiles: Sequence[EscherTile], folder: str | Path) -> Path:
+    """Write tiles as a run's folder: a result.json, and each one's map in a folder of its own.
+
+    Args:
+        tiles: Best first, at least one.
+        folder: Tiles that were saved there before are replaced.
+
+    Returns:
+        The folder.
+
+    Raises:
+        OrbiflowError: without any tile.
+        OutputError: if the folder holds anything else, or cannot be written.
+    """
+    if not tiles:
+        raise OrbiflowError("there is no tile to save")
+    own = ResultFolder(as_path(folder, "the folder to write into"), _saved_files)
+    names = folder_names(tile.isohedral_class or "tile" for tile in tiles)
+    silhouette = tiles[0].silhouette or {"source": tiles[0].name, "y_down": tiles[0].y_down}
+    document = {
+        "schema_version": SCHEMA_VERSION,
+        "input": silhouette,
+        "tiles": [tile_json(tile) for tile in tiles],
+    }
+    with own.replaced() as staged:
+        for tile, name in zip(tiles, names, strict=True):
+            if tile.map is not None:
+                make_folder(staged / name)
+                write_atomic(staged / name / TILE_MODEL, tile.map.to_bytes())
+        write_atomic(staged / RESULT, json.dumps(document, allow_nan=False))
+    return own.path
+
+
+def _saved_files(folder: Path) -> set[str]:
+    """Return the files that `save_tiles` wrote into a folder, relative to it."""
+    try:
+        names = [entry["class"] or "tile" for entry in read_document(folder)[1]["tiles"]]
+    except (OrbiflowError, KeyError, TypeError):
+        return set()
+    return {RESULT, *(f"{name}/{TILE_MODEL}" for name in folder_names(names))}
+
+
+def group_json(group: CrystallographicGroup) -> dict[str, Any]:
+    """Return the lattice (basis vectors as columns) and coset representatives as nested lists."""
+    return {
+        "name": group.name,
+        "lattice": group.lattice.tolist(),
+        "cosets": [
+            {"linear": g.linear.tolist(), "translation": g.translation.tolist()}
+            for g in group.cosets
+        ],
+    }
+
+
+def tile_json(tile: EscherTile) -> dict[str, Any]:
+    """Return one entry of `tiles`: polygon and group in the input's own coordinates."""
+    return {
+        "class": tile.isohedral_class,
+        "score": _or_none(tile.score),
+        "objective": tile.objective,
+        "front": tile.front,
+        "metrics": {
+            **_or_none(tile.metrics.as_dict()),
+            "deformation": tile.deformation,
+            "bent_iou": tile.bent_iou,
+            "pinned": tile.pinned,
+            "fidelity": None if tile.fidelity is None else asdict(tile.fidelity),
+        },
+        "recognisability": _or_none(tile.recognisability.as_dict()),
+        "certificate": tile.certificate.as_dict(),
+        "polygon": _closed(tile.tile.polygon),
+        "bent": None if tile.bent is None else _closed(tile.bent),
+        "thinnest": _thinnest_json(tile.thinnest),
+        "corners": list(tile.tile.corners),
+        "group": group_json(tile.tile.group),
+        "starts": tile.starts,
+        "dropped": tile.dropped,
+        "seconds": round(tile.seconds, 3),
+    }
+
+
+def _or_none(value: Any) -> Any:
+    """Return the value with None for NaN, which JSON has not."""
+    if is_object(value):
+        return {name: _or_none(part) for name, part in value.items()}
+    if is_list(value):
+        return [_or_none(part) for part in value]
+    return None if isinstance(value, float) and math.isnan(value) else value
+
+
+def _closed(ring: Array) -> list[list[float]]:
+    return np.concatenate([ring, ring[:1]]).tolist()
+
+
+def _thinnest_json(found: Thinnest | None) -> dict[str, Any] | None:
+    if found is None:
+        return None
+    return {"width": found.width, "share": found.share, "ends": found.ends.tolist()}
+
+
+def _measurements(entry: dict[str, Any]) -> dict[str, Any]:
+    """Return the fields of an `EscherTile` that an entry states; those that it lacks are left out."""
+    metrics = dict(entry.get("metrics") or {})
+    own = ("deformation", "bent_iou", "pinned")
+    found = {name: metrics.pop(name, None) for name in own}
+    fidelity = metrics.pop("fidelity", None)
+    if fidelity is not None:
+        found["fidelity"] = Fidelity(**{**fidelity, "pieces": tuple(fidelity["pieces"])})
+    if metrics.get("iou") is not None:
+        found["metrics"] = ShapeMetrics(**{**metrics, "window": tuple(metrics["window"])})
+    recognised = entry.get("recognisability")
+    if recognised and recognised["score"] is not None:
+        found["recognisability"] = Recognisability(**recognised)
+    thinnest, bent = entry.get("thinnest"), entry.get("bent")
+    if thinnest is not None:
+        ends = np.array(thinnest["ends"], dtype=np.float64)
+        found["thinnest"] = Thinnest(thinnest["width"], thinnest["share"], ends)
+    if bent is not None:
+        found["bent"] = np.array(bent, dtype=np.float64)[:-1]
+    known = {name: entry[name] for name in _PLAIN if name in entry}
+    return {"known_score": entry.get("score"), **found, **known}
+
+
+_PLAIN = ("objective", "front", "starts", "dropped", "seconds")
+"""Fields of an `EscherTile` that an entry states under the same name."""
+
+
+def _tile(entry: dict[str, Any]) -> Tile:
+    group = entry["group"]
+    cosets = tuple(
+        Isometry(np.array(coset["linear"]), np.array(coset["translation"]))
+        for coset in group["cosets"]
+    )
+    if not cosets:
+        raise OrbiflowError("its group has no cosets")
+    name = str(entry["class"])
+    ring = np.array(entry["polygon"], dtype=np.float64)
+    if ring.ndim != 2 or ring.shape[1] != 2 or len(ring) < 4:
+        raise OrbiflowError(f"its polygon should be a closed ring of points, got {ring.shape}")
+    return Tile(
+        ring[:-1],
+        CrystallographicGroup(checked_lattice(group["lattice"]), cosets, str(group["name"])),
+        name if name in CLASSES else "",
+        tuple(entry["corners"]),
+    )

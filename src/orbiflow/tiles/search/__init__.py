@@ -1,0 +1,5 @@
+"""The search for tiles: placements, co-deformation, the descent, the occupancy method."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

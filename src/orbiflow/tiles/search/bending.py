@@ -1,0 +1,267 @@
+"""The search for likeness in one class: placements, co-deformation, the best worked out in detail."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import NamedTuple, TypeVar
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from orbiflow.arrays import Array, Complex
+from orbiflow.runtime import Cancel
+from orbiflow.tiles.geometry import (
+    best_similarity,
+    plane_points,
+    signed_area,
+)
+from orbiflow.tiles.likeness import (
+    Elastic,
+    Fidelity,
+    Stiffness,
+    fidelity,
+    narrowest_neck,
+    neck_factor,
+)
+from orbiflow.tiles.search.co_deformation import (
+    FIRM,
+    SOFT,
+    Bodies,
+    Hand,
+    drawn_to_tiles,
+    held_on_tiles,
+)
+from orbiflow.tiles.search.corner_shifts import (
+    Drawn,
+    Stage,
+    shifted,
+)
+from orbiflow.tiles.search.placements import Placements, best_placements
+from orbiflow.tiles.search.settings import BendingSettings
+from orbiflow.tiles.search.starts import mirror_closed
+from orbiflow.tiles.search.tile_space import TileSpace
+from orbiflow.tiles.tilings import IsohedralClass
+
+TWIN = 2e-4
+"""Mean squared distance of two bent outlines below which they are twins."""
+
+FIRST_ROUNDS = 6
+"""Steps of the minimisation for all that are held."""
+
+FOLLOWING = 60.0
+"""Strength of the springs by which a finer body follows a coarser one."""
+
+RELAXED = 1500.0
+"""Strength of the springs that keep a relaxed outline near its tile."""
+
+Item = TypeVar("Item")
+
+
+class Bent(NamedTuple):
+    """A bent silhouette that is a tile.
+
+    - `hand`: what was bent.
+    - `points`: (N,) of the fine body; its outline is the tile, up to a similarity.
+    - `linear`, `offset`: the map from the group's own frame, of `points`.
+    - `placement`: one, of the fine outline.
+    - `relaxed`: (n,) the outline let go a little: bent as it would like to be near this tile.
+    - `fidelity`: what is left of the outline, and what bending costs.
+    - `neck`: width of the narrowest neck, in square roots of the area.
+    """
+
+    hand: Hand
+    points: Complex
+    linear: Array
+    offset: Array
+    placement: Placements
+    relaxed: Complex
+    fidelity: Fidelity
+    neck: float
+
+    def score(self, min_neck: float) -> float:
+        """What finalists are ordered by: their fidelity's, less where a neck is too thin."""
+        return self.fidelity.score * neck_factor(self.neck, min_neck)
+
+
+def _told_nobody(_share: float) -> None:
+    """No progress wanted."""
+
+
+def bent_tiles(
+    both: Sequence[Hand],
+    kind: IsohedralClass,
+    settings: BendingSettings,
+    progress: Callable[[float], None] | None = None,
+    cancel: Cancel | None = None,
+    *,
+    wanted: int = 1,
+) -> tuple[list[Bent], int]:
+    """The finalists of one class, best score first, no two of them twins.
+
+    Args:
+        both: of the target.
+        kind: the class.
+        settings: of the search.
+        progress: told the share of the work done.
+        cancel: looked at before each step.
+        wanted: finalists of each hand at least, if there are as many.
+
+    Returns:
+        The finalists, and how many were dropped because they cross themselves.
+
+    Raises:
+        Cancelled: if it was told to stop.
+    """
+    told, cancel = progress or _told_nobody, cancel or Cancel()
+    found: list[Bent] = []
+    dropped = done = 0
+    sides = both[:1] if mirror_closed(kind) else both
+    tasks = [(hand, own) for own in settings.searches(wanted) for hand in sides]
+    work = sum(own.starts for _, own in tasks)
+    for hand, own in tasks:
+        sound, crossed = _finalists(hand, FIRM, kind, own, cancel)
+        if 2 * len(sound) < own.finalists:
+            told((done + 0.5 * own.starts) / work)
+            more, also = _finalists(hand, SOFT, kind, own, cancel)
+            sound, crossed = sound + more, crossed + also
+        found, dropped, done = found + sound, dropped + crossed, done + own.starts
+        told(done / work)
+    found.sort(key=lambda bent: -bent.score(settings.min_neck))
+
+    def twins(a: Bent, b: Bent) -> bool:
+        n = a.hand.fine.size
+        return a.hand is b.hand and _apart(a.points[:n], b.points[:n]) <= TWIN
+
+    return _unlike(found, len(found), twins), dropped
+
+
+def _finalists(
+    hand: Hand,
+    stiffness: Stiffness,
+    kind: IsohedralClass,
+    settings: BendingSettings,
+    cancel: Cancel,
+) -> tuple[list[Bent], int]:
+    """The best of one hand and stiffness worked out, and how many of them cross themselves."""
+    bodies = hand.bodies(stiffness)
+    best = _best_placements(bodies, kind, settings, cancel)
+    found: list[Bent] = []
+    for k in range(len(best.costs)):
+        cancel.check()
+        one = best.take(np.array([k]))
+        bent = _detailed(hand, bodies.fine, kind, one, settings.rounds)
+        found += [] if bent is None else [bent]
+    return found, len(best.costs) - len(found)
+
+
+def _best_placements(
+    bodies: Bodies, kind: IsohedralClass, settings: BendingSettings, cancel: Cancel
+) -> Drawn:
+    """Placements of the fine outline whose tiles cost least: few points, then more and more."""
+    coarse, middle, fine = bodies
+    placements, points = _best_coarse(coarse, kind, settings)
+    share = settings.share
+    if middle is not fine:
+        placements, points = _finer(coarse, middle, placements, points)
+        stages = [Stage(2, settings.starts), Stage(1, 2 * settings.finalists)]
+        drawn = shifted(middle, kind, placements, points, stages, share=share, cancel=cancel)
+        drawn = drawn.take(np.arange(min(len(drawn.costs), settings.finalists)))
+        placements, points = _finer(middle, fine, drawn.placements, drawn.points)
+        stages = [Stage(1, settings.finalists)]
+    else:
+        placements, points = _finer(coarse, fine, placements, points)
+        stages = [
+            Stage(4, settings.starts),
+            Stage(2, 2 * settings.finalists),
+            Stage(1, settings.finalists),
+        ]
+    return shifted(fine, kind, placements, points, stages, share=share, cancel=cancel)
+
+
+def _best_coarse(
+    body: Elastic, kind: IsohedralClass, settings: BendingSettings
+) -> tuple[Placements, Complex]:
+    """Placements whose tiles cost least, with these: few points, all placements side by side."""
+    outline = body.rest[: body.size]
+    placements = best_placements(kind, outline, settings.placements)
+    z, space = drawn_to_tiles(body, kind, placements)
+    rough, _ = _costs(body, z)
+    chosen = np.argsort(rough, kind="stable")[: settings.held]
+    picked = placements._replace(turns=space.turns).take(chosen)
+    tiles = held_on_tiles(body, TileSpace(kind, picked), z[:, chosen], FIRST_ROUNDS)
+    costs, sound = _costs(body, tiles.points)
+    order = np.lexsort((costs, ~sound))
+    outlines = tiles.points[: body.size].T
+
+    def twins(a: int, b: int) -> bool:
+        return _apart(outlines[a], outlines[b]) <= TWIN
+
+    fresh = np.array(_unlike(order.tolist(), settings.starts, twins), dtype=np.int64)
+    return tiles.placements.take(fresh), tiles.points[:, fresh]
+
+
+def _finer(
+    body: Elastic, finer: Elastic, placements: Placements, points: Complex
+) -> tuple[Placements, Complex]:
+    """The same placements, and shapes (N, C) much like those given, of a body with more points."""
+    n, multiple = body.size, finer.size // body.size
+    closed = np.vstack([points[:n], points[:1]])
+    below, part = np.divmod(np.arange(finer.size), multiple)
+    share = (part / multiple)[:, None]
+    outline = (1 - share) * closed[below] + share * closed[below + 1]
+    rest = np.repeat(finer.rest[:, None], outline.shape[1], axis=1)
+    more = placements._replace(
+        lengths=placements.lengths * multiple, starts=placements.starts * multiple
+    )
+    return more, finer.pulled(rest, outline, FOLLOWING, 6)
+
+
+def _detailed(
+    hand: Hand, body: Elastic, kind: IsohedralClass, one: Drawn, rounds: int
+) -> Bent | None:
+    """One placement of the fine outline worked out with a body; None if it crosses itself."""
+    tiles = held_on_tiles(body, TileSpace(kind, one.placements), one.points, rounds)
+    ring = tiles.points[: body.size, 0]
+    polygon = plane_points(ring)
+    area = float(signed_area(polygon))
+    simple = shapely.is_valid(shapely.Polygon(polygon))
+    if not simple or area < 0.1 or np.linalg.det(tiles.linear[0]) < 1e-6:
+        return None
+    return Bent(
+        hand,
+        tiles.points[:, 0],
+        tiles.linear[0],
+        tiles.offset[0],
+        tiles.placements,
+        body.pulled(tiles.points, tiles.points[: body.size], RELAXED, 3)[: body.size, 0],
+        fidelity(body.rest[: body.size], ring, float(hand.fine.cost(tiles.points)[0])),
+        narrowest_neck(polygon).share,
+    )
+
+
+def _costs(body: Elastic, z: Complex) -> tuple[Array, NDArray[np.bool_]]:
+    """Costs (C,) of shapes, and which of them do not cross themselves."""
+    rings = plane_points(z[: body.size].T)
+    area = signed_area(rings)
+    sound = np.asarray(shapely.is_valid(shapely.polygons(rings))) & (area > 0.1)
+    return body.energy(z) / np.maximum(area, 0.1) + body.stiffness.pose * body.displacement(
+        z
+    ), sound
+
+
+def _unlike(items: Iterable[Item], count: int, twins: Callable[[Item, Item], bool]) -> list[Item]:
+    """The first `count` items at most, without twins of earlier ones."""
+    kept: list[Item] = []
+    for item in items:
+        if len(kept) == count:
+            break
+        if not any(twins(item, other) for other in kept):
+            kept.append(item)
+    return kept
+
+
+def _apart(a: Complex, b: Complex) -> float:
+    """Mean squared distance of two outlines after the best similarity."""
+    factor = complex(best_similarity(a, b))
+    return float((abs(factor * (a - a.mean()) - (b - b.mean())) ** 2).mean())

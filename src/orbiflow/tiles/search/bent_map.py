@@ -1,0 +1,162 @@
+"""The map from a silhouette to a tile that it was bent to: its mesh, laid onto the tile's polygon."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from orbiflow.arrays import Array, Integers
+from orbiflow.errors import OrbiflowError
+from orbiflow.tiles.geometry import arc_lengths
+from orbiflow.tiles.search.bending import Bent
+from orbiflow.tiles.silhouette import Bending, Mesh, unfolded
+from orbiflow.tiles.tilings import Tile
+from orbiflow.typed_shapely import ufuncs
+
+SAME = 1e-9
+"""Distance along the outline, in outlines, below which points are one."""
+
+
+def map_of_bent(bent: Bent, factor: complex, shift: complex, tile: Tile) -> Bending:
+    """Return the map that a bent silhouette and its similarity z -> factor z + shift make.
+
+    Args:
+        bent: a silhouette that is a tile.
+        factor, shift: of the similarity, in the frame of the hand that was bent.
+        tile: extracted from it, in the target's normal form: a mirrored hand's is reflected back.
+            It may have fewer vertices than the bent outline: the outline is laid onto it.
+
+    Raises:
+        OrbiflowError: if the silhouette's inside cannot follow without folds.
+    """
+    hand = bent.hand
+    flip = np.array([1.0, -1.0]) if hand.mirrored else np.ones(2)
+    z = factor * bent.points + shift
+    placement, n = bent.placement, hand.fine.size
+    first = np.cumsum(placement.lengths[0]) - placement.lengths[0]
+    mesh, images = onto_polygon(
+        hand.fine.mesh,
+        np.stack([z.real, z.imag], axis=-1),
+        tile.polygon * flip,
+        (first + placement.starts[0]) % n,
+        np.array(tile.corners),
+    )
+    images = unfolded(mesh, images)
+    triangles = mesh.triangles[:, ::-1] if hand.mirrored else mesh.triangles
+    return Bending(mesh.points * flip, images * flip, triangles)
+
+
+def onto_polygon(
+    mesh: Mesh, images: Array, polygon: Array, corners: Integers, vertices: Integers
+) -> tuple[Mesh, Array]:
+    """Move the outline's images so that together they are the polygon.
+
+    Where a vertex of the polygon belongs to none of the outline's points, a point is put on the
+    outline and its triangle divided; points between two vertices are laid onto the side between them,
+    in proportion to where they were.
+
+    Args:
+        mesh: of the silhouette.
+        images: (N, 2) of its points; the outline's lie near the polygon.
+        polygon: (Q, 2), run through as the outline is.
+        corners: (K,) of the outline's points, in order.
+        vertices: (K,) of the polygon's vertices: where the corners go.
+
+    Returns:
+        The mesh, with more points where need be, and their images.
+
+    Raises:
+        OrbiflowError: if the corners do not run round the outline and the polygon once.
+    """
+    n, outline = mesh.size, mesh.size + len(mesh.sides)
+    knots = arc_lengths(np.roll(images[:n], -corners[0], axis=0))
+    polygon = np.roll(polygon, -vertices[0], axis=0)
+    own, goal = (corners - corners[0]) % n, (vertices - vertices[0]) % len(polygon)
+    if len(own) != len(goal) or (np.diff(own) < 1).any() or (np.diff(goal) < 1).any():
+        raise OrbiflowError("the corners of the outline and the polygon do not correspond")
+    places = _places(np.roll(images[:n], -corners[0], axis=0), polygon, knots, own, goal)
+
+    share: Array = (np.concatenate([np.arange(n), mesh.sides + mesh.shares]) - corners[0]) % n
+    known = np.interp(share, np.arange(n + 1), knots)
+    order = np.argsort(known)
+    places, fresh = _snapped(places, known[order], knots[-1])
+    closed = np.append(places, knots[-1])
+    along = np.concatenate([known, places[fresh]])
+    laid = np.stack(
+        [np.interp(along, closed, np.append(column, column[0])) for column in polygon.T], axis=-1
+    )
+    at = np.interp(places[fresh], knots, np.arange(n + 1)) + corners[0]
+    divided = _with_points(mesh, at % n, order, np.searchsorted(known[order], places[fresh]))
+    return divided, np.concatenate([laid, images[outline:]])
+
+
+def _places(ring: Array, polygon: Array, knots: Array, own: Integers, goal: Integers) -> Array:
+    """(Q,) where on the ring, in arc length, the polygon's vertices belong: increasing from 0."""
+    lengths = arc_lengths(polygon)
+    closed, loop = np.concatenate([ring, ring[:1]]), np.concatenate([polygon, polygon[:1]])
+    found = np.empty(len(polygon))
+    ends = zip(own, [*own[1:], len(ring)], goal, [*goal[1:], len(polygon)], strict=True)
+    for a, b, p, q in ends:
+        edge = shapely.LineString(closed[a : b + 1])
+        at = knots[a] + ufuncs.line_locate_point(edge, ufuncs.points(loop[p : q + 1]))
+        at[0], at[-1] = knots[a], knots[b]
+        at = _on_vertices(at, loop[p : q + 1], closed[a : b + 1], knots[a : b + 1])
+        if (np.diff(at) <= SAME * knots[-1]).any():
+            # where the edge comes back to itself the nearest point may be out of order
+            at = np.interp(lengths[p : q + 1], lengths[[p, q]], knots[[a, b]])
+        found[p:q] = at[:-1]
+    return found
+
+
+def _on_vertices(at: Array, vertices: Array, points: Array, knots: Array) -> Array:
+    """Put those vertices that are points of the edge exactly there."""
+    apart = abs(vertices[:, None] - points[None]).max(axis=2)
+    nearest = apart.argmin(axis=1)
+    same = apart.min(axis=1) < SAME
+    same[[0, -1]] = False
+    return np.where(same, knots[nearest], at)
+
+
+def _snapped(places: Array, known: Array, total: float) -> tuple[Array, NDArray[np.bool_]]:
+    """Places moved to the known ones that they agree with, and which agree with none."""
+    after = np.searchsorted(known, places).clip(1, len(known) - 1)
+    near = np.where(
+        places - known[after - 1] < known[after] - places, known[after - 1], known[after]
+    )
+    fresh = abs(near - places) > SAME * total
+    return np.where(fresh, places, near), fresh
+
+
+def _with_points(mesh: Mesh, at: Array, order: Integers, slots: Integers) -> Mesh:
+    """The mesh with points on the outline at `at` (m,), in vertices from the first.
+
+    Point j lies between the outline's points `order[slots[j] - 1]` and `order[slots[j]]`, and after
+    those before it in the same gap.
+    """
+    if not len(at):
+        return mesh
+    n, outline = mesh.size, mesh.size + len(mesh.sides)
+    side = np.minimum(np.floor(at).astype(np.int64), n - 1)
+    start, end = mesh.points[side], mesh.points[(side + 1) % n]
+    points = start + (at - side)[:, None] * (end - start)
+    triangles = np.where(mesh.triangles >= outline, mesh.triangles + len(at), mesh.triangles)
+    owner = {(t[k - 1], t[k]): (i, k) for i, t in enumerate(triangles.tolist()) for k in range(3)}
+    rows = triangles.tolist()
+    for slot in np.unique(slots):
+        a, b = int(order[slot - 1]), int(order[slot % len(order)])
+        i, k = owner[a, b]
+        apex = rows[i][k - 2]
+        chain = [a, *(outline + np.flatnonzero(slots == slot)).tolist(), b]
+        pieces = [[u, v, apex] for u, v in pairwise(chain)]
+        rows[i] = pieces[0]
+        rows += pieces[1:]
+    return Mesh(
+        np.concatenate([mesh.points[:outline], points, mesh.points[outline:]]),
+        np.array(rows, dtype=np.int64),
+        np.concatenate([mesh.sides, side]),
+        np.concatenate([mesh.shares, at - side]),
+        n,
+    )

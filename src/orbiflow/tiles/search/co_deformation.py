@@ -1,0 +1,224 @@
+"""Co-deformation: a silhouette bends, as rigidly as it can, until it is a tile (design point 15).
+
+Hundreds of placements side by side. First springs draw each outline to the nearest tile of its class,
+which is taken anew after every step, and tighten; one factorization serves all placements and all
+classes. Then each outline is held in the linear space of its placement's tiles and the energy is
+minimised there: rotations in turn with one small linear system.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+import scipy.linalg
+
+from orbiflow.arrays import Array, Complex
+from orbiflow.tiles.likeness import (
+    Elastic,
+    Pinned,
+    Stiffness,
+)
+from orbiflow.tiles.search.placements import Placements
+from orbiflow.tiles.search.settings import BendingSettings
+from orbiflow.tiles.search.tile_space import TileSpace
+from orbiflow.tiles.silhouette import (
+    Emphasis,
+    Pins,
+    Samples,
+    Target,
+    sampled,
+    triangulate,
+)
+from orbiflow.tiles.tilings import IsohedralClass
+
+TIGHTER = tuple(np.geomspace(1.2, 3000.0, 9))
+"""Strengths of the springs, stage by stage."""
+
+ROUNDS = 3
+"""Steps of each stage."""
+
+
+class BentTiles(NamedTuple):
+    """C bent silhouettes that are tiles.
+
+    - `points`: (N, C) of the body; the first n rows are the tile's vertices.
+    - `linear`, `offset`: (C, 2, 2) and (C, 2), the map from the group's own frame.
+    - `placements`: C of them, with the glide axes' final turns.
+    """
+
+    points: Complex
+    linear: Array
+    offset: Array
+    placements: Placements
+
+
+def drawn_to_tiles(
+    body: Elastic,
+    kind: IsohedralClass,
+    placements: Placements,
+    *,
+    strengths: tuple[float, ...] = TIGHTER,
+    rounds: int = ROUNDS,
+) -> tuple[Complex, TileSpace]:
+    """Bend a body towards tiles of a class by springs that tighten.
+
+    Args:
+        body: whose outline has as many points as the placements have steps.
+        kind: the class.
+        placements: C of them.
+        strengths: of the springs, stage by stage.
+        rounds: steps of each stage.
+
+    Returns:
+        Shapes (N, C), nearly tiles, and the space of tiles with the glide axes turned to suit them.
+    """
+    space = TileSpace(kind, placements)
+    z = np.repeat(body.rest[:, None], space.count, axis=1)
+    for strength in strengths:
+        space.turn(space.best_turns(z[: body.size].T))
+        for _ in range(rounds):
+            tiles = space.nearest(z[: body.size].T)
+            z = body.pulled(z, space.in_order(tiles.vertices).T, strength, 1)
+    return z, space
+
+
+def held_on_tiles(body: Elastic, space: TileSpace, z: Complex, rounds: int) -> BentTiles:
+    """Minimise the energy among tiles: the outline moves in the space of its placement's tiles.
+
+    Args:
+        body: the silhouette.
+        space: of tiles, C placements.
+        z: shapes (N, C) to start from.
+        rounds: of choosing rotations and solving.
+    """
+    condensed = body.condensed
+    low = condensed.low
+    parts = [_Reduced(condensed.outline, low, *space.matrices(k)) for k in range(space.count)]
+    outline = np.empty((body.size, space.count), dtype=complex)
+    for _ in range(rounds):
+        forces = body.forces(z)
+        own = condensed.forces(forces)
+        for k, part in enumerate(parts):
+            outline[:, k] = part.solve(own[:, k])
+        z = condensed.whole(outline, forces)
+    groups = [space.group(k, part.parameters) for k, part in enumerate(parts)]
+    return BentTiles(
+        z,
+        np.array([linear for linear, _ in groups]).reshape(-1, 2, 2),
+        np.array([offset for _, offset in groups]).reshape(-1, 2),
+        space.placements._replace(turns=space.turns),
+    )
+
+
+class _Reduced:
+    """The outline's equations in the parameters of one placement's tiles."""
+
+    def __init__(self, matrix: Array, low: Complex | None, real: Array, imaginary: Array) -> None:
+        self.real, self.imaginary = real, imaginary
+        own = real.T @ (matrix @ real) + imaginary.T @ (matrix @ imaginary)
+        if low is not None:
+            less = low.conj().T @ (real + 1j * imaginary)
+            own -= (less.conj().T @ less).real
+        # IH1 does not care about the offset
+        own[np.diag_indices_from(own)] += 1e-10 * np.trace(own) / len(own)
+        self.factor = scipy.linalg.cho_factor(own, overwrite_a=True, check_finite=False)
+        self.parameters = np.zeros(len(own))
+
+    def solve(self, force: Complex) -> Complex:
+        right = self.real.T @ force.real + self.imaginary.T @ force.imag
+        self.parameters = scipy.linalg.cho_solve(self.factor, right, check_finite=False)
+        return self.real @ self.parameters + 1j * (self.imaginary @ self.parameters)
+
+
+FIRM = Stiffness(salience=-0.5, pose=60.0)
+"""Of the search: bodies and heads are stiff; thin parts are not, and keep their places.
+
+Tiles bent so cost more by the usual stiffness than the least, and are seen to be more like the
+silhouette: docs/likeness.md has the comparison.
+"""
+
+SOFT = Stiffness(salience=0.0)
+"""Of the search where too few tiles of a firm body are simple: many long limbs, which cross."""
+
+
+class Bodies(NamedTuple):
+    """An elastic silhouette with few points, more and all."""
+
+    coarse: Elastic
+    middle: Elastic
+    fine: Elastic
+
+
+@dataclass(frozen=True, eq=False)
+class Hand:
+    """A silhouette or its mirror image.
+
+    - `mirrored`: whether the latter.
+    - `samples`: points of its outline, coarse to fine.
+    - `made`: the elastic body of a level of points, "coarse", "middle" or "fine", and a stiffness.
+    """
+
+    mirrored: bool
+    samples: Samples
+    made: Callable[[str, Stiffness], Elastic]
+    _bodies: dict[Stiffness, Bodies] = field(default_factory=dict[Stiffness, Bodies])
+
+    @cached_property
+    def fine(self) -> Elastic:
+        """The body of usual stiffness with all points: what costs are measured by."""
+        return self.made("fine", Stiffness())
+
+    def bodies(self, stiffness: Stiffness) -> Bodies:
+        """The bodies of a stiffness, made when they are first asked for."""
+        found = self._bodies.get(stiffness)
+        if found is None:
+            coarse, fine = self.made("coarse", stiffness), self.made("fine", stiffness)
+            same = len(self.samples.middle) == len(self.samples.fine)
+            middle = fine if same else self.made("middle", stiffness)
+            found = self._bodies[stiffness] = Bodies(coarse, middle, fine)
+        return found
+
+
+def hands(
+    target: Target,
+    settings: BendingSettings,
+    *,
+    emphasis: Emphasis | None = None,
+    pins: Pins | None = None,
+) -> tuple[Hand, Hand]:
+    """The silhouette and its mirror image in the x axis, ready to be bent.
+
+    Args:
+        target: the silhouette.
+        settings: of the search.
+        emphasis: what is to bend less, by as much as it matters more.
+        pins: what is not to bend.
+
+    Raises:
+        OrbiflowError: for a silhouette that cannot be sampled or triangulated.
+    """
+    phase = float(np.random.default_rng(settings.seed).random()) if settings.seed else 0.0
+    samples = sampled(np.asarray(target.normal), phase, settings.multiples)
+    # read backwards from the same first point: every k-th fine point stays beside a coarse one
+    mirror = Samples(*(np.roll(part[::-1], 1, axis=0) * (1.0, -1.0) for part in samples))
+
+    def hand(points: Samples, mirrored: bool) -> Hand:
+        meshes = {name: triangulate(ring) for name, ring in points._asdict().items()}
+
+        def made(level: str, stiffness: Stiffness) -> Elastic:
+            ring: Array = getattr(points, level)
+            mesh = meshes[level]
+            own = mesh.points * ((1.0, -1.0) if mirrored else (1.0, 1.0))
+            stiff = None if emphasis is None else emphasis.weight(own)
+            if pins is None:
+                return Elastic(ring, stiffness, stiff=stiff, mesh=mesh)
+            parts, angle = pins.parts(own, mesh.triangles), pins.keep_angle
+            return Pinned(ring, parts, stiffness, keep_angle=angle, stiff=stiff, mesh=mesh)
+
+        return Hand(mirrored, points, made)
+
+    return hand(samples, False), hand(mirror, True)

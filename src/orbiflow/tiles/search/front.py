@@ -1,0 +1,112 @@
+"""A short list from two searches: tiles that no other beats in deformation and overlap together.
+
+The front of Pareto: a tile is on it if no other has at most its deformation and at least its IoU, and
+one of them better.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from orbiflow.arrays import Array
+from orbiflow.tiles.geometry import orient
+from orbiflow.tiles.likeness import laid_on, mutual_iou
+from orbiflow.tiles.search.co_deformation import Hand
+from orbiflow.tiles.tile import EscherTile
+
+MOST = 12
+"""Tiles in the list."""
+
+ALIKE = 0.9
+"""Mutual IoU from which two tiles are one to the eye."""
+
+NEAR = 0.15
+"""How far behind the front a tile may be that fills up the list."""
+
+WORTH = 0.2
+"""IoU that is worth as much as all of the deformation, behind the front."""
+
+
+def front_list(results: Sequence[EscherTile]) -> list[EscherTile]:
+    """At most twelve tiles: those on the front, no two of them alike, then some behind it.
+
+    The tile of least deformation and that of largest IoU are chosen first, then the others on the
+    front, from each search in turn in the order of `results`; what has a mutual IoU of 0.9 with an
+    earlier one is left out. While there is room, the first of each search follows, which it would
+    show alone, and tiles that one on the front beats by at most 15% of their deformation and .03 of
+    IoU, nearest first. Tiles without a deformation (forced ones that cross themselves) come last.
+
+    Args:
+        results: with their deformation measured, best first.
+
+    Returns:
+        The list in the order of `results`, with `front` set.
+    """
+    measured = [k for k, result in enumerate(results) if result.deformation is not None]
+    odd = [k for k, result in enumerate(results) if result.deformation is None]
+    cost = np.array([results[k].deformation for k in measured], dtype=np.float64)
+    overlap = np.array([results[k].metrics.iou for k in measured])
+    objectives = [results[k].objective for k in measured]
+    late = behind(cost, overlap)
+    ends = [] if not measured else [int(np.lexsort((-overlap, cost))[0]), int(overlap.argmax())]
+    order = [k for k in ends if late[k] == 0]
+    # in turn from each search: one must not crowd the other out
+    own = [objectives[:k].count(objectives[k]) for k in range(len(objectives))]
+    order += [int(k) for k in np.argsort(own, kind="stable") if late[k] == 0]
+    order += [objectives.index(objective) for objective in dict.fromkeys(objectives)]
+    order += [int(k) for k in np.argsort(late, kind="stable") if 0 < late[k] <= NEAR]
+    alike = mutual_iou([results[k].normal_tile.polygon for k in measured], ALIKE)
+    chosen: list[int] = []
+    for k in dict.fromkeys(order):
+        if len(chosen) < MOST and all(alike(k, other) < ALIKE for other in chosen):
+            chosen.append(k)
+    kept = sorted([measured[k] for k in chosen] + odd[: MOST - len(chosen)])
+    on_front = {measured[k] for k in chosen if late[k] == 0}
+    return [results[k].changed(front=k in on_front) for k in kept]
+
+
+def behind(cost: Array, overlap: Array) -> Array:
+    """(n,) how far each point is behind the nearest on the front that beats it; 0 on the front.
+
+    The larger of two shares: that of its cost which the other saves, and that of `WORTH` by which the
+    other's overlap is larger.
+
+    >>> behind(np.array([1.0, 1.25, 2.0, 1.3]), np.array([0.7, 0.68, 0.9, 0.68])).round(3)
+    array([0.   , 0.2  , 0.   , 0.231])
+    """
+    # row k: what beats point k
+    beats = (cost <= cost[:, None]) & (overlap >= overlap[:, None])
+    beats &= (cost < cost[:, None]) | (overlap > overlap[:, None])
+    on_front = ~beats.any(axis=1)
+    saved = (cost[:, None] - cost) / np.maximum(cost[:, None], 1e-12)
+    late = np.maximum(saved, (overlap - overlap[:, None]) / WORTH)
+    late = np.where(beats & on_front, late, np.inf).min(axis=1, initial=np.inf)
+    return np.where(on_front, 0.0, late)
+
+
+def deformation(hand: Hand, ring: Array) -> float:
+    """What it costs to bend a silhouette until its outline is a ring: as `Elastic.cost`.
+
+    The forgiving energy in areas of the bent silhouette, and its displacement, at the best laying
+    that `likeness.laid.laid_on` finds: outline points correspond by dynamic programming, four times
+    with other weights, and slide along the ring, which may change its size, while the energy falls.
+    So it is an upper bound of the least cost, as the search's own cost of a tile that it found is.
+
+    Args:
+        hand: the silhouette as it is, not mirrored.
+        ring: (M, 2) simple, in the normal form, laid over the silhouette.
+    """
+    body = hand.fine
+    z = laid_on(body, orient(ring, counter_clockwise=True))
+    return float(body.cost(z[:, None])[0])
+
+
+def measured(result: EscherTile, hand: Hand) -> EscherTile:
+    """A tile with its deformation, the least that is known; without one if it crosses itself."""
+    if not result.certificate.simple:
+        return result
+    found = deformation(hand, result.normal_tile.polygon)
+    known = result.deformation
+    return result.changed(deformation=found if known is None else min(found, known))

@@ -1,0 +1,312 @@
+"""Candidate tiles of one class: D = A o L o flow applied to the template (design points 6-8)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Self
+
+import numpy as np
+import torch
+from numpy.typing import ArrayLike
+from torch import Tensor, nn
+
+from orbiflow.arguments import (
+    instance,
+    is_a,
+    number,
+    numbers,
+    whole,
+)
+from orbiflow.arrays import Array
+from orbiflow.errors import OrbiflowError
+from orbiflow.fields import FourierField
+from orbiflow.flows import Flow
+from orbiflow.symmetry import CrystallographicGroup
+from orbiflow.tiles.geometry import subdivided
+from orbiflow.tiles.search.prototiles import Prototiles
+from orbiflow.tiles.tilings import IsohedralClass
+from orbiflow.tiles.tilings import isohedral_class as class_of
+from orbiflow.typed_torch import linalg
+
+
+class TileModel(nn.Module):
+    """A stack of S candidate tiles of one isohedral class, in the target's normal form.
+
+    The flow commutes with the class's group in the group's own frame; the lattice freedom L and the
+    similarity A come after it, composed and not mixed in: the paper's V_sym(A^-1 z) loses the glide
+    reflections as soon as A rotates (design point 6). A template of area 1 is the start.
+
+    Certificates outlive a change of precision: `.float()`, `.half()`, `.to(...)` round the parameters,
+    which only makes another tile, but `vertices`, whose identified edges must correspond, stay float64
+    whatever is asked, and the group's pose and the polygon (`extract_tile`) are computed in float64.
+
+    Args:
+        isohedral_class: of all S tiles, or its name.
+        angles: (S,) turn of each start, in radians; a number is one.
+        mirrored: (S,) whether A reverses orientation; default no.
+        max_frequency: Omega of the fields.
+        segments: stationary pieces of the flow.
+        smoothness: Sobolev exponent of the fields' parameters.
+        steps, method: of the integrator.
+        dtype: of all parameters.
+        prototiles: S start tiles with their poses, in place of the template; `angles` and `mirrored`
+            are then taken from them.
+
+    Shapes:
+        points (S, N, 2) throughout; arrays and lists are taken as tensors of the model's dtype.
+
+    Raises:
+        OrbiflowError: for arguments that cannot be used, by name.
+    """
+
+    mirror: Tensor
+    vertices: Tensor | None
+    corners: Tensor | None
+
+    def __init__(
+        self,
+        isohedral_class: IsohedralClass | str | int,
+        angles: Tensor | ArrayLike | None = None,
+        *,
+        mirrored: Tensor | ArrayLike | None = None,
+        max_frequency: int = 10,
+        segments: int = 1,
+        smoothness: float = 1.0,
+        steps: int = 8,
+        method: str = "rk4",
+        dtype: torch.dtype = torch.float64,
+        prototiles: Prototiles | None = None,
+    ) -> None:
+        super().__init__()
+        isohedral_class = class_of(isohedral_class)
+        if not (is_a(dtype, torch.dtype) and dtype.is_floating_point):
+            raise OrbiflowError(
+                f"dtype must be a floating-point type such as torch.float64, got {dtype}"
+            )
+        number(smoothness, "smoothness", 0)
+        whole(segments, "segments", 1)
+        if prototiles is not None:
+            instance(prototiles, Prototiles, "prototiles")
+            angles, mirrored = prototiles.angle, prototiles.mirrored
+        if angles is None:
+            raise OrbiflowError("a tile model needs angles or prototiles")
+        turns = torch.as_tensor(np.atleast_1d(numbers(angles, "angles", (...,))))
+        if turns.ndim != 1 or not len(turns):
+            raise OrbiflowError(
+                f"angles: expected shape (S,), S at least 1, got {tuple(turns.shape)}"
+            )
+        size = len(turns)
+        self.isohedral_class = isohedral_class
+        self.group: CrystallographicGroup = isohedral_class.group()
+        area = self.group.cell_volume / self.group.order
+        self.angle = nn.Parameter(turns.to(dtype))
+        self.log_scale = nn.Parameter(torch.full((size,), -0.5 * math.log(area), dtype=dtype))
+        self.offset = nn.Parameter(torch.zeros(size, 2, dtype=dtype))
+        self.shape = nn.Parameter(torch.zeros(size, isohedral_class.shape_dim, dtype=dtype))
+        self.stretch = nn.Parameter(torch.zeros(size, isohedral_class.stretch_dim, dtype=dtype))
+        flips = np.zeros(size) if mirrored is None else numbers(mirrored, "mirrored", (size,))
+        self.register_buffer("mirror", torch.as_tensor(flips != 0))
+        fields = [
+            FourierField(self.group, max_frequency, batch=size, smoothness=smoothness, dtype=dtype)
+            for _ in range(segments)
+        ]
+        self.flow = Flow(fields, steps=steps, method=method, warn=False)
+        self.max_frequency = max_frequency
+        self.segments = segments
+        self.smoothness = smoothness
+        self._start_from(prototiles)
+
+    @torch.no_grad()
+    def _start_from(self, prototiles: Prototiles | None) -> None:
+        if prototiles is None:
+            self.register_buffer("vertices", None)
+            self.register_buffer("corners", None)
+            self.recentre()
+            return
+        kind = self.isohedral_class
+        own = prototiles.corners.shape[-1], prototiles.stretch.shape[-1]
+        if own != (len(kind.template()), kind.stretch_dim):
+            raise OrbiflowError(f"the prototiles are not of class {kind.name}")
+        self.register_buffer("vertices", torch.tensor(prototiles.vertices, dtype=torch.float64))
+        self.register_buffer("corners", torch.tensor(prototiles.corners))
+        for name in ("log_scale", "offset", "stretch"):
+            getattr(self, name).copy_(torch.as_tensor(getattr(prototiles, name)))
+
+    @property
+    def size(self) -> int:
+        """Number S of candidates."""
+        return len(self.angle)
+
+    def template(self) -> Tensor:
+        """Vertices (S, K, 2) of each candidate's template."""
+        return self.isohedral_class.template(self.shape)
+
+    def linear(self) -> Tensor:
+        """The linear part of A o L, (S, 2, 2)."""
+        return self._linear(self.angle.dtype)
+
+    def _linear(self, dtype: torch.dtype) -> Tensor:
+        angle, log_scale, stretch = (
+            p.to(dtype) for p in (self.angle, self.log_scale, self.stretch)
+        )
+        c, s = angle.cos(), angle.sin()
+        sign = torch.where(self.mirror, -1.0, 1.0).to(dtype)
+        turn = torch.stack([torch.stack([c, -s * sign], -1), torch.stack([s, c * sign], -1)], -2)
+        return log_scale.exp()[:, None, None] * turn @ self.isohedral_class.stretch(stretch)
+
+    @torch.no_grad()
+    def recentre(self) -> None:
+        """Put each template's centre at the target's centroid, by the offset."""
+        center = self.template().mean(dim=-2, keepdim=True) @ self.linear().mT
+        self.offset.copy_(-center[:, 0])
+
+    def place(self, points: Tensor) -> Tensor:
+        """A o L at points (S, N, 2) of the group's frame."""
+        return self._points(points) @ self.linear().mT + self.offset[:, None, :]
+
+    def unplace(self, points: Tensor) -> Tensor:
+        """(A o L)^-1 at points (N, 2) or (S, N, 2) of the target's normal form."""
+        return (self._points(points) - self.offset[:, None, :]) @ linalg.inv(self.linear()).mT
+
+    def forward(self, points: Tensor) -> Tensor:
+        """D at points (S, N, 2) of the group's frame."""
+        return self.place(self.flow(self._points(points)))
+
+    def inverse(self, points: Tensor) -> Tensor:
+        """D^-1 at points (N, 2) or (S, N, 2) of the target's normal form."""
+        return self.flow.inverse(self.unplace(points))
+
+    def _points(self, points: Tensor | ArrayLike) -> Tensor:
+        """`points` if they suit the model; arrays and lists become tensors of its dtype."""
+        if not isinstance(points, Tensor):
+            return torch.as_tensor(
+                numbers(points, "points", (..., "N", 2), finite=False),
+                dtype=self.angle.dtype,
+                device=self.angle.device,
+            )
+        if points.dtype != self.angle.dtype:
+            raise OrbiflowError(
+                f"points are {points.dtype}, the model is {self.angle.dtype}: give points.to(...) or "
+                "convert the model"
+            )
+        if points.ndim < 2 or points.shape[-1] != 2:
+            raise OrbiflowError(f"points: expected shape (S, N, 2), got {tuple(points.shape)}")
+        return points
+
+    def prototile(self) -> tuple[Tensor, Tensor]:
+        """What the flow starts from: vertices (S, N, 2) and the corners' indices (S, K)."""
+        if self.vertices is None or self.corners is None:
+            template = self.template()
+            corners = torch.arange(template.shape[1], device=template.device)
+            return template, corners.expand(len(template), -1)
+        return self.vertices.to(self.angle.dtype), self.corners
+
+    def boundary(self, pieces: int) -> Tensor:
+        """Points (S, N pieces, 2) along the prototile, `pieces` evenly spaced on each side.
+
+        Identified edges have as many sides each, so their samples correspond.
+        """
+        whole(pieces, "pieces", 1)
+        vertices, _ = self.prototile()
+        return subdivided(vertices, pieces)
+
+    def take(self, indices: Sequence[int] | int) -> TileModel:
+        """A new model with the candidates at `indices` only, at the same parameters.
+
+        Raises:
+            OrbiflowError: for indices that are not candidates, and for none.
+        """
+        chosen = self._chosen(indices)
+        fields = [field.parameters_.detach()[chosen] for field in self.fourier_fields()]
+        return self.with_fields(fields, chosen)
+
+    def _chosen(self, indices: Sequence[int] | int) -> list[int]:
+        several = indices if isinstance(indices, Sequence | np.ndarray) else [indices]
+        chosen = [whole(i, "a candidate's index", 0, self.size - 1) for i in several]
+        if not chosen:
+            raise OrbiflowError(f"choose at least one of the {self.size} candidates")
+        return chosen
+
+    @staticmethod
+    @torch.no_grad()
+    def joined(models: Sequence[TileModel]) -> TileModel:
+        """The candidates of models that differ in their parameters alone, as one stack.
+
+        Raises:
+            OrbiflowError: for no models, and for models of several classes.
+        """
+        names = {model.isohedral_class.name for model in models}
+        if len(names) != 1:
+            raise OrbiflowError(f"models of one class can be joined, got {sorted(names) or 'none'}")
+        first = models[0]
+        stack = first.take([0] * sum(model.size for model in models))
+        parts = [dict(model.named_parameters()) for model in models]
+        for name, parameter in stack.named_parameters():
+            parameter.copy_(torch.cat([part[name] for part in parts]))
+        stack.mirror = torch.cat([model.mirror for model in models])
+        if first.vertices is not None and first.corners is not None:
+            stack.vertices = torch.cat([m.vertices for m in models if m.vertices is not None])
+            stack.corners = torch.cat([m.corners for m in models if m.corners is not None])
+        return stack
+
+    def fourier_fields(self) -> list[FourierField]:
+        """The segments of the flow."""
+        return [field for field in self.flow.segments if isinstance(field, FourierField)]
+
+    @torch.no_grad()
+    def with_fields(self, fields: list[Tensor], indices: list[int] | None = None) -> TileModel:
+        """The candidates at `indices` (default all) with another flow: one segment for each field.
+
+        Args:
+            fields: parameters (len(indices), P) of each segment, under this model's smoothness.
+            indices: of the candidates.
+        """
+        chosen = list(range(self.size)) if indices is None else indices
+        model = TileModel(
+            self.isohedral_class,
+            np.zeros(len(chosen)),  # a fit that ran away has angles that none may begin with
+            mirrored=self.mirror[chosen],
+            max_frequency=self.max_frequency,
+            segments=len(fields),
+            smoothness=self.smoothness,
+            steps=self.flow.steps,
+            method=self.flow.method,
+            dtype=self.angle.dtype,
+        ).to(self.angle.device)
+        for name in ("angle", "log_scale", "offset", "shape", "stretch"):
+            getattr(model, name).copy_(getattr(self, name)[chosen])
+        if self.vertices is not None and self.corners is not None:
+            model.vertices = self.vertices[chosen].clone()
+            model.corners = self.corners[chosen].clone()
+        for own, parameters in zip(model.fourier_fields(), fields, strict=True):
+            own.parameters_.copy_(parameters)
+        return model
+
+    def require_single(self) -> None:
+        """Do nothing if the model holds one candidate.
+
+        Raises:
+            OrbiflowError: if it holds more.
+        """
+        if self.size != 1:
+            raise OrbiflowError(f"take one candidate first: this model holds {self.size}")
+
+    def placed_group(self) -> CrystallographicGroup:
+        """The group of a single candidate's tile, in the target's normal form.
+
+        Raises:
+            OrbiflowError: if the model holds more than one candidate.
+        """
+        self.require_single()
+        linear: Array = self._linear(torch.float64).detach().cpu().numpy()[0]
+        offset: Array = self.offset.detach().double().cpu().numpy()[0]
+        return self.group.conjugate(linear, np.asarray(offset))
+
+    def _apply(self, fn: Callable[[Tensor], Tensor], recurse: bool = True) -> Self:
+        # what .float(), .half() and .to(...) go through: the start follows them to a device alone
+        exact = {name: buffer for name, buffer in self._buffers.items() if buffer is not None}
+        super()._apply(fn, recurse)  # pyright: ignore[reportUnknownMemberType]
+        for name, buffer in exact.items():
+            setattr(self, name, buffer.to(getattr(self, name).device))
+        return self

@@ -1,0 +1,286 @@
+"""The paper's method: occupancy loss, affine phase, then flow phase (paper, section 4.1)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+import shapely
+import torch
+import torch.nn.functional as F
+from torch import Tensor
+
+from orbiflow.arguments import (
+    instance,
+    number,
+    numbers,
+    whole,
+)
+from orbiflow.flows import method as integrator
+from orbiflow.runtime import Cancel
+from orbiflow.tiles.search.fit import Progress, silent
+from orbiflow.tiles.search.model import TileModel
+from orbiflow.tiles.search.settings import check_max_frequency
+from orbiflow.tiles.search.starts import initial_poses, template_symmetries
+from orbiflow.tiles.silhouette import Target, signed_distance
+from orbiflow.tiles.tilings import IsohedralClass, isohedral_class
+from orbiflow.typed_shapely import ufuncs
+from orbiflow.typed_torch import (
+    adam,
+    linalg,
+    listed,
+)
+
+SHAPE_PENALTY = 0.02
+"""Factor of the squared displacement of a pentagon's free vertex: keeps the template simple."""
+
+
+@dataclass(frozen=True)
+class OccupancySettings:
+    """Knobs of the occupancy method; the defaults were measured on the paper's goals.
+
+    - `max_frequency`: Omega; 0 leaves the flow the translations that commute with the group.
+    - `turns`: starting rotations of the template.
+    - `finalists`: starts that survive the affine phase; a third of the flow phase later the better
+      half of them goes on.
+    - `affine_iterations`, `iterations`: steps of each phase.
+    - `points`: sample points an iteration.
+    - `hardness`: tau at the start and end of the flow phase, per unit of length (the target has
+      area 1); it grows geometrically.
+    - `penalty`: factor of the fields' Sobolev energy, start and end. Without it the flow folds
+      parts of the tile to nothing, which no integrator follows.
+    - `smoothness`: Sobolev exponent s of the fields.
+    - `segments`: stationary pieces of the flow.
+    - `steps`, `method`: integrator during the optimisation; results are judged at finer steps.
+    - `learning_rate`: of Adam on the fields.
+    - `seed`: of the sample points.
+    """
+
+    max_frequency: int = 10
+    turns: int = 12
+    finalists: int = 4
+    affine_iterations: int = 80
+    iterations: int = 200
+    points: int = 800
+    hardness: tuple[float, float] = (8.0, 70.0)
+    penalty: tuple[float, float] = (1e-2, 1e-3)
+    smoothness: float = 2.0
+    segments: int = 1
+    steps: int = 4
+    method: str = "midpoint"
+    learning_rate: float = 0.04
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        for name in ("turns", "finalists", "iterations", "points", "segments", "steps"):
+            whole(getattr(self, name), name, 1)
+        check_max_frequency(self.max_frequency)
+        integrator(instance(self.method, str, "method"))
+        whole(self.affine_iterations, "affine_iterations", 0)
+        number(self.smoothness, "smoothness", 0)
+        number(self.learning_rate, "learning_rate", 0, above=True)
+        for name in ("hardness", "penalty"):
+            for value in numbers(getattr(self, name), name, (2,)):
+                number(value, f"{name}, first and last,", 0, above=True)
+        whole(self.seed, "seed", 0, 2**32 - 1)
+
+
+class OccupancySamples:
+    """Points around a target and whether it contains them: the paper's Q and o(q).
+
+    A third is uniform in the target's bounding box with a margin of 0.2, the rest normally scattered
+    about the outline (standard deviations 0.02, 0.06, 0.15): far points teach little.
+    """
+
+    def __init__(
+        self, target: Target, count: int, *, seed: int, dtype: torch.dtype = torch.float32
+    ) -> None:
+        instance(target, Target, "the target", "Target.read and Target.from_polygon make one")
+        whole(count, "count", 1)
+        rng = np.random.default_rng(seed)
+        region = shapely.Polygon(target.normal)
+        uniform = count // 3
+        along = rng.random(count - uniform) * region.exterior.length
+        near = shapely.get_coordinates(ufuncs.line_interpolate_point(region.exterior, along))
+        spread = rng.choice([0.02, 0.06, 0.15], size=(len(near), 1))
+        near += spread * rng.standard_normal(near.shape)
+        low, high = target.normal.min(axis=0) - 0.2, target.normal.max(axis=0) + 0.2
+        points = np.concatenate([low + (high - low) * rng.random((uniform, 2)), near])
+        inside = shapely.contains_xy(region, points[:, 0], points[:, 1])
+        self.points = torch.tensor(points, dtype=dtype)
+        self.inside = torch.tensor(inside, dtype=dtype)
+        self._generator = torch.Generator().manual_seed(seed)
+
+    def draw(self, count: int) -> tuple[Tensor, Tensor]:
+        """A random batch: points (count, 2) and occupancies (count,)."""
+        chosen = torch.randint(len(self.points), (count,), generator=self._generator)
+        return self.points[chosen], self.inside[chosen]
+
+
+def occupancy_loss(
+    model: TileModel, points: Tensor, inside: Tensor, hardness: float, *, affine: bool = False
+) -> Tensor:
+    """Mean binary cross-entropy of sigmoid(tau phi(D^-1 q)) against o(q), one value a candidate.
+
+    phi is the signed distance to the template, rescaled to the target's units. (Paper, equation of
+    L.)
+
+    Args:
+        model: S candidates.
+        points: (N, 2), in the target's normal form.
+        inside: (N,) occupancies, 0 or 1.
+        hardness: tau.
+        affine: leave the flow out.
+    """
+    pulled = model.unplace(points) if affine else model.inverse(points)
+    phi = signed_distance(pulled, model.template()) * model.log_scale.exp()[:, None]
+    goal = torch.as_tensor(inside, dtype=phi.dtype).expand_as(phi)
+    return F.binary_cross_entropy_with_logits(hardness * phi, goal, reduction="none").mean(dim=-1)
+
+
+def fit_occupancy(
+    target: Target,
+    kind: IsohedralClass | str,
+    settings: OccupancySettings | None = None,
+    progress: Progress | None = None,
+    *,
+    cancel: Cancel | None = None,
+) -> TileModel:
+    """Fit tiles of one class to a target by the paper's method, all starts side by side.
+
+    Returns:
+        The surviving candidates, best loss first. They are not certified yet.
+
+    Raises:
+        Cancelled: if `cancel`, which is looked at before each step, says so.
+    """
+    kind = isohedral_class(kind)
+    instance(target, Target, "the target", "Target.read and Target.from_polygon make one")
+    settings = instance(settings or OccupancySettings(), OccupancySettings, "settings")
+    # the mean over the candidates is all that couples them: separate fits, one tensor
+    samples = OccupancySamples(target, 16384, seed=settings.seed)
+    cancel = cancel or Cancel()
+    model = _affine_phase(_start(kind, settings), samples, settings, cancel)
+    first = replace(settings, iterations=max(1, settings.iterations // 3))
+    told = progress or silent
+
+    def report(share: float, loss: float) -> None:
+        told(share, loss)
+        cancel.check()
+
+    model = _flow_phase(model, samples, settings, 0, first.iterations, report)
+    if model.size > 1:
+        model = _ranked(model, samples, settings.hardness[1], keep=(model.size + 1) // 2)
+    model = _flow_phase(model, samples, settings, first.iterations, settings.iterations, report)
+    return _ranked(model, samples, settings.hardness[1], keep=model.size)
+
+
+def _start(isohedral_class: IsohedralClass, settings: OccupancySettings) -> TileModel:
+    angles, mirrored = initial_poses(isohedral_class, settings.turns)
+    return TileModel(
+        isohedral_class,
+        angles,
+        mirrored=mirrored,
+        max_frequency=settings.max_frequency,
+        segments=settings.segments,
+        smoothness=settings.smoothness,
+        steps=settings.steps,
+        method=settings.method,
+        dtype=torch.float32,
+    )
+
+
+def _pose(model: TileModel) -> list[torch.nn.Parameter]:
+    return [model.angle, model.log_scale, model.offset, model.shape, model.stretch]
+
+
+def _affine_phase(
+    model: TileModel, samples: OccupancySamples, settings: OccupancySettings, cancel: Cancel
+) -> TileModel:
+    optimizer = adam(_pose(model), lr=0.03)
+    for _ in range(settings.affine_iterations):
+        cancel.check()
+        points, inside = samples.draw(512)
+        optimizer.zero_grad()
+        loss = occupancy_loss(model, points, inside, 15.0, affine=True)
+        torch.autograd.backward((loss + _shape_penalty(model)).sum())
+        optimizer.step()
+    ranked = _ranked(model, samples, 15.0, keep=model.size, affine=True)
+    return ranked.take(_distinct(ranked, settings.finalists))
+
+
+@torch.no_grad()
+def _distinct(model: TileModel, count: int) -> list[int]:
+    """The first `count` candidates whose placed templates differ: starts often meet in one pose."""
+    order, _ = template_symmetries(model.isohedral_class)
+    placed = model.place(model.template())
+    sides = placed.shape[1]
+    chosen: list[int] = []
+    for i in range(model.size):
+        shifts = [placed[i].roll(k * sides // order, dims=0) for k in range(order)]
+        nearest = [
+            float(linalg.vector_norm(shift - placed[j], dim=-1).max())
+            for shift in shifts
+            for j in chosen
+        ]
+        if min(nearest, default=math.inf) > 0.1:
+            chosen.append(i)
+    return chosen[:count]
+
+
+def _flow_phase(
+    model: TileModel,
+    samples: OccupancySamples,
+    settings: OccupancySettings,
+    begin: int,
+    end: int,
+    report: Progress,
+) -> TileModel:
+    rate = settings.learning_rate
+    optimizer = adam(
+        [
+            {"params": _pose(model), "lr": rate / 2, "peak": rate / 2},
+            {"params": list(model.flow.parameters()), "lr": rate, "peak": rate},
+        ]
+    )
+    for i in range(begin, end):
+        done = i / settings.iterations
+        for group in optimizer.param_groups:
+            warm = min(1.0, (i - begin + 1) / 10)
+            group["lr"] = group["peak"] * warm * (0.51 + 0.49 * math.cos(math.pi * done))
+        optimizer.zero_grad()
+        points, inside = samples.draw(settings.points)
+        loss = occupancy_loss(model, points, inside, _between(settings.hardness, done))
+        energy = _between(settings.penalty, done) * _energy(model)
+        torch.autograd.backward((loss + energy + _shape_penalty(model)).sum())
+        optimizer.step()
+        report((i + 1) / settings.iterations, float(loss.detach().min()))
+    return model
+
+
+def _energy(model: TileModel) -> Tensor:
+    squares = [p.square().sum(dim=-1) for p in model.flow.parameters()]
+    return torch.stack(squares).sum(dim=0)
+
+
+def _shape_penalty(model: TileModel) -> Tensor:
+    return SHAPE_PENALTY * model.shape.square().sum(dim=-1)
+
+
+def _between(ends: tuple[float, float], share: float) -> float:
+    return ends[0] * (ends[1] / ends[0]) ** share
+
+
+@torch.no_grad()
+def _ranked(
+    model: TileModel,
+    samples: OccupancySamples,
+    hardness: float,
+    *,
+    keep: int,
+    affine: bool = False,
+) -> TileModel:
+    points, inside = samples.points[::4], samples.inside[::4]
+    loss = occupancy_loss(model, points, inside, hardness, affine=affine)
+    return model.take(listed(loss.argsort(stable=True)[:keep]))

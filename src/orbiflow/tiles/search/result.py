@@ -1,0 +1,126 @@
+"""What an escherization gives: the tile, how good it is, and the proof that it tiles."""
+
+from __future__ import annotations
+
+import contextlib
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import shapely
+
+from orbiflow.errors import CertificationError, OrbiflowError
+from orbiflow.tiles.likeness import (
+    Pinned,
+    Recogniser,
+    compare,
+    iou,
+    narrowest_neck,
+)
+from orbiflow.tiles.search.bending_fit import PlacedBent
+from orbiflow.tiles.search.bent_map import map_of_bent
+from orbiflow.tiles.search.boundary import extract_tile
+from orbiflow.tiles.search.fit import Fit
+from orbiflow.tiles.search.model import TileModel
+from orbiflow.tiles.search.storage import as_map
+from orbiflow.tiles.silhouette import Bending, Target
+from orbiflow.tiles.tile import EscherTile
+from orbiflow.tiles.tilings import Tile
+
+
+@dataclass(frozen=True)
+class ClassFailure:
+    """A class that gave no certified tile, and why."""
+
+    name: str
+    reason: str
+
+
+def best_tiles(
+    target: Target,
+    fit: Fit,
+    *,
+    seconds: float = 0.0,
+    force: bool = False,
+    min_neck: float = 0.0,
+) -> list[EscherTile]:
+    """Turn finalists into polygons and certify them, best first, until there are enough.
+
+    Returns:
+        Certified tiles, best score first.
+
+    Raises:
+        CertificationError: if no finalist is certified and `force` is not set.
+    """
+    found: list[EscherTile] = []
+    reasons: list[str] = []
+    for index in range(fit.model.size):
+        try:
+            result = _result(target, fit.model.take([index]), fit.starts, seconds, force=force)
+            result = result.changed(min_neck=min_neck)
+            if not force:
+                result.certificate.require()
+            if fit.bent:
+                result = _with_bent(target, result, fit.bent[index])
+            found.append(result)
+        except CertificationError as error:
+            reasons.append(str(error))
+        if len(found) == fit.enough:
+            break
+    if not found:
+        raise CertificationError("; ".join(dict.fromkeys(reasons)))
+    found.sort(key=lambda r: (not r.certificate.valid, -r.score))
+    return [result.changed(dropped=fit.crossed + len(reasons)) for result in found]
+
+
+def _result(
+    target: Target, model: TileModel, starts: int, seconds: float, *, force: bool
+) -> EscherTile:
+    tile, fine = extract_tile(model, force=force)
+    placed = tile.transformed(target.frame.linear, target.frame.offset)
+    # a forced tile may cross itself: measure the region that it covers
+    shape = shapely.Polygon(placed.polygon)
+    region = shape if shape.is_valid else shapely.make_valid(shape).buffer(0)
+    return EscherTile(
+        placed,
+        y_down=target.y_down,
+        silhouette=target.report(),
+        map_source=as_map(fine, target.frame),
+        normal=tile,
+        metrics=compare(region, target.outline),
+        recognisability=recogniser(target)(region),
+        starts=starts,
+        seconds=seconds,
+        thinnest=narrowest_neck(placed.polygon) if shape.is_valid else None,
+    )
+
+
+def _bending(placed: PlacedBent, tile: Tile) -> Bending | None:
+    with contextlib.suppress(OrbiflowError):  # hairs that no triangulation follows
+        return map_of_bent(*placed, tile)
+    return None
+
+
+def _with_bent(target: Target, result: EscherTile, placed: PlacedBent) -> EscherTile:
+    rest, outline = (target.frame.to_input(ring) for ring in placed.outlines)
+    region = shapely.Polygon(outline)
+    whole = region if region.is_valid else shapely.make_valid(region).buffer(0)
+    tile = shapely.Polygon(result.tile.polygon)
+    body = placed.bent.hand.fine
+    outline_points = placed.bent.points[: body.size]
+    maps, bending = result.map, _bending(placed, result.normal_tile)
+    return result.changed(
+        objective="likeness",
+        rest=rest,
+        bent=outline,
+        bent_iou=iou(whole, tile) if tile.is_valid else None,
+        deformation=placed.bent.fidelity.cost,
+        fidelity=placed.bent.fidelity,
+        pinned=body.misfit(outline_points) if isinstance(body, Pinned) else None,
+        map_source=None if maps is None else replace(maps, bending=bending),
+    )
+
+
+@lru_cache(maxsize=2)  # targets hash by identity; one serves all tiles
+def recogniser(target: Target) -> Recogniser:
+    """Of the target's outline in the input's own coordinates."""
+    return Recogniser(target.outline)

@@ -1,0 +1,279 @@
+"""Starts that find the good basin: tiles of a class that are near the target's outline already."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+import torch
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d
+from torch import Tensor
+
+from orbiflow.arguments import instance, whole
+from orbiflow.arrays import Array, Complex
+from orbiflow.errors import OrbiflowError
+from orbiflow.runtime import Cancel
+from orbiflow.symmetry import (
+    CrystallographicGroup,
+    Isometry,
+    Line,
+    reflection,
+    rotation,
+    rotation_matrix,
+)
+from orbiflow.tiles.geometry import (
+    resampled,
+    reverse,
+    subdivided,
+)
+from orbiflow.tiles.likeness import boundary_iou, prepared_region
+from orbiflow.tiles.search.placements import Placements, best_placements
+from orbiflow.tiles.search.prototiles import Prototiles
+from orbiflow.tiles.search.tile_space import NearestTiles, nearest_tiles
+from orbiflow.tiles.silhouette import Target
+from orbiflow.tiles.tilings import (
+    EdgeIdentification,
+    IsohedralClass,
+    isohedral_class,
+)
+
+
+def template_symmetries(isohedral_class: IsohedralClass) -> tuple[int, bool]:
+    """Rotations and reflections of the template that also leave its group alone.
+
+    Two starts that differ by such a map give the same tiles.
+
+    Returns:
+        The order of the rotations, and whether there is a reflection (then mirrored targets need
+        no starts of their own).
+    """
+    vertices = isohedral_class.template()
+    group = isohedral_class.group()
+    center = vertices.mean(axis=0)
+    order = max(n for n in (1, 2, 3, 6) if _keeps(rotation(center, n), vertices, group))
+    spokes = [*vertices, *((a + b) / 2 for a, b in itertools.pairwise(vertices))]
+    mirrored = any(
+        _keeps(reflection(Line(center, spoke - center)), vertices, group) for spoke in spokes
+    )
+    return order, mirrored
+
+
+def initial_poses(isohedral_class: IsohedralClass, turns: int) -> tuple[Tensor, Tensor]:
+    """Angles (S,) in radians and mirror flags (S,): `turns` angles, twice if mirroring matters.
+
+    The angles divide the range in which the template does not look the same.
+    """
+    order, mirror_closed = template_symmetries(isohedral_class)
+    angles = torch.arange(turns, dtype=torch.float64) * (2 * math.pi / order / turns)
+    if mirror_closed:
+        return angles, torch.zeros(turns, dtype=torch.bool)
+    return angles.repeat(2), torch.arange(2 * turns) >= turns
+
+
+def _keeps(isometry: Isometry, vertices: Array, group: CrystallographicGroup) -> bool:
+    distance = abs(isometry(vertices)[:, None] - vertices[None]).max(axis=-1)
+    if distance.min(axis=1).max() > 1e-9:
+        return False
+    integral = group.inverse_lattice @ isometry.linear @ group.lattice
+    undo = isometry.inverse()
+    return bool(abs(integral - integral.round()).max() < 1e-9) and all(
+        group.contains(isometry @ g @ undo) for g in group.cosets
+    )
+
+
+APART = 0.025
+"""Starts differ by this share of the outline in where some corner sits, or they are twins."""
+
+SMOOTHING = (0.0, 1.0, 2.0)
+"""Standard deviations, in points, of the smoothing of outlines whose nearest tile crosses itself."""
+
+
+@dataclass(frozen=True)
+class Starts:
+    """The best starts of a search.
+
+    - `prototiles`: best overlap first.
+    - `iou`: (S,) of each before the descent.
+    """
+
+    prototiles: Prototiles
+    iou: Array
+
+
+def outline_starts(
+    target: Target,
+    kind: IsohedralClass | str,
+    *,
+    count: int,
+    resolutions: Sequence[int] = (40, 60, 80),
+    projected: int = 1000,
+    measured: int = 200,
+    vertices: int = 240,
+    phase: float = 0.0,
+    cancel: Cancel | None = None,
+) -> Starts:
+    """The best start tiles of one class for a target, no two of them twins.
+
+    Args:
+        target: the silhouette.
+        kind: the class.
+        count: how many at most; fewer if the rest cross themselves.
+        resolutions: points of the outline, several for the sake of thin limbs: the fewer, the
+            smoother the start. Each divides `vertices`.
+        projected: placements projected at each resolution.
+        measured: of these, the nearest tiles whose overlap is measured.
+        vertices: of every start tile.
+        phase: of the points along the outline, in spacings; what a seed changes.
+        cancel: looked at before each resolution.
+
+    Raises:
+        Cancelled: if it was told to stop.
+    """
+    kind = isohedral_class(kind)
+    instance(target, Target, "the target", "Target.read and Target.from_polygon make one")
+    for points in resolutions:
+        if vertices % whole(points, "a resolution", 24):
+            raise OrbiflowError(f"resolutions must divide vertices = {vertices}, got {points}")
+    cancel = cancel or Cancel()
+    parts: list[Prototiles] = []
+    scores: list[Array] = []
+    places: list[Array] = []
+    for mirrored in (False,) if mirror_closed(kind) else (False, True):
+        ring = reverse(target.normal * (1.0, -1.0)) if mirrored else target.normal
+        goal = prepared_region(ring)
+        for points in resolutions:
+            cancel.check()
+            outline = resampled(ring, points, phase) @ [1, 1j]
+            found = best_placements(kind, outline, projected)
+            for tiles, placements, score in _simple_tiles(kind, goal, outline, found, measured):
+                parts.append(Prototiles.of(kind, tiles, vertices, mirrored=mirrored))
+                scores.append(score)
+                places.append((placements.starts[:, None] + tiles.corners) / points)
+    iou, all_tiles = np.concatenate(scores), Prototiles.joined(parts)
+    chosen = _apart(iou, np.concatenate(places), all_tiles.mirrored, count)
+    return Starts(all_tiles.take(chosen), iou[chosen])
+
+
+def template_starts(
+    kind: IsohedralClass | str,
+    *,
+    turns: int,
+    stretch: float,
+    vertices: int = 240,
+    phase: float = 0.0,
+) -> Prototiles:
+    """The template itself, turned and stretched: starts that know nothing of the target.
+
+    Args:
+        kind: the class.
+        turns: angles, over the range in which the template does not look the same; twice as many
+            for classes without lattice freedom.
+        stretch: size of the starting stretches along each axis of the lattice freedom, besides none.
+        vertices: of every start tile, a multiple of the template's.
+        phase: of the angles, in steps.
+    """
+    kind = isohedral_class(kind)
+    order, symmetric = template_symmetries(kind)
+    stretches = [np.zeros(kind.stretch_dim)]
+    for axis, sign in itertools.product(np.eye(kind.stretch_dim), (1.0, -1.0)):
+        stretches.append(sign * stretch * axis)
+    turns *= 1 if kind.stretch_dim else 2
+    step = 2 * np.pi / order / turns
+    sides = (False,) if symmetric else (False, True)
+    poses = list(itertools.product(sides, (np.arange(turns) + phase) * step, stretches))
+    corners = kind.template()
+    pieces = vertices // len(corners)
+    count = len(poses)
+    area = kind.group().cell_volume / kind.group().order
+    mirrored = np.array([side for side, _, _ in poses])
+    angle = np.array([turn for _, turn, _ in poses])
+    pull = np.array([pull for _, _, pull in poses])
+    scale = area**-0.5
+    turned = np.array([rotation_matrix(a) for a in angle])
+    turned[mirrored, :, 1] *= -1
+    center = scale * turned @ kind.stretch(pull) @ corners.mean(axis=0)
+    return Prototiles(
+        np.tile(subdivided(corners[None], pieces), (count, 1, 1)),
+        np.tile(np.arange(len(corners)) * pieces, (count, 1)),
+        angle,
+        np.full(count, np.log(scale)),
+        -center,
+        pull,
+        mirrored,
+    )
+
+
+def mirror_closed(kind: IsohedralClass) -> bool:
+    """Whether reading the template's edges backwards gives the same identifications.
+
+    Then the mirror image of a tile of the class is a tile of the class under another placement.
+    """
+    size = len(kind.template())
+    own = {(frozenset((p.first, p.second)), _turn_order(p)) for p in kind.identified_edges}
+    for k in range(size):
+        image = {(frozenset(((k - e) % size) for e in edges), turn) for edges, turn in own}
+        if image == own:
+            return True
+    return False
+
+
+def _turn_order(pair: EdgeIdentification) -> int:
+    linear = pair.isometry.linear
+    if np.linalg.det(linear) < 0:
+        return -1
+    return round(np.degrees(abs(np.arctan2(linear[1, 0], linear[0, 0]))))
+
+
+def _simple_tiles(
+    kind: IsohedralClass,
+    goal: shapely.Polygon,
+    outline: Complex,
+    placements: Placements,
+    wanted: int,
+) -> Iterator[tuple[NearestTiles, Placements, Array]]:
+    """The `wanted` nearest tiles that do not cross themselves, their placements and their IoU.
+
+    Where the nearest tile to the outline crosses itself, that to the outline smoothed may not: the
+    limbs are shorter, their roots at the same places, and the descent lets them grow.
+    """
+    for spread in SMOOTHING:
+        if not len(placements.starts) or wanted < 1:
+            return
+        tiles = nearest_tiles(kind, _smoothed(outline, spread), placements)
+        rings = np.stack([tiles.vertices.real, tiles.vertices.imag], axis=-1)
+        valid = np.asarray(shapely.is_valid(shapely.polygons(rings)))
+        simple = valid & (np.linalg.det(tiles.linear) > 1e-6)
+        nearest = np.argsort(tiles.distance, kind="stable")
+        chosen = nearest[simple[nearest]][:wanted]
+        yield tiles.take(chosen), placements.take(chosen), boundary_iou(goal, rings[chosen])
+        wanted -= len(chosen)
+        placements = placements.take(np.flatnonzero(~simple))
+
+
+def _smoothed(outline: Complex, spread: float) -> Complex:
+    if spread == 0.0:
+        return outline
+    x, y = (
+        np.asarray(gaussian_filter1d(part, spread, mode="wrap"))
+        for part in (outline.real, outline.imag)
+    )
+    return (x + 1j * y).astype(np.complex128)
+
+
+def _apart(scores: Array, places: Array, mirrored: NDArray[np.bool_], count: int) -> list[int]:
+    """Greedily the best scores whose corners are not where those of a better one are."""
+    chosen: list[int] = []
+    for index in np.argsort(-scores, kind="stable"):
+        gap = abs(places[chosen] - places[index]) % 1.0
+        near = np.minimum(gap, 1 - gap).max(axis=1) < APART
+        if (near & (mirrored[chosen] == mirrored[index])).any():
+            continue
+        chosen.append(int(index))
+        if len(chosen) == count:
+            break
+    return chosen

@@ -1,0 +1,144 @@
+"""Candidates as plain arrays, and again as models."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+
+from orbiflow.arguments import instance
+from orbiflow.arrays import Array
+from orbiflow.errors import OrbiflowError
+from orbiflow.tiles.search.model import TileModel
+from orbiflow.tiles.search.settings import MAX_FREQUENCY, MAX_SEGMENTS
+from orbiflow.tiles.silhouette import Bending, Frame
+from orbiflow.tiles.tile_map import TileMap, naming_file
+from orbiflow.tiles.tilings import isohedral_class
+
+MAX_SIDES = 100_000
+VERTICES, CORNERS = "prototile.outline", "prototile.corners"
+
+
+def as_map(model: TileModel, frame: Frame | None = None, bending: Bending | None = None) -> TileMap:
+    """Return a single candidate as plain arrays; `frame` and `bending` go with it.
+
+    Raises:
+        OrbiflowError: for a model that holds more than one candidate.
+    """
+    instance(model, TileModel, "the model", "load_model and the fits give one").require_single()
+    settings = {
+        "class": model.isohedral_class.name,
+        "max_frequency": model.max_frequency,
+        "segments": model.segments,
+        "smoothness": model.smoothness,
+        "steps": model.flow.steps,
+        "method": model.flow.method,
+        "mirrored": bool(model.mirror[0]),
+    }
+    arrays = {
+        name: parameter.detach().double().cpu().numpy()[0].copy()
+        for name, parameter in model.named_parameters()
+    }
+    if model.vertices is not None and model.corners is not None:
+        arrays[VERTICES] = model.vertices.cpu().numpy()[0].copy()
+        arrays[CORNERS] = model.corners.cpu().numpy()[0].copy()
+    return TileMap(settings, arrays, frame, bending)
+
+
+def as_model(stored: TileMap) -> TileModel:
+    """Return the model again, float64, one candidate, in the target's normal form.
+
+    Raises:
+        OrbiflowError: if settings or arrays do not fit together.
+    """
+    settings, arrays = stored.settings, stored.arrays
+    _check_segments(settings, arrays)
+    try:
+        model = TileModel(
+            isohedral_class(settings["class"]),
+            torch.zeros(1, dtype=torch.float64),
+            mirrored=torch.tensor([bool(settings["mirrored"])]),
+            max_frequency=_whole(settings["max_frequency"], MAX_FREQUENCY, least=0),
+            segments=_whole(settings["segments"], MAX_SEGMENTS),
+            smoothness=_exponent(settings["smoothness"]),
+            steps=_whole(settings["steps"], 1_000_000),
+            method=str(settings["method"]),
+        )
+    except (KeyError, TypeError) as error:
+        raise OrbiflowError(f"the model's settings are incomplete: {error}") from error
+    with torch.no_grad():
+        for name, parameter in model.named_parameters():
+            shape = tuple(parameter.shape[1:])
+            parameter.copy_(torch.tensor(_checked(arrays.get(name), name, shape))[None])
+    if VERTICES in arrays or CORNERS in arrays:
+        vertices, corners = _prototile(arrays, len(model.template()[0]))
+        model.vertices, model.corners = torch.tensor(vertices)[None], torch.tensor(corners)[None]
+    return model
+
+
+def load_model(path: str | Path) -> TileModel:
+    """Read the flow of a `model.safetensors`: one candidate, float64, in the target's normal form.
+
+    Raises:
+        InputFileError: for a file that is missing, too large or not such a model.
+    """
+    stored = TileMap.read(path)
+    with naming_file(path):
+        return as_model(stored)
+
+
+def _checked(stored: Array | None, name: str, shape: tuple[int, ...]) -> Array:
+    if stored is None or stored.shape != shape:
+        found = "nothing" if stored is None else f"shape {stored.shape}"
+        raise OrbiflowError(f"the model's {name} should have shape {shape}, found {found}")
+    if not np.isfinite(stored).all():
+        raise OrbiflowError(f"the model's {name} has NaN or infinite entries")
+    return stored
+
+
+def _prototile(arrays: dict[str, Array], count: int) -> tuple[Array, Array]:
+    vertices = np.asarray(arrays.get(VERTICES, np.zeros((0, 2))), dtype=np.float64)
+    corners = np.asarray(arrays.get(CORNERS, np.zeros(0)))
+    if vertices.ndim != 2 or vertices.shape[1] != 2 or not count <= len(vertices) <= MAX_SIDES:
+        raise OrbiflowError(
+            f"the model's {VERTICES} should have shape (N, 2) with N from {count} to "
+            f"{MAX_SIDES}, found {vertices.shape}"
+        )
+    if not np.isfinite(vertices).all():
+        raise OrbiflowError(f"the model's {VERTICES} has NaN or infinite entries")
+    if (
+        corners.shape != (count,)
+        or corners.dtype.kind != "i"
+        or corners[0] != 0
+        or (np.diff(corners, append=len(vertices)) < 1).any()
+    ):
+        raise OrbiflowError(
+            f"the model's {CORNERS} should be {count} increasing indices from 0, "
+            f"less than {len(vertices)}"
+        )
+    return vertices, corners.astype(np.int64)
+
+
+def _check_segments(settings: dict[str, Any], arrays: dict[str, Array]) -> None:
+    # before anything is built: each segment takes time and memory
+    stored = sum(name.startswith("flow.") for name in arrays)
+    if settings.get("segments") != stored:
+        raise OrbiflowError(
+            f"the model's settings say {settings.get('segments')!r} segments, "
+            f"its arrays hold {stored}"
+        )
+
+
+def _exponent(value: Any) -> float:
+    number = float(value)
+    if not 0.0 <= number <= 100.0:
+        raise OrbiflowError(f"expected a smoothness from 0 to 100, got {value!r}")
+    return number
+
+
+def _whole(value: Any, most: int, least: int = 1) -> int:
+    if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
+        raise OrbiflowError(f"expected a whole number from {least} to {most}, got {value!r}")
+    return value

@@ -1,0 +1,352 @@
+"""The polygons of a class that tile, as a linear space: for every placement of the corners, at once.
+
+With the corners placed and the glide axes' turn given, a vertex of a tile is free, or the image of a
+free one, or fixed by the group; images and fixed points depend linearly on the group's position and
+lattice. So the tiles of a class with n vertices form a real linear space (the idea of EST: Koizumi
+and Sugihara, Maximum Eigenvalue Problem for Escherization, 2011; Nagata and Imahori, 2020). Points
+are complex numbers x + iy throughout.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orbiflow.arrays import (
+    Array,
+    Complex,
+    Integers,
+)
+from orbiflow.symmetry import Isometry
+from orbiflow.tiles.search.placements import Placements
+from orbiflow.tiles.tilings import IsohedralClass
+
+
+class NearestTiles(NamedTuple):
+    """C tiles, each the nearest to an outline under its placement.
+
+    - `vertices`: (C, n) x + iy, vertex i near point `start + i` of the outline.
+    - `linear`, `offset`: (C, 2, 2) and (C, 2), the map from the group's own frame.
+    - `corners`: (C, K) vertices at the template's corners.
+    - `distance`: (C,) sum of squared distances.
+
+    A tile may cross itself, and `linear` may reverse orientation: then it is of no use.
+    """
+
+    vertices: Complex
+    linear: Array
+    offset: Array
+    corners: Integers
+    distance: Array
+
+    def take(self, index: Integers) -> NearestTiles:
+        """Those at `index`."""
+        return NearestTiles(
+            self.vertices[index],
+            self.linear[index],
+            self.offset[index],
+            self.corners[index],
+            self.distance[index],
+        )
+
+
+class TileSpace:
+    """The tiles of C placements of one class.
+
+    Args:
+        kind: the class.
+        placements: C of them, all of n steps; `turns` is the direction of the glide axes.
+        weights: (n,) positive weights of the outline's points; default 1.
+    """
+
+    def __init__(
+        self, kind: IsohedralClass, placements: Placements, weights: Array | None = None
+    ) -> None:
+        self.kind, self.placements = kind, placements
+        self.count, self.size = len(placements.starts), int(placements.lengths[0].sum())
+        self._orbits = _Orbits(kind, placements.lengths)
+        self.order = (np.arange(self.size) + placements.starts[:, None]) % self.size
+        """(C, n): the outline's point at each vertex."""
+        self._place = np.argsort(self.order, axis=1)
+        self._weight = None if weights is None else np.asarray(weights, float)[self.order]
+        flat = self._orbits.source + np.arange(self.count)[:, None] * self.size
+        self._flat = flat.ravel()
+        ones = None if self._weight is None else self._weight.ravel()
+        self._total = np.bincount(self._flat, ones, minlength=flat.size)
+        self._total[self._total == 0] = 1.0
+        self.turn(placements.turns)
+
+    @property
+    def corners(self) -> Integers:
+        """(C, K) vertices at the template's corners."""
+        return self._orbits.corners
+
+    @property
+    def glides(self) -> bool:
+        """Whether the class has glide reflections, whose axes can be turned."""
+        return any(not pair.reversed for pair in self.kind.identified_edges)
+
+    def turn(self, turns: Array) -> None:
+        """Set the directions (C,) of the glide axes, in radians; no effect without glides."""
+        self.turns = np.asarray(turns, dtype=np.float64)
+        unit, orbits = np.exp(1j * self.turns)[:, None], self._orbits
+        # the group's linear parts in the placed frame
+        self._factor = np.where(orbits.flips, orbits.factor * unit**2, orbits.factor)
+        self._columns = _columns(self.kind, orbits, self._factor, unit)
+        pulled = _unturn(self._factor, orbits.flips, self._columns)
+        self._means = self._orbit_means(pulled)
+        self._basis = self._residual(pulled, self._means)
+        weighted = np.conj(self._basis)
+        if self._weight is not None:
+            weighted = self._weight[..., None] * weighted
+        matrix = np.real(np.swapaxes(weighted, 1, 2) @ self._basis)
+        # IH1 does not care about the offset: the least solution
+        size = matrix.shape[-1]
+        ridge = 1e-10 * np.trace(matrix, axis1=1, axis2=2)[:, None, None] * np.eye(size)
+        self._solve: Complex = np.linalg.inv(matrix + ridge) @ np.swapaxes(weighted, 1, 2)
+
+    def best_turns(self, outlines: Complex) -> Array:
+        """(C,) directions of the glide axes that suit the outlines (C, n) best; 0 without glides."""
+        if not self.glides:
+            return self.turns
+        glides = [pair for pair in self.kind.identified_edges if not pair.reversed]
+        total = np.zeros(self.count, dtype=complex)
+        goal = np.take_along_axis(outlines, self.order, axis=1)
+        steps = np.roll(goal, -1, axis=1) - goal
+        lengths, first = self.placements.lengths, self.corners
+        for pair in glides:
+            linear = pair.isometry.linear
+            own = lengths[:, [pair.first]]
+            j = np.arange(int(own.max()))
+            a, b = ((first[:, [edge]] + j) % self.size for edge in (pair.first, pair.second))
+            both = np.take_along_axis(steps, a, axis=1) * np.take_along_axis(steps, b, axis=1)
+            total += complex(linear[0, 0], -linear[1, 0]) * np.where(j < own, both, 0).sum(axis=1)
+        return np.angle(total) / 2
+
+    def nearest(self, outlines: Complex) -> NearestTiles:
+        """The tile of each placement that is nearest to its own outline (C, n)."""
+        orbits = self._orbits
+        goal = np.take_along_axis(outlines, self.order, axis=1)[..., None]
+        pulled = _unturn(self._factor, orbits.flips, goal)
+        means = self._orbit_means(pulled)
+        rest = self._residual(pulled, means)
+        solution: Array = np.real(self._solve @ rest)[..., 0]
+        left = rest[..., 0] - (self._basis @ solution[..., None])[..., 0]
+        free = means[..., 0] - (self._means @ solution[..., None])[..., 0]
+        image = _turn(self._factor, orbits.flips, np.take_along_axis(free, orbits.source, axis=1))
+        moved = (self._columns @ solution[..., None])[..., 0]
+        vertices = np.where(orbits.fixed, 0, image) + moved
+        weight = 1.0 if self._weight is None else self._weight
+        return NearestTiles(
+            vertices,
+            _linear(self.kind, solution[:, 2:], self.turns),
+            solution[:, :2],
+            self.corners,
+            (weight * abs(left) ** 2).sum(axis=1),
+        )
+
+    def in_order(self, vertices: Complex) -> Complex:
+        """Vertices (C, n), as of tiles, in the order of the outline's points."""
+        return np.take_along_axis(vertices, self._place, axis=1)
+
+    def matrices(self, index: int) -> tuple[Array, Array]:
+        """Real and imaginary part of the map from parameters (d,) to the tile of one placement.
+
+        Each (n, d), its rows in the order of the outline's points. The last columns are the group's
+        offset and lattice; `group` reads them.
+        """
+        orbits, n = self._orbits, self.size
+        source, fixed = orbits.source[index], orbits.fixed[index]
+        free = np.flatnonzero((source == np.arange(n)) & ~fixed)
+        position = np.zeros(n, dtype=np.int64)
+        position[free] = np.arange(len(free))
+        columns = self._columns[index]
+        real = np.zeros((n, 2 * len(free) + columns.shape[1]))
+        imaginary = np.zeros_like(real)
+        v = np.flatnonzero(~fixed)
+        at, factor = 2 * position[source[v]], self._factor[index, v]
+        sign = np.where(orbits.flips[index, v], -1.0, 1.0)
+        real[v, at], real[v, at + 1] = factor.real, -factor.imag * sign
+        imaginary[v, at], imaginary[v, at + 1] = factor.imag, factor.real * sign
+        real[:, 2 * len(free) :], imaginary[:, 2 * len(free) :] = columns.real, columns.imag
+        return real[self._place[index]], imaginary[self._place[index]]
+
+    def group(self, index: int, parameters: Array) -> tuple[Array, Array]:
+        """Linear part (2, 2) and offset (2,) of the map from the group's frame, from `matrices`."""
+        own = parameters[-self._columns.shape[2] :][None]
+        return _linear(self.kind, own[:, 2:], self.turns[[index]])[0], own[0, :2]
+
+    def _residual(self, pulled: Complex, means: Complex) -> Complex:
+        """Take out what the free vertices can do."""
+        at_source = np.take_along_axis(means, self._orbits.source[..., None], axis=1)
+        return np.where(self._orbits.fixed[..., None], pulled, pulled - at_source)
+
+    def _orbit_means(self, values: Complex) -> Complex:
+        """Weighted means of values (C, n, m) over each orbit, at its free vertex."""
+        count, n, m = values.shape
+        means: Complex = np.empty((count * n, m), dtype=complex)
+        for column in range(m):
+            part = values[..., column]
+            weighted = (part if self._weight is None else part * self._weight).ravel()
+            for own, sums in ((weighted.real, means.real), (weighted.imag, means.imag)):
+                sums[:, column] = np.bincount(self._flat, own, minlength=count * n) / self._total
+        return means.reshape(count, n, m)
+
+
+class _Element(NamedTuple):
+    """z -> factor z + shift, or factor conj(z) + shift."""
+
+    factor: complex
+    flips: bool
+    shift: complex
+
+    @classmethod
+    def of(cls, isometry: Isometry) -> _Element:
+        linear = isometry.linear
+        return cls(
+            complex(linear[0, 0], linear[1, 0]),
+            bool(np.linalg.det(linear) < 0),
+            complex(*isometry.translation),
+        )
+
+
+class _Layout(NamedTuple):
+    """What a class identifies, in complex numbers: of each edge pair and of each corner."""
+
+    edges: tuple[_Element, ...]
+    corners: tuple[tuple[int, _Element], ...]  # first corner of the orbit; -1: a fixed point
+
+
+@lru_cache(maxsize=16)
+def _layout(kind: IsohedralClass) -> _Layout:
+    group, vertices = kind.group(), kind.template()
+    corners: list[tuple[int, _Element]] = []
+    for k, vertex in enumerate(vertices):
+        if len(list(group.elements_near(vertex, 1e-6, source=vertex))) > 1:
+            corners.append((-1, _Element(1, False, complex(*vertex))))
+            continue
+        for first in range(k + 1):
+            images = list(group.elements_near(vertex, 1e-6, source=vertices[first]))
+            if images:
+                corners.append((first, _Element.of(images[0])))
+                break
+    edges = tuple(_Element.of(pair.isometry) for pair in kind.identified_edges)
+    return _Layout(edges, tuple(corners))
+
+
+class _Orbits:
+    """For each vertex: the free vertex that it is an image of, and by which element; or fixed."""
+
+    def __init__(self, kind: IsohedralClass, lengths: Integers) -> None:
+        count, n = len(lengths), int(lengths[0].sum())
+        layout = _layout(kind)
+        self.corners = np.cumsum(lengths, axis=1) - lengths
+        self.source = np.tile(np.arange(n), (count, 1))
+        self.factor = np.ones((count, n), dtype=complex)
+        self.flips = np.zeros((count, n), dtype=bool)
+        self.shift = np.zeros((count, n), dtype=complex)
+        self.fixed = np.zeros((count, n), dtype=bool)
+        vertices = kind.template() @ [1, 1j]
+        for pair, element in zip(kind.identified_edges, layout.edges, strict=True):
+            middle = (vertices[pair.first] + vertices[(pair.first + 1) % len(vertices)]) / 2
+            own = self.corners[:, [pair.first]]
+            other = self.corners[:, [pair.second]]
+            length = lengths[:, [pair.first]]
+            j = np.arange(1, int(length.max(initial=1)))
+            if pair.folded:
+                self._map((j < length) & (2 * j > length), own + j, own + length - j, element)
+                rows = np.flatnonzero(length[:, 0] % 2 == 0)
+                self._fix(rows, (own + length // 2)[rows, 0], middle)
+            else:
+                mate = other + (length - j if pair.reversed else j)
+                self._map(j < length, mate, own + j, element)
+        rows = np.arange(count)
+        for k, (first, element) in enumerate(layout.corners):
+            if first < 0:
+                self._fix(rows, self.corners[:, k], element.shift)
+            else:
+                live = np.ones((count, 1), dtype=bool)
+                self._map(live, self.corners[:, [k]], self.corners[:, [first]], element)
+
+    def _map(self, live: NDArray[np.bool_], vertex: Array, source: Array, by: _Element) -> None:
+        rows, columns = np.nonzero(live)
+        at = rows, np.broadcast_to(vertex, live.shape)[rows, columns]
+        self.source[at] = np.broadcast_to(source, live.shape)[rows, columns]
+        self.factor[at], self.flips[at], self.shift[at] = by
+
+    def _fix(self, rows: Integers, vertex: Integers, where: complex) -> None:
+        self.fixed[rows, vertex] = True
+        self.shift[rows, vertex] = where
+
+
+def _columns(kind: IsohedralClass, orbits: _Orbits, factor: Complex, turn: Complex) -> Complex:
+    """(C, n, 2 + m): how offset and linear part move each vertex, its free vertex held."""
+    shift, one = orbits.shift, np.ones_like(factor)
+    columns = [
+        np.where(orbits.fixed, z * one, z * one - _turn(factor, orbits.flips, z * one))
+        for z in (1, 1j)
+    ]
+    match kind.stretch_dim:
+        case 2:
+            columns += [shift, 1j * shift, np.conj(shift), 1j * np.conj(shift)]
+        case 1:  # along the glides, which are the axes of the group's own frame
+            columns += [turn * np.real(shift), 1j * turn * np.imag(shift)]
+        case _:
+            columns += [shift, 1j * shift]
+    return np.stack(columns, axis=-1)
+
+
+def _linear(kind: IsohedralClass, solution: Array, turns: Array) -> Array:
+    """(C, 2, 2) from the coefficients of `_columns`."""
+    cos, sin = np.cos(turns), np.sin(turns)
+    match kind.stretch_dim:
+        case 2:
+            a, b, c, d = solution.T
+            rows = [a + c, d - b, b + d, a - c]
+        case 1:  # along the glides, which are the axes of the group's own frame
+            p, q = solution.T
+            rows = [cos * p, -sin * q, sin * p, cos * q]
+        case _:
+            a, b = solution.T
+            rows = [a, -b, b, a]
+    return np.stack(rows, axis=-1).reshape(-1, 2, 2)
+
+
+def _turn(factor: Complex, flips: NDArray[np.bool_], z: Complex) -> Complex:
+    return factor * np.where(flips, np.conj(z), z)
+
+
+def _unturn(factor: Complex, flips: NDArray[np.bool_], z: Complex) -> Complex:
+    """The inverse of `_turn` on (C, n, m)."""
+    return np.where(
+        flips[..., None], factor[..., None] * np.conj(z), np.conj(factor)[..., None] * z
+    )
+
+
+CHUNK = 4000
+"""Placements worked on at a time: bounds the memory at some hundred MB."""
+
+
+def nearest_tiles(
+    kind: IsohedralClass,
+    outline: Complex,
+    placements: Placements,
+    weights: Array | None = None,
+) -> NearestTiles:
+    """Project an outline onto the tiles of a class, for every placement (see `tile_space`).
+
+    Args:
+        kind: the isohedral class.
+        outline: (n,) points x + iy, counter-clockwise.
+        placements: C of them, of this class and n.
+        weights: (n,) positive weights of the points; default 1.
+    """
+    found: list[NearestTiles] = []
+    pieces = max(1, -(-len(placements.starts) // CHUNK))
+    for index in np.array_split(np.arange(len(placements.starts)), pieces):
+        space = TileSpace(kind, placements.take(index), weights)
+        found.append(space.nearest(np.broadcast_to(outline, (space.count, len(outline)))))
+    return NearestTiles(*(np.concatenate(parts) for parts in zip(*found, strict=True)))

@@ -1,0 +1,264 @@
+"""A triangulation of a silhouette: fine along its outline and in thin parts, coarser inside."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from scipy.spatial import Delaunay, Voronoi
+
+from orbiflow.arrays import Integers
+from orbiflow.errors import OrbiflowError
+from orbiflow.tiles.geometry import subdivided
+from orbiflow.typed_shapely import ufuncs
+
+Array = NDArray[np.float64]
+
+ROUNDS = 24
+"""Times that missing sides of the outline are halved."""
+
+FLAT = 1e-12
+"""Twice the area of a triangle, in areas of the polygon, below which it counts as flat."""
+
+
+class Mesh(NamedTuple):
+    """Triangles that fill a polygon.
+
+    - `points`: (N, 2); the polygon's n vertices first, then points on its sides, then inside.
+    - `triangles`: (M, 3) indices, counter-clockwise.
+    - `sides`: (k,) for each of the points n .. n + k, the side that it lies on.
+    - `shares`: (k,) how far along that side, 0 to 1.
+    - `size`: n.
+    """
+
+    points: Array
+    triangles: Integers
+    sides: Integers
+    shares: Array
+    size: int
+
+
+def triangulate(ring: Array, spacing: float | None = None) -> Mesh:
+    """Triangulate the inside of a simple polygon, its sides among the triangles' sides.
+
+    A Delaunay triangulation of the vertices and of points inside; sides of the polygon that are no
+    sides of triangles are halved until they are (Ruppert's first rule). Sides of triangles that cross
+    the inside from one point of the outline to another are halved, so that every triangle can follow
+    wherever the outline is moved.
+
+    Args:
+        ring: (n, 2), counter-clockwise.
+        spacing: of the points inside next to the outline; default the mean length of a side.
+
+    Raises:
+        OrbiflowError: for a ring that crosses itself, or too thin to be filled in double precision.
+    """
+    polygon = shapely.Polygon(ring)
+    if not polygon.is_valid or not polygon.area > 0:
+        raise OrbiflowError("a polygon that crosses itself or has no area cannot be triangulated")
+    n = len(ring)
+    spacing = spacing or polygon.exterior.length / n
+    inside = _inside(polygon, spacing)
+    ends = np.stack([np.arange(n), (np.arange(n) + 1) % n], axis=1)
+    sides, low, high = np.arange(n), np.zeros(n), np.ones(n)
+    extra: Array = np.zeros((0, 2))
+    own_side: Integers = np.zeros(0, dtype=np.int64)
+    own_share: Array = np.zeros(0)
+    for _ in range(ROUNDS):
+        points = np.concatenate([ring, extra, inside])
+        triangles = Delaunay(points).simplices.astype(np.int64)
+        missing = ~_are_sides(ends, triangles, len(points))
+        if not missing.any():
+            return _divided(_kept(Mesh(points, triangles, own_side, own_share, n), polygon))
+        middle = (low + high)[missing] / 2
+        fresh = n + len(extra) + np.arange(len(middle))
+        at, after = ring[sides[missing]], ring[(sides[missing] + 1) % n]
+        extra = np.concatenate([extra, at + middle[:, None] * (after - at)])
+        own_side = np.concatenate([own_side, sides[missing]])
+        own_share = np.concatenate([own_share, middle])
+        near = ufuncs.distance(ufuncs.points(inside), shapely.MultiPoint(extra))
+        inside = inside[near > spacing / 4]
+        old = ends[missing]
+        halves = np.concatenate([np.stack([old[:, 0], fresh], 1), np.stack([fresh, old[:, 1]], 1)])
+        ends = np.concatenate([ends[~missing], halves])
+        low, high = (
+            np.concatenate([low[~missing], low[missing], middle]),
+            np.concatenate([high[~missing], middle, high[missing]]),
+        )
+        sides = np.concatenate([sides[~missing], sides[missing], sides[missing]])
+    raise OrbiflowError(
+        "the silhouette is too thin somewhere to be triangulated: simplify or thicken it there"
+    )
+
+
+def _inside(polygon: shapely.Polygon, spacing: float) -> Array:
+    """Points inside on triangular grids, the farther from the outline the wider."""
+    xmin, ymin, xmax, ymax = polygon.bounds
+    found: list[Array] = []
+    for level, (least, most) in enumerate(((0.6, 1.7), (1.7, 4.5), (4.5, np.inf))):
+        step = spacing * 2**level
+        x = np.arange(xmin, xmax + step, step)
+        y = np.arange(ymin, ymax + step, step * np.sqrt(3) / 2)
+        grid = np.stack(np.meshgrid(x, y), axis=-1)
+        grid[1::2, :, 0] += step / 2
+        points = grid.reshape(-1, 2)
+        points = points[ufuncs.contains_xy(polygon, points[:, 0], points[:, 1])]
+        depth = ufuncs.distance(ufuncs.points(points), polygon.exterior) / spacing
+        found.append(points[(depth >= least) & (depth < most)])
+    return np.concatenate(found)
+
+
+def _are_sides(ends: Integers, triangles: Integers, count: int) -> NDArray[np.bool_]:
+    pairs = np.sort(
+        np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
+    )
+    known = np.unique(pairs[:, 0] * count + pairs[:, 1])
+    wanted = np.sort(ends, axis=1)
+    return np.isin(wanted[:, 0] * count + wanted[:, 1], known)
+
+
+def _kept(mesh: Mesh, polygon: shapely.Polygon) -> Mesh:
+    """The triangles inside the polygon, counter-clockwise, and the points that they use."""
+    corners = mesh.points[mesh.triangles]
+    middle = corners.mean(axis=1)
+    u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    area = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
+    triangles = np.where((area < 0)[:, None], mesh.triangles[:, ::-1], mesh.triangles)
+    inside = ufuncs.contains_xy(polygon, *middle.T)
+    flat = abs(area) < FLAT * polygon.area
+    triangles = _without_flat(triangles[inside & ~flat], mesh.triangles[flat])
+    used = np.zeros(len(mesh.points), dtype=bool)
+    used[: mesh.size + len(mesh.sides)] = True
+    used[triangles] = True
+    index = np.cumsum(used) - 1
+    return mesh._replace(points=mesh.points[used], triangles=index[triangles])
+
+
+def _without_flat(triangles: Integers, flat: Integers) -> Integers:
+    """Vertices in line may be the corners of one flat triangle alone: its neighbour is divided."""
+    known = set(triangles.ravel().tolist())
+    lost = [(row, k) for row in flat.tolist() for k in range(3) if row[k] not in known]
+    for row, k in lost:
+        b, ends = row[k], {row[k - 1], row[k - 2]}
+        for t, triangle in enumerate(triangles.tolist()):
+            if ends <= set(triangle):
+                i = next(i for i in range(3) if triangle[i] not in ends)
+                apex, start, end = triangle[i], triangle[i - 2], triangle[i - 1]
+                triangles = np.concatenate([triangles, [[apex, b, end]]])
+                triangles[t] = apex, start, b
+                break
+    return triangles.astype(np.int64)
+
+
+def _divided(mesh: Mesh) -> Mesh:
+    """Halve every side that crosses the inside between two points of the outline."""
+    on_outline = mesh.size + len(mesh.sides)
+    if len(mesh.points) == 3:  # no side crosses, and yet nothing could follow
+        middle = np.array([[0, 1, 3], [1, 2, 3], [2, 0, 3]])
+        points = np.concatenate([mesh.points, mesh.points.mean(axis=0, keepdims=True)])
+        return mesh._replace(points=points, triangles=middle)
+    directed = {(t[k - 1], t[k]) for t in mesh.triangles.tolist() for k in range(3)}
+    crossing = sorted((a, b) for a, b in directed if a < b < on_outline and (b, a) in directed)
+    middle = {pair: len(mesh.points) + k for k, pair in enumerate(crossing)}
+    ends = np.array(crossing, dtype=np.int64).reshape(-1, 2)
+    triangles: list[tuple[int, int, int]] = []
+    for a, b, c in mesh.triangles.tolist():
+        triangles += _pieces(
+            (a, b, c), [middle.get((min(u, v), max(u, v))) for u, v in ((a, b), (b, c), (c, a))]
+        )
+    points = np.concatenate([mesh.points, mesh.points[ends].mean(axis=1)])
+    return mesh._replace(points=points, triangles=np.array(triangles, dtype=np.int64))
+
+
+def _pieces(corners: tuple[int, int, int], middles: list[int | None]) -> list[tuple[int, int, int]]:
+    """A triangle whose sides ab, bc, ca have these middles or none, in pieces without loose ends."""
+    a, b, c = corners
+    count = sum(m is not None for m in middles)
+    if count == 0:
+        return [corners]
+    while middles[0] is None or (count == 2 and middles[1] is None):
+        a, b, c = b, c, a
+        middles = [*middles[1:], middles[0]]
+    ab, bc, ca = middles
+    assert ab is not None
+    if bc is None:
+        return [(a, ab, c), (ab, b, c)]
+    if ca is None:
+        return [(ab, b, bc), (a, ab, bc), (a, bc, c)]
+    return [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
+
+
+class Located(NamedTuple):
+    """Where P points lie in a mesh.
+
+    - `triangle`: (P,) the one that holds the point, or the nearest; of several, any.
+    - `nearest`: (P, 2) the triangle's point next to it: the point itself inside the mesh.
+    """
+
+    triangle: Integers
+    nearest: Array
+
+
+class Locator:
+    """The triangles of a mesh in a tree.
+
+    Args:
+        points: (N, 2).
+        triangles: (M, 3) indices of the points, none of the triangles flat.
+    """
+
+    def __init__(self, points: Array, triangles: Integers) -> None:
+        self._tree = shapely.STRtree(np.asarray(shapely.polygons(points[triangles])))
+
+    def locate(self, points: Array) -> Located:
+        """The triangle of each point (P, 2); finite points alone."""
+        found = np.full(len(points), -1)
+        where = np.asarray(shapely.points(points))
+        index, triangle = self._tree.query(where, predicate="intersects")
+        found[index] = triangle
+        nearest = points.copy()
+        outside = np.flatnonzero(found < 0)
+        if len(outside):
+            found[outside] = self._tree.nearest(where[outside])
+            lines = ufuncs.shortest_line(self._tree.geometries[found[outside]], where[outside])
+            nearest[outside] = shapely.get_coordinates(lines)[::2]
+        return Located(found, nearest)
+
+
+PIECES = 3
+"""Parts of each side of the outline: more make the medial axis finer."""
+
+ROUNDING = 1.02
+"""Balls reach a little beyond themselves: triangles have size."""
+
+
+def local_thickness(mesh: Mesh) -> Array:
+    """Radius (M,) of the largest disc in the polygon that covers the middle of each triangle.
+
+    The local thickness of Hildebrand and Rüegsegger (1997), over discs about the Voronoi
+    vertices of points on the outline, which lie near the medial axis.
+
+    Args:
+        mesh: of the polygon.
+    """
+    polygon = shapely.Polygon(mesh.points[: mesh.size])
+    corners = mesh.points[mesh.triangles]
+    dense = subdivided(mesh.points[: mesh.size], PIECES)
+    centers = Voronoi(dense).vertices
+    centers = centers[shapely.contains_xy(polygon, centers[:, 0], centers[:, 1])]
+    middle = corners.mean(axis=1)
+    outline = polygon.exterior
+    shapely.prepare(outline)
+    own = ufuncs.distance(ufuncs.points(middle), outline)
+    if not len(centers):
+        return own
+    radius = ufuncs.distance(ufuncs.points(centers), outline)
+    found = own.copy()
+    for start in range(0, len(middle), 512):  # bounds the memory
+        part = middle[start : start + 512]
+        apart = np.hypot(*(part[:, None] - centers[None]).transpose(2, 0, 1))
+        covering = np.where(apart <= ROUNDING * radius, radius, 0.0).max(axis=1)
+        found[start : start + 512] = np.maximum(own[start : start + 512], covering)
+    return found

@@ -1,0 +1,301 @@
+"""What a silhouette's outline must satisfy, and how one is taken from a shapely geometry."""
+
+from __future__ import annotations
+
+import re
+from typing import NamedTuple
+
+import numpy as np
+import shapely
+from numpy.typing import ArrayLike, NDArray
+from shapely.geometry import Polygon
+from shapely.geometry.base import BaseGeometry
+
+from orbiflow.arguments import numbers
+from orbiflow.errors import OrbiflowError
+from orbiflow.tiles.geometry import (
+    arc_lengths,
+    points_along,
+    polygons_in,
+    resampled,
+    ring_length,
+    signed_area,
+)
+
+MAX_VERTICES = 100_000
+MAX_COORDINATE = 1e12
+# Below these a shape has no digits left: relative to its distance from the origin, and absolute.
+MIN_RELATIVE_SIZE = 1e-9
+MIN_SIZE = 1e-100
+# Relative to the square of the longer side of the bounding box.
+MIN_RELATIVE_AREA = 1e-9
+# Of the box's longer side: a polygon that is simple by less would cross itself when it is rescaled.
+CLEARANCE_DIGITS = 12
+
+_POSITION = re.compile(r"\[(\S+) (\S+)\]")
+
+
+def clean_ring(
+    points: ArrayLike, where: str, error: type[OrbiflowError] = OrbiflowError
+) -> tuple[NDArray[np.float64], list[str]]:
+    """Check that `points` (N, 2) bound a region, and drop repeated vertices.
+
+    Returns the ring and a note, in plain words, of each thing that was dropped. `where` opens each
+    message (a file name, say).
+
+    Raises `error` when a coordinate is not a finite number, when fewer than 3 or more than 100,000
+    vertices are given, when no area is enclosed, or when the polygon crosses or touches itself.
+
+    >>> ring, notes = clean_ring([[0, 0], [1, 0], [1, 0], [0, 1], [0, 0]], "example")
+    >>> ring.tolist(), notes
+    ([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]], ['dropped 1 repeated vertex'])
+    """
+    ring = _as_points(points, where, error)
+    _check_coordinates(ring, where, error)
+    if len(ring) > 1 and np.array_equal(ring[0], ring[-1]):
+        ring = ring[:-1]
+    kept = ring[(ring != np.roll(ring, 1, axis=0)).any(axis=1)]
+    dropped = len(ring) - len(kept)
+    notes = [f"dropped {dropped} repeated vert{'ex' if dropped == 1 else 'ices'}"] * (dropped > 0)
+    if len(kept) < 3:
+        raise error(
+            f"{where}: a polygon needs at least 3 distinct vertices, this one has {len(kept)}"
+        )
+    _check_region(kept, where, error)
+    return kept, notes
+
+
+def _as_points(points: ArrayLike, where: str, error: type[OrbiflowError]) -> NDArray[np.float64]:
+    try:
+        ring: NDArray[np.float64] = np.zeros(0)
+        if np.ndim(points):
+            ring = numbers(points, where, (...,), finite=False)
+    except (TypeError, ValueError) as exc:
+        raise error(
+            f"{where}: the vertices are not numbers in pairs; give them as [[x, y], ...]"
+        ) from exc
+    if ring.ndim != 2 or ring.shape[1] != 2:
+        raise error(f"{where}: vertices must have shape (N, 2), got {ring.shape}")
+    if len(ring) > MAX_VERTICES:
+        raise error(
+            f"{where}: {len(ring)} vertices, at most {MAX_VERTICES} are read; simplify the outline"
+        )
+    return ring
+
+
+def _check_coordinates(ring: NDArray[np.float64], where: str, error: type[OrbiflowError]) -> None:
+    bad = np.flatnonzero(~np.isfinite(ring).all(axis=1))
+    if bad.size:
+        raise error(
+            f"{where}: vertex {bad[0]} (counted from 0) is {_pair(ring[bad[0]])}; "
+            "every coordinate must be a finite number"
+        )
+    far = np.flatnonzero((np.abs(ring) > MAX_COORDINATE).any(axis=1))
+    if far.size:
+        raise error(
+            f"{where}: vertex {far[0]} (counted from 0) is {_pair(ring[far[0]])}; coordinates "
+            f"beyond {MAX_COORDINATE:g} are not read, rescale the outline"
+        )
+
+
+def _check_region(ring: NDArray[np.float64], where: str, error: type[OrbiflowError]) -> None:
+    low, high = ring.min(axis=0), ring.max(axis=0)
+    size = float((high - low).max())
+    if size < max(MIN_RELATIVE_SIZE * float(np.abs(ring).max()), MIN_SIZE):
+        raise error(
+            f"{where}: the polygon has no size: its {len(ring)} vertices all lie within {size:.3g} "
+            f"of {_pair(low)}; move it nearer the origin or enlarge it"
+        )
+    # In units of the box, so that neither a huge nor a tiny shape strains the predicates.
+    local: NDArray[np.float64] = (ring - low) / size
+    polygon = Polygon(np.round(local, CLEARANCE_DIGITS))
+    if polygon.convex_hull.area < MIN_RELATIVE_AREA:
+        raise error(f"{where}: the polygon encloses no area, its vertices all lie on one line")
+    if not polygon.is_valid:
+        position = _POSITION.search(shapely.is_valid_reason(polygon))
+        at = low if position is None else low + size * np.array(position.groups(), dtype=float)
+        raise error(
+            f"{where}: the polygon crosses or touches itself near {_pair(at)}; "
+            "an outline must be a simple closed curve"
+        )
+    if abs(signed_area(local)) < MIN_RELATIVE_AREA:
+        raise error(f"{where}: the polygon encloses no area; check its vertices")
+
+
+def _pair(point: NDArray[np.float64]) -> str:
+    return f"({point[0]:.6g}, {point[1]:.6g})"
+
+
+def percent(share: float) -> str:
+    """`share` (0 to 1) in words, never rounded to none or all of it.
+
+    >>> percent(0.9213), percent(0.0002), percent(0.9999)
+    ('92.1%', 'under 0.1%', 'over 99.9%')
+    """
+    if 0 < share < 0.001:
+        return "under 0.1%"
+    return "over 99.9%" if 0.999 < share < 1 else f"{share:.1%}"
+
+
+def filled(polygon: Polygon) -> Polygon:
+    """`polygon` without its holes."""
+    return Polygon(polygon.exterior)
+
+
+def simplified(polygon: Polygon, tolerance: float) -> Polygon:
+    """`polygon` with fewer vertices, its boundary moved by at most `tolerance`; may be invalid."""
+    parts = polygons_in(polygon.simplify(tolerance))
+    return max(parts, key=lambda part: part.area, default=Polygon())
+
+
+def outer_ring(polygon: Polygon) -> NDArray[np.float64]:
+    """The exterior of `polygon` as a ring (N, 2)."""
+    return np.asarray(polygon.exterior.coords, dtype=np.float64)[:-1, :2].copy()
+
+
+def outer_outline(geometry: BaseGeometry) -> tuple[Polygon, list[str]]:
+    """The largest component of `geometry`, its holes filled, with notes of what was left out.
+
+    Components are compared by their area with holes filled; a component that lies in another's
+    hole goes with that hole. `geometry` must be valid and hold at least one polygon.
+
+    >>> from shapely.geometry import MultiPolygon, box
+    >>> shape, notes = outer_outline(MultiPolygon([box(0, 0, 3, 3), box(5, 5, 6, 6)]))
+    >>> shape.area, notes
+    (9.0, ['kept the largest of 2 components (90.0% of the filled area)'])
+    """
+    components = polygons_in(geometry)
+    solid = polygons_in(shapely.unary_union([filled(part) for part in components]))
+    shape = filled(max(solid, key=lambda part: part.area))
+    notes: list[str] = []
+    if len(solid) > 1:
+        share = shape.area / sum(part.area for part in solid)
+        notes.append(
+            f"kept the largest of {len(solid)} components ({percent(share)} of the filled area)"
+        )
+    own = shapely.intersection(geometry, shape)
+    n_holes = sum(len(part.interiors) for part in polygons_in(own))
+    if n_holes:
+        share = 1 - own.area / shape.area
+        notes.append(f"filled {n_holes} hole{'s' * (n_holes > 1)} ({percent(share)} of the area)")
+    return shape, notes
+
+
+Array = NDArray[np.float64]
+
+PLAIN = 8.2
+"""Length of an outline of area 1 up to which it is sampled with the fewest points; a disc has 3.5."""
+
+FEW, MOST = 60, 120
+"""Points for the search."""
+
+DETAIL = 0.004
+"""What a corner must stand out from the line past it to be kept, in square roots of the area."""
+
+MULTIPLES = (4, 6)
+"""Points of the tile for each point of the search."""
+
+MIDDLE = 2
+"""Points between the two for each point of the search; divides all `MULTIPLES` of use."""
+
+
+class Samples(NamedTuple):
+    """An outline (M, 2) of area 1, counter-clockwise, sampled three times.
+
+    - `coarse`: (n, 2) points, evenly spaced.
+    - `middle`: (2 n, 2) points, most of the outline's corners among them; or `fine` itself.
+    - `fine`: (k n, 2) points; every k-th is near one of `coarse`; the outline's corners are among them.
+    """
+
+    coarse: Array
+    middle: Array
+    fine: Array
+
+
+def sampled(ring: Array, phase: float = 0.0, multiples: tuple[int, ...] = MULTIPLES) -> Samples:
+    """Sample an outline, more densely where it is long or rich in corners.
+
+    Where twice the coarse points make no simple polygon, or do not divide the fine ones, `middle` is
+    `fine`.
+
+    Args:
+        ring: (M, 2) of area about 1, counter-clockwise.
+        phase: of the points, in coarse spacings.
+        multiples: fine points for each coarse one, in the order in which they are tried.
+
+    Raises:
+        OrbiflowError: if no sampling is free of self-crossings: the silhouette has hairs.
+    """
+    longer = ring_length(ring) / PLAIN
+    count = int(np.clip(6 * round(FEW * longer / 6), FEW, MOST))
+    coarse = _simple_coarse(ring, count, phase)
+    corners = important_vertices(ring, DETAIL)
+    fine = None
+    for multiple in multiples:
+        points = with_corners(ring, corners, multiple * len(coarse), phase * multiple)
+        if shapely.Polygon(points).is_valid:
+            fine = points
+            if 2 * len(corners) <= len(points):
+                break
+    if fine is None:
+        raise OrbiflowError(
+            "parts of the silhouette are too thin to be sampled: thicken or remove the hairs"
+        )
+    middle = with_corners(ring, corners, MIDDLE * len(coarse), phase * MIDDLE)
+    if len(fine) % len(middle) or not shapely.Polygon(middle).is_valid:
+        middle = fine
+    return Samples(coarse, middle, fine)
+
+
+def _simple_coarse(ring: Array, count: int, phase: float) -> Array:
+    """As many points as it takes for a polygon that does not cross itself; hairs made thicker."""
+    polygon = shapely.Polygon(ring)
+    for width in (0.0, 0.01, 0.02, 0.04):
+        thick = ring
+        if width:
+            grown = shapely.Polygon(polygon.buffer(width, join_style="mitre").exterior)
+            thick = shapely.get_coordinates(grown.exterior)[:-1]
+            thick = thick[::-1] if not grown.exterior.is_ccw else thick
+            start = int(np.argmin(np.linalg.norm(thick - ring[0], axis=1)))
+            thick = np.roll(thick, -start, axis=0)
+        for points in dict.fromkeys((count, min(MOST, 3 * count // 2), MOST)):
+            coarse = resampled(thick, points, phase)
+            if shapely.Polygon(coarse).is_valid:
+                return coarse
+    raise OrbiflowError("the silhouette is too ragged to be sampled: simplify its outline")
+
+
+def important_vertices(ring: Array, tolerance: float) -> list[int]:
+    """Indices of the vertices that Douglas and Peucker's simplification keeps."""
+    first = int(np.argmax(np.linalg.norm(ring - ring.mean(axis=0), axis=1)))
+    turned = np.roll(ring, -first, axis=0)
+    half = int(np.argmax(np.linalg.norm(turned - turned[0], axis=1)))
+    kept: list[int] = []
+    for start, part in ((0, turned[: half + 1]), (half, np.vstack([turned[half:], turned[:1]]))):
+        line = shapely.LineString(part)
+        points = shapely.get_coordinates(line.simplify(tolerance, preserve_topology=False))
+        at = 0
+        for point in points[:-1]:  # vertices are kept bit for bit and in order
+            at += int(np.flatnonzero((part[at:] == point).all(axis=1))[0])
+            kept.append((start + at + first) % len(ring))
+    return sorted(kept)
+
+
+def with_corners(ring: Array, corners: list[int], count: int, phase: float = 0.0) -> Array:
+    """`count` points (count, 2) nearly evenly spaced, the nearest point moved to each corner.
+
+    Point i stays within a spacing of where even spacing has it. Of corners that are nearest to the
+    same point, the first is kept.
+    """
+    along = arc_lengths(ring)
+    total = along[-1]
+    at: Array = along[corners] / total * count - phase
+    index = np.round(at).astype(int)
+    order = np.argsort(index % count, kind="stable")
+    slots, first = np.unique((index % count)[order], return_index=True)
+    shifts = (at - index)[order][first]
+    if not len(slots):
+        return resampled(ring, count, phase)
+    around = np.concatenate([slots - count, slots, slots + count])
+    shift = np.interp(np.arange(count), around, np.tile(shifts, 3))
+    return points_along(ring, (np.arange(count) + shift + phase) / count * total)

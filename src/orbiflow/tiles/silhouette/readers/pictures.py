@@ -1,0 +1,338 @@
+"""Images: decoding within bounds, and the choice of which part of the picture is the shape."""
+
+import re
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+from numbers import Real
+from typing import Any, TypeVar
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from PIL import Image, ImageOps, UnidentifiedImageError
+from skimage.filters import threshold_otsu
+
+from orbiflow.arguments import described
+from orbiflow.errors import InputFileError, OrbiflowError
+from orbiflow.tiles.silhouette.readers.reading import (
+    Held,
+    Reading,
+    Source,
+    check_file,
+    opened,
+)
+from orbiflow.tiles.silhouette.readers.tracing import Level, trace
+
+MAX_BYTES = 64 * 2**20
+MAX_PIXELS = 40_000_000
+MAX_SIDE = 1500  # pixels; beyond this an image is averaged down before it is traced
+MIN_CONTRAST = 0.04  # of full scale, between the shape's and the background's usual level
+
+_FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "GIF", "TIFF")
+# What Pillow raises on a damaged file depends on the format.
+_DAMAGED = (
+    *(OSError, SyntaxError, ValueError, EOFError, KeyError, IndexError, TypeError),
+    *(OverflowError, MemoryError, ArithmeticError, Image.DecompressionBombError),
+)
+
+_PARTS = {"alpha": ("opaque", "transparent"), "mask": ("marked", "unmarked")}
+"""Channels that say by themselves where the shape is: their high part and their low part."""
+
+_Decoded = TypeVar("_Decoded")
+
+
+@dataclass(frozen=True)
+class Picture:
+    """One channel, 0 to 1, shape (H, W); each of its pixels is `reduced` pixels of the image wide.
+
+    - `name`: "luminance"; or "alpha" or "mask", whose high part is the shape.
+    """
+
+    channel: NDArray[np.float64]
+    name: str
+    size: tuple[int, int]
+    reduced: int
+    notes: tuple[str, ...]
+
+
+def read_image(
+    path: Source, *, threshold: float | None = None, invert: bool | None = None
+) -> Reading:
+    """Read the outline of the shape in a PNG, JPEG or WebP image, in pixels with y down.
+
+    The shape is the opaque part where some of the image is transparent and some is opaque, else it
+    is told from the background by its luminance: the background is what most of the border is.
+    `threshold`, between 0 and 1, is the level that parts them. `invert=True` says that the shape is
+    the light (or the transparent) part, `False` that it is the dark (or the opaque) part. The
+    image is turned as its EXIF orientation asks, and coordinates are those of the turned image.
+
+    Raises `InputFileError` for a file over 64 MB, an image over 40 megapixels, one that cannot be
+    decoded, and one without a shape of its own; `OrbiflowError` for a threshold out of range.
+    """
+    checked_threshold(threshold)
+    picture = open_image(path, _decode)
+    level, notes = choose_shape(path, picture, threshold, invert)
+    outline, traced = trace(path, level, scale=picture.reduced, size=picture.size)
+    return Reading(outline, True, "image", picture.size, (*picture.notes, *notes, *traced))
+
+
+def checked_threshold(threshold: float | None) -> None:
+    """Raise OrbiflowError for a threshold out of range."""
+    if threshold is not None and not (isinstance(threshold, Real) and 0 < threshold < 1):
+        raise OrbiflowError(f"threshold must lie between 0 and 1, got {threshold}")
+
+
+def open_image(path: Source, decode: Callable[[Any, Image.Image], _Decoded]) -> _Decoded:
+    """What `decode` makes of the image at `path`, which is opened within bounds.
+
+    Raises `InputFileError` for a file over 64 MB, an image over 40 megapixels (before a pixel of it
+    is decoded), and one that is no image or that `decode` finds damaged.
+    """
+    n_bytes = check_file(path)
+    if n_bytes > MAX_BYTES:
+        raise InputFileError(
+            f"{path}: {n_bytes / 2**20:.0f} MB, images over {MAX_BYTES / 2**20:.0f} MB are not "
+            "read; downscale it"
+        )
+    try:
+        with warnings.catch_warnings():
+            # Pillow warns of damaged metadata and of sizes that are refused here anyway.
+            warnings.simplefilter("ignore")
+            with Image.open(opened(path), formats=_FORMATS) as image:
+                check_size(path, image.size)
+                return decode(path, image)
+    except InputFileError:
+        raise
+    except Image.DecompressionBombError as exc:
+        n_pixels = max(map(int, re.findall(r"\d+", str(exc))), default=0)
+        raise InputFileError(_too_large(path, f"{n_pixels / 1e6:.0f} megapixels")) from exc
+    except PermissionError as exc:
+        raise InputFileError(f"{path}: cannot be read; check its permissions") from exc
+    except UnidentifiedImageError as exc:
+        raise InputFileError(
+            f"{path}: the image is damaged or cut short, or it is none; give a PNG, JPEG or WebP image"
+        ) from exc
+    except _DAMAGED as exc:
+        raise InputFileError(
+            f"{path}: the image is damaged or cut short ({exc}); export or download it again"
+        ) from exc
+
+
+def check_size(path: Source, size: tuple[int, int]) -> None:
+    """Raise InputFileError for a picture of `size` (width, height) that is too large or too small."""
+    width, height = size
+    if width * height > MAX_PIXELS:
+        raise InputFileError(
+            _too_large(path, f"{width} x {height} pixels ({width * height / 1e6:.0f} megapixels)")
+        )
+    if width * height < 2:
+        raise InputFileError(f"{path}: {width} x {height} pixels cannot hold a silhouette")
+
+
+def _too_large(path: Source, size: str) -> str:
+    return f"{path}: {size}, at most {MAX_PIXELS // 10**6} megapixels are read; downscale the image"
+
+
+def upright(image: Image.Image) -> tuple[Image.Image, list[str]]:
+    """The first frame of `image`, turned as its EXIF orientation asks, with notes."""
+    notes: list[str] = []
+    if getattr(image, "n_frames", 1) > 1:
+        notes.append("took the first frame of several")
+    turned = ImageOps.exif_transpose(image)
+    if image.getexif().get(0x0112, 1) not in (0, 1):
+        notes.append("turned the image as its EXIF orientation asks")
+    return turned, notes
+
+
+def averaged(band: Image.Image) -> tuple[NDArray[np.float64], int]:
+    """Levels of `band` ("L" or "F"), 0 to 1, with at most 1500 pixels along a side.
+
+    Also how many pixels of `band`, along each axis, were averaged into one.
+    """
+    reduced = -(-max(band.size) // MAX_SIDE)
+    full_scale = 255.0 if band.mode == "L" else 1.0
+    return np.asarray(band.reduce(reduced), dtype=np.float64) / full_scale, reduced
+
+
+def _decode(path: Source, image: Image.Image) -> Picture:
+    turned, notes = upright(image)
+    band, name, band_notes = _channel(path, turned)
+    channel, reduced = averaged(band)
+    if reduced > 1:
+        notes.append(f"averaged {reduced} x {reduced} pixels into one before tracing")
+    return Picture(channel, name, turned.size, reduced, (*notes, *band_notes))
+
+
+def _channel(path: Source, image: Image.Image) -> tuple[Image.Image, str, list[str]]:
+    """The channel that shows the shape: mode "L" (0 to 255) or "F" (0 to 1)."""
+    if image.mode.startswith(("I", "F")):
+        return deep_channel(path, image), "luminance", []
+    if not image.has_transparency_data:
+        return image.convert("L"), "luminance", []
+    rgba = image.convert("RGBA")
+    alpha = rgba.getchannel("A")
+    values = np.asarray(alpha)
+    low, high = int(values.min()), int(values.max())
+    if high == 0:
+        raise InputFileError(f"{path}: the image is wholly transparent; there is no shape in it")
+    if low < 128 <= high:
+        return alpha, "alpha", []
+    if low == 255:
+        return rgba.convert("L"), "luminance", []
+    white = Image.new("RGBA", rgba.size, "white")
+    note = "laid the half-transparent image on white"
+    return Image.alpha_composite(white, rgba).convert("L"), "luminance", [note]
+
+
+def deep_channel(path: Source, image: Image.Image) -> Image.Image:
+    """A channel of more than 8 bits as mode "F", 0 to 1."""
+    values = np.asarray(image, dtype=np.float32)
+    if not np.isfinite(values).all():
+        raise InputFileError(f"{path}: holds pixels that are not finite numbers; export it as PNG")
+    low, high = float(values.min()), float(values.max())
+    if image.mode == "F" or low < 0 or high > 65535:
+        # No full scale is known: the image's own range stands in for it.
+        values, full_scale = values - low, max(high - low, np.finfo(np.float32).tiny)
+    else:
+        full_scale = 65535.0
+    return Image.fromarray(values / np.float32(full_scale))
+
+
+def choose_shape(
+    path: Source, picture: Picture, threshold: float | None, invert: bool | None
+) -> tuple[Level, list[str]]:
+    """The level turned so that the shape is high, and notes of how it was told apart."""
+    channel = picture.channel
+    if channel.min() == channel.max():
+        raise InputFileError(
+            f"{path}: the image is blank, every pixel has {picture.name} {channel.min():.2f}; "
+            "there is no shape in it"
+        )
+    cut = _cut(path, picture) if threshold is None else threshold
+    given = "" if threshold is None else ", as given"
+    above = channel > cut
+    if above.all() or not above.any():
+        side = "above" if above.any() else "below"
+        raise InputFileError(
+            f"{path}: every pixel lies {side} the threshold {cut:.2f} ({picture.name} from "
+            f"{channel.min():.2f} to {channel.max():.2f}); choose one in between"
+        )
+    high = np.median(channel[above])
+    low = np.median(channel[~above])
+    if picture.name in _PARTS:
+        take_high = not invert
+        part = _PARTS[picture.name][not take_high]
+        notes = [f"shape taken: the {part} part ({picture.name} threshold {cut:.2f}{given})"]
+    else:
+        take_high, notes = _polarity(above, invert, f"threshold {cut:.2f}{given}")
+    if take_high:
+        return Level(channel, cut, float(high)), notes
+    return Level(1 - channel, 1 - cut, 1 - float(low)), notes
+
+
+def _cut(path: Source, picture: Picture) -> float:
+    """Level midway between the usual levels of the two classes that Otsu's method finds."""
+    if picture.name in _PARTS:
+        return 0.5
+    channel = picture.channel
+    above = channel > threshold_otsu(channel)
+    low, high = float(np.median(channel[~above])), float(np.median(channel[above]))
+    if high - low < MIN_CONTRAST:
+        raise InputFileError(
+            f"{path}: the image is all but blank, its luminance is {low:.2f} to {high:.2f}; "
+            "raise the contrast or give a threshold"
+        )
+    return (low + high) / 2
+
+
+def _polarity(
+    above: NDArray[np.bool_], invert: bool | None, threshold: str
+) -> tuple[bool, list[str]]:
+    """Whether the shape is the light part."""
+    border = np.concatenate([above[0], above[-1], above[1:-1, 0], above[1:-1, -1]])
+    light = float(border.mean())
+    shape_is_light = light < 0.5 if invert is None else invert
+    kind = "light on dark" if shape_is_light else "dark on light"
+    how = "detected" if invert is None else "taken as told"
+    notes = [f"shape {how}: {kind} ({threshold})"]
+    if invert is None and 0.3 < light < 0.7:
+        notes.append(
+            f"only {max(light, 1 - light):.0%} of the image's border is background; if the wrong "
+            f"part was taken, set invert to {not shape_is_light}"
+        )
+    return shape_is_light, notes
+
+
+def read_mask_array(
+    values: Any,
+    name: str = "mask",
+    *,
+    threshold: float | None = None,
+    invert: bool | None = None,
+) -> Reading:
+    """The outline of the shape in an array (H, W), in pixels with y down, the first row on top.
+
+    Booleans, and integers that are 0 and 1 alone, say where the shape is; with `invert`, where it is
+    not. Other integers of 8 or 16 bits are gray levels of that full scale, floats of full scale 1:
+    `threshold` and `invert` mean what they do for images (see `read_image`).
+
+    Raises:
+        OrbiflowError: for another shape or type, levels out of range, or a setting that does not fit.
+        InputFileError: for over 40 megapixels, and an array without a shape of its own.
+    """
+    checked_threshold(threshold)
+    source = Held(b"", name)
+    array = _array(values, name)
+    check_size(source, (array.shape[1], array.shape[0]))
+    levels, is_mask = _levels(array, name)
+    if is_mask and threshold is not None:
+        raise OrbiflowError(
+            f"{name}: threshold parts gray levels, and this is a mask; leave it out"
+        )
+    channel, reduced = averaged(Image.fromarray(levels))
+    size = array.shape[1], array.shape[0]
+    notes = (
+        [f"averaged {reduced} x {reduced} pixels into one before tracing"] if reduced > 1 else []
+    )
+    picture = Picture(channel, "mask" if is_mask else "luminance", size, reduced, tuple(notes))
+    level, chosen = choose_shape(source, picture, threshold, invert)
+    outline, traced = trace(source, level, scale=reduced, size=size)
+    return Reading(outline, True, "image", size, (*picture.notes, *chosen, *traced))
+
+
+def _array(values: Any, name: str) -> NDArray[Any]:
+    if isinstance(values, torch.Tensor):
+        values = values.detach().cpu().numpy()
+    try:
+        array = np.asarray(values)
+    except ValueError:  # lists of several lengths
+        array = np.asarray(None)
+    if array.dtype.kind not in "biuf":
+        raise OrbiflowError(
+            f"{name}: expected an array of booleans or levels, got {described(values)}"
+        )
+    if array.ndim != 2:
+        raise OrbiflowError(
+            f"{name}: expected an array (H, W), got shape {array.shape}; of a picture in colour give "
+            "one channel, such as pixels[..., 3] for its opacity or pixels.mean(axis=-1)"
+        )
+    return array
+
+
+def _levels(array: NDArray[Any], name: str) -> tuple[NDArray[np.float32], bool]:
+    """Levels 0 to 1, and whether they say where the shape is."""
+    low, high = (array.min(), array.max()) if array.size else (0, 0)
+    if array.dtype.kind == "b" or (array.dtype.kind in "iu" and low >= 0 and high <= 1):
+        return array.astype(np.float32), True
+    full = 1.0
+    if array.dtype.kind in "iu":
+        full = 255.0 if high <= 255 else 65535.0
+        if array.dtype.itemsize == 2 and array.dtype.kind == "u":
+            full = 65535.0
+    if not (low >= 0 and high <= full and np.isfinite([low, high]).all()):
+        what = "0 to 1" if array.dtype.kind == "f" else "0 to 255, or to 65535"
+        raise OrbiflowError(
+            f"{name}: levels of type {array.dtype} lie from {what}, got {low:g} to {high:g}; scale them"
+        )
+    return (array / full).astype(np.float32), False

@@ -1,0 +1,100 @@
+"""What every reader of silhouettes hands back, and how a file's bytes are fetched."""
+
+import io
+import stat
+from dataclasses import dataclass
+from pathlib import Path, PurePath
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orbiflow.errors import InputFileError
+
+
+@dataclass(frozen=True)
+class Held:
+    """The content of a file, in memory, under a name: what messages call it, and its ending."""
+
+    data: bytes
+    name: str
+
+    @property
+    def suffix(self) -> str:
+        """Ending of the name, such as ".svg"."""
+        return PurePath(self.name).suffix
+
+    def __str__(self) -> str:
+        return self.name
+
+
+Source = Path | Held
+
+
+def opened(source: Source) -> Path | io.BytesIO:
+    """What libraries open: the path, or a stream of the bytes."""
+    return io.BytesIO(source.data) if isinstance(source, Held) else source
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A silhouette as found in a file.
+
+    - `outline`: (N, 2), simple closed ring without a repeated last vertex, in the file's own units.
+    - `y_down`: whether the file's y axis points down.
+    - `kind`: "image", "svg", "dat", "json".
+    - `size`: width and height of the picture or drawing, where the file states one.
+    - `notes`: what was decided for the user, in plain words.
+    - `corner`: of least coordinates, of that picture or drawing.
+    """
+
+    outline: NDArray[np.float64]
+    y_down: bool
+    kind: str
+    size: tuple[float, float] | None
+    notes: tuple[str, ...]
+    corner: tuple[float, float] = (0.0, 0.0)
+
+
+def check_file(path: Source) -> int:
+    """Size of the regular file at `path` in bytes; `InputFileError` where there is none to read."""
+    if isinstance(path, Held):
+        if not path.data:
+            raise InputFileError(f"{path}: there are no bytes in it; give the content of a file")
+        return len(path.data)
+    try:
+        status = path.stat()
+    except FileNotFoundError as exc:
+        raise InputFileError(f"{path}: no such file; check the path") from exc
+    except (OSError, ValueError) as exc:
+        raise InputFileError(f"{path}: cannot be reached ({exc}); check the path") from exc
+    if stat.S_ISDIR(status.st_mode):
+        raise InputFileError(f"{path}: is a directory; give a file inside it")
+    if not stat.S_ISREG(status.st_mode):
+        raise InputFileError(f"{path}: is not a regular file; give an image, SVG or polygon file")
+    if status.st_size == 0:
+        raise InputFileError(f"{path}: the file is empty; export or download it again")
+    return status.st_size
+
+
+def read_bytes(path: Source, limit: int) -> bytes:
+    """Content of the file at `path`; refused when it is larger than `limit` bytes."""
+    data = read_head(path, limit + 1)
+    if len(data) > limit:
+        raise InputFileError(
+            f"{path}: larger than {limit / 2**20:.0f} MB, the most that is read of this kind of "
+            "file; simplify or downscale it"
+        )
+    return data
+
+
+def read_head(path: Source, n: int) -> bytes:
+    """First `n` bytes of the file at `path`, or all of a shorter one."""
+    if isinstance(path, Held):
+        return path.data[:n]
+    try:
+        with path.open("rb") as file:
+            return file.read(n)
+    except OSError as exc:
+        raise InputFileError(
+            f"{path}: cannot be read ({exc.strerror}); check its permissions"
+        ) from exc

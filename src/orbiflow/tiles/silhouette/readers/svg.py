@@ -1,0 +1,187 @@
+"""SVG drawings: the outline of the largest closed shape, in the drawing's own user units."""
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely.errors import GEOSException
+from shapely.geometry.base import BaseGeometry
+
+from orbiflow.errors import InputFileError
+from orbiflow.tiles.silhouette.outlines import (
+    MAX_COORDINATE,
+    MAX_VERTICES,
+    clean_ring,
+    outer_outline,
+    outer_ring,
+    simplified,
+)
+from orbiflow.tiles.silhouette.readers.reading import (
+    Reading,
+    Source,
+    read_bytes,
+)
+from orbiflow.tiles.silhouette.readers.svg_paths import (
+    MAX_POINTS,
+    SubPath,
+    TooManyPoints,
+    TooTangled,
+    fill,
+)
+from orbiflow.tiles.silhouette.readers.svg_shapes import Drawing, parse_xml
+from orbiflow.typed_shapely import ufuncs
+
+MAX_BYTES = 16 * 2**20
+# Flattening error, of the size of each shape, and its floor, of the size of the drawing.
+FLATNESS = 1 / 2000
+FLATNESS_FLOOR = 1 / 20_000
+CLOSING_GAP = 1e-6  # of the size of the drawing: ends nearer than this are one point
+GRID = 1e-9  # of the size of the drawing: the grid that the united outline is snapped to
+GRID_FLOOR = 1e-12  # of the largest coordinate
+COLLINEAR = 1e-6  # of the size of the drawing: vertices nearer their chord than this are dropped
+
+
+def read_svg(path: Source) -> Reading:
+    """Read the outline of the silhouette in an SVG drawing, in user units with y down.
+
+    User units are those of the viewBox (of the root element), whatever width and height say. All
+    closed sub-paths of paths, rectangles, circles, ellipses, polygons and polylines count, painted
+    or not; the sub-paths of one element are filled by its `fill-rule`, so that holes are holes; the
+    elements are united, the largest component is kept and its holes are filled. Strokes, clips and
+    masks are passed over. Curves are flattened to within 1/2000 of the size of their shape.
+
+    Raises `InputFileError` for a file over 16 MB, XML that is not well formed or declares entities,
+    elements that cannot be understood, more than 200,000 points, and a drawing with no closed path.
+    """
+    drawing = Drawing(path, parse_xml(path, read_bytes(path, MAX_BYTES)))
+    drawing.collect()
+    size = _drawing_size(drawing)
+    regions, n_open = _regions(drawing, size)
+    if not regions:
+        raise InputFileError(f"{path}: {_why_empty(drawing, n_open)}")
+    notes = [_left_open(n_open)] if n_open else []
+    regions, dropped = _drop_backgrounds(regions, drawing.box)
+    shape, kept = outer_outline(_overlay(path, regions))
+    outline, cleaned = clean_ring(_thinned(shape, size), str(path), InputFileError)
+    box = drawing.box
+    page = None if box is None else (box[2] - box[0], box[3] - box[1])
+    corner = (0.0, 0.0) if box is None else (box[0], box[1])
+    return Reading(outline, True, "svg", page, (*notes, *dropped, *kept, *cleaned), corner)
+
+
+def _drawing_size(drawing: Drawing) -> float:
+    reach = [path.reach() for shape in drawing.shapes for path in shape.paths]
+    if not reach:
+        return 0.0
+    points = np.concatenate(reach)
+    if not np.isfinite(points).all() or np.abs(points).max() > MAX_COORDINATE:
+        raise InputFileError(
+            f"{drawing.path}: a path reaches beyond {MAX_COORDINATE:g} user units; rescale the "
+            "drawing"
+        )
+    return float(np.ptp(points, axis=0).max())
+
+
+def _regions(drawing: Drawing, size: float) -> tuple[list[BaseGeometry], int]:
+    """Regions filled by the elements' closed sub-paths, and how many sub-paths were left open."""
+    regions: list[BaseGeometry] = []
+    n_open, n_points = 0, 0
+    for shape in drawing.shapes:
+        closed = [path for path in shape.paths if _is_closed(path, size)]
+        n_open += len(shape.paths) - len(closed)
+        try:
+            rings = _flatten(closed, size)
+            n_points += sum(map(len, rings))
+            if n_points > MAX_POINTS:
+                raise TooManyPoints
+            region = fill(rings, shape.fill_rule)
+        except TooManyPoints as exc:
+            raise InputFileError(
+                f"{drawing.path}: the paths come to more than {MAX_POINTS} points; simplify them"
+            ) from exc
+        except (TooTangled, GEOSException) as exc:
+            raise InputFileError(
+                f"{drawing.path}: a path crosses itself too often to be filled; simplify it"
+            ) from exc
+        if region.area > 0:
+            regions.append(region)
+    return regions, n_open
+
+
+def _is_closed(path: SubPath, size: float) -> bool:
+    gap = float(np.hypot(*(path.curves[-1].end - path.start)))
+    return path.closed or gap <= CLOSING_GAP * size
+
+
+def _flatten(paths: list[SubPath], size: float) -> list[NDArray[np.float64]]:
+    if not paths:
+        return []
+    own = float(np.ptp(np.concatenate([path.reach() for path in paths]), axis=0).max())
+    if own == 0:
+        return []
+    tolerance = max(own * FLATNESS, size * FLATNESS_FLOOR)
+    return [path.flatten(tolerance) for path in paths]
+
+
+def _drop_backgrounds(
+    regions: list[BaseGeometry], box: tuple[float, float, float, float] | None
+) -> tuple[list[BaseGeometry], list[str]]:
+    """`regions` without rectangles that cover the page, as long as something else is there."""
+    xmin, ymin, xmax, ymax = ufuncs.total_bounds(regions) if box is None else box
+    page = shapely.box(xmin, ymin, xmax, ymax)
+    rest = [region for region in regions if not _covers(region, page)]
+    n = len(regions) - len(rest)
+    if not rest or n == 0:
+        return regions, []
+    noun = (
+        "a background rectangle that covers" if n == 1 else f"{n} background rectangles that cover"
+    )
+    return rest, [f"left out {noun} the whole drawing"]
+
+
+def _covers(region: BaseGeometry, page: BaseGeometry) -> bool:
+    """Whether `region` is a rectangle that covers `page`, but for 0.1% of it."""
+    is_box = region.area >= 0.999 * region.envelope.area
+    return is_box and region.envelope.intersection(page).area >= 0.999 * page.area
+
+
+def _overlay(path: Source, regions: list[BaseGeometry]) -> BaseGeometry:
+    # Snapped to a grid: neighbours that all but share an edge would leave cracks between them.
+    bounds = ufuncs.total_bounds(regions)
+    size = max(bounds[2] - bounds[0], bounds[3] - bounds[1])
+    grid = max(GRID * size, GRID_FLOOR * float(np.abs(bounds).max()))
+    try:
+        union = shapely.union_all(regions, grid_size=grid)
+    except GEOSException as exc:
+        raise InputFileError(
+            f"{path}: the shapes cannot be united ({exc}); unite them in the drawing program"
+        ) from exc
+    if not union.area > 0:
+        raise InputFileError(f"{path}: the drawing encloses no area that shows at its size")
+    return union
+
+
+def _thinned(shape: shapely.Polygon, size: float) -> NDArray[np.float64]:
+    tolerance = COLLINEAR * size
+    thin = simplified(shape, tolerance)
+    while len(thin.exterior.coords) > MAX_VERTICES:
+        tolerance *= 2
+        thin = simplified(shape, tolerance)
+    return outer_ring(thin if thin.is_valid else shape)
+
+
+def _left_open(n: int) -> str:
+    return f"left out {n} open path{'s' * (n > 1)}"
+
+
+def _why_empty(drawing: Drawing, n_open: int) -> str:
+    if n_open:
+        return (
+            f"no closed path: {'its only path is' if n_open == 1 else f'all {n_open} paths are'} "
+            "open; close the outline in the drawing program"
+        )
+    images, texts = drawing.others.get("image", 0), drawing.others.get("text", 0)
+    if images or texts:
+        parts = [f"{images} embedded image(s)"] * bool(images) + [f"{texts} text(s)"] * bool(texts)
+        advice = "trace the image or give it as PNG" if images else "convert the text to paths"
+        return f"no closed path: it holds only {' and '.join(parts)}; {advice}"
+    return "no closed path: the drawing has no shape that encloses an area"

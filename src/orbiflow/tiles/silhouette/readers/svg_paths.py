@@ -1,0 +1,215 @@
+"""Sub-paths of an SVG drawing and their flattening into polygons with a bounded error."""
+
+import math
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+import numpy as np
+import shapely
+import svgelements
+from numpy.typing import NDArray
+from shapely.geometry import Polygon
+from shapely.geometry.base import BaseGeometry
+
+MAX_POINTS = 200_000
+
+
+class TooManyPoints(Exception):
+    """Flattening would make more than `MAX_POINTS` points."""
+
+
+@dataclass(frozen=True)
+class Bezier:
+    """A line, quadratic or cubic: its control points after the first, (1, 2, or 3; 2)."""
+
+    control: NDArray[np.float64]
+
+    @property
+    def end(self) -> NDArray[np.float64]:
+        return self.control[-1]
+
+    def reach(self) -> NDArray[np.float64]:
+        """Control points: they span as much as the curve, but for a small factor."""
+        return self.control
+
+    def flatten(self, start: NDArray[np.float64], tolerance: float) -> NDArray[np.float64]:
+        """Points after `start`, on the curve, whose polyline is within `tolerance` of it."""
+        if len(self.control) == 1:
+            return self.control
+        points = np.vstack([start, self.control])
+        degree = len(self.control)
+        # Bound of the chord error by the second differences: G. Wang, "The subdivision method for
+        # finding the intersection between two Bezier curves or surfaces" (1984).
+        bend = float(np.hypot(*np.diff(points, n=2, axis=0).T).max())
+        steps = _steps(math.sqrt(degree * (degree - 1) / 8 * bend / tolerance))
+        t = np.arange(1, steps + 1)[:, None] / steps
+        level: list[NDArray[np.float64]] = list(points)
+        while len(level) > 1:  # de Casteljau, at all parameters at once
+            level = [(1 - t) * a + t * b for a, b in pairwise(level)]
+        return level[0]
+
+
+@dataclass(frozen=True)
+class EllipticArc:
+    """Points `centre + cos(t) u + sin(t) v`, t from `t0` over `sweep` radians, up to `end`."""
+
+    centre: NDArray[np.float64]
+    u: NDArray[np.float64]
+    v: NDArray[np.float64]
+    t0: float
+    sweep: float
+    end: NDArray[np.float64]
+
+    def reach(self) -> NDArray[np.float64]:
+        """The middle and the end of the arc."""
+        t = self.t0 + self.sweep / 2
+        return np.stack([self.centre + np.cos(t) * self.u + np.sin(t) * self.v, self.end])
+
+    def flatten(self, start: NDArray[np.float64], tolerance: float) -> NDArray[np.float64]:  # noqa: ARG002
+        """Points after the first, on the arc, whose polyline is within `tolerance` of it."""
+        radius = math.hypot(*self.u, *self.v)
+        half_step = math.acos(max(1 - tolerance / radius, 0.0)) if radius > 0 else math.pi
+        steps = _steps(abs(self.sweep) / max(2 * half_step, 1e-9))
+        t = self.t0 + self.sweep * np.arange(1, steps + 1)[:, None] / steps
+        points = self.centre + np.cos(t) * self.u + np.sin(t) * self.v
+        points[-1] = self.end
+        return points
+
+
+def _steps(needed: float) -> int:
+    if not needed <= MAX_POINTS:
+        raise TooManyPoints
+    return max(1, math.ceil(needed))
+
+
+@dataclass
+class SubPath:
+    """A connected run of curves from `start`."""
+
+    start: NDArray[np.float64]
+    curves: list[Bezier | EllipticArc] = field(default_factory=list[Bezier | EllipticArc])
+    closed: bool = False
+
+    def reach(self) -> NDArray[np.float64]:
+        """Points (M, 2) that span about as much as its curves do."""
+        return np.vstack([self.start, *(curve.reach() for curve in self.curves)])
+
+    def flatten(self, tolerance: float) -> NDArray[np.float64]:
+        """Polyline (N, 2) within `tolerance` of the curves. Raises `TooManyPoints`."""
+        parts, last, count = [self.start[None]], self.start, 1
+        for curve in self.curves:
+            parts.append(curve.flatten(last, tolerance))
+            last = curve.end
+            count += len(parts[-1])
+            if count > MAX_POINTS:
+                raise TooManyPoints
+        return np.concatenate(parts)
+
+
+def sub_paths(path: svgelements.Path, matrix: NDArray[np.float64]) -> list[SubPath]:
+    """The sub-paths of `path`, mapped by the affine `matrix` (2, 3)."""
+
+    def mapped(*points: svgelements.Point) -> NDArray[np.float64]:
+        xy = np.array([(point.x, point.y) for point in points], dtype=np.float64)
+        return xy @ matrix[:, :2].T + matrix[:, 2]
+
+    found: list[SubPath] = []
+    for segment in path:
+        if isinstance(segment, svgelements.Move):
+            found.append(SubPath(mapped(segment.end)[0]))
+            continue
+        if not found or found[-1].closed:
+            # After a close without a move the next sub-path begins where the last one began.
+            found.append(SubPath(found[-1].start if found else mapped(segment.start)[0]))
+        if isinstance(segment, svgelements.Close):
+            found[-1].closed = True
+        elif isinstance(segment, svgelements.Arc):
+            frame = mapped(segment.center, segment.prx, segment.pry, segment.end)
+            found[-1].curves.append(_arc(segment, frame))
+        elif isinstance(segment, svgelements.CubicBezier):
+            control = mapped(segment.control1, segment.control2, segment.end)
+            found[-1].curves.append(Bezier(control))
+        elif isinstance(segment, svgelements.QuadraticBezier):
+            found[-1].curves.append(Bezier(mapped(segment.control, segment.end)))
+        else:
+            found[-1].curves.append(Bezier(mapped(segment.end)))
+    return [path for path in found if path.curves]
+
+
+def _arc(arc: svgelements.Arc, points: NDArray[np.float64]) -> Bezier | EllipticArc:
+    centre, u_end, v_end, end = points
+    if arc.center == arc.prx or arc.center == arc.pry:
+        return Bezier(end[None])  # an arc of no radius is a line
+    t0, sweep = float(arc.get_start_t()), float(arc.sweep or 0.0)
+    return EllipticArc(centre, u_end - centre, v_end - centre, t0, sweep, end)
+
+
+# Of pairs of segments whose boxes overlap, in all and for each segment: the crossings of a scribble
+# grow with the square of its length.
+MAX_OVERLAPS = 200_000
+MAX_OVERLAPS_EACH = 20
+MAX_FACES = 50_000
+_SAMPLE = 400
+
+
+class TooTangled(Exception):
+    """The curves cross each other too often to be resolved."""
+
+
+def fill(rings: list[NDArray[np.float64]], rule: str = "nonzero") -> BaseGeometry:
+    """Region filled by closed `rings`, each (N, 2), under `rule` "nonzero" or "evenodd".
+
+    Raises `TooTangled` for curves with more crossings than can be resolved.
+
+    >>> square = np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]])
+    >>> inner = square / 2 + 1
+    >>> fill([square, inner]).area, fill([square, inner[::-1]]).area
+    (16.0, 12.0)
+    >>> fill([square, inner], "evenodd").area
+    12.0
+    """
+    rings = [ring for ring in rings if len(np.unique(ring, axis=0)) >= 3]
+    if len(rings) == 1 and (single := Polygon(rings[0])).is_valid:
+        return single
+    if not rings:
+        return Polygon()
+    _check_tangle(rings)
+    lines = [shapely.LinearRing(ring) for ring in rings]
+    faces = np.array(shapely.polygonize([shapely.unary_union(lines)]).geoms, dtype=object)
+    if len(faces) > MAX_FACES:
+        raise TooTangled
+    if not len(faces):
+        return Polygon()
+    inside = shapely.get_coordinates(shapely.point_on_surface(faces))
+    winding = sum(_winding(inside, ring) for ring in rings)
+    kept = winding % 2 != 0 if rule == "evenodd" else winding != 0
+    return shapely.union_all(faces[kept])
+
+
+def _check_tangle(rings: list[NDArray[np.float64]]) -> None:
+    """Estimate from a sample how many pairs of segments must be tested for a crossing."""
+    ends = np.concatenate([np.stack([ring, np.roll(ring, -1, axis=0)], axis=1) for ring in rings])
+    low, high = ends.min(axis=1), ends.max(axis=1)
+    sample = np.random.default_rng(0).permutation(len(ends))[:_SAMPLE]
+    overlaps = sum(
+        np.count_nonzero(((low <= high[i]) & (high >= low[i])).all(axis=1)) for i in sample
+    )
+    if overlaps / len(sample) * len(ends) > MAX_OVERLAPS + MAX_OVERLAPS_EACH * len(ends):
+        raise TooTangled
+
+
+def _winding(points: NDArray[np.float64], ring: NDArray[np.float64]) -> NDArray[np.int64]:
+    """How often `ring` (N, 2) winds around each of `points` (P, 2)."""
+    winding = np.zeros(len(points), dtype=np.int64)
+    low, high = ring.min(axis=0), ring.max(axis=0)
+    near = np.flatnonzero(((points >= low) & (points <= high)).all(axis=1))
+    start, end = ring, np.roll(ring, -1, axis=0)
+    for i in near:
+        x, y = points[i]
+        up = (start[:, 1] <= y) & (end[:, 1] > y)
+        down = (start[:, 1] > y) & (end[:, 1] <= y)
+        side = (end[:, 0] - start[:, 0]) * (y - start[:, 1]) - (x - start[:, 0]) * (
+            end[:, 1] - start[:, 1]
+        )
+        winding[i] = np.count_nonzero(up & (side > 0)) - np.count_nonzero(down & (side < 0))
+    return winding

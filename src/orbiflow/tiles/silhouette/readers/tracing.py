@@ -1,0 +1,142 @@
+"""From a picture's level to the outline of its largest shape, to a fraction of a pixel."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+from shapely.geometry import Polygon, box
+from skimage.measure import find_contours
+
+from orbiflow.errors import InputFileError
+from orbiflow.tiles.geometry import polygons_in
+from orbiflow.tiles.silhouette.outlines import (
+    outer_ring,
+    percent,
+    simplified,
+)
+from orbiflow.tiles.silhouette.readers.reading import Source
+
+MIN_AREA = 30.0  # square pixels
+MAX_OUTLINE_VERTICES = 4000
+SIMPLIFY_TOLERANCE = 0.15  # pixels
+# The steps of a picture of two levels are within this of the line they stand for, and are no detail
+# of the shape. Small shapes are held to the finer tolerance for their size.
+STEP_TOLERANCE = 0.7  # pixels
+STEP_TOLERANCE_OF_SIZE = 0.005  # of the square root of the area
+
+
+@dataclass(frozen=True)
+class Level:
+    """A picture (H, W) whose shape is where `values` exceed `cut`; `inside` is its usual level."""
+
+    values: NDArray[np.float64]
+    cut: float
+    inside: float
+
+
+def trace(
+    path: Source, level: Level, *, scale: int, size: tuple[int, int]
+) -> tuple[NDArray[np.float64], list[str]]:
+    """Outline (N, 2) of the largest shape in image pixels, with notes.
+
+    A pixel of `level` is `scale` pixels of the image wide, and the image is `size` (width, height).
+    Pixels of a shape hold together along their sides, not their corners.
+
+    Raises `InputFileError` when the shape fills the image or is smaller than 30 pixels.
+    """
+    mask = level.values > level.cut
+    shape, notes = _largest(mask)
+    if shape.all():
+        raise InputFileError(
+            f"{path}: the shape fills the whole image ({size[0]} x {size[1]} pixels); leave a "
+            "margin around it, or set invert to take the other part"
+        )
+    if _touches_border(shape):
+        notes.append("the shape touches the image's border and may be cut off there")
+    polygon, stepped = _polygon(_isolate(level, mask, shape), level.cut, level.inside)
+    area = polygon.area * scale**2
+    if area < MIN_AREA:
+        raise InputFileError(
+            f"{path}: the largest shape covers only {area:.1f} pixels, at least {MIN_AREA:.0f} are "
+            "needed; give a larger image, or set threshold or invert"
+        )
+    tolerance = SIMPLIFY_TOLERANCE
+    if stepped:
+        own = min(STEP_TOLERANCE, STEP_TOLERANCE_OF_SIZE * float(np.sqrt(polygon.area)))
+        tolerance = max(tolerance, own)
+    polygon, simplified = _simplify(polygon, tolerance)
+    ring = np.clip(outer_ring(polygon) * scale, 0, size)
+    return ring, notes + simplified
+
+
+def _largest(mask: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], list[str]]:
+    """The component that is largest with its holes filled."""
+    # Background holds together across corners where the shape does not: hence the full structure.
+    filled = ndimage.binary_fill_holes(mask, structure=np.ones((3, 3), dtype=int))
+    labels, n = ndimage.label(filled)
+    areas = np.bincount(labels.ravel())
+    areas[0] = 0
+    shape = labels == areas.argmax()
+    notes: list[str] = []
+    if n > 1:
+        share = areas.max() / areas.sum()
+        notes.append(f"kept the largest of {n} components ({percent(share)} of the filled area)")
+    holes = shape & ~mask
+    n_holes = ndimage.label(holes, structure=np.ones((3, 3), dtype=int))[1]
+    if n_holes:
+        share = holes.sum() / shape.sum()
+        notes.append(f"filled {n_holes} hole{'s' * (n_holes > 1)} ({percent(share)} of the area)")
+    return shape, notes
+
+
+def _touches_border(shape: NDArray[np.bool_]) -> bool:
+    return bool(shape[[0, -1]].any() or shape[:, [0, -1]].any())
+
+
+def _isolate(
+    level: Level, mask: NDArray[np.bool_], shape: NDArray[np.bool_]
+) -> NDArray[np.float64]:
+    """The level with the shape's holes filled and all other components taken out."""
+    values = np.where(shape & ~mask, level.inside, level.values)
+    return np.where(mask & ~shape, 2 * level.cut - level.inside, values)
+
+
+def _polygon(values: NDArray[np.float64], cut: float, inside: float) -> tuple[Polygon, bool]:
+    """The region where `values` exceed `cut`, pixel (0, 0) spanning [0, 1] x [0, 1].
+
+    Also whether its outline is stepped: drawn in two levels, without anti-aliasing.
+    """
+    # The margin mirrors the shape's level in the cut, so that a shape which runs off the image is
+    # closed along the image's very edge.
+    padded = np.pad(values, 1, constant_values=2 * cut - inside)
+    contours = find_contours(padded, cut, fully_connected="low")
+    regions = [Polygon(contour[:, ::-1] - 0.5) for contour in contours if len(contour) > 3]
+    largest = max(regions, key=lambda polygon: polygon.area)
+    height, width = values.shape
+    # A level that equals the cut at a pixel's centre can pinch the contour there.
+    whole = largest if largest.is_valid else largest.buffer(0)
+    parts = polygons_in(whole.intersection(box(0, 0, width, height)))
+    return max(parts, key=lambda part: part.area), _is_stepped(outer_ring(largest))
+
+
+def _is_stepped(ring: NDArray[np.float64]) -> bool:
+    """Whether nearly every vertex cuts its grid line at the same fraction."""
+    # Each vertex lies on one line of pixel centres and anywhere between two of them.
+    fraction: NDArray[np.float64] = np.mod(ring - 0.5, 1.0).sum(axis=1)
+    return bool(np.mean(np.abs(fraction - np.median(fraction)) < 0.05) > 0.95)
+
+
+def _simplify(polygon: Polygon, tolerance: float) -> tuple[Polygon, list[str]]:
+    """Fewer vertices, the boundary moved by at most the tolerance, and still simple."""
+    simple = simplified(polygon, tolerance)
+    while len(simple.exterior.coords) > MAX_OUTLINE_VERTICES:
+        tolerance *= 1.5
+        simple = simplified(polygon, tolerance)
+    notes: list[str] = []
+    if tolerance > STEP_TOLERANCE:
+        notes.append(f"simplified the outline to within {tolerance:.2f} traced pixels")
+    while not (simple.is_valid and simple.area > 0):
+        tolerance /= 2
+        simple = simplified(polygon, tolerance) if tolerance > 1e-3 else polygon
+    return simple, notes

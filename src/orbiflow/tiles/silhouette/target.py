@@ -1,0 +1,212 @@
+"""The silhouette that a tile is to look like, in the user's coordinates and in normal form."""
+
+import os
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import IO, Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from orbiflow.arguments import described, is_a
+from orbiflow.errors import InputFileError, OrbiflowError
+from orbiflow.tiles.geometry import (
+    centroid,
+    orient,
+    signed_area,
+)
+from orbiflow.tiles.silhouette.frame import Frame
+from orbiflow.tiles.silhouette.outlines import clean_ring
+from orbiflow.tiles.silhouette.readers import (
+    MAX_BYTES,
+    Held,
+    Reading,
+    read_mask_array,
+    read_outline,
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Target:
+    """A silhouette: one simple closed curve.
+
+    Make one with `Target.read`, `from_bytes`, `from_mask` or `from_polygon`, which check the outline.
+
+    - `outline`: (N, 2), without a repeated last vertex, in the input's own units. In an image the
+      unit is the pixel and (0, 0) the image's top left corner, so that pixel (row 0, column 0)
+      spans [0, 1] x [0, 1]. Run through so that the normal form is counter-clockwise; read-only.
+    - `y_down`: whether the input's y axis points down (images, SVG and `.dat` files).
+    - `notes`: what was decided for the user, in plain words.
+    - `source`: the file's name, or what stands in for it.
+    - `kind`: "image", "svg", "dat", "json" or "polygon".
+    - `size`, `corner`: width and height of the picture or drawing, where there is one, and its corner
+      of least coordinates.
+
+    >>> target = Target.from_polygon([[0, 0], [2, 0], [2, 2], [0, 2]])
+    >>> target.normal.tolist()
+    [[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]]
+    >>> target.to_input([0.5, 0.5])
+    array([2., 2.])
+    """
+
+    outline: NDArray[np.float64]
+    y_down: bool
+    notes: tuple[str, ...] = ()
+    source: str = "polygon"
+    kind: str = "polygon"
+    size: tuple[float, float] | None = None
+    corner: tuple[float, float] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        outline = orient(np.array(self.outline, float), counter_clockwise=not self.y_down)
+        object.__setattr__(self, "outline", _read_only(outline))
+
+    @classmethod
+    def read(
+        cls,
+        path: str | Path | IO[bytes],
+        *,
+        threshold: float | None = None,
+        invert: bool | None = None,
+    ) -> Self:
+        """Read a silhouette from an image (PNG, JPEG, WebP), an SVG, a `.json` or a `.dat` file.
+
+        A binary stream, such as an open file or `io.BytesIO`, is read from where it stands. For
+        images, `threshold` (0 to 1) is the level that parts the shape from its background and
+        `invert` says that the shape is the light (or the transparent) part; both are found out from
+        the image where they are not given, and `notes` say what was found.
+
+        Raises `InputFileError` for a file without a usable silhouette, with what to do about it.
+        """
+        where = path if isinstance(path, str | os.PathLike) else _held(path)
+        return cls._of(read_outline(where, threshold=threshold, invert=invert), str(where))
+
+    @classmethod
+    def from_bytes(
+        cls,
+        data: bytes | bytearray | memoryview,
+        name: str = "bytes",
+        *,
+        threshold: float | None = None,
+        invert: bool | None = None,
+    ) -> Self:
+        """As `read`, of the content of such a file; `name` stands in messages and for its ending.
+
+        >>> Target.from_bytes(b"[[0, 0], [2, 0], [2, 2], [0, 2]]").kind
+        'json'
+        """
+        if not is_a(data, bytes | bytearray | memoryview):
+            raise OrbiflowError(
+                f"data must be bytes, got {described(data)}; Target.read takes paths"
+            )
+        held = Held(bytes(data), str(name))
+        return cls._of(read_outline(held, threshold=threshold, invert=invert), held.name)
+
+    @classmethod
+    def from_mask(
+        cls,
+        mask: ArrayLike,
+        *,
+        threshold: float | None = None,
+        invert: bool | None = None,
+        source: str = "mask",
+    ) -> Self:
+        """The largest shape in an array (H, W), a row of pixels at a time, the first on top.
+
+        Booleans, and integers that are 0 and 1 alone, are true in the shape (`invert`: outside of it).
+        Other integers and floats are gray levels, of 0 to 255, 65535 or 1, and are read as those of
+        images are: `threshold` and `invert` are found out where they are not given.
+
+        Raises `OrbiflowError` for another array, and `InputFileError` for one without a shape.
+
+        >>> import numpy as np
+        >>> mask = np.zeros((60, 80), bool)
+        >>> mask[10:50, 20:70] = True
+        >>> round(Target.from_mask(mask).area)
+        2000
+        """
+        reading = read_mask_array(mask, source, threshold=threshold, invert=invert)
+        return cls._of(reading, source)
+
+    @classmethod
+    def _of(cls, reading: Reading, source: str) -> Self:
+        return cls(
+            reading.outline,
+            reading.y_down,
+            reading.notes,
+            source,
+            reading.kind,
+            reading.size,
+            reading.corner,
+        )
+
+    @classmethod
+    def from_polygon(
+        cls, points: ArrayLike, *, y_down: bool = False, source: str = "polygon"
+    ) -> Self:
+        """The silhouette bounded by the polygon `points` (N, 2), closed or not, in either sense.
+
+        Raises `OrbiflowError` for coordinates that are not finite, fewer than 3 vertices, no area,
+        or a polygon that crosses or touches itself.
+        """
+        with np.errstate(all="ignore"):  # what overflows is refused
+            outline, notes = clean_ring(points, source)
+        return cls(outline, y_down, tuple(notes), source)
+
+    @property
+    def area(self) -> float:
+        """Area of the silhouette in square input units."""
+        return float(abs(signed_area(self.outline)))
+
+    @cached_property
+    def frame(self) -> Frame:
+        """Where the normal form lies in the input: a scale, y's flip and a translation."""
+        linear = np.sqrt(self.area) * np.diag([1.0, -1.0 if self.y_down else 1.0])
+        return Frame(linear, centroid(self.outline), self.kind, self.size, self.corner)
+
+    @cached_property
+    def normal(self) -> NDArray[np.float64]:
+        """The outline (N, 2) with y up, area 1, centroid 0 and counter-clockwise, vertex by vertex."""
+        return _read_only(self.to_normal(self.outline))
+
+    def to_input(self, points: ArrayLike) -> NDArray[np.float64]:
+        """`points` (..., 2) of the normal form in the input's units: `frame.to_input`."""
+        return self.frame.to_input(points)
+
+    def to_normal(self, points: ArrayLike) -> NDArray[np.float64]:
+        """`points` (..., 2) in the input's units, in the normal form: `frame.to_normal`."""
+        return self.frame.to_normal(points)
+
+    def report(self) -> dict[str, Any]:
+        """What was read and decided, ready for JSON."""
+        return {
+            "source": self.source,
+            "kind": self.kind,
+            "size": None if self.size is None else list(self.size),
+            "vertices": len(self.outline),
+            "area": self.area,
+            "y_down": self.y_down,
+            "notes": list(self.notes),
+        }
+
+
+def _held(stream: Any) -> Held:
+    """What a binary stream holds, up to what is read of any file."""
+    how = "a path or a binary stream; Target.from_bytes takes bytes, Target.from_mask arrays"
+    if not callable(getattr(stream, "read", None)):
+        raise OrbiflowError(f"the silhouette's file must be {how}, got {described(stream)}")
+    name = getattr(stream, "name", None)
+    name = name if isinstance(name, str) else "stream"
+    try:
+        data = stream.read(MAX_BYTES + 1)
+    except (OSError, ValueError) as error:
+        raise InputFileError(f"{name}: cannot be read ({error})") from error
+    if not isinstance(data, bytes):
+        raise OrbiflowError(f'{name} is a stream of text; open it in binary mode, "rb"')
+    return Held(data, name)
+
+
+def _read_only(array: NDArray[np.float64]) -> NDArray[np.float64]:
+    array.setflags(write=False)
+    return array

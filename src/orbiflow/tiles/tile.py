@@ -1,0 +1,326 @@
+"""A finished tile: all that is known of it, and what can be done with it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import KW_ONLY, dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeAlias, overload
+
+from orbiflow.arguments import instance
+from orbiflow.errors import CertificationError, InputFileError, OrbiflowError
+from orbiflow.tiles.likeness import (
+    Fidelity,
+    Recognisability,
+    ShapeMetrics,
+    Thinnest,
+    neck_factor,
+    rank_score,
+)
+from orbiflow.tiles.tile_map import TileMap
+from orbiflow.tiles.tilings import Certificate, Tile, certify
+
+if TYPE_CHECKING:
+    import torch
+    from numpy.typing import ArrayLike
+
+    from orbiflow.arrays import Array
+    from orbiflow.tiles.art import ArtSettings
+    from orbiflow.tiles.exporting import Exported, ExportSettings
+    from orbiflow.tiles.motion import AnimationSettings
+    from orbiflow.tiles.search import TileModel
+    from orbiflow.tiles.silhouette import Bending, Frame, Target
+
+NAN = float("nan")
+NOT_COMPARED = ShapeMetrics(NAN, NAN, NAN, (NAN, NAN, NAN, NAN), NAN)
+NOT_RECOGNISED = Recognisability(NAN, NAN, NAN, NAN)
+
+
+@dataclass(frozen=True, eq=False)
+class EscherTile:
+    """A finished tile, from a search, a file or a polygon of one's own.
+
+    The tile itself:
+
+    - `tile`: The polygon with its group, in the input's coordinates.
+    - `name`: What files and titles call it, such as "IH4" or "turtle-IH4". Default: its class.
+    - `y_down`: Whether y points down in its coordinates, as in images.
+    - `rank`: Its place in the list of its run, from 1; None outside a saved run.
+    - `silhouette`: What was read as the silhouette, as result.json has it.
+    - `map_source`: The maps behind it, or the file that holds them, which may be missing.
+    - `no_map`: Why there is no map from the silhouette, if that is known.
+    - `normal`: The tile in the normal form of the silhouette, as the search left it.
+    - `notes`: What the user should know of it.
+
+    How it compares with the silhouette; NaN or None where that was not measured:
+
+    - `metrics`, `recognisability`: Measures of the certified polygon against the silhouette.
+    - `thinnest`: The narrowest neck of the polygon.
+    - `min_neck`: Width in square roots of the area below which necks lower the score.
+    - `deformation`, `fidelity`: What bending the silhouette costs, and what is left of its outline
+      (docs/likeness.md).
+    - `bent`, `rest`: The bent silhouette near which the tile was found, and the silhouette as it is:
+      outlines (n, 2) in the input's coordinates, point by point.
+    - `bent_iou`: The IoU of the tile with the bent silhouette.
+    - `pinned`: How far the worst pinned part is from similar to what it was; None without pins.
+    - `known_score`: The score that a file states.
+
+    How it was found:
+
+    - `objective`: What the search was after, "likeness" or "overlap".
+    - `front`: After a search for both, whether no other tile beats this one in both.
+    - `starts`, `dropped`: The number of starts, and of those that gave no certified tile.
+    - `seconds`: Computing time on one core.
+    - `others`: More tiles of the class, if they were asked for.
+    """
+
+    tile: Tile
+    _: KW_ONLY
+    name: str = ""
+    y_down: bool = False
+    rank: int | None = None
+    silhouette: dict[str, Any] | None = None
+    map_source: TileMap | Path | None = None
+    no_map: str = ""
+    normal: Tile | None = None
+    notes: tuple[str, ...] = ()
+    metrics: ShapeMetrics = NOT_COMPARED
+    recognisability: Recognisability = NOT_RECOGNISED
+    thinnest: Thinnest | None = None
+    min_neck: float = 0.0
+    deformation: float | None = None
+    fidelity: Fidelity | None = None
+    bent: Array | None = None
+    rest: Array | None = None
+    bent_iou: float | None = None
+    pinned: float | None = None
+    known_score: float | None = None
+    objective: str = "overlap"
+    front: bool | None = None
+    starts: int = 0
+    dropped: int = 0
+    seconds: float = 0.0
+    others: tuple[EscherTile, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not self.name:
+            object.__setattr__(self, "name", self.tile.isohedral_class or "tile")
+
+    @classmethod
+    def of(cls, source: TileSource) -> EscherTile:
+        """Return the finished tile that is meant; the best one of a run's folder.
+
+        Raises:
+            OrbiflowError: for what holds no tile.
+            InputFileError: as `load`.
+        """
+        if isinstance(source, EscherTile):
+            return source
+        if isinstance(source, str | Path):
+            return cls.load(source)
+        return cls(instance(source, Tile, "the tile", "EscherTile.load(folder) gives one"))
+
+    @staticmethod
+    def load(path: str | Path, which: str | int = 1) -> EscherTile:
+        """Return a tile of a run; see `read_result`."""
+        from orbiflow.tiles.result_file import read_result
+
+        return read_result(path, which)
+
+    def save(self, folder: str | Path) -> Path:
+        """Write the tile as a folder that `load`, and every command on a result, takes.
+
+        Raises:
+            OutputError: if the folder holds anything else, or cannot be written.
+        """
+        from orbiflow.tiles.result_file import save_tiles
+
+        return save_tiles([self], folder)
+
+    @property
+    def isohedral_class(self) -> str:
+        """The class, such as "IH4"; "" if it is not known."""
+        return self.tile.isohedral_class
+
+    @property
+    def group_name(self) -> str:
+        """The name of the wallpaper group, such as "p2"."""
+        return self.tile.group.name
+
+    @cached_property
+    def certificate(self) -> Certificate:
+        """The proof that it tiles, or what is wrong: from the polygon and the group alone."""
+        return certify(self.tile)
+
+    @cached_property
+    def normal_tile(self) -> Tile:
+        """The tile in the normal form of the silhouette: y up, the silhouette's area 1."""
+        if self.normal is not None:
+            return self.normal
+        if self.frame is None:
+            raise OrbiflowError(f"{self.name}: where its silhouette lies is not known")
+        inverse = self.frame.inverse
+        return self.tile.transformed(inverse, -inverse @ self.frame.offset)
+
+    @cached_property
+    def map(self) -> TileMap | None:
+        """The maps behind the tile, read from their file when first asked for; None if it is gone.
+
+        Raises:
+            InputFileError: for a file that is damaged or belongs to another tile.
+        """
+        source = self.map_source
+        if not isinstance(source, Path):
+            return source
+        if not source.is_file():
+            return None
+        found = TileMap.read(source)
+        if not found.ends_on(self.tile):
+            raise InputFileError(
+                f"{source}: belongs to another tile than the one in result.json; search again"
+            )
+        return found
+
+    @property
+    def bending(self) -> Bending | None:
+        """The map from the silhouette, in normal form; None for a tile that no silhouette bent to."""
+        return None if self.map is None else self.map.bending
+
+    @property
+    def frame(self) -> Frame | None:
+        """Where the silhouette's normal form lies in the input."""
+        return None if self.map is None else self.map.frame
+
+    @property
+    def score(self) -> float:
+        """What tiles are ranked by, from 0 to 1.
+
+        After a search for likeness the score of its `fidelity`, otherwise `rank_score` of IoU and
+        recognisability; less in proportion where a neck is too thin.
+        """
+        if self.known_score is not None:
+            return self.known_score
+        if self.fidelity is not None:
+            score = self.fidelity.score
+        elif math.isnan(self.metrics.iou):
+            return NAN
+        else:
+            score = rank_score(self.metrics.iou, self.recognisability.score)
+        if self.thinnest is None:
+            return score
+        return score * neck_factor(self.thinnest.share, self.min_neck)
+
+    def changed(self, **changes: Any) -> EscherTile:
+        """Return the tile with other values of some fields, and a certificate that is known kept."""
+        other = replace(self, **changes)
+        if "certificate" in self.__dict__ and other.tile is self.tile:
+            other.__dict__["certificate"] = self.certificate
+        return other
+
+    def family(self) -> tuple[EscherTile, ...]:
+        """Return this tile and the others of its class."""
+        return (self, *self.others)
+
+    def model(self) -> TileModel:
+        """Return the flow that made the tile, as a torch module.
+
+        Raises:
+            OrbiflowError: if no flow is known.
+        """
+        from orbiflow.tiles.search import as_model
+
+        if self.map is None or not self.map.settings:
+            raise OrbiflowError(f"{self.name}: the flow that made this tile is not known")
+        return as_model(self.map)
+
+    @overload
+    def forward(self, points: torch.Tensor) -> torch.Tensor: ...
+    @overload
+    def forward(self, points: ArrayLike) -> Array: ...
+    def forward(self, points: torch.Tensor | ArrayLike) -> torch.Tensor | Array:
+        """Return where points (..., 2) of the silhouette go, in the input's coordinates.
+
+        Raises:
+            OrbiflowError: if there is no map.
+        """
+        bending, frame = self.require_map()
+        return frame.to_input(bending.forward(frame.to_normal(points)))
+
+    @overload
+    def inverse(self, points: torch.Tensor) -> torch.Tensor: ...
+    @overload
+    def inverse(self, points: ArrayLike) -> Array: ...
+    def inverse(self, points: torch.Tensor | ArrayLike) -> torch.Tensor | Array:
+        """Return where points (..., 2) of the tile come from; as `forward`."""
+        bending, frame = self.require_map()
+        return frame.to_input(bending.inverse(frame.to_normal(points)))
+
+    def require_map(self) -> tuple[Bending, Frame]:
+        """Return the map from the silhouette, and where its coordinates lie in the input.
+
+        Raises:
+            OrbiflowError: if there is none, with the reason.
+        """
+        if self.bending is None or self.frame is None:
+            raise OrbiflowError(
+                f"{self.name}: no picture of the silhouette can be carried onto this tile: "
+                f"{self.no_map or 'its run left no map'}"
+            )
+        return self.bending, self.frame
+
+    def require_certified(self, *, force: bool = False, otherwise: str) -> Certificate:
+        """Return the certificate.
+
+        Args:
+            force: Accept a tile that is not certified.
+            otherwise: What does not happen to such a tile, and what to do, for the message.
+
+        Raises:
+            CertificationError: if it is not valid and `force` is not set.
+        """
+        if not self.certificate.valid and not force:
+            reasons = "; ".join(self.certificate.reasons)
+            raise CertificationError(f"{self.name} is not certified ({reasons}), {otherwise}")
+        return self.certificate
+
+    def draw(self, *, width_px: int = 1600) -> bytes:
+        """Return a PNG of the tiling."""
+        from orbiflow.tiles.pictures import tiling_png
+
+        return tiling_png(self.tile, y_down=self.y_down, width_px=width_px)
+
+    def draw_art(
+        self,
+        out: str | Path,
+        settings: ArtSettings | None = None,
+        *,
+        picture: str | Path | None = None,
+        target: Target | None = None,
+        force: bool = False,
+    ) -> Path:
+        """Write a picture of the tiling with something on its tiles; see `orbiflow.draw_art`."""
+        from orbiflow.tiles.art import draw_art
+
+        return draw_art(self, out, settings, picture=picture, target=target, force=force)
+
+    def export(
+        self, out: str | Path, settings: ExportSettings | None = None, *, force: bool = False
+    ) -> Exported:
+        """Write the tiling, its lines or its pieces in real size; see `orbiflow.tiles.export`."""
+        from orbiflow.tiles.exporting import export
+
+        return export(self, out, settings, force=force)
+
+    def animate(
+        self, out: str | Path, settings: AnimationSettings | None = None, *, force: bool = False
+    ) -> Path:
+        """Write an animation of the tile; see `orbiflow.tiles.animate`."""
+        from orbiflow.tiles.motion import animate
+
+        return animate(self, out, settings, force=force)
+
+
+TileSource: TypeAlias = EscherTile | Tile | str | Path
+"""What functions take for a tile. A text or path is a run's folder, or its result.json, whose best
+tile is meant; `EscherTile.load` gives the others."""

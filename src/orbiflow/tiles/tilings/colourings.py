@@ -1,0 +1,208 @@
+"""Colourings in which tiles that share an edge differ: periodic, with few colours."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orbiflow.symmetry import Isometry
+from orbiflow.tiles.tilings.surroundings import neighbours
+from orbiflow.tiles.tilings.tile_copies import Copies, prototile_of
+from orbiflow.tiles.tilings.tiling import (
+    Cell,
+    Tiles,
+    Tiling,
+    as_tiling,
+)
+
+Graph: TypeAlias = list[set[int]]
+"""Neighbours of each vertex; symmetric, without loops."""
+
+
+def colour_graph(graph: Graph, count: int, *, max_steps: int = 4000) -> list[int] | None:
+    """A proper colouring with colours 0 ... count - 1, or None.
+
+    Backtracking in the order of saturation (Brélaz, "New methods to color the vertices of a graph",
+    CACM 22, 1979). None means there is none, or that none was found in `max_steps` assignments;
+    with more colours than the largest degree there always is one, found without going back.
+
+    >>> colour_graph([{1, 2}, {0, 2}, {0, 1}], 3)
+    [0, 1, 2]
+    >>> colour_graph([{1, 2}, {0, 2}, {0, 1}], 2)
+    """
+    colours = [-1] * len(graph)
+    trail: list[tuple[int, list[int]]] = []  # vertex and the colours still to try there
+    for _ in range(max(max_steps, len(graph))):
+        vertex = _most_constrained(graph, colours)
+        if vertex is None:
+            return colours
+        taken = {colours[n] for n in graph[vertex]}
+        highest = max(colours)  # colours not used yet are interchangeable: try only the first
+        options = [c for c in range(min(count, highest + 2)) if c not in taken]
+        trail.append((vertex, options))
+        if not _advance(trail, colours):
+            return None
+    return colours if min(colours) >= 0 else None
+
+
+def _most_constrained(graph: Graph, colours: list[int]) -> int | None:
+    """The uncoloured vertex with most colours around it, ties to the larger degree."""
+    free = [v for v in range(len(graph)) if colours[v] < 0]
+    if not free:
+        return None
+    return max(free, key=lambda v: (len({colours[n] for n in graph[v]} - {-1}), len(graph[v]), -v))
+
+
+def _advance(trail: list[tuple[int, list[int]]], colours: list[int]) -> bool:
+    """Colour the last vertex of the trail with its next option, going back while there is none."""
+    while trail:
+        vertex, options = trail[-1]
+        if options:
+            colours[vertex] = options.pop(0)
+            return True
+        colours[vertex] = -1
+        trail.pop()
+        # the next vertex back gets its next option in the next round of this loop
+    return False
+
+
+Sublattice: TypeAlias = tuple[int, int, int]
+"""(a, b, c): spanned by a B_1 and b B_1 + c B_2, with 0 <= b < a; its index is a c."""
+
+_MAX_INDEX = 9
+
+
+@dataclass(frozen=True, eq=False)
+class Colouring:
+    """A colour for each tile, the same for tiles that differ by a vector of a sublattice.
+
+    Args:
+        tiling: whose tiles they are.
+        count: number of colours.
+        sublattice: in Hermite normal form, over the basis of the group's lattice.
+        table: (A, a, c) colour by aspect and by cell modulo the sublattice.
+    """
+
+    tiling: Tiling
+    count: int
+    sublattice: Sublattice
+    table: NDArray[np.int64]
+
+    def colour(self, element: Isometry) -> int:
+        """Colour, 0 ... count - 1, of the tile that `element` makes of its prototile.
+
+        Raises:
+            OrbiflowError: for an isometry that is not in the tile's group.
+        """
+        own = self.tiling
+        aspect, cell, _ = own.aspects.find(own.group, element, prototile_of(element))
+        first, second = reduce_cell(cell, self.sublattice)
+        return int(self.table[aspect, first, second])
+
+    def colours(self, copies: Copies) -> NDArray[np.int64]:
+        """(M,) colour of each copy, all at once.
+
+        Args:
+            copies: of `tiling`, or of one with the same group and aspects.
+        """
+        a, b, c = self.sublattice
+        wraps, second = np.divmod(copies.cells[:, 1], c)
+        return self.table[copies.aspects, (copies.cells[:, 0] - wraps * b) % a, second]
+
+
+def colouring(tile: Tiles) -> Colouring:
+    """A proper colouring with the fewest colours that a small sublattice allows; deterministic.
+
+    Exact search on the quotient of the tiling by each sublattice of index up to 9, for 1, 2, 3 ...
+    colours in turn; among equals the smallest index, so that colours follow the aspects where they
+    can. Colour 0 is the most frequent, and so on down. Never fails: extremely skew lattices, whose
+    tiles meet their own translates modulo all those sublattices, get a larger one.
+
+    Args:
+        tile: a tile or a tiling.
+
+    Raises:
+        OrbiflowError: if polygon and group are of very different size.
+
+    >>> from orbiflow.tiles import Tile
+    >>> from orbiflow.tiles import isohedral_class
+    >>> hexagons = isohedral_class("IH1")
+    >>> colouring(Tile(hexagons.template(), hexagons.group())).count
+    3
+    """
+    tiling = as_tiling(tile)
+    graphs = _loop_free_quotients(_links(tiling))
+    most = max(len(near) for _, graph in graphs for near in graph) + 1
+    for count in range(1, most + 1):
+        for sublattice, graph in graphs:
+            colours = colour_graph(graph, count)
+            if colours is not None:
+                shape = (len(tiling.aspects), sublattice[0], sublattice[2])
+                table = _most_frequent_first(np.array(colours)).reshape(shape)
+                return Colouring(tiling, count, sublattice, table)
+    raise RuntimeError("unreachable: maximal degree + 1 colours always suffice")
+
+
+def reduce_cell(cell: Cell, sublattice: Sublattice) -> Cell:
+    """Representative (0 <= m < a, 0 <= n < c) of lattice coordinates modulo the sublattice."""
+    a, b, c = sublattice
+    wraps, second = divmod(cell[1], c)
+    return (cell[0] - wraps * b) % a, second
+
+
+_Links: TypeAlias = list[list[tuple[int, Cell]]]
+
+
+def _links(tiling: Tiling) -> _Links:
+    """Per aspect: (aspect, offset) of the neighbours of its tile in cell (0, 0)."""
+    table, group = tiling.aspects, tiling.group
+    shared = [neighbours(tiling, k).edge for k in range(len(tiling.prototiles))]
+    links: _Links = []
+    for k, coset in zip(table.prototiles, table.cosets, strict=True):
+        g = group.cosets[int(coset)]
+        found = [table.find(group, g @ near, near.prototile) for near in shared[int(k)]]
+        links.append([(aspect, cell) for aspect, cell, _ in found])
+    return links
+
+
+def _loop_free_quotients(links: _Links) -> list[tuple[Sublattice, Graph]]:
+    sublattices = [h for index in range(1, _MAX_INDEX + 1) for h in _sublattices(index)]
+    size = _MAX_INDEX
+    while True:
+        graphs = [(h, _quotient(links, h)) for h in sublattices]
+        usable = [(h, g) for h, g in graphs if all(i not in near for i, near in enumerate(g))]
+        if usable:
+            return usable
+        size *= 2
+        sublattices = [(size, 0, size)]
+
+
+def _sublattices(index: int) -> Iterator[Sublattice]:
+    # square-like ones first, so that a tie does not go to a long thin period
+    divisors = [a for a in range(1, index + 1) if index % a == 0]
+    for a in sorted(divisors, key=lambda a: abs(a * a - index)):
+        for b in range(a):
+            yield a, b, index // a
+
+
+def _quotient(links: _Links, sublattice: Sublattice) -> Graph:
+    """Adjacency of tiles modulo the sublattice; node (i, m, n) is number (i a + m) c + n."""
+    a, _, c = sublattice
+    graph: Graph = []
+    for near in links:
+        for m in range(a):
+            for n in range(c):
+                cells = [(k, reduce_cell((m + u, n + v), sublattice)) for k, (u, v) in near]
+                graph.append({(k * a + p) * c + q for k, (p, q) in cells})
+    return graph
+
+
+def _most_frequent_first(colours: NDArray[np.int64]) -> NDArray[np.int64]:
+    order: Sequence[int] = np.argsort(-np.bincount(colours), kind="stable").tolist()
+    rank = np.empty(len(order), dtype=np.int64)
+    rank[order] = np.arange(len(order))
+    return rank[colours]

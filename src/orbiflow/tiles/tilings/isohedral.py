@@ -1,0 +1,349 @@
+"""The nine isohedral classes: template, group, paper's operators, lattice freedom."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple, overload
+
+import numpy as np
+import torch
+
+from orbiflow.arguments import described, numbers
+from orbiflow.arrays import Array
+from orbiflow.errors import OrbiflowError
+from orbiflow.symmetry import (
+    CrystallographicGroup,
+    Isometry,
+    Line,
+    Points,
+    cast_like,
+    reduced_basis,
+    rotation,
+    rotation_matrix,
+    transflection,
+)
+from orbiflow.tiles.tilings.class_table import (
+    CLASS_TABLE,
+    ClassRow,
+    Coefficients,
+    OperatorRow,
+    RotationRow,
+    TemplateKind,
+)
+from orbiflow.tiles.tilings.tile_edges import EdgeIdentification
+
+
+class PentagonGauge(NamedTuple):
+    """A family of pentagons with a rotation centre at p0 and another at p2.
+
+    p0 is the origin, p2 = (distance, 0) and p1 is free; p4 is p1 turned by `degrees_0` about p0
+    and p3 is p1 turned by `degrees_2` about p2. Then p3 + p4, and with it the lattice and the
+    group, depend on p2 alone. `default` is p1 at shape (0, 0).
+    """
+
+    distance: float
+    default: tuple[float, float]
+    degrees_0: float
+    degrees_2: float
+
+
+# The distances give all templates the area of the hexagon with unit sides, 3 sqrt(3) / 2.
+_FLORET_DISTANCE = math.sqrt(6.0)
+_CAIRO_DISTANCE = 3.0**0.75
+
+PENTAGONS: dict[str, PentagonGauge] = {
+    "floret": PentagonGauge(
+        _FLORET_DISTANCE,
+        # with sides 2, 1, 1, 1, 2 and angles 60, 120, ... degrees, p2 is (5, sqrt(3)) / 2
+        (_FLORET_DISTANCE * 5 / 7, -_FLORET_DISTANCE * math.sqrt(3.0) / 7),
+        60.0,
+        -120.0,
+    ),
+    "cairo": PentagonGauge(
+        _CAIRO_DISTANCE,
+        # apex of the isosceles triangle over p0 p2 with base angles of 30 degrees
+        (_CAIRO_DISTANCE / 2, -_CAIRO_DISTANCE / (2 * math.sqrt(3.0))),
+        90.0,
+        -90.0,
+    ),
+}
+
+
+def hexagon() -> torch.Tensor:
+    """(6, 2) vertices p_k = (cos 60k, sin 60k), float64, counter-clockwise."""
+    half, high = 0.5, math.sqrt(3.0) / 2
+    return torch.tensor(
+        [(1.0, 0.0), (half, high), (-half, high), (-1.0, 0.0), (-half, -high), (half, -high)],
+        dtype=torch.float64,
+    )
+
+
+def pentagon(gauge: PentagonGauge, shape: torch.Tensor) -> torch.Tensor:
+    """Vertices (..., 5, 2) of the pentagon whose p1 is moved by `shape` (..., 2) from its default.
+
+    Counter-clockwise for small shapes. Differentiable in `shape`.
+
+    >>> tile = pentagon(PENTAGONS["cairo"], torch.zeros(2, dtype=torch.float64))
+    >>> sides = (tile.roll(-1, 0) - tile).norm(dim=1) / tile[1].norm()
+    >>> [round(float(side), 6) for side in sides]
+    [1.0, 1.0, 1.0, 0.732051, 1.0]
+    """
+
+    def turn(degrees: float, vector: torch.Tensor) -> torch.Tensor:
+        return vector @ cast_like(rotation_matrix(math.radians(degrees)), shape).T
+
+    p1 = shape + shape.new_tensor(gauge.default)
+    p0 = torch.zeros_like(p1)
+    p2 = torch.zeros_like(p1) + shape.new_tensor((gauge.distance, 0.0))
+    p3 = p2 + turn(gauge.degrees_2, p1 - p2)
+    p4 = turn(gauge.degrees_0, p1)
+    return torch.stack([p0, p1, p2, p3, p4], dim=-2)
+
+
+def template_vertices(kind: TemplateKind, shape: torch.Tensor) -> torch.Tensor:
+    """Vertices (..., K, 2) for shape parameters (..., 2) of a pentagon or (..., 0) of the hexagon."""
+    if kind == "hexagon":
+        vertices = hexagon().to(dtype=shape.dtype, device=shape.device)
+        return vertices.expand(*shape.shape[:-1], 6, 2)
+    return pentagon(PENTAGONS[kind], shape)
+
+
+_ROUNDING = 1e-9
+
+
+def commutant(linear_parts: Array) -> Array:
+    """Orthonormal basis (m, 2) of the (a, b) whose [[a, b], [b, -a]] commutes with a point group.
+
+    The mean over the group projects on them: R X R^T turns (a, b) as R turns directions, twice as far.
+    The basis is made by Gram-Schmidt in the order a, b, so that it depends on nothing but the group;
+    saved parameters are coordinates in it.
+
+    Args:
+        linear_parts: (n, 2, 2), of every coset.
+
+    >>> commutant(np.array([np.eye(2), np.diag([1.0, -1.0])])).tolist()
+    [[1.0, 0.0]]
+    """
+    units = np.array([[[1.0, 0.0], [0.0, -1.0]], [[0.0, 1.0], [1.0, 0.0]]])
+    turned = np.einsum("gij,kjl,gml->kim", linear_parts, units, linear_parts) / len(linear_parts)
+    basis: list[Array] = []
+    for a, b in turned[:, 0]:
+        rest = np.array([a, b])
+        for known in basis:
+            rest = rest - (rest @ known) * known
+        if np.linalg.norm(rest) > _ROUNDING:
+            rest = rest / np.linalg.norm(rest)
+            # a group in the frame of its axes has just these: not a rounding beside them
+            near = np.round(rest)
+            basis.append(near if np.abs(rest - near).max() < _ROUNDING else rest)
+    return np.array(basis).reshape(-1, 2)
+
+
+def stretch_matrix(basis: Array, parameters: torch.Tensor) -> torch.Tensor:
+    """Unimodular symmetric maps (..., 2, 2) for parameters (..., m) over a basis of `commutant`.
+
+    exp [[a, b], [b, -a]], where (a, b) = parameters @ basis. Differentiable, at zero too.
+    """
+    a, b = (parameters @ parameters.new_tensor(basis)).unbind(dim=-1)
+    cosh, sinhc = _cosh_sinhc(a * a + b * b)
+    rows = [cosh + sinhc * a, sinhc * b, sinhc * b, cosh - sinhc * a]
+    return torch.stack(rows, dim=-1).reshape(*parameters.shape[:-1], 2, 2)
+
+
+def _cosh_sinhc(square: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+    """cosh r and sinh(r) / r as functions of r^2, by their series where the root would hurt."""
+    small = square < 1e-2
+    root = torch.sqrt(torch.where(small, torch.ones_like(square), square))
+    s = torch.where(small, square, torch.zeros_like(square))
+    cosh = 1 + s / 2 * (1 + s / 12 * (1 + s / 30 * (1 + s / 56 * (1 + s / 90))))
+    sinhc = 1 + s / 6 * (1 + s / 20 * (1 + s / 42 * (1 + s / 72 * (1 + s / 110))))
+    return (
+        torch.where(small, cosh, torch.cosh(root)),
+        torch.where(small, sinhc, torch.sinh(root) / root),
+    )
+
+
+class PaperOperator(NamedTuple):
+    """One symmetrization operator of the paper: V -> sum_{k < terms} g^-k o V o g^k.
+
+    `terms` is K for the (c, K)-rotation and 2 for a transflection (paper, section 4).
+    """
+
+    isometry: Isometry
+    terms: int
+
+
+@dataclass(frozen=True, eq=False)
+class IsohedralClass:
+    """A type of tiling by one shape, as a template polygon and a wallpaper group.
+
+    Every tile of the class is the image of the template (with some shape parameters) under a
+    diffeomorphism that commutes with the group, followed by a map of the lattice freedom and a
+    similarity. Paper, section "Escherization"; design points 7 and 8.
+
+    >>> ih4 = isohedral_class("IH4")
+    >>> ih4.group_name, ih4.group().order, ih4.template().shape, ih4.stretch_dim, ih4.shape_dim
+    ('p2', 2, (6, 2), 2, 0)
+    """
+
+    name: str
+    row: ClassRow
+
+    @property
+    def group_name(self) -> str:
+        """The wallpaper group, such as "pgg"."""
+        return self.row.group
+
+    @cached_property
+    def identified_edges(self) -> tuple[EdgeIdentification, ...]:
+        """Which edge of the template (edge k from p_k to p_{k+1}) is mapped onto which, and by what."""
+        return tuple(
+            EdgeIdentification(first, second, self._edge_isometry(first, second))
+            for first, second in self.row.edges
+        )
+
+    @property
+    def shape_dim(self) -> int:
+        """Number of shape parameters of the template: 0 for hexagons, 2 for pentagons."""
+        return 0 if self.row.template == "hexagon" else 2
+
+    @property
+    def stretch_dim(self) -> int:
+        """Number of parameters of the lattice freedom: 2, 1 or 0 (`commutant` of the point group)."""
+        return len(self._freedom)
+
+    @overload
+    def template(self, shape: None = None) -> Array: ...
+    @overload
+    def template(self, shape: Points) -> Points: ...
+    def template(self, shape: Any = None) -> Any:
+        """Vertices (..., K, 2) of the template, counter-clockwise.
+
+        Args:
+            shape: (..., shape_dim), NumPy or torch (then differentiable); for the pentagons the
+                displacement of p1 from its default. None means the default, as a NumPy array.
+
+        Raises:
+            OrbiflowError: if the last axis of `shape` is not `shape_dim` long.
+        """
+        if shape is None:
+            return self._default.copy()
+        tensor = self._parameters(shape, self.shape_dim, "shape")
+        return _same_kind(template_vertices(self.row.template, tensor), shape)
+
+    def stretch(self, parameters: Points) -> Points:
+        """Unimodular maps L (..., 2, 2) that commute with the point group.
+
+        Args:
+            parameters: (..., stretch_dim), NumPy or torch (then differentiable).
+
+        Raises:
+            OrbiflowError: if the last axis of `parameters` is not `stretch_dim` long.
+        """
+        tensor = self._parameters(parameters, self.stretch_dim, "stretch")
+        return _same_kind(stretch_matrix(self._freedom, tensor), parameters)
+
+    def group(self) -> CrystallographicGroup:
+        """The group of the template; the same for all shape parameters."""
+        return self._group
+
+    def generators(self) -> tuple[Isometry, ...]:
+        """The paper's rotations and transflections, in the table's order."""
+        return tuple(operator.isometry for operator in self.paper_operators())
+
+    def paper_operators(self) -> tuple[PaperOperator, ...]:
+        """The paper's symmetrization operators, outermost first: V = O_1(O_2(...(F)))."""
+        return tuple(self._operator(row) for row in self.row.operators)
+
+    def _edge_isometry(self, first: int, second: int) -> Isometry:
+        """The element that takes an edge onto another, and the tile to its other side."""
+        vertices = self._default
+        start, end = vertices[first], vertices[(first + 1) % len(vertices)]
+        ends = vertices[second], vertices[(second + 1) % len(vertices)]
+        for sign, goal, goal_end in ((-1, *ends), (1, *ends[::-1])):
+            for element in self._group.elements_near(goal, 1e-6, source=start):
+                if element.determinant == sign and np.allclose(element(end), goal_end, atol=1e-6):
+                    return element
+        raise RuntimeError(f"{self.name}: no element takes edge {first} onto edge {second}")
+
+    @cached_property
+    def _default(self) -> Array:
+        return template_vertices(
+            self.row.template, torch.zeros(self.shape_dim, dtype=torch.float64)
+        ).numpy()
+
+    @cached_property
+    def _group(self) -> CrystallographicGroup:
+        columns = [
+            rotation_matrix(math.radians(vector.degrees)) @ self._point(vector.coefficients)
+            for vector in self.row.lattice
+        ]
+        # another basis of the paper's lattice: with the shortest, |k_i| <= Omega is isotropic
+        basis = reduced_basis(np.stack(columns, axis=1))
+        return CrystallographicGroup.generate(basis, self.generators(), name=self.row.group)
+
+    @cached_property
+    def _freedom(self) -> Array:
+        return commutant(self._group.linear_parts)
+
+    def _point(self, coefficients: Coefficients) -> Array:
+        terms = [c * self._default[k] for k, c in coefficients.items()]
+        return np.sum(terms, axis=0) if terms else np.zeros(2)
+
+    def _operator(self, row: OperatorRow) -> PaperOperator:
+        if isinstance(row, RotationRow):
+            return PaperOperator(rotation(self._point(row.center), row.order), row.order)
+        line = Line(self._point(row.point), self._point(row.direction))
+        return PaperOperator(transflection(line, float(np.hypot(*self._point(row.shift)))), 2)
+
+    def _parameters(self, values: Array | torch.Tensor, size: int, what: str) -> torch.Tensor:
+        tensor = values
+        if not isinstance(tensor, torch.Tensor):
+            tensor = torch.as_tensor(numbers(tensor, f"{what} parameters", (...,)))
+        elif not tensor.is_floating_point():
+            tensor = tensor.double()
+        if tensor.ndim == 0 or tensor.shape[-1] != size:
+            raise OrbiflowError(
+                f"{self.name} has {size} {what} parameters: expected shape (..., {size}), "
+                f"got {tuple(tensor.shape)}"
+            )
+        return tensor
+
+    def __repr__(self) -> str:
+        return f"IsohedralClass({self.name}, {self.group_name})"
+
+
+def _same_kind(result: torch.Tensor, like: Points) -> Points:
+    if isinstance(like, torch.Tensor):
+        return result
+    return result.numpy().copy()
+
+
+CLASSES: dict[str, IsohedralClass] = {
+    name: IsohedralClass(name, row) for name, row in CLASS_TABLE.items()
+}
+"""The nine classes by name."""
+
+
+def isohedral_class(name: str | int | IsohedralClass) -> IsohedralClass:
+    """The class called `name`: "IH4", "ih4", "IH04", "4" and 4 are the same; a class is itself.
+
+    Raises:
+        OrbiflowError: for anything but the nine.
+
+    >>> isohedral_class("ih04")
+    IsohedralClass(IH4, p2)
+    """
+    if isinstance(name, IsohedralClass):
+        return name
+    match = re.fullmatch(r"(?:IH[\s_-]?)?0*(\d+)", str(name).strip(), flags=re.IGNORECASE)
+    key = f"IH{match[1]}" if match else ""
+    if key not in CLASSES:
+        raise OrbiflowError(
+            f"unknown isohedral class {described(name)}; the nine are {', '.join(CLASSES)}: "
+            "every tile shape of an isohedral tiling occurs in one of them"
+        )
+    return CLASSES[key]

@@ -1,0 +1,367 @@
+"""The tiles around a prototile, in coordinates where a tile has area one."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from scipy.spatial import KDTree
+
+from orbiflow.arguments import number, whole
+from orbiflow.arrays import (
+    Array,
+    Integers,
+    checked_window,
+)
+from orbiflow.errors import OrbiflowError
+from orbiflow.symmetry import Isometry
+from orbiflow.tiles.geometry import subdivided
+from orbiflow.tiles.tilings.tile_copies import (
+    Copies,
+    Placed,
+    copies_meeting,
+    copies_near,
+    prototile_of,
+)
+from orbiflow.tiles.tilings.tiling import (
+    Tiles,
+    Tiling,
+    as_tiling,
+)
+
+MAX_SPAN = 12.0
+"""Largest radius of a tile, in square roots of its group's area, whose images are listed."""
+
+
+def expected_area(tile: Tiles) -> float:
+    """|det B| over the number of tiles in a lattice cell: the area of a tile of this group."""
+    return as_tiling(tile).tile_area
+
+
+def span(tile: Tiles) -> float:
+    """Radius of the tile over the square root of the expected area: about 0.6 for a hexagon."""
+    tiling = as_tiling(tile)
+    return tiling.radius / math.sqrt(tiling.tile_area)
+
+
+@dataclass(frozen=True, eq=False)
+class Surroundings:
+    """A prototile and the tiles nearby, moved and scaled so that the expected area is one.
+
+    - `prototile`: its number.
+    - `ring`: (N, 2) the prototile without repeated vertices, centred at zero.
+    - `copies`: the M tiles nearby, not the prototile itself, in the tiling's own coordinates.
+    - `points`: (P, 2) their vertices, one tile after the other, each as its prototile has them.
+    - `counts`: (M,) how many each has.
+    - `mirrored`: (M,) whether the tile's element reverses orientation.
+    """
+
+    prototile: int
+    ring: Array
+    copies: Copies
+    points: Array
+    counts: Integers
+    mirrored: NDArray[np.bool_]
+
+    def __len__(self) -> int:
+        return len(self.copies)
+
+    @cached_property
+    def owner(self) -> Integers:
+        """(P,) which tile each of the points is a vertex of."""
+        return np.repeat(np.arange(len(self.counts)), self.counts)
+
+    @cached_property
+    def place(self) -> Integers:
+        """(P,) which vertex of its prototile each of the points is."""
+        first = np.cumsum(self.counts) - self.counts
+        return np.arange(len(self.points)) - np.repeat(first, self.counts)
+
+    @cached_property
+    def ahead(self) -> Array:
+        """(P, 2) the next vertex of the same tile."""
+        following = np.arange(1, len(self.points) + 1)
+        last = np.cumsum(self.counts) - 1
+        following[last] = last + 1 - self.counts
+        return self.points[following]
+
+    @cached_property
+    def rings(self) -> Any:
+        """(M,) the tiles' boundaries, as shapely's rings."""
+        return np.asarray(shapely.linearrings(self.points, indices=self.owner))
+
+    def elements(self) -> tuple[Placed, ...]:
+        """The tiles as elements of the group."""
+        return tuple(self.copies.isometry(k) for k in range(len(self)))
+
+    def select(self, keep: NDArray[np.bool_]) -> Surroundings:
+        """The tiles where `keep`, (M,), is true."""
+        return Surroundings(
+            self.prototile,
+            self.ring,
+            self.copies.select(keep),
+            self.points[keep[self.owner]],
+            self.counts[keep],
+            self.mirrored[keep],
+        )
+
+
+def surroundings(tiling: Tiling, prototile: int, margin: float) -> Surroundings:
+    """The tiles whose bounding box comes within `margin` (unit: a tile's area is 1) of a prototile's.
+
+    Nearest first.
+
+    Raises:
+        OrbiflowError: for a tile of span over `MAX_SPAN`, or with fewer than three vertices.
+    """
+    scale = math.sqrt(tiling.tile_area)
+    if span(tiling) > MAX_SPAN:
+        raise OrbiflowError(
+            f"the tile reaches {span(tiling):.0f} times the size that its group allows for; "
+            "polygon and group do not belong together (are their units the same?)"
+        )
+    own = tiling.prototiles[prototile]
+    if any(len(p.ring) < 3 for p in tiling.prototiles):
+        raise OrbiflowError("the tile's polygon has fewer than three distinct vertices")
+    (left, bottom), (right, top) = own.box + margin * scale * np.array([[-1.0], [1.0]])
+    near = copies_near(tiling, (left, bottom, right, top), whole=False)
+    itself = (near.aspects == tiling.aspects.table[prototile, 0]) & ~near.cells.any(axis=1)
+    away = np.linalg.norm(near.centers() - own.center, axis=1)
+    away[itself] = np.inf
+    order = np.argsort(away, kind="stable")[: len(near) - int(itself.sum())]
+    near = near.select(order)
+    rings = [p.ring for p in tiling.prototiles]
+    counts = np.array([len(ring) for ring in rings])[near.prototiles]
+    points = np.empty((int(counts.sum()), 2))
+    first = np.cumsum(counts) - counts
+    for k, ring in enumerate(rings):
+        mine = np.flatnonzero(near.prototiles == k)
+        rows = first[mine, None] + np.arange(len(ring))
+        points[rows] = near.select(mine).images(ring)
+    linear = tiling.group.linear_parts
+    signs = linear[:, 0, 0] * linear[:, 1, 1] - linear[:, 0, 1] * linear[:, 1, 0]
+    return Surroundings(
+        prototile,
+        _flushed((own.ring - own.center) / scale),
+        near,
+        _flushed((points - own.center) / scale),
+        counts,
+        (signs < 0)[near.cosets],
+    )
+
+
+def _flushed(points: Array) -> Array:
+    # squares of coordinates such as 1e-200 underflow in GEOS and give areas that are plainly wrong
+    return np.where(np.abs(points) < 1e-15, 0.0, points)
+
+
+class SegmentMatch(NamedTuple):
+    """Nearest reversed segment, of the tiles around, of each segment of a prototile.
+
+    - `distance`: (N,) distance in R^4 of (a, b) to the nearest (b', a').
+    - `tile`: (N,) whose segment that is, as an index of the surroundings; -1 where there is none.
+    - `partner`: (N,) which segment of that tile's prototile it is.
+    """
+
+    distance: Array
+    tile: Integers
+    partner: Integers
+
+
+def match_segments(around: Surroundings, tolerance: float) -> SegmentMatch:
+    """For each segment (a, b) of a prototile the nearest segment that runs from b to a.
+
+    All prototiles run the same way around, and so do their images: those of elements that reverse
+    orientation are read backwards.
+    """
+    ring = around.ring
+    count = len(ring)
+    plain = ~around.mirrored[around.owner, None]
+    starts, ends = around.points, around.ahead
+    reverse = np.concatenate([np.where(plain, ends, starts), np.where(plain, starts, ends)], axis=1)
+    low, high = ring.min(axis=0) - tolerance, ring.max(axis=0) + tolerance
+    inside = np.flatnonzero(
+        ((reverse >= np.tile(low, 2)) & (reverse <= np.tile(high, 2))).all(axis=1)
+    )
+    if not len(inside):
+        nowhere = np.full(count, -1)
+        return SegmentMatch(np.full(count, np.inf), nowhere, nowhere)
+    segments = np.concatenate([ring, np.roll(ring, -1, axis=0)], axis=1)
+    distance, index = KDTree(reverse[inside]).query(segments)
+    found = inside[index]
+    return SegmentMatch(np.asarray(distance), around.owner[found], around.place[found])
+
+
+def boundaries_cancel(
+    tiling: Tiling, around: Sequence[Surroundings], matches: Sequence[SegmentMatch]
+) -> bool:
+    """Whether the matched segments of all prototiles, with their signs, add up to nothing.
+
+    Args:
+        around, matches: of each prototile.
+
+    The boundary of all tiles together is, per orbit of the group, the sum of [e] / |S_k| over the
+    segments e of each T_k. If e is the reverse of an image of its partner, it is also minus the sum
+    of [partner of e] / |S_k|. The two agree if every segment, modulo the stabiliser of its prototile,
+    is a partner as often as it occurs, counted so; then the sum is its own negative. With one
+    prototile and no stabiliser: if the partners are a permutation.
+    """
+    sizes = np.array([len(a.ring) for a in around])
+    first: Integers = np.cumsum(sizes) - sizes
+    weights = np.repeat([1.0 / own.order for own in tiling.stabilisers], sizes)
+    partners = np.concatenate(
+        [
+            first[a.copies.prototiles[match.tile]] + match.partner
+            for a, match in zip(around, matches, strict=True)
+        ]
+    )
+    labels = _orbits(tiling, first)
+    if labels is None:
+        return False
+    own = np.bincount(labels, weights, minlength=len(labels))
+    named = np.bincount(labels[partners], weights, minlength=len(labels))
+    return bool(np.abs(own - named).max() < 1e-9)
+
+
+def _orbits(tiling: Tiling, first: Integers) -> Integers | None:
+    """The first segment that each is an image of under its prototile's stabiliser.
+
+    None where vertices are not taken to vertices.
+    """
+    labels: list[Integers] = []
+    for start, own in zip(first, tiling.stabilisers, strict=True):
+        images: list[Integers] = []
+        for element, order in zip(own.elements, own.orders, strict=True):
+            if order is None:
+                return None
+            # segment i from vertex i on; read backwards its image begins where its end is taken
+            images.append(order if element.determinant > 0 else np.roll(order, -1))
+        labels.append(start + np.min(images, axis=0))
+    return np.concatenate(labels)
+
+
+def curve_distance(around: Surroundings) -> float:
+    """Largest distance of a vertex of the prototile to the boundaries of the tiles around it.
+
+    With the tiles' vertices seen from the prototile being its vertices seen from them, over all
+    prototiles this is the Hausdorff distance between a boundary and the union of the others near it.
+    """
+    if not len(around):
+        return float("inf")
+    tree = segment_tree(around)
+    _, distance = tree.query_nearest(
+        shapely.points(around.ring), all_matches=False, return_distance=True
+    )
+    return float(distance.max())
+
+
+def segment_tree(around: Surroundings) -> shapely.STRtree:
+    """Tree of the segments of all tiles around; segment p begins at the p-th of their points."""
+    ends = np.stack([around.points, around.ahead], axis=1)
+    return shapely.STRtree(np.asarray(shapely.linestrings(ends)))
+
+
+_SAMPLES = 200  # points on the boundary at least, so that coarse polygons are seen as curves
+
+
+class Neighbours(NamedTuple):
+    """The other tiles that touch a prototile, each as one group element, nearest first.
+
+    Args:
+        edge: those that share a piece of boundary of positive length.
+        point: those that only touch at points.
+    """
+
+    edge: tuple[Placed, ...]
+    point: tuple[Placed, ...]
+
+
+def neighbours(tile: Tiles, prototile: int = 0, *, tolerance: float = 1e-7) -> Neighbours:
+    """The tiles that touch a prototile.
+
+    Args:
+        tile: a tile or a tiling, certified or not.
+        prototile: whose neighbours; each of them says of which prototile it is a copy.
+        tolerance: what counts as touching, in square roots of the tile's area.
+
+    Raises:
+        OrbiflowError: if polygon and group are of very different size.
+
+    >>> from orbiflow.tiles import Tile
+    >>> from orbiflow.tiles import isohedral_class
+    >>> floret = isohedral_class("IH21")
+    >>> found = neighbours(Tile(floret.template(), floret.group()))
+    >>> len(found.edge), len(found.point)
+    (5, 3)
+    """
+    tiling = as_tiling(tile)
+    tolerance = number(tolerance, "tolerance", 0)
+    prototile = whole(prototile, "the prototile", 0, len(tiling.prototiles) - 1)
+    around = surroundings(tiling, prototile, tolerance)
+    near, shares = touching(around, tolerance)
+    return Neighbours(near.select(shares).elements(), near.select(~shares).elements())
+
+
+def touching(around: Surroundings, tolerance: float) -> tuple[Surroundings, NDArray[np.bool_]]:
+    """Those of the tiles around that touch the prototile, and which of them share boundary."""
+    if not len(around):
+        return around, np.zeros(0, dtype=bool)
+    outline = shapely.linearrings(around.ring)
+    shapely.prepare(outline)
+    near = around.select(np.asarray(shapely.dwithin(outline, around.rings, tolerance)))
+    shares: NDArray[np.bool_] = np.zeros(len(near), dtype=bool)
+    if len(near):
+        points = shapely.points(_boundary_samples(near.ring))
+        _, hits = segment_tree(near).query(points, predicate="dwithin", distance=tolerance)
+        shares[near.owner[hits]] = True
+    return near, shares
+
+
+def _boundary_samples(ring: Array) -> Array:
+    """Interior points of the segments, midpoints among them: never the corners."""
+    per_segment = 2 * math.ceil(_SAMPLES / (2 * len(ring))) + 1 if len(ring) < _SAMPLES else 1
+    return subdivided(ring, per_segment, phase=0.5)
+
+
+def patch(tile: Tiles, window: Sequence[float]) -> list[Placed]:
+    """The tiles that meet the rectangle, as elements of the group, nearest the middle first.
+
+    Args:
+        tile: a tile or a tiling, certified or not.
+        window: (xmin, ymin, xmax, ymax) in the tile's units.
+
+    Raises:
+        OrbiflowError: for an empty window, or one of more than `MAX_TILES` tiles.
+
+    >>> from orbiflow.tiles import Tile
+    >>> from orbiflow.tiles import isohedral_class
+    >>> ih1 = isohedral_class("IH1")
+    >>> len(patch(Tile(ih1.template(), ih1.group()), (-0.1, -0.1, 0.1, 0.1)))
+    1
+    """
+    found = copies_meeting(tile, window)
+    xmin, ymin, xmax, ymax = checked_window(window)
+    middle = np.array([xmin + xmax, ymin + ymax]) / 2
+    away = np.linalg.norm(found.centers() - middle, axis=1)
+    return [found.isometry(int(k)) for k in np.argsort(away, kind="stable")]
+
+
+def aspects(tile: Tiles, elements: Sequence[Isometry]) -> list[int]:
+    """For each element the aspect of its tile: tiles of one aspect are translates of each other.
+
+    Args:
+        tile: a tile or a tiling.
+        elements: a plain isometry carries prototile 0.
+
+    Raises:
+        OrbiflowError: for an isometry that is not in the tile's group.
+    """
+    tiling = as_tiling(tile)
+    find, group = tiling.aspects.find, tiling.group
+    return [find(group, element, prototile_of(element))[0] for element in elements]

@@ -1,0 +1,329 @@
+"""Tiles of a tiling as integers: in which aspect, in which lattice cell."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from orbiflow.arrays import (
+    Array,
+    Integers,
+    Window,
+    checked_window,
+)
+from orbiflow.errors import OrbiflowError
+from orbiflow.symmetry import CrystallographicGroup, Isometry
+from orbiflow.tiles.tilings.tiling import (
+    Tiles,
+    Tiling,
+    as_tiling,
+)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Placed(Isometry):
+    """An isometry, and the number of the prototile that it carries.
+
+    What is carried stays the same whatever else is done to it: `g @ placed` is where g takes that
+    tile.
+
+    >>> import numpy as np
+    >>> from orbiflow.symmetry import translation
+    >>> second = Placed(np.eye(2), np.zeros(2), 1)
+    >>> (translation([3.0, 0.0]) @ second).prototile
+    1
+    """
+
+    prototile: int = 0
+
+    def __matmul__(self, other: Isometry) -> Isometry:
+        """As of isometries; of what `other` carries, if that carries anything."""
+        product = Isometry.__matmul__(self, other)
+        if isinstance(other, Placed) and product is not NotImplemented:
+            return Placed(product.linear, product.translation, other.prototile)
+        return product
+
+    def __rmatmul__(self, other: Isometry) -> Placed:
+        product = Isometry.__matmul__(other, self)
+        return Placed(product.linear, product.translation, self.prototile)
+
+    def __repr__(self) -> str:
+        return f"{Isometry.__repr__(self)[:-1]}, prototile={self.prototile})".replace(
+            "Isometry", "Placed", 1
+        )
+
+
+def prototile_of(element: Isometry) -> int:
+    """The number of the prototile that an isometry carries: 0 unless it says."""
+    return element.prototile if isinstance(element, Placed) else 0
+
+
+MAX_TILES = 20_000
+"""Largest number of tiles in a patch."""
+
+
+class Beyond(NamedTuple):
+    """What lies across given elements from each of M copies.
+
+    - `copy`: (M, E) its index among the copies, -1 if it is not one of them.
+    - `turn`: (M, E) which element of its prototile's stabiliser comes before it: copy m followed by
+      element e is that copy after `turn`.
+    """
+
+    copy: Integers
+    turn: Integers
+
+
+@dataclass(frozen=True, eq=False)
+class Copies:
+    """M tiles of a tiling.
+
+    - `tiling`: the first prototile is the copy of aspect 0 in cell (0, 0).
+    - `aspects`: (M,) indices into the tiling's aspects.
+    - `cells`: (M, 2) coordinates over the lattice basis.
+    """
+
+    tiling: Tiling
+    aspects: Integers
+    cells: Integers
+
+    def __len__(self) -> int:
+        return len(self.aspects)
+
+    @property
+    def group(self) -> CrystallographicGroup:
+        """The tiling's group."""
+        return self.tiling.group
+
+    @cached_property
+    def cosets(self) -> Integers:
+        """(M,) indices of coset representatives; with one prototile of no symmetry the aspects."""
+        return self.tiling.aspects.cosets[self.aspects]
+
+    @cached_property
+    def prototiles(self) -> Integers:
+        """(M,) of which prototile each is a copy."""
+        return self.tiling.aspects.prototiles[self.aspects]
+
+    @cached_property
+    def translations(self) -> Array:
+        """(M, 2) translation of each copy's isometry."""
+        return self.group.translations[self.cosets] + self.cells @ self.group.lattice.T
+
+    def isometry(self, index: int) -> Placed:
+        """The group element of a copy."""
+        linear = self.group.linear_parts[self.cosets[index]]
+        return Placed(linear, self.translations[index], int(self.prototiles[index]))
+
+    def images(self, points: Array) -> Array:
+        """(M, N, 2) images of points (N, 2), one set a copy."""
+        turned = np.einsum("gij,nj->gni", self.group.linear_parts, points)
+        return turned[self.cosets] + self.translations[:, None, :]
+
+    def rings(self) -> list[Array]:
+        """Each copy's polygon."""
+        found: list[Array] = [np.empty((0, 2))] * len(self)
+        for k, prototile in enumerate(self.tiling.prototiles):
+            own = np.flatnonzero(self.prototiles == k)
+            for index, ring in zip(own, self.select(own).images(prototile.polygon), strict=True):
+                found[index] = ring
+        return found
+
+    def centers(self) -> Array:
+        """(M, 2) where the centre of each copy's prototile comes to lie."""
+        own = np.stack([p.center for p in self.tiling.prototiles])
+        turned = np.einsum("mij,mj->mi", self.group.linear_parts[self.cosets], own[self.prototiles])
+        return turned + self.translations
+
+    def boxes(self) -> tuple[Array, Array]:
+        """(M, 2) lower left and upper right corners of the copies' bounding boxes."""
+        low, high = aspect_boxes(self.tiling)
+        shifts = self.cells @ self.group.lattice.T
+        return low[self.aspects] + shifts, high[self.aspects] + shifts
+
+    def select(self, keep: NDArray[np.bool_] | Integers) -> Copies:
+        """The copies where `keep` is true, or of these indices."""
+        return Copies(self.tiling, self.aspects[keep], self.cells[keep])
+
+    def neighbours(self, elements: Sequence[Isometry], of: Sequence[int] | None = None) -> Integers:
+        """(M, E) index of the copy beyond each copy g, g @ element; -1 if it is not among them.
+
+        Args:
+            elements: a plain isometry carries prototile 0.
+            of: (E,) from the copies of which prototile each element leads, default all of 0; there is
+                nothing beyond the others.
+        """
+        return self.beyond(elements, of).copy
+
+    def beyond(self, elements: Sequence[Isometry], of: Sequence[int] | None = None) -> Beyond:
+        """As `neighbours`, and how the copies found lie.
+
+        Integer arithmetic on aspects and cells: nothing is compared by its place.
+        """
+        table = self.tiling.aspects
+        copy = np.full((len(self), len(elements)), -1, dtype=np.int64)
+        turn = np.zeros_like(copy)
+        codes = _Codes(self)
+        for number, element in enumerate(elements):
+            source = 0 if of is None else of[number]
+            mine = np.flatnonzero(self.prototiles == source)
+            own = np.flatnonzero(table.prototiles == source)
+            found = [
+                table.find(self.group, self.group.cosets[int(c)] @ element, prototile_of(element))
+                for c in table.cosets[own]
+            ]
+            place = np.searchsorted(own, self.aspects[mine])
+            aspects = np.array([aspect for aspect, _, _ in found])[place]
+            steps = np.array([cell for _, cell, _ in found])[place]
+            copy[mine, number] = codes.find(aspects, self.cells[mine] + steps)
+            turn[mine, number] = np.array([by for _, _, by in found])[place]
+        return Beyond(copy, turn)
+
+
+class _Codes:
+    """Finds copies by aspect and cell."""
+
+    def __init__(self, copies: Copies) -> None:
+        self.low = copies.cells.min(axis=0, initial=0)
+        self.sizes = copies.cells.max(axis=0, initial=0) - self.low + 1
+        codes = self._codes(copies.aspects, copies.cells)
+        self.order = np.argsort(codes)
+        self.sorted = codes[self.order]
+
+    def _codes(self, aspects: Integers, cells: Integers) -> Integers:
+        steps = cells - self.low
+        return (aspects * self.sizes[0] + steps[:, 0]) * self.sizes[1] + steps[:, 1]
+
+    def find(self, aspects: Integers, cells: Integers) -> Integers:
+        if not len(self.sorted):
+            return np.full(len(aspects), -1)
+        steps = cells - self.low
+        known = ((steps >= 0) & (steps < self.sizes)).all(axis=1)
+        codes = np.where(known, self._codes(aspects, cells), -1)
+        place = np.minimum(np.searchsorted(self.sorted, codes), len(self.sorted) - 1)
+        return np.where(self.sorted[place] == codes, self.order[place], -1)
+
+
+def copies_inside(tile: Tiles, window: Sequence[float]) -> Copies:
+    """The tiles that lie in a rectangle whole, row by row.
+
+    Args:
+        tile: a tile or a tiling, certified or not.
+        window: (xmin, ymin, xmax, ymax) in the tile's units.
+
+    Raises:
+        OrbiflowError: for an empty window, or one of more than `MAX_TILES` tiles.
+    """
+    tiling, box = as_tiling(tile), checked_window(window)
+    _refuse_too_many(tiling, box)
+    return _by_rows(copies_near(tiling, box, whole=True))
+
+
+def copies_meeting(tile: Tiles, window: Sequence[float]) -> Copies:
+    """The tiles that meet a rectangle, as `copies_inside`.
+
+    >>> from orbiflow.symmetry import wallpaper_group
+    >>> eighth = Tiling(wallpaper_group("p4m"), [[[0, 0], [0.5, 0], [0.5, 0.5]]])
+    >>> len(copies_meeting(eighth, (-0.01, -0.01, 0.01, 0.01)))
+    8
+    """
+    tiling, box = as_tiling(tile), checked_window(window)
+    _refuse_too_many(tiling, box)
+    found = copies_near(tiling, box, whole=False)
+    low, high = found.boxes()
+    meets = np.asarray(((low >= box[:2]) & (high <= box[2:])).all(axis=1))
+    page = shapely.box(*box)
+    shapely.prepare(page)
+    middle = (box[0] + box[2]) / 2, (box[1] + box[3]) / 2
+    for k, prototile in enumerate(tiling.prototiles):
+        unsure = np.flatnonzero(~meets & (found.prototiles == k))
+        rings = found.select(unsure).images(prototile.polygon)
+        # rings, not polygons: a tile that crosses itself must not stop the picture that shows it
+        touched = shapely.intersects(page, shapely.linearrings(rings))
+        meets[unsure] = touched | shapely.contains_xy(shapely.polygons(rings), *middle)
+    return _by_rows(found.select(meets))
+
+
+def copies_near(tiling: Tiling, window: Window, *, whole: bool) -> Copies:
+    """The tiles whose bounding box lies in the window, or meets it, in no order that matters."""
+    low, high = aspect_boxes(tiling)
+    least, most = window[:2] - (low if whole else high), window[2:] - (high if whole else low)
+    aspects, cells = _cells_within(tiling.group.lattice, least, most)
+    return Copies(tiling, aspects, cells)
+
+
+def aspect_boxes(tiling: Tiling) -> tuple[Array, Array]:
+    """(A, 2) lower left and upper right corners of the bounding boxes of the tiles of a cell."""
+    table, group = tiling.aspects, tiling.group
+    low, high = np.empty((len(table), 2)), np.empty((len(table), 2))
+    for k, prototile in enumerate(tiling.prototiles):
+        own = table.prototiles == k
+        images = group.images(prototile.polygon)[table.cosets[own]]
+        low[own], high[own] = images.min(axis=1), images.max(axis=1)
+    return low, high
+
+
+def _cells_within(lattice: Array, least: Array, most: Array) -> tuple[Integers, Integers]:
+    """All integer n with least <= lattice @ n <= most, for A boxes at once.
+
+    Args:
+        least, most: (A, 2).
+
+    Returns:
+        (M,) the number of the box, and (M, 2) n.
+    """
+    inverse = np.linalg.inv(lattice)[1]
+    # the range of the second coordinate over a box; its rows; and the range of the first in a row
+    middle, half = (least + most) @ inverse / 2, (most - least) @ abs(inverse) / 2
+    half[(least > most).any(axis=1)] = -1.0
+    box, second = _ranges(middle - half, middle + half)
+    low, high = np.full(len(box), -np.inf), np.full(len(box), np.inf)
+    for axis, (step, across) in enumerate(lattice.tolist()):
+        if abs(step) < 1e-12 * abs(inverse).max() * abs(np.linalg.det(lattice)):
+            continue
+        one, other = ((ends[box, axis] - across * second) / step for ends in (least, most))
+        low, high = (
+            np.maximum(low, np.minimum(one, other)),
+            np.minimum(high, np.maximum(one, other)),
+        )
+    row, first = _ranges(low, high)
+    cells = np.stack([first, second[row]], axis=1)
+    box = box[row]
+    shifts = cells @ lattice.T
+    kept = ((shifts >= least[box]) & (shifts <= most[box])).all(axis=1)
+    return box[kept], cells[kept].astype(np.int64)
+
+
+def _ranges(low: Array, high: Array) -> tuple[Integers, Array]:
+    """All whole numbers in some intervals, one more at either end than rounding may leave out.
+
+    Returns:
+        (M,) the number of the interval, and (M,) the whole number.
+    """
+    first = np.ceil(low - 1e-9)
+    counts = np.maximum(np.floor(high + 1e-9) + 1 - first, 0).astype(np.int64)
+    own = np.repeat(np.arange(len(counts)), counts)
+    return own, first[own] + np.arange(len(own)) - (np.cumsum(counts) - counts)[own]
+
+
+def _by_rows(copies: Copies) -> Copies:
+    rows = np.round(copies.centers() / (0.01 * copies.tiling.radius))
+    return copies.select(np.lexsort((copies.aspects, rows[:, 0], rows[:, 1])))
+
+
+def _refuse_too_many(tiling: Tiling, window: Window) -> None:
+    width, height = window[2] - window[0], window[3] - window[1]
+    size, reach = tiling.tile_area, 2 * tiling.radius
+    expected = (width + reach) * (height + reach) / size
+    if expected > 2 * MAX_TILES or width * height / size > MAX_TILES:
+        raise OrbiflowError(
+            f"the window of {width:.4g} by {height:.4g} would hold about "
+            f"{width * height / size:.0f} tiles; the most is {MAX_TILES}: choose larger tiles or a "
+            "smaller window"
+        )

@@ -1,0 +1,401 @@
+"""The edges of a tiling and the isometries that identify them, found from polygons and group alone."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal, NamedTuple, TypeAlias
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from orbiflow.arrays import Array, Integers
+from orbiflow.errors import OrbiflowError
+from orbiflow.symmetry import Isometry, identity
+from orbiflow.tiles.tilings.prototile import Prototile
+from orbiflow.tiles.tilings.surroundings import (
+    SegmentMatch,
+    Surroundings,
+    match_segments,
+    surroundings,
+)
+from orbiflow.tiles.tilings.tile_copies import Placed
+from orbiflow.tiles.tilings.tiling import (
+    Tiles,
+    Tiling,
+    as_tiling,
+)
+from orbiflow.typed_shapely import ufuncs
+
+EdgeKind: TypeAlias = Literal["translation", "rotation", "glide", "mirror"]
+
+
+class EdgeIdentification(NamedTuple):
+    """`isometry` takes edge `first` onto edge `second`, and its tile to the other side of it.
+
+    So across its edge `second` a tile T meets the copy isometry(T'), along that copy's `first`. The
+    isometry says the rest. An edge may be its own partner: turned over about its middle, or on a
+    mirror, which leaves it as it is.
+    """
+
+    first: int
+    second: int
+    isometry: Isometry
+
+    @property
+    def folded(self) -> bool:
+        """Whether the edge is its own partner."""
+        return self.first == self.second
+
+    @property
+    def reversed(self) -> bool:
+        """Whether the start of `first` goes to the end of `second`: unless orientation is reversed.
+
+        All tiles run the same way around, so edges that two share run opposite ways.
+        """
+        return self.isometry.determinant > 0
+
+    @property
+    def kind(self) -> EdgeKind:
+        """What the isometry is."""
+        linear, shift = self.isometry.linear, self.isometry.translation
+        if self.isometry.determinant > 0:
+            return "translation" if np.abs(linear - np.eye(2)).max() < 1e-6 else "rotation"
+        twice = linear @ shift + shift  # the translation that a transflection applied twice is
+        still = np.abs(twice).max() <= 1e-6 * np.abs(shift).max() + 1e-12
+        return "mirror" if self.folded or still else "glide"
+
+    @property
+    def brief(self) -> str:
+        """In brief: = translation, ~ glide, > rotation, | mirror, o turned over about its middle.
+
+        >>> from orbiflow.symmetry import rotation, translation
+        >>> across = EdgeIdentification(0, 3, translation([1.0, 0.0]))
+        >>> across.brief, EdgeIdentification(2, 2, rotation([1.0, 0.0], 2)).brief
+        ('0=3', '2o')
+        """
+        kind = self.kind
+        if self.folded and kind in ("rotation", "mirror"):
+            return f"{self.first}{'o' if kind == 'rotation' else '|'}"
+        sign = {"translation": "=", "glide": "~", "rotation": ">", "mirror": "|"}[kind]
+        return f"{self.first}{sign}{self.second}"
+
+
+TOLERANCE = 1e-7
+"""How far vertices of two copies may lie apart that count as one, in square roots of the area."""
+
+
+@dataclass(frozen=True, eq=False)
+class Edges:
+    """How the boundaries of the prototiles fall into edges, each shared with one neighbour.
+
+    Edges are numbered through, those of the first prototile first; each runs as its polygon does.
+
+    - `tiling`: whose edges they are.
+    - `owners`: for each edge, of which prototile it is.
+    - `starts`: index into that prototile's polygon of the vertex in which it begins, increasing.
+    - `across`: for each edge the group element whose tile lies beyond it, and of which prototile.
+    - `partners`: for each edge, which edge of that tile it is.
+    - `turned`: per prototile, (|S|, E) where each element of its stabiliser takes its edges; the other
+      edges stay.
+    """
+
+    tiling: Tiling
+    owners: tuple[int, ...]
+    starts: tuple[int, ...]
+    across: tuple[Placed, ...]
+    partners: tuple[int, ...]
+    turned: tuple[Integers, ...]
+
+    def __len__(self) -> int:
+        return len(self.owners)
+
+    @cached_property
+    def following(self) -> tuple[int, ...]:
+        """For each edge the next one around its prototile."""
+        first = [self.owners.index(k) for k in range(len(self.tiling.prototiles))]
+        last = [*first[1:], len(self)]
+        return tuple(e + 1 if e + 1 < last[k] else first[k] for e, k in enumerate(self.owners))
+
+    def points(self, edge: int) -> Array:
+        """(M, 2) vertices of an edge, both ends included."""
+        polygon = self.tiling.prototiles[self.owners[edge]].polygon
+        first, last = self.starts[edge], self.starts[self.following[edge]]
+        length = (last - first - 1) % len(polygon) + 2
+        return polygon[(first + np.arange(length)) % len(polygon)]
+
+    @property
+    def identifications(self) -> tuple[EdgeIdentification, ...]:
+        """Each edge with its partner; where they are each other's, once, the lesser one first."""
+        return tuple(
+            EdgeIdentification(partner, edge, self.across[edge])
+            for edge, partner in enumerate(self.partners)
+            if partner <= edge or self.partners[partner] != edge
+        )
+
+
+def edges(tile: Tiles) -> Edges:
+    """The edges of a tile or tiling: the longest runs of boundary along one neighbour.
+
+    Args:
+        tile: whose images match vertex by vertex, as those of every tile that orbiflow finds do;
+            `edge_to_edge` makes others so.
+
+    Raises:
+        OrbiflowError: for a tile whose boundary does not match that of its images so.
+
+    >>> from orbiflow.tiles import Tile
+    >>> from orbiflow.tiles import isohedral_class
+    >>> ih4 = isohedral_class("IH4")
+    >>> [found.brief for found in edges(Tile(ih4.template(), ih4.group())).identifications]
+    ['0o', '2o', '3o', '1=4', '5o']
+    """
+    tiling = as_tiling(tile)
+    numbers = range(len(tiling.prototiles))
+    around = [surroundings(tiling, k, TOLERANCE) for k in numbers]
+    matches = [match_segments(a, TOLERANCE) for a in around]
+    _require_match(tiling, matches)
+    begins = [_begins(tiling, a, match) for a, match in zip(around, matches, strict=True)]
+    first = np.cumsum([0] + [len(b) for b in begins])
+    owners: list[int] = []
+    starts: list[int] = []
+    across: list[Placed] = []
+    partners: list[int] = []
+    for k in numbers:
+        match, near = matches[k], around[k].copies
+        for segment in begins[k]:
+            beyond = near.isometry(int(match.tile[segment]))
+            there = beyond.prototile
+            owners.append(k)
+            starts.append(int(tiling.prototiles[k].kept[segment]))
+            across.append(beyond)
+            partner = _edge_of(begins[there], int(match.partner[segment]))
+            partners.append(int(first[there]) + partner)
+    turned = tuple(_turned(tiling, k, begins[k], first) for k in numbers)
+    # each other's partners where that can be, and then by isometries that are each other's inverses
+    own = Edges(tiling, tuple(owners), tuple(starts), tuple(across), tuple(partners), turned)
+    return _mutual(own)
+
+
+def _require_match(tiling: Tiling, matches: Sequence[SegmentMatch]) -> None:
+    missing = sum(int((match.distance > TOLERANCE).sum()) for match in matches)
+    if missing or any(order is None for own in tiling.stabilisers for order in own.orders):
+        count = sum(len(match.distance) for match in matches)
+        what = f"{missing} of the tile's {count} sides are no side of a neighbour"
+        if not missing:
+            what = "the tile's vertices are not as symmetric as its outline"
+        raise OrbiflowError(
+            f"{what}, so its edges are not known; certify(tile) says how its edges match, and "
+            "edge_to_edge(tile) gives it the vertices that it lacks"
+        )
+
+
+def _begins(tiling: Tiling, around: Surroundings, match: SegmentMatch) -> Integers:
+    """The segments of a prototile with which an edge begins."""
+    sizes = np.array([len(p.ring) for p in tiling.prototiles])
+    step = np.where(around.mirrored[match.tile], 1, -1)
+    size = sizes[around.copies.prototiles[match.tile]]
+    before = (np.roll(match.partner, 1) + step) % size
+    continues = (match.tile == np.roll(match.tile, 1)) & (match.partner == before)
+    starts = np.flatnonzero(~continues)
+    if len(starts) < 2:
+        raise OrbiflowError("the tile has fewer than two edges: it cannot tile the plane")
+    return starts
+
+
+def _edge_of(begins: Integers, segment: int) -> int:
+    """The edge to which a segment belongs, by the segments with which edges begin."""
+    return int(np.searchsorted(begins, segment, side="right") - 1) % len(begins)
+
+
+def _turned(tiling: Tiling, k: int, begins: Integers, first: Integers) -> Integers:
+    own = tiling.stabilisers[k]
+    turned = np.tile(np.arange(int(first[-1])), (own.order, 1))
+    for row, element, order in zip(turned, own.elements, own.orders, strict=True):
+        assert order is not None
+        # a segment read backwards begins where its end is taken
+        image = order if element.determinant > 0 else np.roll(order, -1)
+        for number, segment in enumerate(begins):
+            row[first[k] + number] = first[k] + _edge_of(begins, int(image[segment]))
+    return turned
+
+
+def _mutual(own: Edges) -> Edges:
+    """With partners chosen where a stabiliser leaves a choice: an edge itself, or each other."""
+    across, partners = list(own.across), list(own.partners)
+    done: NDArray[np.bool_] = np.zeros(len(own), dtype=bool)
+    for edge in range(len(own)):
+        if done[edge]:
+            continue
+        there = across[edge].prototile
+        images = own.turned[there][:, partners[edge]]
+        signs = [s.determinant for s in own.tiling.stabilisers[there].elements]
+        choice = np.flatnonzero(images == edge)
+        # a mirror rather than a half-turn: it says that the edge is straight
+        choice = choice[
+            np.argsort(np.array(signs)[choice] * across[edge].determinant, kind="stable")
+        ]
+        if not len(choice):
+            choice = np.flatnonzero(~done[images])
+        done[edge] = True
+        if not len(choice):
+            continue  # it has more images in its own tile than its partner has
+        by = own.tiling.stabilisers[there].elements[int(choice[0])].inverse()
+        element, partner = across[edge] @ by, int(images[choice[0]])
+        across[edge] = Placed(element.linear, element.translation, there)
+        partners[edge] = partner
+        if partner != edge:
+            back = element.inverse()
+            across[partner] = Placed(back.linear, back.translation, own.owners[edge])
+            partners[partner] = edge
+            done[partner] = True
+    return Edges(own.tiling, own.owners, own.starts, tuple(across), tuple(partners), own.turned)
+
+
+class EdgeImage(NamedTuple):
+    """An edge as an image of another: by which isometry, and whether its start is the other's end."""
+
+    edge: int
+    isometry: Isometry
+    reversed: bool
+
+
+class EdgeClass(NamedTuple):
+    """An edge, and all that follows from it.
+
+    - `edge`: the first of the class.
+    - `folds`: how it is its own image, other than by the identity: at most a half-turn about its
+      middle, the mirror along it (not reversed: then it is straight), and the mirror across it.
+    - `images`: the other edges of the class.
+    """
+
+    edge: int
+    folds: tuple[EdgeImage, ...]
+    images: tuple[EdgeImage, ...]
+
+    @property
+    def straight(self) -> bool:
+        """Whether the edge lies on a mirror."""
+        return any(not fold.reversed for fold in self.folds)
+
+
+def edge_classes(own: Edges) -> tuple[EdgeClass, ...]:
+    """The classes of a tiling's edges: whoever draws or fits one edge of each draws them all.
+
+    >>> from orbiflow.symmetry import wallpaper_group
+    >>> from orbiflow.tiles import Tiling, edges
+    >>> cell = Tiling(wallpaper_group("p4m"), [[[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]]])
+    >>> [(len(found.images), found.straight) for found in edge_classes(edges(cell))]
+    [(3, True)]
+    """
+    links = _links(own)
+    found: dict[int, EdgeImage] = {}
+    classes: list[EdgeClass] = []
+    for edge in range(len(own)):
+        if edge in found:
+            continue
+        found[edge] = EdgeImage(edge, identity(2), reversed=False)
+        folds: dict[tuple[int, bool], EdgeImage] = {}
+        members: list[EdgeImage] = []
+        waiting = deque([edge])
+        while waiting:
+            here = waiting.popleft()
+            for link in links[here]:
+                image = EdgeImage(
+                    link.edge,
+                    link.isometry @ found[here].isometry,
+                    found[here].reversed != link.reversed,
+                )
+                known = found.get(link.edge)
+                if known is None:
+                    found[link.edge] = image
+                    members.append(image)
+                    waiting.append(link.edge)
+                    continue
+                loop = known.isometry.inverse() @ image.isometry
+                fold = EdgeImage(edge, loop, known.reversed != image.reversed)
+                folds.setdefault((loop.determinant, fold.reversed), fold)
+        folds.pop((1, False), None)  # the identity
+        classes.append(EdgeClass(edge, tuple(_closed(edge, folds)), tuple(members)))
+    return tuple(classes)
+
+
+def _links(own: Edges) -> list[list[EdgeImage]]:
+    """For each edge its images next to it: beyond it, and in its own tile."""
+    links: list[list[EdgeImage]] = [[] for _ in range(len(own))]
+    for edge, (partner, element) in enumerate(zip(own.partners, own.across, strict=True)):
+        plain = Isometry(element.linear, element.translation)
+        turned_over = plain.determinant > 0
+        links[partner].append(EdgeImage(edge, plain, turned_over))
+        links[edge].append(EdgeImage(partner, plain.inverse(), turned_over))
+    for k, stabiliser in enumerate(own.tiling.stabilisers):
+        for element, turned in zip(stabiliser.elements[1:], own.turned[k][1:], strict=True):
+            for edge in np.flatnonzero(np.array(own.owners) == k).tolist():
+                links[edge].append(EdgeImage(int(turned[edge]), element, element.determinant < 0))
+    return links
+
+
+def _closed(edge: int, folds: dict[tuple[int, bool], EdgeImage]) -> list[EdgeImage]:
+    """With the third of two."""
+    if len(folds) == 2:
+        one, other = folds.values()
+        third = EdgeImage(edge, one.isometry @ other.isometry, one.reversed != other.reversed)
+        folds[third.isometry.determinant, third.reversed] = third
+    return list(folds.values())
+
+
+def edge_to_edge(tile: Tiles) -> Tiling:
+    """The same tiling, with a vertex wherever a neighbour, or the tile's own image, has one.
+
+    After that the vertices on a boundary are all those of the tiling that lie there, so shared sides
+    agree. One that is edge to edge already comes back with the same vertices.
+
+    Args:
+        tile: a tile or a tiling.
+
+    Raises:
+        OrbiflowError: if polygon and group are of very different size.
+
+    >>> from orbiflow.symmetry import wallpaper_group
+    >>> bricks = Tiling(wallpaper_group("p1", [[2, 1], [0, 1]]), [[[0, 0], [2, 0], [2, 1], [0, 1]]])
+    >>> len(edge_to_edge(bricks).prototiles[0].polygon)
+    6
+    """
+    tiling = as_tiling(tile)
+    return Tiling(tiling.group, [_with_vertices(tiling, k) for k in range(len(tiling.prototiles))])
+
+
+def _with_vertices(tiling: Tiling, k: int) -> Prototile:
+    own, around = tiling.prototiles[k], surroundings(tiling, k, TOLERANCE)
+    ring = own.ring
+    points = np.concatenate(
+        [_back(around, own, tiling), *(s(ring) for s in _symmetries(tiling, k))]
+    )
+    reach = TOLERANCE * float(np.sqrt(tiling.tile_area))
+    line = shapely.LinearRing(ring)
+    points = points[shapely.dwithin(line, shapely.points(points), reach)]
+    near = np.linalg.norm(points[:, None] - ring, axis=2).min(axis=1, initial=np.inf)
+    points = points[near > 2 * reach]
+    if not len(points):
+        return own
+    along = ufuncs.line_locate_point(line, ufuncs.points(points))
+    order = np.argsort(along)
+    fresh = np.diff(along[order], prepend=-np.inf) > 2 * reach
+    points, along = points[order][fresh], along[order][fresh]
+    steps = np.linalg.norm(np.roll(ring, -1, axis=0) - ring, axis=1)
+    at = np.searchsorted(np.cumsum(steps) - steps, along, side="right")
+    corners = np.searchsorted(own.kept, own.corners, side="left")
+    moved = corners + np.searchsorted(at, corners, side="right")
+    return Prototile(np.insert(ring, at, points, axis=0), tuple(int(c) for c in moved))
+
+
+def _back(around: Surroundings, own: Prototile, tiling: Tiling) -> Array:
+    """The vertices of the tiles around, in the tiling's own coordinates."""
+    return around.points * np.sqrt(tiling.tile_area) + own.center
+
+
+def _symmetries(tiling: Tiling, k: int) -> list[Isometry]:
+    return list(tiling.stabilisers[k].elements[1:])

@@ -1,0 +1,302 @@
+"""Tilings: a crystallographic group, and prototiles whose images are to cover the plane."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from orbiflow.arguments import (
+    described,
+    instance,
+    is_a,
+)
+from orbiflow.arrays import Array, Integers
+from orbiflow.errors import OrbiflowError
+from orbiflow.symmetry import CrystallographicGroup, Isometry
+from orbiflow.tiles.tilings.prototile import (
+    Prototile,
+    Stabiliser,
+    stabiliser,
+)
+
+Cell: TypeAlias = tuple[int, int]
+"""Coordinates of a lattice vector over the basis of the group's lattice."""
+
+
+@dataclass(frozen=True, eq=False)
+class Aspects:
+    """The A tiles of a tiling up to translations: pairs of a prototile and a coset of the lattice.
+
+    Elements that differ by an element of a prototile's stabiliser make the same tile of it; the coset
+    of an aspect is the first of those that do. With trivial stabilisers and one prototile aspects are
+    cosets.
+
+    - `prototiles`, `cosets`: (A,).
+    - `table`: (K, |G|) the aspect of coset i's image of prototile k.
+    - `steps`: (K, |G|, 2) and the lattice cell in which that aspect is.
+    - `turns`: (K, |G|) which element s of the stabiliser comes before: coset i is the aspect's
+      representative, in that cell, after s.
+    """
+
+    prototiles: Integers
+    cosets: Integers
+    table: Integers
+    steps: Integers
+    turns: Integers
+
+    def __len__(self) -> int:
+        return len(self.cosets)
+
+    @classmethod
+    def of(cls, group: CrystallographicGroup, stabilisers: Sequence[Stabiliser]) -> Aspects:
+        """Of prototiles with these stabilisers."""
+        count, order = len(stabilisers), group.order
+        if all(own.order == 1 for own in stabilisers):
+            return cls._of_all(count, order)
+        table = np.zeros((count, order), dtype=np.int64)
+        steps = np.zeros((count, order, 2), dtype=np.int64)
+        turns = np.zeros((count, order), dtype=np.int64)
+        prototiles: list[int] = []
+        cosets: list[int] = []
+        for k, own in enumerate(stabilisers):
+            first = np.arange(order)
+            if own.order > 1:
+                first, steps[k], turns[k] = _first_cosets(group, own)
+            kept, number = np.unique(first, return_inverse=True)
+            table[k] = len(cosets) + number
+            prototiles += [k] * len(kept)
+            cosets += kept.tolist()
+        return cls(np.array(prototiles), np.array(cosets), table, steps, turns)
+
+    @classmethod
+    def _of_all(cls, count: int, order: int) -> Aspects:
+        """Of prototiles without symmetry: every pair."""
+        none = np.zeros((count, order), dtype=np.int64)
+        table = np.arange(count * order).reshape(count, order)
+        prototiles, cosets = np.divmod(table.ravel(), order)
+        return cls(prototiles, cosets, table, np.zeros((count, order, 2), dtype=np.int64), none)
+
+    def find(
+        self, group: CrystallographicGroup, element: Isometry, prototile: int
+    ) -> tuple[int, Cell, int]:
+        """(aspect, cell, turn) of the tile that `element` makes of a prototile.
+
+        Raises:
+            OrbiflowError: for an isometry that is not in the group.
+        """
+        coset, (first, second) = coset_and_cell(group, element)
+        step = self.steps[prototile, coset]
+        cell = first + int(step[0]), second + int(step[1])
+        return int(self.table[prototile, coset]), cell, int(self.turns[prototile, coset])
+
+
+def _first_cosets(
+    group: CrystallographicGroup, own: Stabiliser
+) -> tuple[Integers, Integers, Integers]:
+    """Per coset: the first that makes the same tile, in which cell, after which element."""
+    first = np.arange(group.order)
+    steps = np.zeros((group.order, 2), dtype=np.int64)
+    turns = np.zeros(group.order, dtype=np.int64)
+    for i, g in enumerate(group.cosets):
+        for s in own.elements[1:]:
+            coset, cell = coset_and_cell(group, g @ s)
+            if coset < first[i]:  # g s = (translation) h, so g = (translation) h s^-1
+                first[i], steps[i], turns[i] = coset, cell, _inverse(own.elements, s)
+    return first, steps, turns
+
+
+def _inverse(elements: tuple[Isometry, ...], s: Isometry) -> int:
+    errors = [np.abs(s.linear @ t.linear - np.eye(2)).max() for t in elements]
+    return int(np.argmin(errors))
+
+
+def coset_and_cell(group: CrystallographicGroup, element: Isometry) -> tuple[int, Cell]:
+    """(i, n) with element = translation by B n after the i-th coset representative.
+
+    Raises:
+        OrbiflowError: for an isometry that is not in the group.
+    """
+    instance(element, Isometry, "an element of the group")
+    steps = (element.translation - group.translations) @ group.inverse_lattice.T
+    error = np.abs(steps - np.round(steps)).max(axis=1)
+    error += np.abs(group.linear_parts - element.linear).max(axis=(1, 2))
+    coset = int(error.argmin())
+    if error[coset] > 1e-6:
+        raise OrbiflowError(f"{element!r} is not an element of {group!r}")
+    nearest: Array = steps[coset]
+    first, second = np.round(nearest).astype(int)
+    return coset, (int(first), int(second))
+
+
+@dataclass(frozen=True, eq=False)
+class Tiling:
+    """Prototiles T_k and a group G in the same coordinates; the tiles are all g(T_k) (design point 16).
+
+    The elements that take T_k onto itself, its stabiliser S_k, are found from the polygon: tiles that
+    are mirror images of themselves, or turn about their middle, need not be announced. Being a
+    `Tiling` proves nothing: `certify` does. Its tiles cover the plane once if
+    sum_k area(T_k) |G| / |S_k| = |det B| and their boundaries pair off.
+
+    Args:
+        group: of the plane.
+        prototiles: at least one, none an image of another; each a `Prototile` or its polygon
+            (N, 2). All run the same way around.
+
+    Raises:
+        OrbiflowError: if the group is not planar, there is no prototile, a polygon is none, or
+            polygons run different ways around.
+
+    >>> from orbiflow.symmetry import wallpaper_group
+    >>> eighth = Tiling(wallpaper_group("p4m"), [[[0, 0], [0.5, 0], [0.5, 0.5]]])
+    >>> cell = Tiling(eighth.group, [[[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]]])
+    >>> [tiling.stabilisers[0].order for tiling in (eighth, cell)]
+    [1, 8]
+    """
+
+    group: CrystallographicGroup
+    prototiles: tuple[Prototile, ...]
+
+    def __init__(
+        self, group: CrystallographicGroup, prototiles: Sequence[Prototile | ArrayLike]
+    ) -> None:
+        how = "isohedral_class(name).group() and wallpaper_group(name) make one"
+        instance(group, CrystallographicGroup, "the tile's group", how)
+        if group.dim != 2:
+            raise OrbiflowError(f"a tile needs a group of the plane, got dimension {group.dim}")
+        try:
+            given = list(prototiles)
+        except TypeError:
+            given = []
+        if given and not isinstance(given[0], Prototile | str) and np.ndim(given[0]) == 1:
+            given = []  # a polygon by itself
+        own = tuple(p if isinstance(p, Prototile) else Prototile(np.asarray(p)) for p in given)
+        if not own:
+            raise OrbiflowError(
+                "a tiling needs a sequence of prototiles, one at least: Tiling(group, [polygon])"
+            )
+        for number, prototile in enumerate(own):
+            if prototile.signed_area * own[0].signed_area < 0:
+                raise OrbiflowError(
+                    f"prototile {number} runs the other way around than prototile 0: reverse its "
+                    "vertices"
+                )
+        object.__setattr__(self, "group", group)
+        object.__setattr__(self, "prototiles", own)
+
+    @cached_property
+    def stabilisers(self) -> tuple[Stabiliser, ...]:
+        """Of each prototile: which elements of the group take it onto itself."""
+        return tuple(stabiliser(self.group, p.ring) for p in self.prototiles)
+
+    @cached_property
+    def aspects(self) -> Aspects:
+        """The tiles of a lattice cell."""
+        return Aspects.of(self.group, self.stabilisers)
+
+    @cached_property
+    def tile_area(self) -> float:
+        """|det B| over the tiles of a cell: the area of a tile, the mean one of several prototiles."""
+        return self.group.cell_volume / len(self.aspects)
+
+    @cached_property
+    def box(self) -> Array:
+        """(2, 2) lower left and upper right corner of the prototiles' bounding box."""
+        boxes = np.stack([p.box for p in self.prototiles])
+        return np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
+
+    @property
+    def center(self) -> Array:
+        """(2,) centre of `box`."""
+        return (self.box[0] + self.box[1]) / 2
+
+    @property
+    def radius(self) -> float:
+        """Radius of the largest prototile."""
+        return max(p.radius for p in self.prototiles)
+
+    def transformed(self, linear: Array, offset: Array) -> Tiling:
+        """Prototiles and group under the affine map p -> linear p + offset (a similarity)."""
+        by, to = np.asarray(linear), np.asarray(offset)
+        moved = [Prototile(p.polygon @ by.T + to, p.corners) for p in self.prototiles]
+        return Tiling(self.group.conjugate(by, to), moved)
+
+    def __repr__(self) -> str:
+        orders = ", ".join(str(own.order) for own in self.stabilisers)
+        name = self.group.name or f"order {self.group.order}"
+        return f"Tiling({name}, prototiles with stabilisers of order {orders})"
+
+
+@dataclass(frozen=True, eq=False)
+class Tile:
+    """A closed polygon with a crystallographic group acting in the same coordinates.
+
+    A `Tiling` by one prototile, `tiling`, with what is known of where it comes from. Being a `Tile`
+    proves nothing: `certify` does.
+
+    Args:
+        polygon: (N, 2) vertices in order, without repeating the first, either orientation.
+        group: whose images of the polygon are the tiles.
+        isohedral_class: such as "IH4", or "" when unknown.
+        corners: indices into `polygon` of the tiling vertices of the class, in order.
+
+    Raises:
+        OrbiflowError: if the polygon is not (N >= 3, 2) finite numbers or the group not planar.
+    """
+
+    polygon: Array
+    group: CrystallographicGroup
+    isohedral_class: str = ""
+    corners: tuple[int, ...] = field(default=())
+    tiling: Tiling = field(init=False)
+
+    def __post_init__(self) -> None:
+        prototile = Prototile(self.polygon, self.corners)
+        object.__setattr__(self, "tiling", Tiling(self.group, (prototile,)))
+        instance(self.isohedral_class, str, "the tile's isohedral class", 'give its name, "IH4"')
+        object.__setattr__(self, "polygon", prototile.polygon)
+        object.__setattr__(self, "corners", prototile.corners)
+
+    @property
+    def signed_area(self) -> float:
+        """Area, positive for counter-clockwise order (with y up)."""
+        return self.tiling.prototiles[0].signed_area
+
+    @property
+    def center(self) -> Array:
+        """(2,) centre of the bounding box."""
+        return self.tiling.prototiles[0].center
+
+    @property
+    def radius(self) -> float:
+        """Largest distance of a vertex from `center`."""
+        return self.tiling.prototiles[0].radius
+
+    def transformed(self, linear: Array, offset: Array) -> Tile:
+        """The tile and its group under the affine map p -> linear p + offset (a similarity)."""
+        moved = self.polygon @ np.asarray(linear).T + np.asarray(offset)
+        group = self.group.conjugate(linear, offset)
+        return Tile(moved, group, self.isohedral_class, self.corners)
+
+
+Tiles: TypeAlias = Tile | Tiling
+"""What the functions of this room take."""
+
+
+def as_tiling(tiles: Tiles) -> Tiling:
+    """The tiling that is meant.
+
+    Raises:
+        OrbiflowError: for what is neither a `Tile` nor a `Tiling`.
+    """
+    if isinstance(tiles, Tiling):
+        return tiles
+    if is_a(tiles, Tile):
+        return tiles.tiling
+    raise OrbiflowError(
+        f"the tile must be a Tile or a Tiling, got {described(tiles)}; Tile(polygon, group) makes one"
+    )

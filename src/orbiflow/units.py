@@ -1,0 +1,191 @@
+"""Lengths, sizes and colours as people write them: 40mm, 4 cm, 1.5in, 300x200mm, #2a9d8f.
+
+The functions read text; the types are for fields of settings classes, where a plain number is in mm.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import Annotated
+
+from orbiflow.arguments import Range
+from orbiflow.errors import OrbiflowError
+from orbiflow.kinds import Parsed, Unit
+
+MILLIMETRES = {"mm": 1.0, "cm": 10.0, "in": 25.4, "pt": 25.4 / 72}
+"""Millimetres in each unit."""
+
+LONGEST = 100_000.0
+"""Longest length in mm; beyond it, number or unit is a slip."""
+
+LONGEST_SIDE = 20_000.0
+"""Longest side of a page and largest length on it, in mm."""
+
+COLUMNS = {"single": 85.0, "double": 180.0}
+"""Widths in mm of a journal's one and two columns, between those of the large publishers."""
+
+_NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?"
+_UNIT = r"[a-z\"'µ]*"
+
+
+def length(text: str, *, zero: bool = False) -> float:
+    """Return a length in mm.
+
+    Args:
+        text: A number and one of mm, cm, in, pt.
+        zero: Whether 0 is a length, too; it needs no unit.
+
+    Raises:
+        OrbiflowError: If the unit is missing or unknown, or the length too small or too large.
+
+    >>> length("4 cm"), length("1in"), length("0", zero=True)
+    (40.0, 25.4, 0.0)
+    """
+    found = re.fullmatch(rf"\s*({_NUMBER})\s*({_UNIT})\s*", text, flags=re.IGNORECASE)
+    if not found:
+        raise OrbiflowError(f"{text!r} is not a length; write a number and its unit, such as 40mm")
+    number, unit = float(found[1]), found[2].lower()
+    if zero and number == 0 and not unit:
+        return 0.0
+    return _checked(number * _unit(unit, found[1], text), text, zero=zero)
+
+
+def length_or_zero(text: str) -> float:
+    """Return a length in mm, which may be 0."""
+    return length(text, zero=True)
+
+
+def size(text: str) -> tuple[float, float]:
+    """Return width and height in mm of a text such as 300x200mm, 30cm x 200mm or 12x8 in.
+
+    Raises:
+        OrbiflowError: As `length`.
+
+    >>> size("300x200mm"), size("1in × 5 cm")
+    ((300.0, 200.0), (25.4, 50.0))
+    """
+    pattern = rf"\s*({_NUMBER})\s*({_UNIT})\s*[x×]\s*({_NUMBER})\s*({_UNIT})\s*"
+    found = re.fullmatch(pattern, text, flags=re.IGNORECASE)
+    if not found:
+        raise OrbiflowError(
+            f"{text!r} is not a width and a height; write both and their unit, such as 300x200mm"
+        )
+    last = found[4].lower()
+    first = found[2].lower() or last
+    numbers = f"{found[1]}x{found[3]}"
+    width = float(found[1]) * _unit(first, numbers, text)
+    height = float(found[3]) * _unit(last, numbers, text)
+    return _checked(width, text, zero=False), _checked(height, text, zero=False)
+
+
+def pixels(text: str, dpi: float, *, zero: bool = False) -> float:
+    """Return a number of pixels, or a length at `dpi` pixels an inch, in pixels.
+
+    Raises:
+        OrbiflowError: As `length`.
+
+    >>> pixels("400", 300), pixels("1.5px", 300), pixels("25.4mm", 300)
+    (400.0, 1.5, 300.0)
+    """
+    found = re.fullmatch(rf"\s*({_NUMBER})\s*(px)?\s*", text, flags=re.IGNORECASE)
+    if found is None:
+        return length(text, zero=zero) * dpi / MILLIMETRES["in"]
+    return _checked(float(found[1]), text, zero=zero)
+
+
+def pixel_size(text: str, dpi: float) -> tuple[int, int]:
+    """Return width and height of a picture in whole pixels, from 3000x2000 or 300x200mm.
+
+    Raises:
+        OrbiflowError: As `size`.
+
+    >>> pixel_size("3000x2000", 300), pixel_size("1x2in", 100)
+    ((3000, 2000), (100, 200))
+    """
+    whole = re.fullmatch(r"\s*(\d{1,9})\s*(?:px)?\s*[x×]\s*(\d{1,9})\s*(?:px)?\s*", text)
+    if whole:
+        return int(whole[1]), int(whole[2])
+    if not re.search("[a-wyz]", text, flags=re.IGNORECASE):
+        raise OrbiflowError(
+            f"{text!r} is not a size in pixels; write two whole numbers, such as 3000x2000"
+        )
+    width, height = size(text)
+    per = dpi / MILLIMETRES["in"]
+    return max(1, round(width * per)), max(1, round(height * per))
+
+
+def page_size(text: str) -> tuple[float, float]:
+    """Return width and height of a page in mm; a journal's column is two thirds as high as wide.
+
+    Raises:
+        OrbiflowError: As `size`.
+
+    >>> page_size("double"), page_size("3x2cm")
+    ((180.0, 120.0), (30.0, 20.0))
+    """
+    width = COLUMNS.get(text.strip().lower())
+    return size(text) if width is None else (width, round(width / 1.5, 1))
+
+
+def colour(text: str) -> str:
+    """Return a colour as #rrggbb.
+
+    >>> colour("2A9D8F")
+    '#2a9d8f'
+    """
+    found = re.fullmatch(r"\s*#?([0-9a-fA-F]{6})\s*", text)
+    if not found:
+        raise OrbiflowError(f"{text!r} is not a colour; write it as #rrggbb, such as #2a9d8f")
+    return f"#{found[1].lower()}"
+
+
+_Side = Annotated[float, Range(above=0, most=LONGEST_SIDE)]
+
+Length = Annotated[
+    float,
+    Parsed(length, "a length such as 40mm", "LENGTH"),
+    Range(above=0, most=LONGEST_SIDE),
+    Unit("mm"),
+]
+"""A length above 0: text with a unit, or a number of mm."""
+
+LengthOrZero = Annotated[
+    float,
+    Parsed(length_or_zero, "a length such as 2mm", "LENGTH"),
+    Range(0, LONGEST_SIDE),
+    Unit("mm"),
+]
+"""A length of at least 0: text with a unit, or a number of mm."""
+
+Size = Annotated[tuple[_Side, _Side], Parsed(size, "a size such as 300x200mm", "SIZE"), Unit("mm")]
+"""A width and a height: text with a unit, or two numbers of mm."""
+
+PageSize = Annotated[
+    tuple[_Side, _Side],
+    Parsed(page_size, "a size such as 300x200mm, single or double", "SIZE"),
+    Unit("mm"),
+]
+"""A width and a height, or a journal's single or double column."""
+
+Colour = Annotated[str, Parsed(colour, "a colour such as #2a9d8f", "COLOUR")]
+"""A colour as #rrggbb."""
+
+
+def _unit(unit: str, number: str, text: str) -> float:
+    if not unit:
+        raise OrbiflowError(f"{text!r} has no unit; write {number}mm, {number}cm or {number}in")
+    if unit not in MILLIMETRES:
+        raise OrbiflowError(
+            f"{text!r} has the unknown unit {unit!r}; use one of {', '.join(MILLIMETRES)}"
+        )
+    return MILLIMETRES[unit]
+
+
+def _checked(value: float, text: str, *, zero: bool) -> float:
+    if not math.isfinite(value) or value > LONGEST:
+        raise OrbiflowError(f"{text!r} is longer than 100 m; check number and unit")
+    if value < 0 or (value == 0 and not zero):
+        bound = "at least 0" if zero else "above 0"
+        raise OrbiflowError(f"{text!r} must be {bound}")
+    return value

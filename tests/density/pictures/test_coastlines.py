@@ -1,0 +1,145 @@
+"""Lines of a user's own for the globe: GeoJSON and tables, and files that are neither."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from orbiflow.density import read_coastlines
+from orbiflow.density.pictures import coastlines
+from orbiflow.density.pictures.coastlines import simplified
+from orbiflow.errors import InputFileError
+
+SQUARE = [[10, 20], [30, 20], [30, 40], [10, 20]]
+
+
+def written(tmp_path: Path, content: Any) -> Path:
+    path = tmp_path / "lines.geojson"
+    path.write_bytes(content if isinstance(content, bytes) else json.dumps(content).encode())
+    return path
+
+
+def shape(kind: str, coordinates: Any) -> dict[str, Any]:
+    return {"type": kind, "coordinates": coordinates}
+
+
+@pytest.mark.parametrize(
+    ("item", "count"),
+    [
+        (shape("LineString", SQUARE), 1),
+        (shape("LineString", [[10, 20, 99.5], [30, 20, 0]]), 1),
+        (shape("MultiLineString", [SQUARE, SQUARE]), 2),
+        (shape("Polygon", [SQUARE, SQUARE]), 2),
+        (shape("MultiPolygon", [[SQUARE], [SQUARE, SQUARE]]), 3),
+        ({"type": "Feature", "geometry": shape("LineString", SQUARE), "properties": None}, 1),
+        (
+            {
+                "type": "FeatureCollection",
+                "features": [
+                    {"type": "Feature", "geometry": None},
+                    {"type": "Feature", "geometry": shape("Point", [0, 0])},
+                    {"type": "GeometryCollection", "geometries": [shape("LineString", SQUARE)]},
+                ],
+            },
+            1,
+        ),
+    ],
+)
+def test_all_geometries_with_lines_are_read(tmp_path: Path, item: Any, count: int) -> None:
+    lines = read_coastlines(written(tmp_path, item))
+    assert len(lines) == count
+    assert lines[0][0].tolist() == [20.0, 10.0]  # latitude, longitude
+    marked = b"\xef\xbb\xbf" + json.dumps(item).encode()
+    assert len(read_coastlines(written(tmp_path, marked))) == count
+
+
+def test_edges_along_which_a_flat_map_was_cut_are_no_coasts(tmp_path: Path) -> None:
+    ring = [[170, -80], [180, -80], [180, -90], [-180, -90], [-180, -80], [-170, -75], [170, -80]]
+    lines = read_coastlines(written(tmp_path, shape("Polygon", [ring])))
+    assert [line.tolist() for line in lines] == [
+        [[-80, 170], [-80, 180]],
+        [[-80, -180], [-75, -170], [-80, 170]],
+    ]
+    # a line is what its author drew
+    assert len(read_coastlines(written(tmp_path, shape("LineString", ring)))[0]) == 7
+
+
+def test_tables_end_lines_at_impossible_latitudes(tmp_path: Path) -> None:
+    path = tmp_path / "lines.csv"
+    path.write_text("lat,lon\n0,0\n10,10\n99,0\n20,20\n30,30\n99,0\n1,1\n")
+    assert [len(line) for line in read_coastlines(path)] == [2, 2]
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"{", "is not GeoJSON"),
+        (b"[1, 2]", "expected a feature or a geometry"),
+        (b"\x00\x00\x27\x0a rest", "is a shapefile"),
+        (b"PK\x03\x04 rest", "is a zip archive"),
+        (b"{\xff}", "is not GeoJSON"),
+        (b'{"a":' * 5000, "is not GeoJSON"),
+        (b'{"type": "LineString", "coordinates": [[1e999, 0], [0, 0]]}', "beyond the globe"),
+        (b'{"type": "LineString", "coordinates": [[NaN, 0], [0, 0]]}', "beyond the globe"),
+        ({"type": "Topology", "arcs": []}, "is TopoJSON"),
+        ({"type": "Circle"}, "got 'Circle'"),
+        ({"type": ["x"]}, "got None"),
+        ({"type": "FeatureCollection"}, "without a list of them"),
+        ({"type": "FeatureCollection", "features": []}, "holds no lines"),
+        (shape("Point", [0, 0]), "holds no lines"),
+        (shape("LineString", [[0, 0]]), "holds no lines"),
+        (shape("LineString", [[0, 0], "ab"]), "not longitude, latitude"),
+        (shape("LineString", [[0, 0], [{}, 1]]), "not longitude, latitude"),
+        (shape("LineString", [[0, 0], 3]), "not longitude, latitude"),
+        (shape("Polygon", [3]), "must be lists"),
+        (shape("LineString", None), "must be lists"),
+        (shape("LineString", [[500000, 4649776], [500100, 4649776]]), "beyond the globe"),
+        (shape("LineString", [[48.2, 116.4], [48.3, 116.5]]), "the longitude first"),
+    ],
+)
+def test_other_files_are_refused(tmp_path: Path, content: Any, message: str) -> None:
+    with pytest.raises(InputFileError, match=message):
+        read_coastlines(written(tmp_path, content))
+
+
+def test_collections_are_not_followed_for_ever(tmp_path: Path) -> None:
+    item: Any = shape("LineString", SQUARE)
+    for _ in range(30):
+        item = {"type": "GeometryCollection", "geometries": [item]}
+    with pytest.raises(InputFileError, match="more than 20 deep"):
+        read_coastlines(written(tmp_path, item))
+
+
+def test_places_that_are_no_files_and_files_that_are_too_large(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with pytest.raises(InputFileError, match="cannot read"):
+        read_coastlines(tmp_path / "none.geojson")
+    for place in (tmp_path, Path("/dev/zero")):
+        with pytest.raises(InputFileError, match="it is not a file"):
+            read_coastlines(place)
+    path = written(tmp_path, shape("LineString", SQUARE * 10))
+    monkeypatch.setattr(coastlines, "MOST_POINTS", 9)
+    with pytest.raises(InputFileError, match="more than 9 points"):
+        read_coastlines(path)
+    monkeypatch.setattr(coastlines, "MOST_BYTES", 99)
+    with pytest.raises(InputFileError, match="take coarser lines"):
+        read_coastlines(path)
+
+
+@given(st.integers(0, 99))
+def test_simplified_lines_are_few_and_near(seed: int) -> None:
+    t = np.linspace(0, 6, 4000)
+    noise = 0.02 * np.random.default_rng(seed).normal(size=4000)
+    line = np.stack([20 * np.sin(t) + noise, 20 * t], axis=-1)
+    (few,) = simplified([line], 500)
+    assert len(few) <= 500
+    back = np.interp(line[:, 1], few[:, 1], few[:, 0])
+    assert np.abs(back - line[:, 0]).max() < 1.0
+    assert simplified([line], 5000)[0] is line

@@ -1,0 +1,130 @@
+"""Dots over a density: seen, and small where they crowd, so that its peaks are seen, too."""
+
+import base64
+import io
+import json
+import re
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import given
+from hypothesis import strategies as st
+from PIL import Image
+
+from orbiflow.density import (
+    AdaptiveKernels,
+    BlendedDensity,
+    UniformBase,
+    density_page,
+    density_picture,
+    make_space,
+    map_picture,
+)
+from orbiflow.density.models import still_flow
+from orbiflow.density.pictures.dots import COVER, roomy
+from orbiflow.drawing import Picture, Sheet
+
+SPACES = ("torus", "klein-bottle", "sphere", "projective-plane")
+
+
+@given(st.integers(0, 2**31), st.integers(2, 60), st.floats(0.01, 100), st.integers(2, 3))
+def test_widths_are_in_the_points_unit_and_repeated_points_are_one(
+    seed: int, count: int, scale: float, dim: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    points = rng.normal(size=(count, dim))
+    places, widths = roomy(points)
+    assert np.array_equal(places, points)
+    np.testing.assert_allclose(roomy(scale * points).widths, scale * widths, rtol=1e-6)
+    again = roomy(np.concatenate([points, points[rng.integers(0, count, 30)]]))
+    assert np.array_equal(again.places, places)
+    assert np.array_equal(again.widths, widths)
+
+
+@pytest.mark.parametrize("count", [200, 20_000])
+def test_dots_hide_no_more_than_their_share(count: int) -> None:
+    points = np.random.default_rng(1).uniform(0, 1, (count, 2))
+    widths = roomy(points).widths
+    assert np.pi / 4 * float((widths**2).sum()) == pytest.approx(COVER, rel=0.35)
+
+
+@pytest.mark.parametrize("count", [0, 1, 2])
+def test_few_dots(count: int) -> None:
+    places, widths = roomy(np.arange(2.0 * count).reshape(count, 2))
+    assert len(places) == len(widths) == count
+    assert (widths > 0).all()
+
+
+def peaked(name: str) -> BlendedDensity:
+    """One narrow peak on an even floor."""
+    space = make_space(name)
+    kernels = AdaptiveKernels(
+        space,
+        torch.tensor([[0.4, 0.3]]).double(),
+        torch.full((1, 1 if space.is_round else 2), 60.0).double(),
+        torch.ones(1).double(),
+    )
+    shares = torch.tensor([0.0, 0.9, 0.1]).double()
+    return BlendedDensity(space, still_flow(space), UniformBase(space), kernels, shares)
+
+
+def pixels(picture: Picture) -> np.ndarray:
+    """Of the axes (rows, columns, 3), without the colour bar."""
+    found = np.asarray(Image.open(io.BytesIO(picture.file())).convert("RGB"), dtype=np.float64)
+    rows, columns = found.shape[:2]
+    box = max(
+        (axes.get_position() for axes in picture.figure.axes), key=lambda b: b.width * b.height
+    )
+    return found[
+        round(rows * (1 - box.y1)) : round(rows * (1 - box.y0)),
+        round(columns * box.x0) : round(columns * box.x1),
+    ]
+
+
+@pytest.mark.parametrize("count", [100, 2000, 20_000])
+@pytest.mark.parametrize("name", SPACES)
+def test_a_peak_is_seen_through_its_dots(
+    name: str, count: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("orbiflow.density.pictures.square._FINE_GRID", 120)
+    monkeypatch.setattr("orbiflow.density.pictures.maps._PIXELS", 20_000)
+    density = peaked(name)
+    drawn = density.sample((count,), torch.Generator().manual_seed(0))
+    sheet = Sheet.column("single", "png")
+
+    def picture(dots: torch.Tensor | None) -> np.ndarray:
+        if density.space.is_round:
+            made = map_picture(density, dots, about=drawn, most=count, sheet=sheet)
+        else:
+            made = density_picture(density, dots, most=count, sheet=sheet)
+        return pixels(made)
+
+    bare, dotted = picture(None), picture(drawn)
+    yellow = (bare[..., 0] > 180) & (bare[..., 1] > 200) & (bare[..., 2] < 120)
+    assert yellow.sum() > 500
+    off = np.abs(bare - dotted).max(axis=-1)
+    assert off[yellow].mean() < 70
+    assert (off[yellow] > 60).mean() < 0.45
+    assert (off > 100).sum() > 20 * min(count, 300)  # dots are seen all the same
+
+
+@pytest.mark.parametrize("name", SPACES)
+def test_the_page_has_the_dots_widths(name: str) -> None:
+    density = peaked(name)
+    drawn = density.sample((200,), torch.Generator().manual_seed(0))
+    page = density_page(density, resolution=8, samples=torch.cat([drawn, drawn[:50]]))
+    found = re.search(r'<script type="application/json" id="data">(.*?)</script>', page, re.DOTALL)
+    assert found
+    data = json.loads(found[1])
+    places, widths = (
+        np.frombuffer(base64.b64decode(data[key]), "<f4") for key in ("samples", "widths")
+    )
+    assert places.shape == (600,)
+    assert widths.shape == (200,)
+    crowded = np.argsort(
+        ((places.reshape(-1, 3) - np.median(places.reshape(-1, 3), 0)) ** 2).sum(1)
+    )
+    assert np.median(widths[crowded[:50]]) < np.median(widths[crowded[-20:]]) / 2
+    assert "Dots are smaller where they crowd." in page
+    assert "crowd" not in density_page(density, resolution=8)

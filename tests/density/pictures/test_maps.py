@@ -1,0 +1,196 @@
+"""Densities on maps: what is seen where, what the words say, nothing cut off."""
+
+from __future__ import annotations
+
+import io
+import math
+import re
+from typing import Any
+
+import numpy as np
+import pypdfium2
+import pypdfium2.raw as pdfium
+import pytest
+import torch
+from PIL import Image
+
+from orbiflow.density import (
+    AdaptiveKernels,
+    BlendedDensity,
+    ProjectivePlane,
+    RoundSpace,
+    Sphere,
+    SymmetricDensity,
+    Torus,
+    UniformBase,
+    map_picture,
+    map_samples_picture,
+)
+from orbiflow.density.pictures.maps import coloured_map
+from orbiflow.density.pictures.projections import EqualEarth, Lambert, PlateCarree
+from orbiflow.density.pictures.values import (
+    chosen_scale,
+    density_at,
+    density_on_map,
+)
+from orbiflow.drawing import Sheet
+from orbiflow.drawing.sheet import NARROWEST
+from orbiflow.errors import OrbiflowError
+from orbiflow.fields import FourierField
+from orbiflow.flows import Flow
+from printed import check_inside, letters
+
+COAST = [np.array([[10.0, 160.0], [20.0, -170.0], [0.0, -150.0]])]
+ROUND = [Sphere(), ProjectivePlane()]
+every_space = pytest.mark.parametrize("space", ROUND, ids=lambda s: s.name)
+
+
+@pytest.fixture(autouse=True)
+def _coarse(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("orbiflow.density.pictures.maps._PIXELS", 3000)
+    monkeypatch.setattr("orbiflow.density.pictures.values._COARSE", 24)
+
+
+def peaked(space: RoundSpace, at: tuple[float, float], kappa: float) -> BlendedDensity:
+    flow = Flow([FourierField(space.group, 1, dtype=torch.float64)], steps=1)
+    kernels = AdaptiveKernels(
+        space,
+        space.to_chart([at]),
+        torch.tensor([[kappa]], dtype=torch.float64),
+        torch.ones(1, dtype=torch.float64),
+    )
+    shares = torch.tensor([0.0, 0.99, 0.01], dtype=torch.float64)
+    return BlendedDensity(space, flow, UniformBase(space), kernels, shares)
+
+
+def points(count: int) -> torch.Tensor:
+    return torch.tensor(np.random.default_rng(0).uniform(0, 1, (count, 2)))
+
+
+@every_space
+@pytest.mark.parametrize("kappa", [5.0, 300.0, 1e6])
+def test_a_map_has_the_peak_where_it_is_and_all_the_mass(space: RoundSpace, kappa: float) -> None:
+    at = (37.0, -120.0)
+    projection = EqualEarth((0.0, 100.0)) if space.name == "sphere" else Lambert((60.0, 0.0))
+    drawn = coloured_map(peaked(space, at, kappa), projection, "natural", "linear")
+    values = drawn.places * drawn.shade.high
+    within = drawn.pixels.within
+    assert values[within].sum() * drawn.pixels.angle**2 == pytest.approx(1.0, abs=0.05)
+    best = drawn.pixels.latlon[within][values[within].argmax()]
+    assert float(space.round_distance(space.to_chart([at]), space.to_chart(best[None]))[0]) < 0.1
+
+
+@every_space
+def test_kernels_are_summed_as_finely_as_a_picture_needs(
+    space: RoundSpace,
+) -> None:
+    rng = np.random.default_rng(1)
+    count = 200
+    centers = space.to_chart(
+        np.stack([rng.uniform(-80, 80, count), rng.uniform(-180, 180, count)], 1)
+    )
+    kappa = torch.tensor(10 ** rng.uniform(0, 4, (count, 1)))
+    weights = torch.full((count,), 1 / count, dtype=torch.float64)
+    simple = peaked(space, (0, 0), 3.0)
+    density = BlendedDensity(
+        space, simple.flow, simple.base, AdaptiveKernels(space, centers, kappa, weights),
+        simple.shares,
+    )  # fmt: skip
+    found = density_on_map(density, points(300), "natural", 1e-9)
+    np.testing.assert_allclose(found, density_at(density, points(300), "natural"), rtol=1e-4)
+
+
+@every_space
+@pytest.mark.parametrize("width", [NARROWEST, "single", "double"])
+def test_maps_have_room_and_letters_of_7_to_8_points(space: Any, width: Any) -> None:
+    density, sheet = peaked(space, (20, 30), 50.0), Sheet.column(width)
+    asked: list[Any] = [{"projection": p} for p in ("lambert", "stereographic")]
+    if space.name == "sphere":
+        asked += [
+            {"projection": p, "center": (150,)} for p in ("mollweide", "equal-earth", "latlon")
+        ]
+        asked += [{"projection": "lambert", "center": (-25, 130), "radius": 20}]
+    else:
+        asked += [{"projection": p} for p in ("schmidt", "wulff")]
+    for options in asked:
+        picture = map_picture(density, points(30), scale="auto", sheet=sheet, **options)
+        check_inside(picture)
+        pdf = picture.file()
+        assert all(7 <= size <= 8 for size in letters(pdf))
+        page = pypdfium2.PdfDocument(pdf)[0]
+        kinds = [pdfium.FPDFPageObj_GetType(item) for item in page.get_objects()]
+        assert kinds.count(pdfium.FPDF_PAGEOBJ_IMAGE) <= 2  # the map and the bar: no cells to sew
+        assert page.get_width() == pytest.approx(72 * sheet.width, abs=0.01)
+    for data in (points(30), None):
+        check_inside(map_samples_picture(density, data, points(20), sheet=sheet))
+
+
+def test_what_is_outside_the_outline_is_paper_and_inside_is_colour() -> None:
+    picture = map_picture(peaked(ROUND[0], (0, 0), 2.0), projection="mollweide")
+    image = np.asarray(Image.open(io.BytesIO(picture.file())).convert("RGB")).astype(int)
+    axes = picture.figure.axes[1] if len(picture.figure.axes) > 1 else picture.figure.axes[0]
+    axes = max(picture.figure.axes, key=lambda a: a.get_position().height)
+    height = image.shape[0]
+
+    def colour(x: float, y: float) -> np.ndarray:
+        place = axes.transData.transform((x, y))
+        return image[int(height - place[1]), int(place[0])]
+
+    side, top = 2 * math.sqrt(2), math.sqrt(2)
+    assert (colour(-0.95 * side, 0.8 * top) == 255).all()
+    for turn in np.linspace(0.1, 6.2, 20):
+        x, y = 0.97 * side * math.cos(turn), 0.97 * top * math.sin(turn)
+        assert (colour(x, y) < 255).any()
+
+
+def test_captions_say_what_is_seen() -> None:
+    sphere = peaked(ROUND[0], (20, 30), 500.0)
+    words = map_picture(
+        sphere, points(50), scale="auto", center=(150,), coastlines=COAST, most=20
+    ).caption
+    assert "Equal Earth projection (equal-area), about 150° E" in words
+    assert "coastlines" in words
+    assert "Dots are 20 of 50 points." in words
+    assert re.search(r"Colours are logarithmic, as the density is below a tenth .* 99 % of", words)
+    asked = map_picture(sphere, scale="linear").caption
+    assert "Colours are linear, as asked for." in asked
+    assert "coastlines" not in asked
+    assert "Peaks narrower than" in map_picture(peaked(ROUND[0], (0, 0), 1e7)).caption
+    plane = peaked(ROUND[1], (20, 30), 5.0)
+    net = map_picture(plane, projection="schmidt", scale="auto")
+    assert "Lower hemisphere, Schmidt net (equal-area)" in net.caption
+    assert "opposite points of the rim are one axis" in net.caption
+    assert "Colours are linear, as the density is above a tenth" in net.caption
+    vectors = map_picture(peaked(Sphere(form="vector"), (20, 30), 5.0)).caption
+    assert "latitudes are from the x, y plane towards z" in vectors
+
+
+def test_the_scale_is_the_same_in_all_pictures_and_has_its_reason() -> None:
+    narrow, broad = (peaked(ROUND[1], (80, 0), kappa) for kappa in (60.0, 1.0))
+    assert chosen_scale(narrow, "natural", "auto").log
+    assert not chosen_scale(broad, "natural", "auto").log
+    with pytest.raises(OrbiflowError, match="scale must be"):
+        chosen_scale(broad, "natural", "cubic")
+
+
+def test_coastlines_are_drawn_and_cut() -> None:
+    density = peaked(ROUND[0], (20, 30), 5.0)
+    plain, lines = (
+        map_picture(density, projection="latlon", coastlines=c).file() for c in (None, COAST)
+    )
+    assert plain != lines
+    pieces = PlateCarree().pieces(COAST[0])
+    assert len(pieces) == 2
+    for wrong, message in (
+        ([np.zeros((3, 3))], "coastline"),
+        ([[[99.0, 0.0], [0, 0]]], "latitude"),
+    ):
+        with pytest.raises(OrbiflowError, match=message):
+            map_picture(density, coastlines=wrong)  # pyright: ignore
+
+
+def test_maps_of_other_spaces_are_refused() -> None:
+    space = Torus(2)
+    density = SymmetricDensity(space, Flow([FourierField(space.group, 1)], steps=1))
+    with pytest.raises(OrbiflowError, match="maps are of the sphere"):
+        map_picture(density)

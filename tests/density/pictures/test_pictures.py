@@ -1,0 +1,409 @@
+"""Pictures and pages of densities: sizes, marks, contents, and what they refuse."""
+
+import base64
+import io
+import json
+import re
+
+import numpy as np
+import pytest
+import torch
+from PIL import Image
+
+from orbiflow.density import (
+    AdaptiveKernels,
+    BlendedDensity,
+    KleinBottle,
+    NeuralFlow,
+    ProjectivePlane,
+    Sphere,
+    SymmetricDensity,
+    Torus,
+    UniformBase,
+    density_on_grid,
+    density_page,
+    edge_pairs,
+    to_vectors,
+)
+from orbiflow.density.models import still_flow
+from orbiflow.density.pictures import square as density_square
+from orbiflow.density.pictures.axes import (
+    angle_axis,
+    axis_label,
+    view_of,
+)
+from orbiflow.density.pictures.corner import corner_png
+from orbiflow.density.pictures.flow import flow_png
+from orbiflow.density.pictures.samples import samples_png
+from orbiflow.density.pictures.scale import shading
+from orbiflow.density.pictures.square import density_png
+from orbiflow.density.pictures.surfaces import boy_surface, mesh
+from orbiflow.density.pictures.values import (
+    density_at,
+    is_sharp,
+    takes_logarithms,
+)
+from orbiflow.errors import OrbiflowError
+from orbiflow.fields import FourierField, NeuralTorusField
+from orbiflow.flows import Flow
+from strategies import random_orthogonal
+
+TURN = random_orthogonal(np.random.default_rng(2), 3)
+SPACES = [Torus(2, unit="degrees"), KleinBottle(), Sphere(rotation=TURN), ProjectivePlane()]
+every_space = pytest.mark.parametrize("space", SPACES, ids=lambda s: s.name)
+
+
+def example(space, dtype=torch.float64):
+    field = FourierField(space.group, 2, dtype=dtype)
+    generator = torch.Generator().manual_seed(3)
+    field.parameters_.data.normal_(0, 0.01, generator=generator)
+    return SymmetricDensity(space, Flow([field], steps=2))
+
+
+def points(count, seed=0):
+    return torch.tensor(np.random.default_rng(seed).uniform(-2, 2, (count, 2)))
+
+
+def picture(png):
+    return Image.open(io.BytesIO(png)).convert("RGB")
+
+
+def page_data(page):
+    found = re.search(r'<script type="application/json" id="data">(.*?)</script>', page, re.DOTALL)
+    assert found
+    return json.loads(found[1])
+
+
+def array(text, kind):
+    return np.frombuffer(base64.b64decode(text), dtype=kind)
+
+
+@pytest.fixture(autouse=True)
+def _coarse(monkeypatch):
+    monkeypatch.setattr("orbiflow.density.pictures.square._GRID", 24)
+    monkeypatch.setattr("orbiflow.density.pictures.square._FINE_GRID", 30)
+    monkeypatch.setattr("orbiflow.density.pictures.page._FINE_CELLS", 20)
+    monkeypatch.setattr("orbiflow.density.pictures.values._COARSE", 24)
+    monkeypatch.setattr("orbiflow.drawing.fields._SAMPLES", 40)
+
+
+@every_space
+def test_pictures_decode_at_the_asked_width(space):
+    density = example(space)
+    assert picture(density_png(density, points(40), width_px=320)).width == 320
+    assert picture(flow_png(density, cells=2, width_px=300)).width == 300
+    assert picture(samples_png(density, points(30), points(20), width_px=310)).width == 310
+
+
+def test_the_same_samples_give_the_same_picture_and_other_ones_another():
+    density = example(SPACES[0])
+    many = points(3500)
+    first = density_png(density, many, width_px=300)
+    assert first == density_png(density, many, width_px=300)
+    assert first != density_png(density, width_px=300)
+
+
+def test_all_measures_are_drawn_and_another_is_refused():
+    density = example(SPACES[2])
+    for measure in ("natural", "square", "uniform"):
+        assert density_png(density, measure=measure, width_px=200)
+    with pytest.raises(OrbiflowError, match="measure"):
+        density_png(density, measure="flat")
+
+
+def test_single_precision_is_drawn():
+    density = example(SPACES[1], torch.float32)
+    assert density_png(density, width_px=200)
+    assert flow_png(density, cells=1, width_px=200)
+
+
+@pytest.mark.parametrize("dim", [1, 3])
+def test_other_dimensions_are_refused(dim):
+    density = example(Torus(dim))
+    for draw in (density_png, flow_png, density_page):
+        with pytest.raises(OrbiflowError, match="two dimensions"):
+            draw(density)
+    with pytest.raises(OrbiflowError, match="two dimensions"):
+        samples_png(density, torch.zeros(3, dim), torch.zeros(3, dim))
+
+
+@pytest.mark.parametrize("cells", [0, 10, 1.5])
+def test_number_of_cells_is_checked(cells):
+    with pytest.raises(OrbiflowError, match="cells"):
+        flow_png(example(SPACES[0]), cells=cells)
+
+
+def test_samples_of_another_shape_are_refused():
+    for draw in (density_png, density_page):
+        with pytest.raises(OrbiflowError, match="chart points"):
+            draw(example(SPACES[0]), samples=torch.zeros(4, 3))
+
+
+EDGES = {
+    "torus": [("left up", "right up"), ("bottom right", "top right")],
+    "klein-bottle": [("left up", "right up"), ("bottom right", "top left")],
+    "sphere": [("left up", "bottom right"), ("right down", "top left")],
+    "projective-plane": [("left up", "right down"), ("bottom right", "top left")],
+}
+
+
+def edge_name(edge):
+    (x, y), (u, v) = edge.round().astype(int)
+    if x == u:
+        return f"{'right' if x else 'left'} {'up' if v > y else 'down'}"
+    return f"{'top' if y else 'bottom'} {'right' if u > x else 'left'}"
+
+
+@every_space
+def test_edges_are_paired_as_the_space_identifies_them(space):
+    found = {tuple(sorted(edge_name(edge) for edge in pair)) for pair in edge_pairs(space.group)}
+    expected = [tuple(sorted(pair)) for pair in EDGES[space.name]]
+    swap = {"up": "down", "down": "up", "left": "right", "right": "left"}
+
+    def reversed_pair(pair):
+        parts = [name.split() for name in pair]
+        return tuple(sorted(f"{side} {swap[way]}" for side, way in parts))
+
+    assert len(found) == 2
+    assert all(pair in found or reversed_pair(pair) in found for pair in expected)
+
+
+@every_space
+def test_paired_edges_are_the_same_points(space):
+    t = torch.linspace(0.1, 0.9, 7, dtype=torch.float64)[:, None]
+    for pair in edge_pairs(space.group):
+        first, second = (torch.tensor(edge) for edge in pair)
+        one, other = (edge[0] + t * (edge[1] - edge[0]) for edge in (first, second))
+        assert float(space.distance(one, other).max()) < 1e-6
+
+
+def test_scales_are_chosen_and_checked():
+    density = example(SPACES[0])
+    for scale in ("linear", "log", "auto"):
+        assert density_png(density, scale=scale, width_px=200)
+    assert not takes_logarithms(density, "natural", "auto")
+    assert takes_logarithms(peaked(SPACES[0], 400.0), "natural", "auto")
+    for draw in (density_png, density_page):
+        with pytest.raises(OrbiflowError, match="scale"):
+            draw(density, scale="square root")
+    page = density_page(peaked(SPACES[0], 400.0), scale="auto", resolution=12)
+    assert any("10" in tick["text"] for tick in page_data(page)["ticks"])
+
+
+def test_the_centre_moves_the_picture_but_not_its_colours(monkeypatch):
+    density, drawn = peaked(SPACES[0], 30.0, at=(0.1, 0.8)), []
+    shades = lambda values, *_, **__: drawn.append(values) or shading(values)  # noqa: E731
+    monkeypatch.setattr(density_square, "shading", shades)
+    for center in ((0, 0), (180, 180)):
+        assert density_png(density, center=center, width_px=200)
+    np.testing.assert_allclose(np.roll(drawn[0], 15, axis=(0, 1)), drawn[1], rtol=1e-6)
+    peak = np.unravel_index(drawn[0].argmax(), drawn[0].shape)
+    np.testing.assert_allclose((np.array(peak) + 0.5) / 30, (0.6, 0.3), atol=0.04)
+    assert samples_png(density, points(9), points(9), center=(180, 180), width_px=300) != (
+        samples_png(density, points(9), points(9), width_px=300)
+    )
+    assert flow_png(example(SPACES[0]), cells=1, center=(90, 0), width_px=200)
+
+
+@pytest.mark.parametrize("draw", [density_png, flow_png])
+def test_the_centre_is_checked(draw):
+    with pytest.raises(OrbiflowError, match="not on the klein-bottle"):
+        draw(example(SPACES[1]), center=(0, 0))
+    for center in ((0,), (0, np.nan)):
+        with pytest.raises(OrbiflowError, match="2 finite angles"):
+            draw(example(SPACES[0]), center=center)
+
+
+def test_axes_have_the_users_names():
+    view = view_of(SPACES[1], ("direction", "mixture"))
+    assert angle_axis(view, 0)[0] == "mixture (radians)"
+    assert angle_axis(view, 1)[0] == "direction (radians)"
+    assert axis_label(view_of(SPACES[0], ("x" * 99, "y")), 0) == f"{'x' * 39}… (degrees)"
+    assert density_png(example(SPACES[0]), names=("$x_", "a^$"), width_px=200)
+    page = density_page(example(SPACES[0]), names=("phi", "psi<b>"), resolution=4)
+    assert "phi (degrees) runs round the ring, psi&lt;b&gt; (degrees) round its tube" in page
+    assert {"phi 90°", "phi −90°"} <= {label["text"] for label in page_data(page)["labels"]}
+    with pytest.raises(OrbiflowError, match="2 names"):
+        density_png(example(SPACES[0]), names=("a",))
+
+
+def peaked(space, kappa, at=(0.3, 0.4), flow=0.01):
+    """Mostly one kernel."""
+    kernels = AdaptiveKernels(
+        space,
+        torch.tensor([at], dtype=torch.float64),
+        torch.full((1, 1 if space.is_round else 2), kappa, dtype=torch.float64),
+        torch.ones(1, dtype=torch.float64),
+    )
+    shares = torch.tensor([flow, 0.99 - flow, 0.01], dtype=torch.float64)
+    return BlendedDensity(space, example(space).flow, UniformBase(space), kernels, shares)
+
+
+@every_space
+@pytest.mark.parametrize("measure", ["natural", "square", "uniform"])
+def test_broad_kernels_are_drawn_as_they_are(space, measure):
+    density, t = peaked(space, 3.0, flow=0.4), torch.linspace(0.03, 0.97, 9, dtype=torch.float64)
+    grid = torch.stack(torch.meshgrid(t, t[:5], indexing="ij"), dim=-1).reshape(-1, 2)
+    found = density_on_grid(density, t, t[:5], measure, pixel=1e-6)
+    exact = density_at(density, grid, measure).reshape(9, 5)
+    np.testing.assert_allclose(found, exact, rtol=1e-5)
+    assert not is_sharp(density, 0.01)
+
+
+@every_space
+@pytest.mark.parametrize("at", [(0.3, 0.4), (0.3087, 0.4131), (0.316, 0.46)])
+def test_peaks_narrower_than_a_pixel_keep_their_mass_wherever_they_lie(space, at):
+    density, t = peaked(space, 1e7, at), (torch.arange(90, dtype=torch.float64) + 0.5) / 90
+    values = density_on_grid(density, t, t, "square")
+    assert values.mean() == pytest.approx(1.0, abs=0.03)
+    peak = (np.array(np.unravel_index(values.argmax(), values.shape)) + 0.5) / 90
+    assert abs(peak - at).max() < 1 / 90
+    assert is_sharp(density, 1 / 90)
+
+
+@every_space
+def test_densities_with_kernels_are_drawn_and_say_what_is_averaged(space):
+    density = peaked(space, 1e6)
+    assert density_png(density, width_px=250) != density_png(peaked(space, 10.0), width_px=250)
+    assert flow_png(density, cells=1, width_px=200)
+    assert samples_png(density, points(9), density.sample((20,)), width_px=300)
+    assert "narrower than" in density_page(density)
+    assert "narrower than" not in density_page(example(space), resolution=8)
+
+
+def test_a_flow_in_few_colours_is_small():
+    png = flow_png(example(SPACES[0]))
+    assert len(png) < 600_000
+    image = Image.open(io.BytesIO(png))
+    assert image.mode == "P"
+
+
+def test_a_field_that_changes_with_time_is_drawn():
+    density = SymmetricDensity(SPACES[0], NeuralFlow(NeuralTorusField(2, width=8)))
+    assert flow_png(density, cells=1, width_px=200)
+
+
+@pytest.mark.parametrize("dim", [1, 2, 3, 5])
+def test_pairs_of_angles(dim):
+    density = SymmetricDensity(
+        Torus(dim, unit="degrees"), NeuralFlow(NeuralTorusField(dim, width=4))
+    )
+    data = torch.tensor(np.random.default_rng(0).random((40, dim)))
+    names = [f"${k}_" for k in range(dim)]
+    both = corner_png(density, data, data[:9], names=names, width_px=400)
+    assert picture(both).size == (400, 400)
+    assert corner_png(density, None, data, center=[90] * dim, width_px=300)
+    with pytest.raises(OrbiflowError, match="chart points"):
+        corner_png(density, data[:, :0], data)
+
+
+@pytest.mark.parametrize("space", [Torus(9), SPACES[2]], ids=["torus", "sphere"])
+def test_pairs_of_other_spaces_are_refused(space):
+    with pytest.raises(OrbiflowError, match="1 to 8 angles"):
+        corner_png(SymmetricDensity(space, example(SPACES[0]).flow), None, torch.zeros(3, 9))
+
+
+@every_space
+@pytest.mark.parametrize("measure", ["natural", "square"])
+def test_density_is_finite_at_every_vertex(space, measure):
+    assert np.isfinite(density_at(example(space), mesh(space, 8).points, measure)).all()
+
+
+@every_space
+def test_page_stands_alone(space):
+    page = density_page(example(space), resolution=8, samples=points(9), title="A < B & C")
+    assert not re.search(r"https?://|//cdn|@import|\bfetch\(|XMLHttpRequest|\ssrc=", page)
+    assert "%DATA%" not in page
+    assert "A &lt; B &amp; C" in page
+    assert 'aria-label="' in page
+    data = page_data(page)
+    assert len(array(data["samples"], "<f4")) == 27
+    assert data["dots"]
+    assert len(array(data["colours"], "u1")) == 1024
+    triangles = array(data["triangles"], "<u2")
+    assert len(triangles) == 2 * 8 * 8 * 3
+    assert len(array(data["normals"], "i1")) == len(array(data["points"], "<f4"))
+    assert triangles.max() + 1 == len(array(data["values"], "<u2"))
+
+
+def test_largest_page_is_below_three_megabytes():
+    page = density_page(example(SPACES[2]), resolution=250, samples=points(5000))
+    assert len(page.encode()) < 3_000_000
+
+
+def test_too_large_a_page_is_refused():
+    coast = np.random.default_rng(0).uniform(-60, 60, (200_000, 2))
+    with pytest.raises(OrbiflowError, match="MB"):
+        density_page(example(SPACES[2]), resolution=8, coastlines=[coast])
+
+
+@pytest.mark.parametrize("space", [SPACES[0], SPACES[2]], ids=lambda s: s.name)
+def test_colours_close_over_the_seams(space):
+    # where a surface does not cross itself, vertices at one place are one point
+    data = page_data(density_page(example(space), resolution=12))
+    places = array(data["points"], "<f4").reshape(-1, 3)
+    values = array(data["values"], "<u2").astype(int)
+    one, other = np.nonzero(np.linalg.norm(places[:, None] - places, axis=-1) < 1e-6)
+    corner = ((mesh(space, 12).points - 0.5).abs().amin(dim=1) > 0.49).numpy()
+    apart = (one != other) & ~corner[one] & ~corner[other]
+    assert apart.sum() == 2 * 2 * 11
+    assert abs(values[one] - values[other])[apart].max() <= 2
+
+
+@every_space
+def test_density_is_the_same_at_both_copies_of_an_edge(space):
+    density, t = example(space), torch.linspace(0.05, 0.95, 9, dtype=torch.float64)[:, None]
+    for pair in edge_pairs(space.group):
+        first, second = (torch.tensor(edge) for edge in pair)
+        one, other = (edge[0] + t * (edge[1] - edge[0]) for edge in (first, second))
+        np.testing.assert_allclose(
+            density_at(density, one, "natural"), density_at(density, other, "natural"), rtol=1e-6
+        )
+
+
+def test_sphere_page_has_the_users_frame_and_coastlines():
+    space = SPACES[2]
+    where = np.array([[48.2, 16.4], [40.0, -74.0], [-33.9, 151.2]])
+    samples = space.to_chart(where)
+    data = page_data(
+        density_page(example(space), resolution=8, samples=samples, coastlines=[where, where[:1]])
+    )
+    np.testing.assert_allclose(
+        array(data["samples"], "<f4").reshape(-1, 3), to_vectors(where), atol=1e-6
+    )
+    coast = data["lines"][-1]
+    assert coast["counts"] == [3]
+    np.testing.assert_allclose(
+        array(coast["points"], "<f4").reshape(-1, 3), to_vectors(where), atol=1e-6
+    )
+    north = next(label for label in data["labels"] if label["text"] == "N")
+    assert north["at"][2] > 1
+
+
+def test_coastlines_on_axes_and_nowhere_else():
+    where = np.array([[10.0, 20.0], [30.0, 40.0]])
+    data = page_data(density_page(example(SPACES[3]), resolution=4, coastlines=[where]))
+    np.testing.assert_allclose(
+        array(data["lines"][-1]["points"], "<f4").reshape(-1, 3),
+        boy_surface(to_vectors(where)),
+        atol=1e-6,
+    )
+    with pytest.raises(OrbiflowError, match="coastlines"):
+        density_page(example(SPACES[0]), resolution=4, coastlines=[where])
+
+
+@pytest.mark.parametrize("space", SPACES[:2], ids=lambda s: s.name)
+def test_kernels_are_summed_in_blocks(space, monkeypatch):
+    rng = np.random.default_rng(4)
+    kernels = AdaptiveKernels(
+        space,
+        points(50),
+        torch.tensor(rng.uniform(5, 500, (50, 2))),
+        torch.full((50,), 0.02).double(),
+    )
+    shares = torch.tensor([0.0, 0.9, 0.1]).double()
+    density = BlendedDensity(space, still_flow(space), UniformBase(space), kernels, shares)
+    t = (torch.arange(30, dtype=torch.float64) + 0.5) / 30
+    whole = density_on_grid(density, t, t, "natural")
+    monkeypatch.setattr("orbiflow.density.pictures.values._KERNELS", 7)
+    np.testing.assert_allclose(density_on_grid(density, t, t, "natural"), whole, rtol=1e-12)

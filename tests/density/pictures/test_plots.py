@@ -1,0 +1,163 @@
+"""All pictures of a density: a folder of them, or one PDF; in memory and from folders."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pypdfium2
+import pytest
+import torch
+
+from orbiflow.density import (
+    MODEL,
+    PICTURES,
+    DensityEstimator,
+    PlotSettings,
+    Sphere,
+    SymmetricDensity,
+    Torus,
+    density_to_bytes,
+    plot_density,
+)
+from orbiflow.density.pictures.plots import refuse_others
+from orbiflow.errors import OrbiflowError, OutputError
+from orbiflow.fields import FourierField
+from orbiflow.flows import Flow
+
+DATA = np.random.default_rng(0).uniform(-3, 3, (40, 2))
+
+
+@pytest.fixture(autouse=True)
+def _coarse(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("orbiflow.density.pictures.square._GRID", 12)
+    monkeypatch.setattr("orbiflow.density.pictures.page._CELLS", 8)
+    monkeypatch.setattr("orbiflow.density.pictures.maps._PIXELS", 900)
+    monkeypatch.setattr("orbiflow.density.pictures.values._COARSE", 12)
+    monkeypatch.setattr("orbiflow.drawing.fields._SAMPLES", 20)
+    monkeypatch.setattr("orbiflow.density.pictures.choice.SAMPLES", 50)
+
+
+def example(space: Any = None) -> SymmetricDensity:
+    space = space or Torus(2)
+    field = FourierField(space.group, 1, dtype=torch.float64)
+    field.parameters_.data.normal_(0, 0.02, generator=torch.Generator().manual_seed(3))
+    return SymmetricDensity(space, Flow([field], steps=1))
+
+
+def names(folder: Path) -> set[str]:
+    return {path.name for path in folder.iterdir()}
+
+
+def test_a_folder_holds_the_pictures_of_one_plot(tmp_path: Path) -> None:
+    out = tmp_path / "plots"
+    plotted = plot_density(example(), out, PlotSettings(format="svg"), data=DATA)
+    figures = {"density.svg", "flow.svg", "samples.svg"}
+    assert names(out) == figures | {"surface.html"}
+    assert set(plotted.files) == {out / name for name in names(out)}
+    assert len(plotted.captions) == 3
+    plot_density(example(), out)
+    assert names(out) == {"density.png", "flow.png", "surface.html"}
+    assert names(out) < set(PICTURES)
+    (out / "notes.txt").write_text("mine")
+    with pytest.raises(OutputError, match=r"holds density\.png, which would go"):
+        plot_density(example(), out)
+    assert names(out) == {"density.png", "flow.png", "surface.html", "notes.txt"}
+
+
+def test_one_pdf_has_a_page_a_figure(tmp_path: Path) -> None:
+    out = tmp_path / "plots.pdf"
+    plotted = plot_density(example(), out, PlotSettings(width="double"), data=DATA)
+    assert plotted.files == (out,)
+    assert out.is_file()
+    document = pypdfium2.PdfDocument(out)
+    assert [round(page.get_width()) for page in document] == [510, 510, 510]
+    words = [page.get_textpage().get_text_range() for page in document]
+    assert "density" in words[0]
+    assert "speed" in words[1]
+    assert "samples" in words[2]
+
+
+def test_a_folder_may_be_called_like_a_pdf(tmp_path: Path) -> None:
+    out = tmp_path / "plots.pdf"
+    out.mkdir()
+    plot_density(example(), out)
+    assert "density.png" in names(out)
+
+
+@pytest.mark.parametrize("ending", ["png", "SVG", "html"])
+def test_one_picture_is_no_place_for_several(tmp_path: Path, ending: str) -> None:
+    with pytest.raises(OutputError, match=r"several pictures; give a folder, or a \.pdf"):
+        plot_density(example(), tmp_path / f"plot.{ending}")
+    assert not list(tmp_path.iterdir())
+
+
+def test_densities_from_wherever_they_are(tmp_path: Path) -> None:
+    density, model = example(), tmp_path / "model"
+    model.mkdir()
+    (model / MODEL).write_bytes(density_to_bytes(density, columns=["phi", "psi"]))
+    settings = PlotSettings(format="pdf", names=["phi", "psi"])
+    made = []
+    for k, source in enumerate((density, model, str(model / MODEL))):
+        plot_density(source, tmp_path / f"{k}.pdf", settings, data=DATA)
+        made.append((tmp_path / f"{k}.pdf").read_bytes())
+    assert made[0] == made[1] == made[2]
+    plot_density(model, tmp_path / "named.pdf", data=DATA)  # the columns of the fit
+    assert (tmp_path / "named.pdf").read_bytes() == made[0]
+
+
+def test_a_fitted_estimator_is_drawn_and_another_refused(tmp_path: Path) -> None:
+    estimator = DensityEstimator("torus", detail=1, segments=1, iterations=2)
+    with pytest.raises(OrbiflowError, match=r"call fit\(data\) first"):
+        plot_density(estimator, tmp_path / "a.pdf")
+    plot_density(estimator.fit(DATA), tmp_path / "a.pdf")
+    # the flow has no part in it
+    assert len(pypdfium2.PdfDocument(tmp_path / "a.pdf")) == 1
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"format": "eps"}, "format must be one of png, pdf, svg"),
+        ({"width": "wide"}, "width must be single, double"),
+        ({"measure": "flat"}, "measure must be one of"),
+        ({"scale": "square"}, "scale must be one of"),
+        ({"projection": "globe"}, "projection must be one of"),
+        ({"samples": 0}, "samples must be from 1 to"),
+    ],
+)
+def test_settings_are_checked(settings: dict[str, Any], message: str) -> None:
+    with pytest.raises(OrbiflowError, match=message):
+        PlotSettings(**settings)
+
+
+def test_what_does_not_fit_the_density_is_refused_before_anything_is_written(
+    tmp_path: Path,
+) -> None:
+    out, lines = tmp_path / "plots", [np.zeros((2, 2))]
+    for space, settings, message in (
+        (Torus(2), PlotSettings(coastlines=lines), "coastlines belong to the sphere"),
+        (Torus(9), PlotSettings(), "has 9 angles"),
+        (Torus(2), PlotSettings(names=["one"]), "2 names of columns"),
+        (Sphere(), PlotSettings(center=[0.0, 0.0, 0.0]), "a latitude and a longitude"),
+        (Torus(2), PlotSettings(projection="lambert"), "projection belongs to maps"),
+        (Torus(2), PlotSettings(radius=20), "radius belongs to maps"),
+    ):
+        density = example() if space.dim == 2 and space.is_torus else None
+        density = density or SymmetricDensity(space, example().flow)
+        with pytest.raises(OrbiflowError, match=message):
+            plot_density(density, out, settings)
+    with pytest.raises(OrbiflowError):
+        plot_density(example(), out, data=DATA[:, :1])
+    assert not out.exists()
+
+
+def test_a_folder_of_ones_own_pictures_is_left_alone(tmp_path: Path) -> None:
+    for name in ("density.pdf", "notes.txt"):
+        (tmp_path / name).write_text("mine")
+    with pytest.raises(OutputError, match=r"density\.pdf, which would go, beside notes\.txt"):
+        refuse_others(tmp_path)
+    (tmp_path / "notes.txt").unlink()
+    refuse_others(tmp_path)  # as an earlier plot left it
+    refuse_others(tmp_path / "not there yet")

@@ -1,0 +1,124 @@
+"""Lines about regions of highest density: where they are, and what is said of them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+from matplotlib.contour import QuadContourSet
+from matplotlib.path import Path as MapPath
+
+from orbiflow.density import (
+    AdaptiveKernels,
+    BlendedDensity,
+    DensityLevels,
+    PlotSettings,
+    SymmetricDensity,
+    UniformBase,
+    density_picture,
+    make_space,
+    map_picture,
+    plot_density,
+    to_vectors,
+)
+from orbiflow.density.models import still_flow
+from orbiflow.density.pictures.axes import view_of
+from orbiflow.density.pictures.projections import EqualEarth
+from orbiflow.density.pictures.regions import RegionLine
+from orbiflow.errors import OrbiflowError
+
+SPACES = ("torus", "klein-bottle", "sphere", "projective-plane")
+MEASURES = ("natural", "square", "uniform")
+
+
+def broad(name: str) -> BlendedDensity:
+    """Some broad kernels."""
+    space, rng = make_space(name), np.random.default_rng(5)
+    kernels = AdaptiveKernels(
+        space,
+        space.uniform(4, torch.Generator().manual_seed(2)),
+        torch.tensor(rng.uniform(4, 20, (4, 1 if space.is_round else 2))),
+        torch.full((4,), 0.25).double(),
+    )
+    shares = torch.tensor([0.0, 0.8, 0.2]).double()
+    return BlendedDensity(space, still_flow(space), UniformBase(space), kernels, shares)
+
+
+def lines_of(density: BlendedDensity) -> list[RegionLine]:
+    levels = DensityLevels(density, samples=4000)
+    return [RegionLine(mass, levels.highest(mass).log_prob) for mass in (0.9, 0.5)]
+
+
+def vertices(figure: Any) -> list[np.ndarray]:
+    """Of each set of lines in a figure, (N, 2) on the axes."""
+    (axes,) = [a for a in figure.axes if any(isinstance(c, QuadContourSet) for c in a.collections)]
+    sets = [c for c in axes.collections if isinstance(c, QuadContourSet)]
+    return [np.concatenate([p.vertices for p in one.get_paths()]) for one in sets]
+
+
+@pytest.mark.parametrize("measure", MEASURES)
+@pytest.mark.parametrize("name", SPACES)
+def test_lines_are_where_the_density_is_that_of_the_edge(name: str, measure: str) -> None:
+    density = broad(name)
+    lines, view = lines_of(density), view_of(density.space, None, None)
+    picture = density_picture(density, measure=measure, regions=lines)
+    found = vertices(picture.figure)
+    assert len(found) == 2
+    for line, places in zip(sorted(lines), found, strict=True):  # the smallest first
+        points = torch.tensor(places) + torch.tensor([float(low) for low in view.low])
+        # away from cone points, where a pixel is large on the sphere
+        clear = density.space.log_area(points) - density.space.log_area(points).amax() > -4
+        logs = density.log_prob(points[clear], measure="natural")
+        assert float((logs - line.log_prob).abs().quantile(0.95)) < 0.05
+    assert "hold 50 % (solid) and 90 % (dashed)" in picture.caption
+
+
+@pytest.mark.parametrize("measure", MEASURES)
+def test_lines_on_a_map(measure: str) -> None:
+    density = broad("sphere")
+    lines, projection = lines_of(density)[:1], EqualEarth((0.0, 40.0))
+    picture = map_picture(density, measure=measure, regions=lines, projection=projection)
+    (places,) = vertices(picture.figure)
+    # beyond the outline they are cut off
+    places = places[MapPath(projection.outline()).contains_points(places, radius=-0.02)]
+    points = density.space.vectors_to_chart(to_vectors(projection.inverse(places)))  # type: ignore[attr-defined]
+    logs = density.log_prob(points, measure="natural")
+    assert float((logs - lines[0].log_prob).abs().quantile(0.95)) < 0.05
+    assert "The line is about the smallest region that holds 90 %." in picture.caption
+
+
+@pytest.mark.parametrize("name", ["torus", "sphere"])
+def test_logarithms_are_for_lines_alone(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    called: list[int] = []
+
+    def counted(_: SymmetricDensity, values: np.ndarray, *_rest: object) -> np.ndarray:
+        called.append(len(values))
+        return np.log(values)
+
+    figures = "orbiflow.figures.density"
+    for room in ("square", "map"):
+        monkeypatch.setattr(f"{figures}_{room}.log_natural", counted)
+    monkeypatch.setattr(f"{figures}_square._FINE_GRID", 30)
+    monkeypatch.setattr(f"{figures}_map._PIXELS", 2000)
+    density = broad(name)
+    draw = density_picture if name == "torus" else map_picture
+    draw(density)
+    assert not called
+    draw(density, regions=lines_of(density))
+    assert len(called) == 1
+
+
+def test_masses_that_cannot_be_drawn(tmp_path: Any) -> None:
+    for masses, said in (
+        ((0.5, 0.5), "different masses"),
+        ((0.1, 0.2, 0.3, 0.4, 0.5), "at most 4"),
+        ((1.0,), "a region's mass"),
+    ):
+        with pytest.raises(OrbiflowError, match=said):
+            PlotSettings(regions=masses)
+    space = make_space("torus", dim=3)
+    flat = SymmetricDensity(space, still_flow(space))
+    with pytest.raises(OrbiflowError, match="regions are drawn in two dimensions"):
+        plot_density(flat, tmp_path / "out", PlotSettings(regions=(0.5,)))

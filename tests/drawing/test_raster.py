@@ -1,0 +1,152 @@
+"""The PNG pictures have their size and show what they should."""
+
+from __future__ import annotations
+
+import io
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+from PIL import Image
+
+from orbiflow.arrays import Array
+from orbiflow.drawing import field_png, palette
+from orbiflow.drawing.fields import flow_lines, symmetric_seeds
+from orbiflow.errors import OrbiflowError
+from orbiflow.tiles import (
+    Tile,
+    classes_png,
+    isohedral_class,
+    overlay_png,
+    tiling_png,
+)
+from orbiflow.tiles.pictures.tilings import (
+    ADDED,
+    COMMON,
+    MISSING,
+)
+
+
+def pixels(data: bytes) -> Array:
+    return np.asarray(Image.open(io.BytesIO(data)).convert("RGB"))
+
+
+def share(image: Array, colour: str) -> float:
+    rgb = [int(colour[i : i + 2], 16) for i in (1, 3, 5)]
+    return float((np.abs(image.astype(int) - rgb).max(axis=-1) <= 2).mean())
+
+
+@pytest.mark.parametrize("outline", [0.8, 0.0])
+def test_tiling_fills_the_picture_with_its_colours(bent_tile: Any, outline: float) -> None:
+    image = pixels(tiling_png(bent_tile("IH7"), width_px=600, outline_pt=outline))
+    assert image.shape == (400, 600, 3)
+    chosen = palette("delft")
+    shares = [share(image, chosen.fill(k)) for k in range(3)]
+    assert all(0.2 < value < 0.45 for value in shares)
+    assert share(image, chosen.paper) < 1e-3  # no seams
+    assert sum(shares) > (0.9 if outline else 0.96)
+
+
+def square(side: float, offset: float = 0.0) -> Array:
+    return offset + side * np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+
+
+def test_overlay_shows_missing_and_added_in_proportion() -> None:
+    tile = Tile(square(1.0), isohedral_class("IH1").group(), "IH1")
+    image = pixels(overlay_png(tile, square(1.0) + np.array([0.25, 0.0]), width_px=800))
+    common, missing, added = (share(image, colour) for colour in (COMMON, MISSING, ADDED))
+    assert common / missing == pytest.approx(3.0, rel=0.05)
+    assert added == pytest.approx(missing, rel=0.05)
+    left = image[:, : image.shape[1] // 3]
+    assert share(left[:500], ADDED) > 0.2
+    assert share(left[:500], MISSING) == 0.0
+
+
+def test_overlay_of_awkward_targets() -> None:
+    tile = Tile(square(1.0), isohedral_class("IH1").group())
+    bow_tie = np.array([[0.0, 0.0], [1.0, 1.0], [1.0, 0.0], [0.0, 1.0]])
+    assert share(pixels(overlay_png(tile, bow_tie, width_px=400)), ADDED) > 0.1
+    with pytest.raises(OrbiflowError, match="no area"):
+        overlay_png(tile, np.zeros((5, 2)))
+    with pytest.raises(OrbiflowError, match=r"outline is \(M >= 3, 2\)"):
+        overlay_png(tile, np.zeros((5, 3)))
+
+
+def test_y_down_turns_the_picture_over(bent_tile: Any) -> None:
+    tile = bent_tile("IH5")
+    up = pixels(tiling_png(tile, width_px=300)).astype(int)
+    down = pixels(tiling_png(tile, width_px=300, y_down=True)).astype(int)
+    assert np.abs(up[::-1] - down).mean() < 4.0
+    assert np.abs(up - down).mean() > 10.0
+
+
+def test_absurd_sizes_are_refused(bent_tile: Any) -> None:
+    with pytest.raises(OrbiflowError, match="cannot be made"):
+        tiling_png(bent_tile("IH1"), width_px=10**6)
+
+
+def test_field_picture(bent_tile: Any, equivariant: Any) -> None:
+    tile = bent_tile("IH6")
+    field = equivariant(tile.group)
+    image = pixels(field_png(lambda p: field(p.numpy()), tile.group, tile, width_px=300))
+    assert image.shape[1] == 300
+    assert image.std() > 20
+    still = field_png(lambda p: torch.zeros_like(p), tile.group, width_px=300)
+    assert pixels(still).shape[1] == 300
+
+
+def test_field_picture_has_the_symmetry_of_the_group() -> None:
+    """Half a turn about the middle, a 2-fold centre, leaves a p2 picture as it is."""
+    group = isohedral_class("IH4").group()
+    (center,) = (g(np.zeros(2)) / 2 for g in group.cosets[1:])
+    window = (center[0] - 2, center[1] - 2, center[0] + 2, center[1] + 2)
+
+    def odd(points: torch.Tensor) -> torch.Tensor:
+        inverse = torch.as_tensor(group.inverse_lattice)
+        u = 2 * np.pi * (points - torch.as_tensor(center)) @ inverse.T
+        return torch.sin(u + u.flip(-1))
+
+    image = pixels(field_png(odd, group, window=window, width_px=400)).astype(int)
+    assert np.abs(image - image[::-1, ::-1]).mean() < 5.0  # the outlined cell has no such symmetry
+    assert np.abs(image - image[::-1]).mean() > 15.0
+
+
+def test_field_must_return_vectors() -> None:
+    group = isohedral_class("IH4").group()
+    with pytest.raises(OrbiflowError, match="finite vectors of shape"):
+        field_png(lambda p: p[..., 0], group, width_px=100)
+    with pytest.raises(OrbiflowError, match="finite vectors of shape"):
+        field_png(lambda p: p * np.nan, group, width_px=100)
+
+
+@pytest.mark.parametrize("name", ["IH1", "IH5", "IH21"])
+def test_seeds_are_orbits_and_keep_their_distance(name: str) -> None:
+    group = isohedral_class(name).group()
+    seeds = symmetric_seeds(group, 0.3, tries=100)
+    assert len(seeds) % group.order == 0
+    assert len(seeds) > 10
+    for g in group.cosets:
+        moved = group.wrap(g(seeds))
+        gaps = np.linalg.norm(moved[:, None] - seeds, axis=-1)
+        assert (np.sort(gaps.min(axis=1))[: len(seeds) // 2] < 1e-9).all()
+
+
+def test_flow_lines_follow_the_field() -> None:
+    def turning(points: Array) -> Array:
+        return np.stack([-points[..., 1], points[..., 0]], axis=-1)
+
+    lines = flow_lines(turning, np.array([[1.0, 0.0], [0.0, 0.0], [0.0, 2.0]]), 0.5)
+    assert lines.shape == (2, 13, 2)  # the fixed point has none
+    radii = np.linalg.norm(lines, axis=-1)
+    assert np.ptp(radii, axis=1).max() < 1e-4
+    assert lines[0, -1, 1] > 0 > lines[0, 0, 1]
+
+
+def test_nine_classes() -> None:
+    image = pixels(classes_png(width_px=600))
+    assert image.shape == (492, 600, 3)
+    for row in range(3):
+        for column in range(3):
+            panel = image[row * 157 : row * 157 + 157, column * 200 : column * 200 + 200]
+            assert panel.std() > 20

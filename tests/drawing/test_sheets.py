@@ -1,0 +1,222 @@
+"""Figures for print: their size, their texts, and that nothing is cut off or written over."""
+
+from __future__ import annotations
+
+import io
+import re
+from typing import Any
+
+import numpy as np
+import pypdfium2
+import pypdfium2.raw as pdfium
+import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from PIL import Image
+
+from bent_tiles import bent_tile
+from orbiflow.density import (
+    KleinBottle,
+    NeuralFlow,
+    ProjectivePlane,
+    Sphere,
+    SymmetricDensity,
+    Torus,
+    corner_picture,
+    density_picture,
+    flow_picture,
+    samples_picture,
+)
+from orbiflow.drawing import (
+    Picture,
+    Sheet,
+    field_picture,
+    pdf_pages,
+)
+from orbiflow.drawing.sheet import NARROWEST
+from orbiflow.errors import OrbiflowError
+from orbiflow.fields import FourierField, NeuralTorusField
+from orbiflow.flows import Flow
+from orbiflow.tiles import (
+    bending_picture,
+    overlay_picture,
+    tiling_picture,
+)
+from orbiflow.tiles.pictures import tiling_raster
+from printed import check_inside, letters
+
+SPACES = [Torus(2, unit="degrees"), KleinBottle(), Sphere(), ProjectivePlane()]
+every_space = pytest.mark.parametrize("space", SPACES, ids=lambda s: s.name)
+every_width = pytest.mark.parametrize("width", ["single", "double"])
+
+
+@pytest.fixture(autouse=True)
+def _coarse(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("orbiflow.density.pictures.square._GRID", 24)
+    monkeypatch.setattr("orbiflow.density.pictures.values._COARSE", 24)
+    monkeypatch.setattr("orbiflow.drawing.fields._SAMPLES", 40)
+
+
+def example(space: Any) -> SymmetricDensity:
+    field = FourierField(space.group, 2, dtype=torch.float64)
+    field.parameters_.data.normal_(0, 0.02, generator=torch.Generator().manual_seed(3))
+    return SymmetricDensity(space, Flow([field], steps=2))
+
+
+def points(count: int, dim: int = 2) -> torch.Tensor:
+    return torch.tensor(np.random.default_rng(0).uniform(-2, 2, (count, dim)))
+
+
+def corner(dim: int, sheet: Sheet) -> Picture:
+    density = SymmetricDensity(Torus(dim), NeuralFlow(NeuralTorusField(dim, width=4)))
+    names = [f"a long name {k}" for k in range(dim)]
+    return corner_picture(density, points(40, dim), points(30, dim), names=names, sheet=sheet)
+
+
+def test_the_narrowest_figure_has_room() -> None:
+    names = ["a rather long name of an angle", "ψ"]
+    for measure, scale in (("uniform", "linear"), ("natural", "log")):
+        check_inside(
+            density_picture(
+                example(SPACES[0]), names=names, measure=measure, scale=scale,
+                sheet=Sheet.column(NARROWEST),
+            )
+        )  # fmt: skip
+
+
+@every_space
+@every_width
+def test_density_figures_have_room_and_letters_of_7_to_8_points(space: Any, width: Any) -> None:
+    density, sheet = example(space), Sheet.column(width)
+    names = ["a rather long name of an angle", "ψ"] if space.unit else None
+    made = [
+        density_picture(density, points(50), measure="uniform", names=names, sheet=sheet),
+        density_picture(density, scale="log", sheet=sheet),
+        flow_picture(density, cells=2, sheet=sheet),
+        samples_picture(density, points(60), points(40), sheet=sheet),
+    ]
+    for picture in made:
+        check_inside(picture)
+        pdf = picture.file()
+        page = pypdfium2.PdfDocument(pdf)[0]
+        assert page.get_width() == pytest.approx(72 * sheet.width, abs=0.01)
+        assert all(7 <= size <= 8 for size in letters(pdf))
+        assert b"/FontFile2" in pdf
+        assert b"/Type3" not in pdf
+
+
+@pytest.mark.parametrize(("dim", "width"), [(1, "single"), (3, "single"), (4, 85), (8, "double")])
+def test_pairs_of_angles_have_room(dim: int, width: Any) -> None:
+    picture = corner(dim, Sheet.column(width))
+    check_inside(picture)
+    assert all(7 <= size <= 8 for size in letters(picture.file()))
+    assert "40 data and 30 samples" in picture.caption
+
+
+def test_too_many_angles_for_a_column_are_refused_with_the_width_that_they_need() -> None:
+    with pytest.raises(OrbiflowError, match=r"8 angles need a figure at least 120 mm wide"):
+        corner(8, Sheet.column("single"))
+    corner(8, Sheet.column(120))
+
+
+@every_space
+def test_an_svg_has_texts_as_texts_and_the_same_bytes_again(space: Any) -> None:
+    sheet = Sheet.column("single", "svg")
+    first, again = (density_picture(example(space), sheet=sheet).file() for _ in range(2))
+    assert first == again
+    svg = first.decode()
+    assert re.search(">density, [^<]*per", svg)
+    assert set(re.findall(r"font: (?:\w+ )?([\d.]+)px", svg)) <= {"7.2", "8"}
+    assert re.search(r'width="240\.9\d*pt"', svg)
+
+
+def test_a_printed_png_is_as_wide_as_it_says() -> None:
+    sheet = Sheet.column(80, "png")
+    image = Image.open(io.BytesIO(density_picture(example(SPACES[0]), sheet=sheet).file()))
+    assert image.width == pytest.approx(80 / 25.4 * 600, abs=1)
+    assert image.info["dpi"][0] == pytest.approx(600, abs=0.1)
+
+
+def test_print_leaves_title_and_legend_to_the_caption() -> None:
+    printed = density_picture(example(SPACES[2]), points(9), sheet=Sheet.column())
+    screen = density_picture(example(SPACES[2]), points(9))
+    assert not printed.figure.legends
+    assert screen.figure.legends
+    assert "Squares are cone points of a quarter turn" in printed.caption
+    text = pypdfium2.PdfDocument(printed.file()).get_metadata_dict()
+    assert text["Title"] == "Density on the sphere"
+    assert text["Subject"] == printed.caption
+
+
+def test_pages_of_one_pdf() -> None:
+    pictures = [tiling_picture(bent_tile("IH4")), flow_picture(example(SPACES[0]), cells=1)]
+    assert [p.sheet.format for p in pictures] == ["pdf", "png"]
+    document = pypdfium2.PdfDocument(pdf_pages(pictures))
+    assert [round(page.get_width()) for page in document] == [241, 576]
+
+
+@given(st.floats(40, 1000), st.sampled_from(["png", "pdf", "svg"]))
+@settings(max_examples=20)
+def test_every_width_is_kept(width: float, form: Any) -> None:
+    sheet = Sheet.column(width, form)
+    assert sheet.width * 25.4 == pytest.approx(width)
+    assert (sheet.text, sheet.format) == (8.0, form)
+    assert 0.25 <= sheet.pen(1.0) <= width / 203.2 + 0.25
+
+
+@pytest.mark.parametrize(
+    ("width", "form", "message"),
+    [
+        ("triple", "pdf", "width must be single, double or a number of mm, got 'triple'"),
+        (39.9, "pdf", "40 to 1000 mm wide, got 39.9"),
+        (float("nan"), "pdf", "40 to 1000 mm"),
+        (True, "pdf", "40 to 1000 mm"),
+        ("single", "eps", "format must be one of png, pdf, svg, got 'eps'"),
+    ],
+)
+def test_other_sheets_are_refused(width: Any, form: Any, message: str) -> None:
+    with pytest.raises(OrbiflowError, match=re.escape(message)):
+        Sheet.column(width, form)
+
+
+@pytest.mark.parametrize("y_down", [False, True])
+def test_curves_show_what_the_pixels_show(y_down: bool) -> None:
+    tile = bent_tile("IH6")
+    raster = tiling_raster(tile, width_px=400, y_down=y_down, outline_px=0.75)
+    pixels = np.asarray(raster.image(), dtype=float)
+    pdf = tiling_picture(tile, y_down=y_down).file()
+    page = pypdfium2.PdfDocument(pdf)[0]
+    drawn = page.render(scale=1200 / page.get_width()).to_pil().convert("RGB")
+    drawn = np.asarray(drawn.resize((400, pixels.shape[0]), Image.Resampling.BOX), dtype=float)
+    apart = np.abs(drawn - pixels).max(axis=2)
+    assert np.mean(apart > 60) < 0.02
+
+
+def test_pictures_of_tiles_are_curves() -> None:
+    tile = bent_tile("IH5", 7.0)
+    goal = 1.02 * tile.polygon
+    made = {
+        "Dashed": bending_picture(tile, goal, tile.polygon),
+        "Orange": overlay_picture(tile, goal, y_down=True),
+    }
+    for word, picture in made.items():
+        page = pypdfium2.PdfDocument(picture.file())[0]
+        kinds = {pdfium.FPDFPageObj_GetType(item) for item in page.get_objects()}
+        assert kinds == {pdfium.FPDF_PAGEOBJ_PATH}
+        assert page.get_width() == pytest.approx(72 * 85 / 25.4, abs=0.01)
+        assert word in picture.caption
+
+
+def test_a_field_has_lines_to_scale() -> None:
+    tile, widths = bent_tile("IH4"), []
+    for sheet in (Sheet.screen(1600), Sheet.column("single")):
+        picture = field_picture(torch.zeros_like, tile.group, tile, sheet=sheet)
+        widths.append(picture.figure.axes[0].lines[-1].get_linewidth())
+        assert picture.file()
+    assert widths[1] == pytest.approx(widths[0] * 85 / 25.4 / 8)
+
+
+def test_a_notebook_shows_a_picture() -> None:
+    shown = density_picture(example(SPACES[0]), sheet=Sheet.column())._repr_png_()
+    assert abs(Image.open(io.BytesIO(shown)).width - 85 / 25.4 * 144) < 1

@@ -1,0 +1,258 @@
+"""What each exhibit measures, at tiny settings."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from orbiflow.density import (
+    SPACES,
+    kl_by_quadrature,
+    make_space,
+    midpoints,
+)
+from orbiflow.fields import symmetrize
+from orbiflow.symmetry import identification_group, rotation_matrix
+from orbiflow.tiles import CLASSES, EscherTile, Target, compare
+from reproduction.animal_fits import animal_tile
+from reproduction.classes import (
+    constrained_angles,
+    identification_error,
+    symbol,
+)
+from reproduction.comparison import impossible_rows
+from reproduction.density_fits import fitted
+from reproduction.density_targets import (
+    TARGETS,
+    drawn,
+    kl_of_uniform,
+    target,
+    weighted,
+)
+from reproduction.exhibit import Findings
+from reproduction.exhibits import EXHIBITS
+from reproduction.extent import FAST, Extent
+from reproduction.goal_fits import goal_tile
+from reproduction.method import Pulled
+from reproduction.nested import equivariance_error, nested_error
+from reproduction.published import (
+    GROUPS,
+    KL,
+    animal,
+    goals,
+)
+from reproduction.reproduction import reproduce
+from reproduction.spaces import euler_characteristic, orientable
+from reproduction.square import deformed, unconstrained_field
+from reproduction.symmetries import KINDS, residue
+from reproduction.symmetrization import as_printed, pushed
+from reproduction.tilings import center_orbits, drawn_elements
+
+EXAMPLES = Path(__file__).parents[2] / "examples" / "silhouettes"
+
+TINY = Extent(
+    name="tiny", frequencies=(0, 2), affine=4, iterations=3, effort="fast", classes=("IH6",),
+    points=300, evaluations=3, round_measure=False, grid=30, resolution=16,
+)  # fmt: skip
+
+
+def drawn_alone(name: str, folder: Path, extent: Extent = TINY) -> Findings:
+    (shown,) = reproduce([e for e in EXHIBITS if e.name == name], extent, folder)
+    assert shown.failure == ""
+    assert shown.findings is not None
+    for picture in shown.pictures:
+        for file in (picture.file, *dict(picture.others).values()):
+            assert (folder / file).stat().st_size > 0
+    return shown.findings
+
+
+def test_the_symmetrized_flow_keeps_the_sides_together_and_the_plain_one_does_not() -> None:
+    field = unconstrained_field()
+    free, bound = deformed(field), deformed(symmetrize(field, identification_group("torus")))
+    assert free.mismatch > 0.1
+    assert bound.mismatch < 1e-12
+    assert free.overlap > 0.01
+    assert free.gap > 0.01
+    assert bound.overlap < 1e-9
+    assert bound.gap < 1e-9
+
+
+def test_overlap_and_gap_are_areas() -> None:
+    half = deformed(lambda p: torch.stack([0.5 * p[..., 0], 0 * p[..., 1]], dim=-1))
+    # wider by exp(0.5): what is covered twice is what it has grown by
+    assert half.overlap == pytest.approx(np.exp(0.5) - 1, abs=1e-6)
+    assert half.gap == pytest.approx(0, abs=1e-9)
+
+
+@pytest.mark.parametrize("name", CLASSES)
+def test_templates_fit_and_groups_have_the_printed_symbols(name: str) -> None:
+    kind = CLASSES[name]
+    assert identification_error(kind) < 1e-12
+    assert symbol(kind.group()) == GROUPS[name]
+
+
+def test_angles_are_those_at_rotation_centres() -> None:
+    assert constrained_angles(CLASSES["IH4"]) == {}
+    assert sorted(constrained_angles(CLASSES["IH21"]).values()) == [60, 120]
+    for name in ("IH7", "IH21", "IH28"):
+        corners = CLASSES[name].template()
+        for vertex, degrees in constrained_angles(CLASSES[name]).items():
+            ends = corners[[vertex - 1, (vertex + 1) % len(corners)]] - corners[vertex]
+            cosine = ends[0] @ ends[1] / np.linalg.norm(ends, axis=1).prod()
+            assert np.degrees(np.arccos(cosine)) == pytest.approx(degrees)
+
+
+@pytest.mark.parametrize("name", CLASSES)
+def test_marks_of_symmetry_belong_to_the_group(name: str) -> None:
+    group = CLASSES[name].group()
+    elements = drawn_elements(group)
+    assert all(group.contains(g) for g in elements)
+    kinds = {"p1": 0, "pg": 1, "p2": 1, "p3": 1, "p4": 1, "p6": 1, "pgg": 2}
+    assert len({g.determinant for g in elements}) == kinds[GROUPS[name]]
+
+
+def test_orbits_of_centres() -> None:
+    orders = {
+        name: [c.order for c in center_orbits(kind.group())] for name, kind in CLASSES.items()
+    }
+    assert orders["IH4"] == [2, 2, 2, 2]
+    assert orders["IH7"] == [3, 3, 3]
+    assert orders["IH21"] == [6, 3, 2]
+    assert orders["IH28"] == [4, 4, 2]
+    assert orders["IH2"] == []
+
+
+def test_spaces_are_what_they_are_called() -> None:
+    found = {
+        s: (euler_characteristic(make_space(s).group), orientable(make_space(s).group))
+        for s in SPACES
+    }
+    assert found == {
+        "torus": (0, True),
+        "sphere": (2, True),
+        "klein-bottle": (0, False),
+        "projective-plane": (1, False),
+    }
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.title)
+def test_operators_make_fields_symmetric(kind) -> None:
+    assert residue(kind.before(), kind.images) > 0.5
+    assert residue(kind.after(), kind.images) < 1e-12
+
+
+@pytest.mark.parametrize("name", CLASSES)
+def test_the_printed_equation_fails_where_there_are_glides(name: str) -> None:
+    kind, linear = CLASSES[name], rotation_matrix(0.5)
+    placed = kind.group().conjugate(linear, np.zeros(2))
+    printed = equivariance_error(as_printed(kind, linear), placed)
+    assert (printed > 0.1) == (kind.group_name in ("pg", "pgg"))
+    assert equivariance_error(pushed(kind, linear), placed) < 1e-12
+    assert nested_error(kind.group(), kind.paper_operators()) < 1e-12
+
+
+def test_what_ships_is_what_the_examples_have() -> None:
+    files = {
+        path.stem.split("_")[0].rstrip("1"): path for path in (EXAMPLES / "nagata").glob("*.dat")
+    }
+    for name, goal in goals().items():
+        example = Target.read(files["octpus" if name == "octopus" else name])
+        assert np.array_equal(example.outline, goal.target().outline)
+    shipped = animal()
+    assert np.array_equal(Target.read(EXAMPLES / "turtle.png").outline, shipped.outline)
+    assert shipped.source == "turtle.png"
+
+
+def test_published_tiles_lie_on_their_goals() -> None:
+    goal = goals()["dolphin"]
+    assert compare(goal.tiles["est_largest"].polygon, goal.outline).iou == pytest.approx(
+        0.8795, abs=2e-4
+    )
+    assert compare(goal.tiles["arap_largest"].polygon, goal.outline).iou == pytest.approx(
+        0.8269, abs=2e-4
+    )
+    low, high = (goal.squared().outline.min(axis=0), goal.squared().outline.max(axis=0))
+    assert np.allclose(high - low, 200.0)
+
+
+def test_rows_that_no_overlap_can_have() -> None:
+    assert impossible_rows() == ["beetle", "dolphin", "spider"]
+
+
+def test_targets_are_densities_and_samples_follow_them() -> None:
+    space = make_space("torus")
+    grid = midpoints(space, 200)
+    for name in TARGETS:
+        assert float(target(name, grid).mean()) == pytest.approx(1.0, abs=0.02)
+    points = drawn("checkerboard", space, "flat", 500, seed=0)
+    assert points.shape == (500, 2)
+    assert (target("checkerboard", points) > 0).all()
+    sphere = make_space("sphere")
+    values = weighted("4-gaussian", sphere, grid, "round")
+    assert torch.allclose(values, target("4-gaussian", grid) * sphere.log_area(grid).exp())
+
+
+def test_the_printed_divergence_of_the_checkerboard_is_above_that_of_no_fit() -> None:
+    torus = make_space("torus")
+    assert kl_of_uniform("checkerboard", torus) == pytest.approx(np.log(25 / 13))
+    assert KL["torus"]["checkerboard"] > kl_of_uniform("checkerboard", torus)
+
+
+def test_a_fitted_density_goes_there_and_back() -> None:
+    found = fitted("klein-bottle", "4-gaussian", "flat", 300, 3, 40)
+    grid = midpoints(make_space("klein-bottle"), 40)
+    density = found.density()
+    with torch.no_grad():
+        values = density.with_steps(2 * density.flow.steps).log_prob(grid)
+    assert kl_by_quadrature(target("4-gaussian", grid), values) == pytest.approx(found.kl)
+    assert found.kl < kl_of_uniform("4-gaussian", density.space)
+
+
+def test_the_flow_brings_samples_to_their_side() -> None:
+    result = animal_tile("IH4", 3, 20, 25)
+    assert isinstance(result, EscherTile)
+    pulled = Pulled(result.model())
+    assert pulled.wrong(pulled.full).mean() < pulled.wrong(pulled.affine).mean()
+    assert pulled.losses[1] < pulled.losses[0]
+
+
+def test_a_goal_gives_a_certified_tile_at_either_aspect() -> None:
+    for objective in ("overlap", "squared"):
+        found = goal_tile("penguin", objective, "fast", ("IH6",))
+        assert found is not None
+        assert found.certified
+        assert found.iou > 0.8
+        assert found.iou < found.dice
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["figure-1", "figure-2", "figure-3", "figure-4", "figure-6", "table-1", "table-2", "table-4"],
+)
+def test_exhibits_without_work(name: str, tmp_path: Path) -> None:
+    findings = drawn_alone(name, tmp_path)
+    wanted = "agrees in part" if name in ("table-2", "table-4") else "agrees"
+    assert findings.verdict == wanted
+    assert (findings.why != "") == (name in ("figure-3", "table-2", "table-4"))
+
+
+def test_the_animal_and_the_frequencies(tmp_path: Path) -> None:
+    findings = drawn_alone("figure-8", tmp_path)
+    lengths = findings.numbers["mean_length"]
+    assert lengths["0"] < lengths["2"]
+    assert len(findings.tables[0].rows) == len(CLASSES) + 2
+
+
+@pytest.mark.parametrize("name", ["figure-11"])
+def test_surfaces_come_with_pages_to_turn(name: str, tmp_path: Path) -> None:
+    findings = drawn_alone(name, tmp_path)
+    assert len(findings.numbers) == 6
+    assert len(list(tmp_path.glob(f"{name}-*.html"))) == 6
+
+
+def test_the_fast_extent_has_the_papers_frequency() -> None:
+    assert 5 in FAST.frequencies
+    assert 0 in FAST.frequencies

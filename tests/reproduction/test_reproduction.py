@@ -1,0 +1,241 @@
+"""The runner and the page: shared work is done once, failures are shown and lose nothing else."""
+
+from __future__ import annotations
+
+import html
+import json
+import os
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+
+from orbiflow.errors import OrbiflowError
+from orbiflow.runtime import Cancel, Cancelled
+from reproduction.__main__ import main
+from reproduction.canvas import Canvas
+from reproduction.exhibit import (
+    Exhibit,
+    Findings,
+    Shown,
+    Table,
+    Work,
+)
+from reproduction.exhibits import EXHIBITS
+from reproduction.extent import FAST, Extent
+from reproduction.folder import write_page, written_files
+from reproduction.page import paper_page
+from reproduction.reproduction import reproduce
+
+QUICK = ("figure-4", "table-1", "table-4")
+"""Exhibits that need no work."""
+
+
+def counted(folder: str, number: int) -> int:
+    """Leaves a file each time that it is called."""
+    (Path(folder) / f"{number}-{os.urandom(4).hex()}").touch()
+    return 10 * number
+
+
+def broken(_folder: str) -> int:
+    raise OrbiflowError("the <work> cannot be done")
+
+
+def draw_sum(canvas: Canvas, _extent: Extent, values: list[int]) -> Findings:
+    figure = canvas.figure(0.2, 200)
+    figure.text(0.5, 0.5, str(sum(values)))
+    canvas.add(figure, "a <number>", "its caption")
+    table = Table("all", ("name", "value"), (("sum", str(sum(values))),))
+    return Findings("agrees", "It is so & so.", "A reason.", {"sum": sum(values)}, [table])
+
+
+def draw_badly(_canvas: Canvas, _extent: Extent, _values: list[int]) -> Findings:
+    raise ZeroDivisionError("division by zero")
+
+
+class Needs:
+    """A picklable list of work."""
+
+    def __init__(self, *works: Work) -> None:
+        self.works = list(works)
+
+    def __call__(self, _extent: Extent) -> list[Work]:
+        return self.works
+
+
+def exhibit(name: str, draw, *works: Work) -> Exhibit:
+    return Exhibit(name, name.replace("-", " ").title(), "A title", "A claim.", draw, Needs(*works))
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_equal_work_is_done_once_and_failures_stay_apart(tmp_path: Path, workers: int) -> None:
+    traces = tmp_path / "traces"
+    traces.mkdir()
+    one, two = (Work(counted, (str(traces), k)) for k in (1, 2))
+    chosen = [
+        exhibit("figure-1", draw_sum, one, two),
+        exhibit("figure-2", draw_badly, two),
+        exhibit("figure-3", draw_sum, one, Work(broken, (str(traces),))),
+        exhibit("figure-4", draw_sum, Work(counted, (str(traces), 2))),
+    ]
+    shares: list[float] = []
+    found = reproduce(
+        chosen, FAST, tmp_path, workers=workers, progress=lambda share, _what: shares.append(share)
+    )
+    assert sorted(path.name[0] for path in traces.iterdir()) == ["1", "2"]
+    assert [one.exhibit.name for one in found] == [one.name for one in chosen]
+    assert [one.findings and one.findings.numbers["sum"] for one in found] == [30, None, None, 20]
+    assert found[1].failure == "ZeroDivisionError: division by zero"
+    assert found[2].failure == "the <work> cannot be done"
+    assert shares == sorted(shares)
+    assert shares[-1] == pytest.approx(1.0)
+
+
+def test_work_that_is_told_to_stop_stops(tmp_path: Path) -> None:
+    cancel = Cancel()
+    cancel.cancel()
+    with pytest.raises(Cancelled):
+        reproduce([exhibit("figure-1", draw_sum)], FAST, tmp_path, cancel=cancel)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_page_shows_what_was_drawn_and_what_failed(tmp_path: Path) -> None:
+    chosen = [exhibit("figure-1", draw_sum), exhibit("figure-2", draw_badly)]
+    shown = reproduce(chosen, FAST, tmp_path)
+    write_page(shown, FAST, tmp_path, 3.0)
+    page = (tmp_path / "index.html").read_text("utf-8")
+    assert '<article id="figure-1">' in page
+    assert 'src="figure-1.png" alt="a &lt;number&gt;"' in page
+    assert "It is so &amp; so." in page
+    assert "Why it differs" in page
+    assert '<article id="figure-2">' in page
+    assert "Not drawn: ZeroDivisionError: division by zero" in page
+    assert "<td>0</td>" in page
+    document = json.loads((tmp_path / "paper.json").read_text("utf-8"))
+    assert [entry["failure"] for entry in document["exhibits"]] == [
+        None,
+        "ZeroDivisionError: division by zero",
+    ]
+    files = {path.name for path in tmp_path.iterdir()}
+    assert (
+        written_files(tmp_path)
+        == files
+        == {"index.html", "paper.json", "figure-1.png", "figure-1.pdf"}
+    )
+    assert (tmp_path / "figure-1.pdf").read_bytes().startswith(b"%PDF")
+
+
+def test_the_same_bytes_again(tmp_path: Path) -> None:
+    chosen = [exhibit("figure-1", draw_sum)]
+    contents = []
+    for name in ("first", "second"):
+        (tmp_path / name).mkdir()
+        reproduce(chosen, FAST, tmp_path / name)
+        contents.append({p.name: p.read_bytes() for p in (tmp_path / name).iterdir()})
+    assert contents[0] == contents[1]
+
+
+def test_the_page_lists_every_exhibit_and_refers_to_nothing_else() -> None:
+    page = paper_page([Shown(one, failure="not tried") for one in EXHIBITS], FAST, 1.0)
+    assert "P<sub>B</sub>(F)" in page
+    plain = page.replace("<sub>", "_").replace("</sub>", "")
+    for one in EXHIBITS:
+        assert f'href="#{one.name}"' in page
+        assert f'<article id="{one.name}">' in page
+        assert html.escape(one.states.split(".")[0]) in plain
+    assert page.count("Not drawn: not tried") == len(EXHIBITS)
+    assert not re.findall(r'(?:src|href)="(?:https?:)?//', page)
+    assert "<script" not in page
+
+
+class Balanced(HTMLParser):
+    """Fails where a tag is closed that is not open, or stays open."""
+
+    VOID = ("meta", "img", "br", "link")
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        if tag not in self.VOID:
+            self.open.append(tag)
+        assert tag != "img" or dict(attrs)["alt"]
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+
+def test_the_page_is_well_formed(tmp_path: Path) -> None:
+    chosen = [exhibit("figure-1", draw_sum), exhibit("figure-2", draw_badly)]
+    parser = Balanced()
+    parser.feed(paper_page(reproduce(chosen, FAST, tmp_path), FAST, 1.0))
+    assert parser.open == []
+
+
+def test_the_snippet_of_the_docs(tmp_path: Path, monkeypatch, capsys) -> None:
+    text = (Path(__file__).parents[2] / "docs" / "paper.md").read_text("utf-8")
+    (snippet,) = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
+    monkeypatch.chdir(tmp_path)
+    exec(compile(snippet, "paper.md", "exec"), {})
+    assert capsys.readouterr().out.startswith("agrees {'B-periodic': ")
+    assert (tmp_path / "figures" / "figure-4.pdf").is_file()
+
+
+def test_all_of_the_paper_is_there() -> None:
+    figures, tables = (
+        [e for e in EXHIBITS if e.name.startswith(kind)] for kind in ("figure", "table")
+    )
+    assert [e.label for e in figures] == [f"Figure {k}" for k in range(1, 13)]
+    assert [e.label for e in tables] == [f"Table {k}" for k in range(1, 6)]
+    for one in EXHIBITS:
+        assert one.name == one.label.lower().replace(" ", "-")
+
+
+def test_the_command_writes_the_folder_whole_and_again(tmp_path: Path, capsys) -> None:
+    out = tmp_path / "paper"
+    words = ["--out", str(out), "--fast", "--workers", "1", "--only"]
+    assert main([*words, "Figure 4,table-1,table-4"]) == 0
+    said = capsys.readouterr().out
+    assert "failed" not in said
+    assert str(out / "index.html") in said
+    assert {path.name for path in out.iterdir()} == {
+        "index.html",
+        "paper.json",
+        "figure-4.png",
+        "figure-4.pdf",
+    }
+    document = json.loads((out / "paper.json").read_text("utf-8"))
+    assert [entry["name"] for entry in document["exhibits"]] == ["table-1", "figure-4", "table-4"]
+    assert main([*words, "table-1"]) == 0
+    assert {path.name for path in out.iterdir()} == {"index.html", "paper.json"}
+
+
+def test_a_folder_of_other_things_is_refused(tmp_path: Path, capsys) -> None:
+    (tmp_path / "thesis.tex").touch()
+    assert main(["--out", str(tmp_path), "--only", "table-1"]) == 2
+    assert "thesis.tex" in capsys.readouterr().err
+
+
+def test_a_file_of_numbers_cannot_name_others_files(tmp_path: Path) -> None:
+    document = {
+        "schema_version": 1,
+        "exhibits": [{"files": ["../x.png", "notes.txt", "figure-1.png"]}],
+    }
+    (tmp_path / "paper.json").write_text(json.dumps(document))
+    assert written_files(tmp_path) == {"paper.json", "index.html", "figure-1.png"}
+
+
+def test_the_number_of_workers_is_checked(tmp_path: Path, capsys) -> None:
+    assert main(["--out", str(tmp_path / "paper"), "--workers", "0"]) == 2
+    assert "--workers must be at least 1" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("names", ["figure-99", ""])
+def test_unknown_exhibits_are_refused_by_name(tmp_path: Path, capsys, names: str) -> None:
+    assert main(["--out", str(tmp_path / "paper"), "--only", names]) == 2
+    said = capsys.readouterr().err
+    assert "--only" in said
+    assert "figure-1" in said

@@ -1,0 +1,140 @@
+"""Derived commands: options, help, mistakes in one line, exit statuses."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from typing import Any
+
+import pytest
+
+from orbiflow.cli import commands
+from orbiflow.runtime import Operation, Outcome, all_operations, find
+
+
+@pytest.fixture
+def called(monkeypatch: pytest.MonkeyPatch) -> list[dict[str, Any]]:
+    """The JSON forms of what the command line called, without doing it."""
+    calls: list[dict[str, Any]] = []
+
+    def run(self: Operation, arguments: Any, *_: object) -> Outcome:
+        names = {entry.name for entry in self.fields}
+        flat = {**arguments, **{k: v for s in arguments.values() if hasattr(s, "fields_given")
+                                for k, v in s.to_json().items()}}  # fmt: skip
+        calls.append({name: value for name, value in flat.items() if name in names})
+        return Outcome()
+
+    monkeypatch.setattr(Operation, "run", run)
+    return calls
+
+
+LINES: dict[str, tuple[str, dict[str, Any]]] = {
+    "short": ("export X -o a.svg --for laser", {"purpose": "laser"}),
+    "equals": ("export X --tile-size=4cm", {"tile_size": 40.0}),
+    "flag": ("export X --cut skeleton --clip --border", {"clip": True, "border": True}),
+    "off": ("export X --whole", {"clip": False}),
+    "size": ("export X --bed 3x2cm", {"bed": [30.0, 20.0]}),
+    "repeated": ("escherize X --pin 1,2 --pin=-3,4,5", {"pin": ["1,2", "-3,4,5"]}),
+    "all": ("escherize X --classes all", {"classes": None}),
+    "commas": ("escherize X --classes IH4,IH6", {"classes": ["IH4", "IH6"]}),
+    "negative": ("escherize X --seed -1", {"seed": -1}),
+    "group": ("density fit X --space torus --columns a,b", {"columns": ["a", "b"]}),
+    "no header": ("density fit X --space torus --no-header", {"header": False}),
+}
+
+
+@pytest.mark.parametrize("name", LINES)
+def test_words_become_settings(name: str, called: list[dict[str, Any]]) -> None:
+    line, wanted = LINES[name]
+    assert commands.run(line.split()) == 0
+    assert wanted.items() <= called[0].items()
+
+
+MISTAKES = {
+    "export": ("RESULT", "missing"),
+    "export X --tile-size 40": ("--tile-size", "no unit"),
+    "export X --cut nome": ("--cut", "none, skeleton or pieces"),
+    "export X --for lazer": ("--for", "did you mean laser"),
+    "export X --cutt none": ("--cutt", "--cut"),
+    "export X --dpi": ("--dpi", "needs a value"),
+    "export X --dpi nan": ("--dpi", "number from 1 to 10000"),
+    "export X Y": ("'Y'", "too many"),
+    "export X --tile 1 --tile 2": ("--tile", "more than once"),
+    "export X --kerf 1mm": ("--kerf", "only to --cut pieces"),
+    "export X --force=maybe": ("--force", "true or false"),
+    "export X -o a.foo": ("--out", "--format"),
+    "density fit X": ("--space", "missing"),
+    "density fitt": ("fitt", "fit"),
+    "exprot": ("exprot", "export"),
+    "escherize X --strength 2": ("--strength", "needs --emphasis"),
+    "density fit X --space sphere --missing marginalise": ("--missing", "torus"),
+}
+
+
+@pytest.mark.parametrize("line", MISTAKES)
+def test_mistakes_are_one_line_with_status_2(line: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert commands.run(line.split()) == 2
+    told = capsys.readouterr()
+    assert told.err.startswith("error: ")
+    assert told.err.count("\n") == 1
+    assert not told.out
+    for words in MISTAKES[line]:
+        assert words in told.err
+
+
+@pytest.mark.parametrize("made", all_operations(), ids=lambda made: made.name)
+def test_help_names_every_option(
+    made: Operation, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "200")
+    assert commands.run([*made.name.split(), "--help"]) == 0
+    text = capsys.readouterr().out
+    for entry in made.fields:
+        names = [entry.name.upper()] if entry.positional else entry.option.names
+        if not any(type(part).__name__ == "Hidden" for part in entry.metadata):
+            assert all(name in text for name in names)
+
+
+def test_alone_it_prints_its_help(capsys: pytest.CaptureFixture[str]) -> None:
+    assert commands.run([]) == 0
+    text = capsys.readouterr().out
+    assert all(name in text for name in ("escherize", "export", "density", "--install-completion"))
+
+
+def test_exit_statuses(monkeypatch: pytest.MonkeyPatch) -> None:
+    outcomes = {
+        0: Outcome(),
+        1: Outcome(state="nothing found"),
+        130: Outcome(state="cancelled"),
+    }
+    for status, outcome in outcomes.items():
+        monkeypatch.setattr(Operation, "run", lambda *_, outcome=outcome: outcome)
+        assert commands.run(["export", "X"]) == status
+    assert Outcome(failed=2).exit_status == 1
+
+    def interrupted(*_: object) -> Outcome:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Operation, "run", interrupted)
+    assert commands.run(["export", "X"]) == 130
+
+
+def test_completion_knows_commands_and_choices() -> None:
+    script = commands.app_for([]).generate_completion(shell="bash")
+    assert all(word in script for word in ("escherize", "--tile-size", "skeleton"))
+
+
+@pytest.mark.parametrize("line", ["export X --tile-size 40", "escherize --help", "density", ""])
+def test_mistakes_and_help_need_no_numerical_library(line: str) -> None:
+    code = (
+        "import sys; from orbiflow.cli.commands import run\n"
+        f"run({line.split()!r})\n"
+        "print({'numpy', 'torch', 'scipy'} & set(sys.modules), file=sys.stderr)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stderr.splitlines()[-1] == "set()"
+
+
+def test_an_unknown_operation_is_refused() -> None:
+    with pytest.raises(ValueError, match="unknown operation"):
+        find("exprot")

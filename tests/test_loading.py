@@ -1,0 +1,195 @@
+"""`orbiflow.load`: what commands left, certified anew, and folders that cannot be loaded."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import orbiflow
+from orbiflow.density import DensityEstimator
+from orbiflow.errors import (
+    CertificationError,
+    InputFileError,
+    OrbiflowError,
+    OutputError,
+)
+from orbiflow.jobs import (
+    DensityFitRequest,
+    EscherizeRequest,
+    run,
+)
+from orbiflow.loading import LoadedRun
+from orbiflow.tiles import (
+    AnimationSettings,
+    ArtSettings,
+    EscherTile,
+    ExportSettings,
+    TileMap,
+    export,
+    read_document,
+)
+from orbiflow.tiles.result_file import tile_json
+
+TURTLE = Path(__file__).parents[1] / "examples" / "silhouettes" / "turtle.png"
+
+
+@pytest.fixture(name="folders", scope="module")
+def folders_fixture(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run of two classes, and a density of angles in degrees."""
+    root = tmp_path_factory.mktemp("loaded")
+    run(
+        EscherizeRequest(
+            TURTLE, out=root / "turtle", classes=("IH4", "IH6"), effort="fast", workers=1
+        )
+    )
+    angles = np.degrees(np.random.default_rng(0).vonmises([0.5, -1.0], 6.0, (150, 2)))
+    (root / "a.csv").write_text(
+        "phi,psi\n" + "\n".join(f"{a:.3f},{b:.3f}" for a, b in angles) + "\n"
+    )
+    request = DensityFitRequest(
+        root / "a.csv", "torus", out=root / "density", unit="degrees", parts=("kernels",), seed=3
+    )
+    run(request)
+    return root
+
+
+def test_a_density(folders: Path) -> None:
+    found = orbiflow.load(folders / "density")
+    assert isinstance(found, DensityEstimator)
+    report = json.loads((folders / "density" / "report.json").read_text())
+    data = np.loadtxt(folders / "a.csv", delimiter=",", skiprows=1)
+    assert found.score(data) == pytest.approx(report["log_likelihood"]["natural"], abs=1e-9)
+    assert found.report_.validation_nll == report["report"]["validation_nll"]
+    assert found.report_.parts[0].name == "kernels"
+    assert found.report_.repeats is not None
+    assert found.feature_names_in_.tolist() == ["phi", "psi"]
+    assert (found.parts, found.seed, found.n_features_in_) == ("kernels", 3, 2)
+    assert found.sample(3, random_state=1).shape == (3, 2)
+    again = DensityEstimator(**found.get_params()).fit(data)
+    assert again.score(data) == pytest.approx(found.score(data), abs=1e-9)
+    alone = orbiflow.load(folders / "density" / "density.safetensors")
+    assert isinstance(alone, DensityEstimator)
+
+
+def test_a_run_and_its_tiles(folders: Path, tmp_path: Path) -> None:
+    found = orbiflow.load(folders / "turtle")
+    assert isinstance(found, LoadedRun)
+    assert len(found) == 2
+    assert [tile.rank for tile in found] == [1, 2]
+    tile = orbiflow.load(folders / "turtle" / "IH6")
+    assert isinstance(tile, EscherTile)
+    assert tile.isohedral_class == "IH6"
+    assert tile.certificate.valid
+    _, document = read_document(folders / "turtle")
+    entry = next(entry for entry in document["tiles"] if entry["class"] == "IH6")
+    assert np.array_equal(tile.tile.polygon, np.array(entry["polygon"])[:-1])
+    assert json.loads(json.dumps(tile_json(tile))) == entry
+    assert np.array_equal(tile.tile.polygon, found["IH6"].tile.polygon)
+    assert found[found["IH6"].rank or 0].name == found["IH6"].name
+    assert tile.bending is not None
+    assert tile.frame is not None
+    moved = tile.bending.forward(tile.frame.to_normal([[90.0, 100.0]]))
+    assert moved.shape == (1, 2)
+    assert found.best.tile.group.order > 1
+    export(found.best, tmp_path / "cut.svg", ExportSettings.preset("laser", tile_size=40))
+    assert (tmp_path / "cut.svg").stat().st_size > 500
+    with pytest.raises(OrbiflowError, match="holds no tile 'IH1'; there are IH"):
+        _ = found["IH1"]
+    by_file = orbiflow.load(folders / "turtle" / "result.json")
+    assert isinstance(by_file, LoadedRun)
+
+
+def test_a_tile_that_is_saved_is_loaded_the_same(folders: Path, tmp_path: Path) -> None:
+    found = orbiflow.load(folders / "turtle" / "IH6")
+    assert isinstance(found, EscherTile)
+    again = orbiflow.load(found.save(tmp_path / "saved"))
+    assert isinstance(again, LoadedRun)
+    assert tile_json(again.best) == tile_json(found)
+    assert again.best.name == found.name
+    points = np.array([[90.0, 100.0], [120.0, 80.0]])
+    assert np.array_equal(again.best.forward(points), found.forward(points))
+    orbiflow.save(again, tmp_path / "saved")
+    orbiflow.save([found.changed(map_source=None)], tmp_path / "saved")
+    bare = EscherTile.load(tmp_path / "saved")
+    assert bare.map is None
+    plain = EscherTile(bare.tile)
+    assert np.isnan(plain.score)
+    orbiflow.save(plain, tmp_path / "plain")
+    assert np.isnan(EscherTile.load(tmp_path / "plain").metrics.iou)
+    with pytest.raises(OutputError, match="holds"):
+        found.save(folders / "turtle")
+
+
+def test_a_tile_does_its_own_work(folders: Path, tmp_path: Path) -> None:
+    tile = orbiflow.load(folders / "turtle" / "IH6")
+    assert isinstance(tile, EscherTile)
+    assert tile.export(tmp_path / "a.svg").files == (tmp_path / "a.svg",)
+    assert tile.draw(width_px=60).startswith(b"\x89PNG")
+    assert tile.draw_art(tmp_path / "a.png", ArtSettings(size=(90, 60))).is_file()
+    small = AnimationSettings(seconds=0.5, fps=4, size=64)
+    assert tile.animate(tmp_path / "a.gif", small).is_file()
+    assert tile.model().isohedral_class.name == "IH6"
+
+
+def test_a_tile_that_does_not_tile(folders: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "turtle"
+    shutil.copytree(folders / "turtle", folder)
+    document = json.loads((folder / "result.json").read_text())
+    name = document["tiles"][0]["class"]
+    document["tiles"][0]["polygon"][5][0] += 5
+    (folder / "result.json").write_text(json.dumps(document))
+    for path in (folder, folder / name):
+        with pytest.raises(CertificationError, match=r"does not tile the plane.*uncertified=True"):
+            orbiflow.load(path)
+    found = orbiflow.load(folder, uncertified=True)
+    assert isinstance(found, LoadedRun)
+    assert not found.best.certificate.valid
+    (folder / name / "model.safetensors").unlink()
+    bare = orbiflow.load(folder, uncertified=True)
+    assert isinstance(bare, LoadedRun)
+    assert bare.best.map is None
+    assert bare.best.bending is None
+
+
+def test_folders_that_cannot_be_loaded(folders: Path, tmp_path: Path) -> None:
+    def refuse(path: Any, message: str) -> None:
+        with pytest.raises(OrbiflowError, match=message):
+            orbiflow.load(path)
+
+    refuse(tmp_path, r"holds no density\.safetensors and no result\.json")
+    refuse(tmp_path / "none", "no such folder")
+    refuse(folders / "a.csv", "holds no density")
+    refuse(3, "must be a path")
+    both = tmp_path / "both"
+    shutil.copytree(folders / "density", both)
+    shutil.copy(folders / "turtle" / "result.json", both)
+    refuse(both, r"density\.safetensors and result\.json, of two commands")
+    assert isinstance(orbiflow.load(both / "density.safetensors"), DensityEstimator)
+    alone = tmp_path / "IH4"
+    shutil.copytree(folders / "turtle" / "IH4", alone)
+    assert isinstance(orbiflow.load(alone), TileMap)
+    damaged = tmp_path / "damaged"
+    shutil.copytree(folders / "density", damaged)
+    for text in ("{", "[]", '{"report": 3, "settings": {}}', '{"report": {}, "settings": 1}'):
+        (damaged / "report.json").write_text(text)
+        with pytest.raises(InputFileError, match=r"report\.json"):
+            orbiflow.load(damaged)
+    (damaged / "report.json").unlink()
+    found = orbiflow.load(damaged)
+    assert isinstance(found, DensityEstimator)
+    assert not hasattr(found, "report_")
+    content = (damaged / "density.safetensors").read_bytes()
+    (damaged / "density.safetensors").write_bytes(content[: len(content) // 2])
+    with pytest.raises(InputFileError, match="damaged"):
+        orbiflow.load(damaged)
+    empty = tmp_path / "empty"
+    empty.mkdir()
+    for text in ("{", "{}", '{"tiles": []}', '{"tiles": [1]}', '{"tiles": {"a": 1}}'):
+        (empty / "result.json").write_text(text)
+        with pytest.raises(InputFileError, match=r"result\.json"):
+            orbiflow.load(empty)

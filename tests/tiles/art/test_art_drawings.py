@@ -1,0 +1,234 @@
+"""Drawings in curves: vector and raster agree, the drawing is there once, paints are kept."""
+
+from __future__ import annotations
+
+import base64
+import io
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import shapely
+from PIL import Image
+
+from artworks import EYE, flat, squirrel
+from orbiflow.drawing import palette
+from orbiflow.errors import InputFileError, OrbiflowError
+from orbiflow.tiles import (
+    CLASSES,
+    ArtSettings,
+    Artwork,
+    Uses,
+    art_scene,
+    artwork,
+    read_over,
+    render_artwork,
+    write_artwork,
+    write_dxf,
+    write_pdf,
+)
+from orbiflow.tiles.art.source import covered_area, silhouette_outline
+from orbiflow.tiles.exporting import INK, Part
+
+PAGE = ArtSettings(size=(300, 200), tile_size=130, outline=0.0, samples=4)
+
+
+def svg_of(name: str, body: str, folder: Path) -> Path:
+    low, high = covered_area(squirrel(name))[:2]
+    left, top, width, height = *low, *(high - low)
+    path = folder / "drawing.svg"
+    path.write_text(
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="{left} {top} {width} {height}">{body}</svg>'
+    )
+    return path
+
+
+def drawn(name: str, body: str, folder: Path, **options) -> Artwork:
+    tile = squirrel(name)
+    over = read_over(svg_of(name, body, folder), tile)
+    settings = ArtSettings(**{**PAGE.__dict__, **options})
+    return artwork(tile, settings, drawing=over.drawing, notes=over.notes)
+
+
+BODY = f"""
+<style>.blue {{ fill: #1030c0 }}</style>
+<rect x="0" y="0" width="2000" height="330" class="blue"/>
+<g fill="#20a020" opacity="0.5"><circle cx="620" cy="250" r="90"/></g>
+<path d="M 300 400 L 500 300 L 640 500 Z M 400 380 L 520 340 L 560 420 Z" fill="#ffcc00"
+      fill-rule="evenodd"/>
+<circle cx="{EYE[0]}" cy="{EYE[1]}" r="30" fill="none" stroke="red" stroke-width="12"/>
+"""
+
+
+def rgb(colour: str) -> np.ndarray:
+    return np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)], dtype=float)
+
+
+def region(part: Part) -> Any:
+    """What a filled part covers, by the even-odd rule."""
+    found: Any = shapely.Polygon()
+    for curve in part.curves:
+        ring = shapely.Polygon(curve.pieces[:, 0]).buffer(0)
+        found = found.symmetric_difference(ring)
+    return found
+
+
+def colours_at(art: Artwork, points: np.ndarray) -> np.ndarray:
+    """What the scene shows at points of the page in pixels, by shapely; NaN next to any line."""
+    scene = art_scene(art)
+    unit = 25.4 / art.settings.dpi
+    places = shapely.points(points * unit)
+    chosen = palette(art.settings.palette)
+    found = np.full((len(points), 3), np.nan)
+    tile = shapely.Polygon(scene.symbols["tile"].pieces[:, 0])
+    near = 1.5 * unit
+    for layer in scene.layers:
+        for item in layer.items:
+            if not isinstance(item, Uses):
+                continue
+            for which, offset in zip(item.which, item.offsets, strict=True):
+                move = [*item.linear[which].ravel(), *offset]
+                whole = shapely.affinity.affine_transform(tile, move)
+                own = shapely.contains(whole, places)
+                if item.symbol == "tile":
+                    found[own] = rgb(layer.style.fill or chosen.outline)
+                    found[shapely.distance(whole.exterior, places) < near] = np.nan
+                    continue
+                for part in scene.motifs[item.symbol].parts:
+                    area = region(part)
+                    if part.style.fill is None:
+                        lines = [shapely.LinearRing(curve.pieces[:, 0]) for curve in part.curves]
+                        area = shapely.MultiLineString(lines).buffer(part.style.width / 2)
+                    area = shapely.affinity.affine_transform(area, move)
+                    inside = own & shapely.contains(area, places)
+                    colour = part.style.fill or part.style.stroke or ""
+                    colour = layer.ink if colour == INK else colour
+                    paint = rgb(colour or "")
+                    found[inside] += part.opacity * (paint - found[inside])
+                    found[shapely.distance(area.boundary, places) < near] = np.nan
+    return found
+
+
+@pytest.mark.parametrize("name", ["IH1", "IH4", "IH6", "IH21"])
+def test_vector_and_raster_agree(name: str, tmp_path: Path) -> None:
+    art = drawn(name, BODY, tmp_path)
+    made = render_artwork(art).astype(float)
+    rows, columns = np.mgrid[3:200:6, 3:300:6].reshape(2, -1)
+    expected = colours_at(art, np.stack([columns, rows], axis=1) + 0.5)
+    known = np.isfinite(expected).all(axis=1)
+    assert known.mean() > 0.3
+    apart = np.abs(made[rows, columns] - expected)[known]
+    assert np.quantile(apart, 0.995) <= 2.5
+    seen = {tuple(colour) for colour in np.rint(expected[known]).astype(int).tolist()}
+    assert {(16, 48, 192), (255, 204, 0)} <= seen
+
+
+@pytest.mark.parametrize("strokes", ["hatch", "echoes", "feathers"])
+def test_engraving_keeps_to_the_tile_and_off_the_eye(strokes) -> None:
+    tile = squirrel("IH6")
+    settings = ArtSettings(
+        **{**PAGE.__dict__, "engrave": strokes, "eyes": (EYE,), "tile_size": 260}
+    )
+    art = artwork(tile, settings)
+    ink = art.motif.parts[0]
+    assert ink.style.fill == INK
+    assert len(ink.curves) > 20
+    inside = shapely.Polygon(tile.tile.polygon).buffer(silhouette_outline(tile).max() * 0.004)
+    for curve in ink.curves:
+        assert inside.contains(shapely.MultiPoint(curve.pieces[:, 0]))
+    middle = tile.forward(np.array(EYE))
+    points = np.concatenate([curve.pieces[:, 0] for curve in ink.curves])
+    eye = np.concatenate([curve.pieces[:, 0] for curve in art.motif.parts[1].curves])
+    radius = np.hypot(*(eye - middle).T)
+    np.testing.assert_allclose(radius, radius[0], rtol=1e-6)  # round
+    assert np.hypot(*(points - middle).T).min() > 1.5 * radius[0]
+    plain = artwork(tile, ArtSettings(**{**PAGE.__dict__, "tile_size": 260}))
+    assert (render_artwork(art) != render_artwork(plain)).any()
+
+
+def test_the_drawing_is_there_once(tmp_path: Path) -> None:
+    art = drawn("IH4", BODY, tmp_path, outline=2.0)
+    text = write_artwork(art, ".svg")
+    assert isinstance(text, str)
+    assert text.count("#ffcc00") == 1
+    shown = len(re.findall('href="#motif"', text))
+    assert shown == len(art.page.copies) == len(re.findall('href="#tile" ', text)) / 2
+    assert 'opacity="0.5"' in text
+    assert 'stroke="#ff0000"' in text
+    width = 300 * 25.4 / 300
+    assert f'width="{width:g}mm"' in text
+
+
+def test_a_picture_in_an_svg_is_one_image() -> None:
+    tile = squirrel("IH4")
+    text = write_artwork(artwork(tile, PAGE, picture=flat(tile, "#c02040")), ".svg")
+    assert isinstance(text, str)
+    (data,) = re.findall('href="data:image/png;base64,([^"]+)"', text)
+    image = np.asarray(Image.open(io.BytesIO(base64.b64decode(data))))
+    assert (image == (0xC0, 0x20, 0x40, 255)).all()
+
+
+def test_other_formats_refuse_artwork(tmp_path: Path) -> None:
+    scene = art_scene(drawn("IH4", BODY, tmp_path))
+    with pytest.raises(OrbiflowError, match="written as SVG, or rendered as PNG"):
+        write_pdf(scene)
+    with pytest.raises(OrbiflowError, match="written as SVG, or rendered as PNG"):
+        write_dxf(scene, tolerance=0.1)
+
+
+def test_gradients_and_what_is_left_out(tmp_path: Path) -> None:
+    body = """<defs><linearGradient id="a"><stop stop-color="#000000"/><stop
+      style="stop-color:#ffffff"/></linearGradient><linearGradient id="b" href="#a"/></defs>
+      <rect x="200" y="100" width="300" height="200" fill="url(#b)"/><text>hm</text>
+      <rect x="200" y="100" width="300" height="200" fill="none"/>"""
+    tile = squirrel("IH4")
+    over = read_over(svg_of("IH4", body, tmp_path), tile)
+    assert over.drawing is not None
+    assert [part.style.fill for part in over.drawing.parts] == ["#808080"]
+    assert over.notes == ("left out 1 text of the drawing",)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ('<svg viewBox="0 0 10 99"><rect width="3" height="3"/></svg>', "must have its aspect"),
+        ("<svg><g/></svg>", "draws nothing that is filled or stroked"),
+        ('<svg><rect x="-1e300" width="1e301" height="3"/></svg>', "reaches much too far"),
+        ('<svg><path d="M0 0 L9e7 0 L9e7 9e7 Z"/></svg>', "too intricate to be carried"),
+        ("<svg><rect", "not well-formed XML"),
+        ("<html/>", "not an <svg> drawing"),
+        ('<!DOCTYPE a [<!ENTITY b "c">]><svg/>', "entities are not read"),
+    ],
+)
+def test_drawings_that_are_refused(text: str, message: str, tmp_path: Path) -> None:
+    path = tmp_path / "drawing.svg"
+    path.write_text(text)
+    with pytest.raises(InputFileError, match=message):
+        read_over(path, squirrel("IH4"))
+
+
+@pytest.mark.parametrize("name", CLASSES)
+def test_long_lines_bend_with_the_tile(name: str, tmp_path: Path) -> None:
+    tile = squirrel(name)
+    body = '<line/><polyline points="300,250 700,250" fill="none" stroke="#000"/>'
+    over = read_over(svg_of(name, body, tmp_path), tile)
+    assert over.drawing is not None
+    (part,) = over.drawing.parts
+    (curve,) = part.curves
+    ends = tile.forward(np.array([[300.0, 250.0], [700.0, 250.0]]))
+    np.testing.assert_allclose([curve.start, curve.end], ends, atol=1e-9)
+    assert len(curve.pieces) > 40
+
+
+def test_current_colour_is_ink(tmp_path: Path) -> None:
+    body = f"""<circle cx="{EYE[0]}" cy="{EYE[1]}" r="40" fill="currentColor"/>
+    <path d="M 300 400 L 500 300" fill="none" stroke="currentcolor" stroke-width="9"/>
+    <path d="M 300 400 L 500 300 L 600 400" fill="currentColor" color="#203040"/>"""
+    art = drawn("IH4", body, tmp_path)
+    assert [part.inked for part in art.motif.parts] == [True, True, False]
+    assert art.motif.parts[2].style.fill == "#203040"
+    chosen = palette(art.settings.palette)
+    inks = {layer.ink for layer in art_scene(art).layers} - {None}
+    assert inks == {chosen.outline, chosen.paper}

@@ -1,0 +1,71 @@
+"""Cells that repeat: laid side by side they are the plane itself."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+
+from artworks import checkerboard, squirrel
+from orbiflow.errors import OrbiflowError
+from orbiflow.symmetry import rotation_matrix
+from orbiflow.tiles import (
+    CLASSES,
+    ArtSettings,
+    artwork,
+    render_artwork,
+)
+from orbiflow.tiles.art.making import render_on
+from orbiflow.tiles.art.page import laid
+from orbiflow.tiles.art.repeat import rectangle
+
+
+@pytest.mark.parametrize("how", ["aspect", "neighbour", "one"])
+@pytest.mark.parametrize("name", CLASSES)
+def test_two_by_two_is_the_same_plane(name: str, how) -> None:
+    tile = squirrel(name)
+    settings = ArtSettings(repeat=True, tile_size=60, colour=how, tolerance=0.05)
+    art = artwork(tile, settings, picture=None if how == "one" else checkerboard(tile))
+    cell = render_artwork(art)
+    twice = render_on(art, laid(art.page, tile, settings, 2, 2))
+    apart = np.abs(np.tile(cell, (2, 2, 1)).astype(int) - twice)
+    assert apart.max() <= 1
+
+
+@pytest.mark.parametrize("name", ["IH2", "IH3", "IH5", "IH6", "IH7", "IH21", "IH28"])
+def test_lattices_with_a_rectangle_are_hardly_stretched(name: str) -> None:
+    art = artwork(squirrel(name), ArtSettings(repeat=True, tile_size=300, tolerance=0.0))
+    assert re.search("whole pixels stretch it|nothing is stretched", art.page.notes[0])
+    values = np.linalg.svd(art.page.linear, compute_uv=False)
+    assert values[0] / values[1] < 1.002  # whole pixels alone
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.3, -1.2])
+@pytest.mark.parametrize(
+    ("lattice", "cells"),
+    [
+        ([[1.0, 0.0], [0.0, 0.7]], 1),
+        ([[1.0, 0.5], [0.0, 0.75**0.5]], 2),
+        ([[2.0, 1.0], [0, 0.4]], 2),
+    ],
+)
+def test_known_lattices(lattice, cells: int, turn: float) -> None:
+    basis = rotation_matrix(turn) @ np.array(lattice)
+    found = rectangle(basis, 200.0, 0.0, flipped=False)
+    assert found.cells == cells
+    assert abs(found.turn) <= 45
+    corners = np.linalg.inv(found.linear) @ np.diag([found.width, found.height])
+    steps = np.linalg.solve(basis, corners)
+    np.testing.assert_allclose(steps, np.rint(steps), atol=1e-9)
+    assert abs(round(np.linalg.det(steps))) == cells
+
+
+def test_oblique_lattices_need_a_tolerance() -> None:
+    lattice = np.array([[1.0, 0.331], [0.0, 1.0]])
+    with pytest.raises(OrbiflowError, match="allow a larger tolerance"):
+        rectangle(lattice, 100.0, 0.0, flipped=False)
+    found = rectangle(lattice, 100.0, 0.02, flipped=True)
+    assert found.strain < 0.021
+    assert not found.exact
+    assert np.linalg.det(found.linear) < 0

@@ -1,0 +1,92 @@
+"""Runs read back with their maps; tiles without one get one from the outlines, or a sentence."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from artworks import EYE, squirrel, write_run
+from orbiflow.errors import InputFileError, OrbiflowError
+from orbiflow.tiles import (
+    CLASSES,
+    ArtSettings,
+    artwork,
+    read_result,
+    signed_area,
+    with_map,
+)
+from orbiflow.tiles.art.source import covered_area, silhouette_outline
+from orbiflow.tiles.search import matched
+from outlines import FOLDER, animal, bent_squirrel, disc, star
+
+
+def test_the_map_of_a_run(tmp_path: Path) -> None:
+    tile = with_map(read_result(write_run(tmp_path / "run", "IH6"), "IH6"))
+    assert tile.name == "squirrel-IH6"
+    assert tile.notes == ()
+    there = squirrel("IH6").forward(np.array(EYE))
+    np.testing.assert_allclose(tile.forward(np.array(EYE)), there, atol=1e-9)
+    # the outline is the silhouette's, as fine as it was bent
+    outline = animal("squirrel.dat").outline
+    np.testing.assert_allclose(silhouette_outline(tile).min(axis=0), outline.min(axis=0), atol=4)
+    np.testing.assert_allclose(covered_area(tile).high, outline.max(axis=0), atol=4)
+
+
+def test_without_a_map_outlines_are_matched(tmp_path: Path) -> None:
+    run = write_run(tmp_path / "run", "IH6", model=False)
+    tile = with_map(run)
+    assert "its outline was matched" in tile.notes[0]
+    moved = tile.forward(np.array(EYE))
+    known = squirrel("IH6").forward(np.array(EYE))
+    # the bent head and the matched one are near each other
+    assert np.hypot(*(moved - known)) < 0.15 * np.sqrt(abs(tile.tile.signed_area))
+    assert artwork(tile, ArtSettings(size=(60, 40), eyes=(EYE,))).motif.parts
+
+
+def test_without_a_map_or_silhouette_there_is_one_sentence(tmp_path: Path) -> None:
+    run = write_run(tmp_path / "run", "IH6", model=False)
+    document = json.loads((run / "result.json").read_text())
+    document["input"]["source"] = "gone.dat"
+    (run / "result.json").write_text(json.dumps(document))
+    tile = with_map(run)
+    assert artwork(tile, ArtSettings(size=(60, 40), engrave="hatch")).motif.parts
+    with pytest.raises(OrbiflowError, match=r"its silhouette gone\.dat is not there"):
+        artwork(tile, ArtSettings(size=(60, 40), eyes=(EYE,)))
+    document["input"]["source"] = str(FOLDER / "nagata" / "bat_60.dat")
+    (run / "result.json").write_text(json.dumps(document))
+    with pytest.raises(OrbiflowError, match="is not the silhouette that it was"):
+        with_map(run).require_map()
+
+
+def test_a_model_of_another_tile_is_refused(tmp_path: Path) -> None:
+    run = write_run(tmp_path / "run", "IH6")
+    other = write_run(tmp_path / "other", "IH4")
+    shutil.copy(other / "IH4" / "model.safetensors", run / "IH6" / "model.safetensors")
+    with pytest.raises(InputFileError, match="belongs to another tile"):
+        with_map(run)
+
+
+@pytest.mark.parametrize("name", CLASSES)
+def test_matched_maps_have_no_fold_and_keep_the_outlines(name: str) -> None:
+    target, polygon = animal("squirrel.dat"), bent_squirrel(name).tile.polygon
+    bending = matched(target.normal, polygon)
+    for points in (bending.rest, bending.images):
+        corners = points[bending.triangles]
+        areas = signed_area(corners)
+        assert (areas > 0).all()
+    whole = signed_area(bending.rest[bending.triangles]).sum()
+    assert whole == pytest.approx(1, abs=0.03)
+    np.testing.assert_allclose(
+        bending.inverse(bending.forward(target.normal)), target.normal, atol=0.06
+    )
+
+
+def test_matching_what_is_the_same_moves_little() -> None:
+    ring = star(5, 0.5)
+    bending = matched(ring, ring)
+    assert np.abs(bending.rest - bending.images).max() < 0.06
+    assert np.abs(matched(disc(60), disc(90)).forward([[0.1, 0.2]]) - (0.1, 0.2)).max() < 0.02

@@ -1,0 +1,204 @@
+"""Pictures on tilings: every pixel covered, nothing bleeds, mirrored tiles are mirrored."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapely
+from PIL import Image
+from scipy.ndimage import binary_erosion
+
+from artworks import EYE, checkerboard, face, flat, picture, size_of, squirrel, upside_down
+from orbiflow.drawing import palette
+from orbiflow.tiles import (
+    CLASSES,
+    ArtSettings,
+    Artwork,
+    artwork,
+    render_artwork,
+)
+from orbiflow.tiles.art.making import raster_grid
+from orbiflow.tiles.art.pictures import _places
+from orbiflow.tiles.art.raster import (
+    NOWHERE,
+    runs,
+    triangle_sides,
+)
+from orbiflow.tiles.art.source import covered_area, silhouette_outline
+from orbiflow.tiles.silhouette import triangulate
+
+PAGE = ArtSettings(size=(240, 160), tile_size=95, outline=0.0)
+
+
+def settings(**options) -> ArtSettings:
+    return ArtSettings(**{**PAGE.__dict__, **options})
+
+
+def owners(art: Artwork, points: np.ndarray) -> np.ndarray:
+    """Which copy each point of the page lies in, by shapely."""
+    tree = shapely.STRtree(np.asarray(shapely.polygons(art.page.rings())))
+    point, copy = tree.query(shapely.points(points), predicate="intersects")
+    found = np.full(len(points), -1)
+    found[point] = copy
+    assert (found >= 0).all()
+    return found
+
+
+def rgb(colour: str) -> np.ndarray:
+    return np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)])
+
+
+@pytest.mark.parametrize("name", CLASSES)
+def test_a_flat_picture_covers_the_plane(name: str) -> None:
+    tile = squirrel(name)
+    made = render_artwork(artwork(tile, PAGE, picture=flat(tile, "#c02040")))
+    assert made.shape == (160, 240, 3)
+    assert (made == rgb("#c02040")).all()
+
+
+@pytest.mark.parametrize("name", CLASSES)
+def test_each_sample_is_in_one_copy(name: str) -> None:
+    art = artwork(squirrel(name), settings(samples=1))
+    made = render_artwork(art)
+    rows, columns = np.indices(made.shape[:2])
+    points = np.stack([columns, rows], axis=-1).reshape(-1, 2) + 0.5
+    fills = np.array([rgb(palette(art.settings.palette).fill(k)) for k in range(art.page.count)])
+    expected = fills[art.page.colours[owners(art, points)]].reshape(made.shape)
+    assert (made == expected).all(axis=2).mean() > 0.9999
+
+
+@pytest.mark.parametrize("name", CLASSES)
+def test_a_checkerboard_is_carried(name: str) -> None:
+    tile = squirrel(name)
+    board = checkerboard(tile, 6)
+    art = artwork(tile, settings(size=(480, 320), tile_size=200), picture=board)
+    made = render_artwork(art)[..., 0] / 255.0
+    rng = np.random.default_rng(1)
+    row, column = rng.integers(0, 320, 4000), rng.integers(0, 480, 4000)
+    points = np.stack([column, row], axis=1) + 0.5
+    copy = owners(art, points)
+    own = (points - art.page.offset) @ np.linalg.inv(art.page.linear).T
+    group = art.page.tile.group
+    linear = group.linear_parts[art.page.copies.cosets[copy]]
+    own = np.einsum("mji,mj->mi", linear, own - art.page.copies.translations[copy])
+    from_here = tile.inverse(own)
+    share = (from_here - board.covered.low) / (board.covered.high - board.covered.low)
+    x, y = share.T * np.array(board.image.size)[:, None] - 0.5
+    longer = max(board.image.size)
+    parity = ((np.rint(y).astype(int) * 6 // longer) + (np.rint(x).astype(int) * 6 // longer)) % 2
+    # a pixel of the page is a few of the picture's: away from the squares' sides and the tile's
+    into = np.stack([x, y]) * 6 / longer % 1
+    clear = (abs(into - 0.5) < 0.3).all(axis=0)
+    rings = np.asarray(shapely.linearrings(art.page.rings()))[copy]
+    clear &= shapely.distance(shapely.points(points), rings) > 3
+    assert clear.sum() > 500
+    np.testing.assert_allclose(made[row, column][clear], parity[clear], atol=0.02)
+
+
+@pytest.mark.parametrize("name", CLASSES)
+def test_every_copy_has_its_eye_mirrored_or_not(name: str) -> None:
+    tile = squirrel(name)
+    art = artwork(tile, settings(size=(480, 320)), picture=face(tile))
+    made = render_artwork(art).astype(int)
+    eye = tile.forward(np.array(EYE))[None]
+    places = art.page.copies.images(eye)[:, 0] @ art.page.linear.T + art.page.offset
+    shown = ((places > 4) & (places < (476, 316))).all(axis=1)
+    assert shown.sum() >= 4
+    for x, y in places[shown]:
+        red, green, _ = made[int(y), int(x)]
+        assert red > 200
+        assert green < 60
+    reds = ((made[..., 0] > 200) & (made[..., 1] < 60)).sum()
+    assert reds < 40 * (shown.sum() + 8)
+    mirrored = np.linalg.det(art.page.tile.group.linear_parts) < 0
+    assert mirrored.any() == (name in ("IH2", "IH3", "IH5", "IH6"))
+
+
+def test_the_map_onto_the_raster_has_no_fold() -> None:
+    tile = squirrel("IH6")
+    art = artwork(tile, PAGE, picture=flat(tile, "white"))
+    grid = raster_grid(art)
+    places = _places(tile, grid)
+    whole = np.asarray(binary_erosion(grid.inside(art.page.tile.polygon), iterations=2), dtype=bool)
+    down, right = np.diff(places, axis=0)[:, :-1], np.diff(places, axis=1)[:-1]
+    turn = right[..., 0] * down[..., 1] - right[..., 1] * down[..., 0]
+    inside = whole[:-1, :-1]
+    assert (turn[inside] > 0).all() or (turn[inside] < 0).all()
+
+
+def test_triangles_and_what_is_around_them() -> None:
+    mesh = triangulate(np.array([[2.0, 2.0], [30.0, 5.0], [26.0, 28.0], [15.0, 12.0], [4.0, 25.0]]))
+    found = runs(triangle_sides(mesh.points, mesh.triangles), 0, 32, 32)
+    label = found.spread(found.label).reshape(32, 32)
+    rows, columns = np.indices((32, 32))
+    inside = shapely.contains_xy(
+        shapely.Polygon(mesh.points[: mesh.size]), columns.ravel() + 0.5, rows.ravel() + 0.5
+    )
+    np.testing.assert_array_equal(label.ravel() != NOWHERE, inside)
+    for triangle in np.unique(label[label >= 0]):
+        polygon = shapely.Polygon(mesh.points[mesh.triangles[triangle]]).buffer(1e-5)
+        own = label == triangle
+        assert shapely.contains_xy(polygon, columns[own] + 0.5, rows[own] + 0.5).all()
+
+
+def test_the_fringe_of_a_cut_out_does_not_show() -> None:
+    tile = squirrel("IH4")
+    width, height = size_of(tile)
+    shape = shapely.affinity.affine_transform(
+        shapely.Polygon(silhouette_outline(tile)), [1, 0, 0, 1, *-covered_area(tile).low]
+    )
+    scale = width / np.ptp(covered_area(tile)[:2], axis=0)[0]
+    rows, columns = np.indices((height, width)) + 0.5
+    inside = shapely.contains_xy(shape, columns / scale, rows / scale)
+    alpha = Image.fromarray((inside * 255).astype(np.uint8))
+    green = Image.new("RGB", (width, height), "#108030")
+    cut = Image.new("RGB", (width, height), "white")
+    cut.paste(green, mask=alpha)
+    # as a picture on white, and as one that is transparent around
+    see_through = green.copy()
+    see_through.putalpha(alpha)
+    for image in (cut, see_through):
+        made = render_artwork(artwork(tile, PAGE, picture=picture(image, tile)))
+        np.testing.assert_allclose(made - rgb("#108030") + 0.0, 0, atol=1)
+
+
+def test_a_transparent_picture_shows_the_palette() -> None:
+    tile = squirrel("IH4")
+    clear = picture(Image.new("RGBA", size_of(tile), (0, 0, 0, 0)), tile)
+    plain = render_artwork(artwork(tile, PAGE))
+    np.testing.assert_array_equal(render_artwork(artwork(tile, PAGE, picture=clear)), plain)
+
+
+def test_outlines_part_tiles_of_one_colour() -> None:
+    art = artwork(squirrel("IH1"), settings(colour="one", outline=3.0, size=(480, 320)))
+    made = render_artwork(art).astype(int)
+    edge = rgb(palette(art.settings.palette).outline)
+    rings = art.page.rings()
+    middles = (rings + np.roll(rings, -1, axis=1)).reshape(-1, 2) / 2
+    shown = middles[((middles > 2) & (middles < (478, 318))).all(axis=1)]
+    columns, rows = shown.astype(int).T
+    assert np.abs(made[rows, columns] - edge).max() < 80
+
+
+@pytest.mark.parametrize("name", ["IH4", "IH6"])
+def test_a_silhouette_with_y_up_is_drawn_the_same_way_up(name: str) -> None:
+    tile = squirrel(name)
+    turned = upside_down(tile)
+    image = checkerboard(tile).image
+    image.paste(Image.new("RGBA", (200, 90), "red"), (30, 20))
+    options = {"outline": 2.0, "tile_size": 190}
+    made = [
+        render_artwork(artwork(own, settings(**options), picture=picture(image, own)))
+        for own in (tile, turned)
+    ]
+    apart = np.abs(made[0].astype(int) - made[1])
+    assert apart.mean() < 3  # their rasters lie a fraction of a texel apart
+    assert (apart > 80).mean() < 0.002
+    eyes = [
+        artwork(own, settings(eyes=((EYE[0], y),))).motif.parts
+        for own, y in ((tile, EYE[1]), (turned, -EYE[1]))
+    ]
+    for first, second in zip(*eyes, strict=True):
+        points = second.curves[0].pieces[:, 0] * (1, -1)
+        middle = first.curves[0].pieces[:, 0].mean(axis=0)
+        np.testing.assert_allclose(points.mean(axis=0), middle, atol=1e-6)

@@ -1,0 +1,151 @@
+"""Each format is what its readers expect: sizes, layers, units, and that it is sound."""
+
+from __future__ import annotations
+
+import io
+import json
+import re
+import zlib
+
+import numpy as np
+import pytest
+import shapely
+from PIL import Image
+
+from exported import dxf_lines, tile_of
+from orbiflow.errors import CertificationError, OrbiflowError
+from orbiflow.tiles import (
+    EscherTile,
+    ExportSettings,
+    Tile,
+    edges,
+    export,
+    scenes,
+    write_scene,
+)
+
+TILE = tile_of("IH3")
+
+
+def content(**options) -> str | bytes:
+    chosen = ExportSettings(**options)
+    return write_scene(scenes(TILE, chosen)[0][0], chosen)
+
+
+@pytest.mark.parametrize("cut", ["none", "skeleton", "pieces"])
+def test_dxf_is_sound(cut) -> None:
+    text = content(format="dxf", cut=cut, calibrate=True)
+    assert isinstance(text, str)
+    document, lines = dxf_lines(text)
+    auditor = document.audit()
+    assert not auditor.errors
+    assert not auditor.fixes
+    assert document.header["$INSUNITS"] == 4  # mm
+    assert document.header["$MEASUREMENT"] == 1
+    layers = {layer.dxf.name: layer.dxf.linetype.upper() for layer in document.layers}
+    used = {line.layer for line in lines}
+    assert used <= set(layers)
+    assert all(layers[name] == "CONTINUOUS" for name in used)
+    assert "calibration 100 mm" in used
+    assert all(item.dxftype() == "LWPOLYLINE" for item in document.modelspace())
+    if cut != "skeleton":
+        assert all(line.closed for line in lines if not line.layer.startswith("calib"))
+    points = np.concatenate([line.points for line in lines])
+    assert (points >= 0).all()
+    assert (points <= (300, 200)).all()
+
+
+def test_the_calibration_mark_is_100_mm() -> None:
+    text = content(format="dxf", calibrate=True)
+    assert isinstance(text, str)
+    marks = [line for line in dxf_lines(text)[1] if line.layer.startswith("calib")]
+    points = np.concatenate([line.points for line in marks])
+    assert np.ptp(points[:, 0]) == pytest.approx(100, abs=1e-9)
+    tiles = [line.points for line in dxf_lines(text)[1] if not line.layer.startswith("calib")]
+    assert np.concatenate(tiles)[:, 1].max() < points[:, 1].min()
+    with pytest.raises(OrbiflowError, match="110 mm wide, got 90 mm"):
+        content(calibrate=True, area=(90.0, 90.0))
+
+
+@pytest.mark.parametrize("cut", ["none", "skeleton"])
+def test_pdf_has_its_real_size_curves_and_no_fonts(cut) -> None:
+    data = content(format="pdf", cut=cut, area=(210.0, 148.0))
+    assert isinstance(data, bytes)
+    assert data == content(format="pdf", cut=cut, area=(210.0, 148.0))
+    (box,) = re.findall(rb"/MediaBox \[ ?0 0 ([\d.]+) ([\d.]+) ?\]", data)
+    assert [float(side) / 72 * 25.4 for side in box] == pytest.approx([210, 148], abs=1e-6)
+    assert b"/BaseFont" not in data
+    streams = re.findall(rb"stream\r?\n(.*?)\r?\nendstream", data, flags=re.DOTALL)
+    drawn = b"".join(zlib.decompress(stream) for stream in streams if stream[:1] == b"x")
+    assert drawn.count(b" c\n") > 50
+
+
+def test_png_has_its_real_size() -> None:
+    data = content(format="png", dpi=150.0, area=(127.0, 101.6))
+    assert isinstance(data, bytes)
+    picture = Image.open(io.BytesIO(data))
+    assert picture.size == (750, 600)
+    assert picture.info["dpi"] == pytest.approx((150, 150), abs=0.1)
+    assert len(picture.convert("RGB").resize((60, 48)).getcolors(9999) or []) > 50
+    with pytest.raises(OrbiflowError, match="23622 x 15748 pixels; choose fewer dots"):
+        content(format="png", dpi=2000.0)
+
+
+def test_hairlines_show_in_a_png() -> None:
+    data = content(format="png", cut="skeleton", stroke_width=0.01, stroke="#ff0000", dpi=100.0)
+    assert isinstance(data, bytes)
+    pixels = np.asarray(Image.open(io.BytesIO(data)).convert("RGB"), dtype=int)
+    assert (pixels[..., 1] < 100).mean() > 0.005
+
+
+def test_json_says_where_every_tile_is() -> None:
+    text = content(format="json", clip=True)
+    assert isinstance(text, str)
+    document = json.loads(text)
+    assert document["units"] == "mm"
+    assert (document["class"], document["group"]) == ("IH3", "pg")
+    assert document["certified"] is True
+    prototile = np.array(document["prototile"])
+    found = []
+    for number, tile in enumerate(document["tiles"]):
+        assert tile["number"] == number
+        a, b, c, d, e, f = tile["transform"]
+        polygon = np.array(tile["polygon"])
+        moved = prototile @ np.array([[a, c], [b, d]]).T + [e, f]
+        np.testing.assert_allclose(moved, polygon, atol=2e-4)
+        found.append(shapely.Polygon(polygon))
+        inside = shapely.box(0, 0, 300, 200).covers(found[-1])
+        assert tile["whole"] == inside
+    assert {tile["aspect"] for tile in document["tiles"]} == {0, 1}
+    for tile in document["tiles"]:
+        for other in tile["neighbours"]:
+            assert tile["number"] in document["tiles"][other]["neighbours"]
+            assert found[tile["number"]].distance(found[other]) < 1e-3
+        if shapely.box(60, 60, 240, 140).contains(found[tile["number"]]):
+            assert len(tile["neighbours"]) == len(edges(TILE).starts)
+
+
+@pytest.mark.parametrize("form", ["svg", "pdf", "dxf", "json", "png"])
+def test_what_is_not_certified_is_refused_or_says_so(form, tmp_path) -> None:
+    bad = EscherTile(Tile(1.01 * TILE.polygon, TILE.group, "IH3"), name="boot-IH3")
+    chosen = ExportSettings(format=form, dpi=50.0)
+    with pytest.raises(CertificationError, match=r"boot-IH3 is not certified .*--force exports it"):
+        export(bad, tmp_path / "x", chosen)
+    assert not list(tmp_path.iterdir())
+    done = export(bad, tmp_path / f"x.{form}", chosen, force=True)
+    data = done.files[0].read_bytes()
+    assert b"NOT CERTIFIED" in data or "NOT CERTIFIED".encode("utf-16-be") in data
+    assert "NOT CERTIFIED" in done.scenes[0].title
+
+
+def test_a_forced_tile_that_crosses_itself(tmp_path) -> None:
+    ring = TILE.polygon.copy()
+    ring[[5, 9]] = ring[[9, 5]]
+    bad = Tile(ring, TILE.group)
+    for form in ("svg", "pdf", "dxf", "json"):
+        chosen = ExportSettings(format=form, clip=True, warn_neck=1.0)
+        done = export(bad, tmp_path / f"x.{form}", chosen, force=True)
+        assert done.tiles > 20
+        assert any("necks cannot be measured" in note for note in done.notes)
+    with pytest.raises(OrbiflowError, match="crosses itself"):
+        export(bad, tmp_path / "y.svg", ExportSettings(cut="pieces"), force=True)

@@ -1,0 +1,67 @@
+"""Lengths need a number and a unit that is known."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from orbiflow.errors import OrbiflowError
+from orbiflow.units import MILLIMETRES, length, size
+
+
+@given(st.floats(1e-3, 1e3), st.sampled_from(list(MILLIMETRES)))
+def test_what_is_written_is_read(number: float, unit: str) -> None:
+    assert math.isclose(length(f" {number!r} {unit.upper()} "), number * MILLIMETRES[unit])
+    width, height = size(f"{number!r}{unit}x2cm")
+    assert math.isclose(width, number * MILLIMETRES[unit])
+    assert height == 20
+
+
+def test_points_are_those_of_an_inch() -> None:
+    assert length("72pt") == pytest.approx(25.4)
+    assert size("8.5x11in") == pytest.approx((215.9, 279.4))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("40", "'40' has no unit; write 40mm, 40cm or 40in"),
+        ("40px", "unknown unit 'px'; use one of mm, cm, in, pt"),
+        ("mm", "'mm' is not a length; write a number and its unit, such as 40mm"),
+        ("", "is not a length"),
+        ("-3mm", "must be above 0"),
+        ("0mm", "must be above 0"),
+        ("0", "has no unit"),
+        ("1e9mm", "longer than 100 m"),
+        ("1e999mm", "longer than 100 m"),
+        ("nanmm", "is not a length"),
+        ("40mm cm", "is not a length"),
+    ],
+)
+def test_no_lengths(text: str, message: str) -> None:
+    with pytest.raises(OrbiflowError, match=message):
+        length(text)
+
+
+def test_zero_where_it_is_one() -> None:
+    assert length("0", zero=True) == length("0.0 mm", zero=True) == 0
+    with pytest.raises(OrbiflowError, match="at least 0"):
+        length("-1mm", zero=True)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("300x200", "has no unit; write 300x200mm"),
+        ("300mm", "not a width and a height; write both and their unit, such as 300x200mm"),
+        ("300x200x10mm", "not a width and a height"),
+        ("0x200mm", "above 0"),
+        ("300x200ft", "unknown unit 'ft'"),
+    ],
+)
+def test_no_sizes(text: str, message: str) -> None:
+    with pytest.raises(OrbiflowError, match=message):
+        size(text)

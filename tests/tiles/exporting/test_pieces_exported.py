@@ -1,0 +1,143 @@
+"""Pieces measured in the files: their width when the beam has been, their distance, their number."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.distance import pdist
+
+from exported import dxf_lines, polygons, svg_lines, tile_of, tiles
+from orbiflow.errors import OrbiflowError
+from orbiflow.tiles import (
+    CLASSES,
+    ExportSettings,
+    Tile,
+    scenes,
+    write_scene,
+)
+from orbiflow.tiles.exporting.layouts import layout
+from orbiflow.tiles.exporting.nesting import Arrangement, on_sheet
+from orbiflow.tiles.exporting.pieces import cut_ring
+
+
+def cut(tile: Tile, **options) -> list[list[shapely.Polygon]]:
+    """The regions that the cuts bound, sheet by sheet."""
+    chosen = ExportSettings(cut="pieces", **options)
+    found = []
+    for scene in scenes(tile, chosen)[0]:
+        text = write_scene(scene, chosen)
+        assert isinstance(text, str)
+        assert "<use" not in text
+        lines = dxf_lines(text)[1] if chosen.format == "dxf" else svg_lines(text)
+        found.append(polygons([line for line in lines if line.layer == "cut"]))
+    return found
+
+
+@settings(max_examples=10, deadline=None)
+@given(
+    tiles,
+    st.sampled_from([0.0, 0.15, 0.4]),
+    st.sampled_from([0.0, 0.1, 0.3]),
+    st.sampled_from(["svg", "dxf"]),
+)
+def test_what_the_beam_leaves_is_the_piece(tile, kerf, clearance, form) -> None:
+    options = {"tile_size": 50.0, "area": (120.0, 80.0), "spacing": 0.5}
+    (sheet,) = cut(tile, kerf=kerf, clearance=clearance, format=form, **options)
+    chosen = ExportSettings(cut="pieces", **options)
+    wanted = shapely.Polygon(layout(tile, chosen, y_down=False).tile.polygon)
+    wanted = wanted.buffer(-clearance / 2) if clearance else wanted
+    for polygon in sheet:
+        left = polygon.buffer(-kerf / 2, quad_segs=32)  # the beam is round
+        assert left.geom_type == "Polygon"
+        # rounding of inner corners apart, the tolerance all around
+        slack = chosen.deviation * wanted.length
+        assert abs(left.area - wanted.area) < slack
+        assert left.length == pytest.approx(wanted.length, rel=0.03)
+        assert diameter(left) == pytest.approx(diameter(wanted), abs=2.1 * chosen.deviation)
+
+
+def diameter(polygon: shapely.Polygon) -> float:
+    """Largest distance of two of its points: no turn changes it."""
+    return float(pdist(shapely.get_coordinates(polygon.convex_hull)).max())
+
+
+@pytest.mark.parametrize("name", CLASSES)
+@pytest.mark.parametrize("spacing", [0.0, 2.5])
+def test_pieces_keep_their_distance_and_the_page(name: str, spacing: float) -> None:
+    (sheet,) = cut(tile_of(name), spacing=spacing, area=(220.0, 160.0), kerf=0.1)
+    page = shapely.box(0, 0, 220, 160)
+    assert all(polygon.within(page) for polygon in sheet)
+    tree = shapely.STRtree(sheet)
+    first, second = tree.query(sheet, predicate="dwithin", distance=max(0.99 * spacing, 1e-4))
+    assert (first == second).all()
+    # dense: most of the page is pieces
+    assert shapely.area(sheet).sum() > (0.6 if spacing == 0 else 0.5) * page.area
+
+
+@pytest.mark.parametrize("count", [1, 7, 23])
+def test_as_many_as_asked_for_on_as_few_sheets_as_it_takes(count: int) -> None:
+    tile = tile_of("IH6")
+    sheets = cut(tile, copies=count, bed=(110.0, 90.0))
+    assert sum(len(sheet) for sheet in sheets) == count
+    full = len(sheets[0])
+    assert all(len(sheet) == full for sheet in sheets[:-1])
+    assert len(sheets) == -(-count // full)
+
+
+def test_too_many_for_the_page() -> None:
+    tile = tile_of("IH6")
+    (sheet,) = cut(tile, area=(110.0, 90.0))
+    fit = len(sheet)
+    with pytest.raises(OrbiflowError, match=rf"it holds {fit} pieces, so that 3 sheets are needed"):
+        cut(tile, copies=2 * fit + 1, area=(110.0, 90.0))
+
+
+def test_a_single_piece_goes_in_whichever_way_it_fits() -> None:
+    bar = np.array([[0, 0], [10, 0], [10, 1], [0, 1.0]])
+    tile = Tile(bar, tile_of("IH1").group)
+    line = layout(
+        Tile(bar, tile.group), ExportSettings(cut="pieces", tile_size=100), y_down=True
+    ).tile.polygon
+    one = Arrangement(300 * np.eye(2), np.eye(2)[None], np.zeros((1, 2)))
+    assert len(on_sheet([one], line, 12, 101)) == 1
+    assert len(on_sheet([one], line, 79, 79)) == 1  # along the diagonal
+    assert len(on_sheet([one], line, 70, 70)) == 0
+
+
+def test_a_sheet_smaller_than_a_piece() -> None:
+    with pytest.raises(OrbiflowError, match=r"does not hold a single piece, which takes 4\d\.\d x"):
+        cut(tile_of("IH4"), area=(30.0, 30.0))
+
+
+HALF = [[0, 0], [4, 0], [4, 1.8], [6, 1.8], [6, 0], [10, 0]]
+DUMBBELL = np.array([*HALF, *([x, 4.0 - y] for x, y in reversed(HALF))])
+
+
+def test_a_kerf_wider_than_a_neck() -> None:
+    with pytest.raises(OrbiflowError, match=r"kerf of 0\.5 mm is wider than the piece's neck") as e:
+        cut_ring(DUMBBELL, 0.5, 0.0)
+    assert "0.40 mm wide 4.0 mm from its left and 2.0 mm from its top" in str(e.value)
+    assert cut_ring(DUMBBELL, 0.3, 0.0) is not None
+    with pytest.raises(OrbiflowError, match=r"clearance of 0\.6 mm is wider"):
+        cut_ring(DUMBBELL, 0.0, 0.6)
+
+
+def test_a_kerf_wider_than_a_slit() -> None:
+    slit = np.array([[0, 0], [10, 0], [10, 2.9], [3, 2.9], [3, 3.1], [10, 3.1], [10, 6], [0, 6.0]])
+    with pytest.raises(OrbiflowError, match=r"wider than a slit of the piece: it is 0\.20 mm"):
+        cut_ring(slit, 0.25, 0.0)
+    assert shapely.Polygon(cut_ring(slit, 0.15, 0.0)).is_valid
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.floats(0.02, 1.0), st.just(0.0) | st.floats(1e-3, 0.35))
+def test_offset_there_and_back(kerf: float, clearance: float) -> None:
+    shape = np.array([[0, 0], [30, 3], [33, 20], [18, 12], [5, 24], [8, 10.0]])
+    region = shapely.Polygon(cut_ring(shape, kerf, clearance))
+    left = region.buffer(-kerf / 2, quad_segs=64)
+    wanted = shapely.Polygon(shape).buffer(-clearance / 2, join_style="mitre", mitre_limit=9)
+    # the round beam leaves fillets in inner corners, and nothing else
+    assert left.symmetric_difference(wanted).area < 0.5 * max(kerf, clearance) ** 2 + 1e-6

@@ -1,0 +1,185 @@
+"""What Python calls take: result folders, tiles in memory; and what decides a file's format."""
+
+from __future__ import annotations
+
+import io
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from artworks import squirrel, write_run
+from orbiflow.errors import (
+    CertificationError,
+    InputFileError,
+    OrbiflowError,
+    OutputError,
+)
+from orbiflow.tiles import (
+    AnimationSettings,
+    ArtSettings,
+    BendingSettings,
+    EscherTile,
+    ExportSettings,
+    Tile,
+    animate,
+    artwork,
+    draw_art,
+    escherize_class,
+    export,
+    read_result,
+    with_map,
+)
+from orbiflow.tiles import write_run as write_folder
+from orbiflow.tiles.art.source import covered_area
+from outlines import animal
+
+SMALL = ArtSettings(size=(90, 60), tile_size=40.0)
+BARE = BendingSettings(placements=20, held=4, finalists=1, rounds=4)
+
+
+@pytest.fixture(scope="module")
+def found() -> EscherTile:
+    result = escherize_class(animal("squirrel.dat"), "IH4", BARE)
+    assert isinstance(result, EscherTile)
+    return result
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory, found: EscherTile) -> Path:
+    target = animal("squirrel.dat")
+    return write_folder([found], target, tmp_path_factory.mktemp("runs") / "squirrel", BARE)
+
+
+def sources(folder: Path, found: EscherTile) -> list[Any]:
+    return [folder, str(folder), folder / "result.json", read_result(folder), found]
+
+
+def test_a_folder_that_was_written_is_a_run_s(folder: Path, found: EscherTile) -> None:
+    document = json.loads((folder / "result.json").read_text())
+    assert [tile["class"] for tile in document["tiles"]] == ["IH4"]
+    assert document["settings"]["placements"] == 20
+    assert (folder / "IH4" / "model.safetensors").is_file()
+    np.testing.assert_array_equal(read_result(folder).tile.polygon, found.tile.polygon)
+
+
+def test_a_run_takes_the_place_of_an_earlier_one_and_of_nothing_else(
+    tmp_path: Path, found: EscherTile
+) -> None:
+    target, out = animal("squirrel.dat"), tmp_path / "out"
+    for figures in (True, False):
+        write_folder([found], target, out, figures=figures)
+        assert (out / "IH4" / "overlay.pdf").is_file() == figures
+    (out / "notes.txt").write_text("mine")
+    with pytest.raises(OutputError, match=r"notes\.txt, which is of no earlier run"):
+        write_folder([found], target, out)
+    with pytest.raises(OrbiflowError, match="no tile to write"):
+        write_folder([], target, tmp_path / "none")
+
+
+def test_everything_that_holds_a_tile_is_exported_alike(
+    tmp_path: Path, folder: Path, found: EscherTile
+) -> None:
+    settings = ExportSettings(tile_size=30, area=(90, 60))
+    files = [
+        export(source, tmp_path / f"{k}.json", settings).files[0]
+        for k, source in enumerate(sources(folder, found))
+    ]
+    first, *others = (json.loads(file.read_text())["tiles"] for file in files)
+    assert first
+    assert all(other == first for other in others)
+
+
+def test_everything_with_a_map_is_drawn_alike(
+    tmp_path: Path, folder: Path, found: EscherTile
+) -> None:
+    settings = ArtSettings(size=(90, 60), tile_size=40.0, eyes=((210.0, 190.0),))
+    drawn = [
+        draw_art(source, tmp_path / f"{k}.png", settings).read_bytes()
+        for k, source in enumerate(sources(folder, found))
+    ]
+    assert len(set(drawn)) == 1
+    assert Image.open(io.BytesIO(drawn[0])).size == (90, 60)
+
+
+@pytest.mark.parametrize("ending", ["svg", "pdf", "dxf", "png", "json"])
+def test_the_ending_decides_an_export_s_format(
+    ending: str, tmp_path: Path, found: EscherTile
+) -> None:
+    starts = {"svg": b"<?xml", "pdf": b"%PDF", "dxf": b"  0\n", "png": b"\x89PNG", "json": b"{"}
+    settings = ExportSettings(tile_size=30, area=(90, 60), dpi=50)
+    out = export(found, tmp_path / f"a.{ending.upper()}", settings).files[0]
+    assert out.read_bytes().startswith(starts[ending])
+    plain = export(found, tmp_path / "plain", ExportSettings(format="json", tile_size=30))
+    assert plain.files[0].read_bytes().startswith(b"{")
+
+
+def test_the_ending_decides_an_animation_s_format(tmp_path: Path, found: EscherTile) -> None:
+    settings = AnimationSettings(seconds=0.5, fps=4, size=64)
+    assert animate(found, tmp_path / "a.svg", settings).read_text().lstrip().startswith("<")
+    assert animate(found, tmp_path / "a.gif", settings).read_bytes().startswith(b"GIF")
+
+
+def test_an_ending_of_no_format_is_refused_unless_settings_say_it(
+    tmp_path: Path, found: EscherTile
+) -> None:
+    out = tmp_path / "a.xyz"
+    with pytest.raises(
+        OutputError, match=r"a\.xyz ends in \.xyz; give ExportSettings .*\.svg, \.pdf"
+    ):
+        export(found, out)
+    with pytest.raises(OutputError, match=r"a\.xyz ends in \.xyz; give AnimationSettings .*\.gif"):
+        animate(found, out)
+    assert not out.exists()
+    assert export(found, out, ExportSettings(format="json")).files == (out,)
+
+
+def test_a_tile_without_a_map_needs_the_target_for_pictures(tmp_path: Path) -> None:
+    target, tile = animal("squirrel.dat"), squirrel("IH4").tile
+    plain = Tile(tile.polygon, tile.group, "IH4")
+    assert draw_art(plain, tmp_path / "plain.svg", SMALL).is_file()
+    seen = ArtSettings(size=(90, 60), eyes=((210.0, 190.0),))
+    with pytest.raises(OrbiflowError, match="give the search's target as well"):
+        draw_art(plain, tmp_path / "eye.png", seen)
+    assert draw_art(plain, tmp_path / "eye.png", seen, target=target).is_file()
+    assert with_map(plain, target).notes
+
+
+def test_a_rank_of_a_folder_keeps_its_map(tmp_path: Path) -> None:
+    run = write_run(tmp_path / "run", "IH5")
+    assert with_map(read_result(run, "IH5")).bending is not None
+
+
+def test_a_picture_goes_through_the_map(tmp_path: Path, found: EscherTile) -> None:
+    covered = covered_area(found)
+    size = tuple(int(side) for side in np.rint(covered.high - covered.low))
+    painted = tmp_path / "painted.png"
+    Image.new("RGB", (size[0], size[1]), "#ff0000").save(painted)
+    settings = ArtSettings(size=(90, 60), tile_size=40.0, outline=0.0)
+    out = draw_art(found, tmp_path / "red.png", settings, picture=painted)
+    pixels = np.asarray(Image.open(out).convert("RGB"))
+    assert (pixels == (255, 0, 0)).all()
+
+
+def test_mistakes_are_said_before_anything_is_written(tmp_path: Path, found: EscherTile) -> None:
+    out = tmp_path / "a.gif"
+    with pytest.raises(OrbiflowError, match=r"written to a \.png or \.svg, got 'a\.gif'"):
+        draw_art(found, out)
+    with pytest.raises(InputFileError, match="no such file or folder"):
+        export(tmp_path / "none", tmp_path / "a.svg")
+    with pytest.raises(InputFileError, match="no such file"):
+        draw_art(found, tmp_path / "a.png", SMALL, picture=tmp_path / "none.png")
+    bad = Tile(1.01 * found.tile.polygon, found.tile.group, "IH4")
+    with pytest.raises(CertificationError):
+        draw_art(bad, tmp_path / "a.png", SMALL)
+    assert not list(tmp_path.iterdir())
+    assert draw_art(bad, tmp_path / "a.png", SMALL, force=True).is_file()
+
+
+def test_a_notebook_shows_exports_and_artwork(tmp_path: Path, found: EscherTile) -> None:
+    done = export(found, tmp_path / "a.svg", ExportSettings(tile_size=30, area=(90, 60)))
+    assert Image.open(io.BytesIO(done._repr_png_())).size == (600, 400)
+    assert Image.open(io.BytesIO(artwork(found, SMALL)._repr_png_())).size == (90, 60)

@@ -1,0 +1,147 @@
+"""Tilings measured in the files: areas, edges, sizes, layers."""
+
+from __future__ import annotations
+
+import math
+import re
+import xml.etree.ElementTree as ET
+from typing import Any
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from exported import dxf_lines, polygons, svg_lines, tile_of, tiles
+from orbiflow.tiles import (
+    CLASSES,
+    EscherTile,
+    ExportSettings,
+    Tile,
+    colouring,
+    scenes,
+    write_scene,
+)
+from orbiflow.tiles.exporting import longer_side
+
+INKSCAPE = "{http://www.inkscape.org/namespaces/inkscape}"
+SVG = "{http://www.w3.org/2000/svg}"
+
+
+def text_of(tile: Tile | EscherTile, **options) -> str:
+    chosen = ExportSettings(**options)
+    found, _ = scenes(tile, chosen)
+    content = write_scene(found[0], chosen)
+    assert isinstance(content, str)
+    return content
+
+
+@settings(max_examples=15, deadline=None)
+@given(tiles, st.floats(25, 60), st.booleans())
+def test_tiles_cover_the_page_once(tile: Tile, size: float, dxf: bool) -> None:
+    options = {"tile_size": size, "area": (120.0, 90.0), "clip": True}
+    page = shapely.box(0, 0, 120, 90)
+    tolerance = ExportSettings(tile_size=size).deviation
+    if dxf:
+        _, lines = dxf_lines(text_of(tile, format="dxf", **options))
+    else:
+        lines = [line for line in svg_lines(text_of(tile, **options)) if line.layer != "paper"]
+    found = polygons(lines)
+    if dxf:  # cut at the page's edge
+        assert shapely.union_all(found).within(page.buffer(1e-6))
+    pieces = shapely.intersection(found, page)
+    edge = sum(polygon.length for polygon in found)
+    assert shapely.area(pieces).sum() == pytest.approx(page.area, rel=1e-3)
+    # overlaps and gaps are slivers no wider than the rounding of the numbers written
+    missing = page.area - shapely.union_all(pieces, grid_size=1e-6).area
+    width = tolerance / 2 if dxf else 2e-3
+    assert abs(missing) <= edge * width
+    assert shapely.area(pieces).sum() - (page.area - missing) <= edge * width
+
+
+@pytest.mark.parametrize("name", CLASSES)
+def test_edges_that_tiles_share_are_the_same(name: str) -> None:
+    found = polygons([x for x in svg_lines(text_of(tile_of(name))) if x.layer != "paper"])
+    # every point of a boundary within the tiling lies on a neighbour's
+    tree = shapely.STRtree([polygon.exterior for polygon in found])
+    inner = shapely.union_all(found).buffer(-1.0)
+    worst = 0.0
+    for k, polygon in enumerate(found):
+        points: Any = shapely.points(np.asarray(polygon.exterior.coords))
+        points = points[shapely.contains(inner, points)]
+        own, near = tree.query(points, predicate="dwithin", distance=1.0)
+        others = near != k
+        distance = np.full(len(points), np.inf)
+        rings = tree.geometries[near[others]]
+        np.minimum.at(distance, own[others], shapely.distance(points[own[others]], rings))
+        worst = max(worst, distance.max(initial=0))
+    assert worst < 0.003  # mm: the last of the decimals, of matrix and symbol
+
+
+@pytest.mark.parametrize("name", CLASSES)
+def test_sizes_are_what_was_asked_for(name: str) -> None:
+    text = text_of(tile_of(name), tile_size=37.0, area=(210.0, 148.5))
+    root = ET.fromstring(text)
+    assert (root.get("width"), root.get("height")) == ("210mm", "148.5mm")
+    assert root.get("viewBox") == "0 0 210 148.5"
+    for line in svg_lines(text):
+        if line.layer != "paper":
+            assert longer_side(line.points) == pytest.approx(37, abs=0.11)
+            assert (line.points >= 0).all()
+            assert (line.points <= (210, 148.5)).all()
+
+
+def test_one_symbol_and_a_short_line_a_tile_in_layers() -> None:
+    tile = tile_of("IH6")
+    text = text_of(tile, area=(400.0, 300.0), tile_size=20.0)
+    root = ET.fromstring(text)
+    uses = re.findall(r"\n    <use [^\n]*/>", text)
+    assert len(uses) > 200
+    assert max(map(len, uses)) < 120
+    assert len(list(root.iter(f"{SVG}path"))) == 2  # the paper and the symbol
+    layers = [g for g in root.iter(f"{SVG}g") if g.get(f"{INKSCAPE}groupmode") == "layer"]
+    names = [layer.get(f"{INKSCAPE}label") for layer in layers]
+    assert names == ["paper", *(f"colour {k + 1}" for k in range(colouring(tile).count))]
+    assert "C" in next(root.iter(f"{SVG}path")).attrib["d"]
+
+
+def test_the_picture_is_the_way_up_that_the_input_has() -> None:
+    tile = tile_of("IH4")
+    for y_down in (False, True):
+        text = text_of(EscherTile(tile, y_down=y_down), area=(60.0, 60.0))
+        (line, *_) = [x for x in svg_lines(text) if x.layer != "paper"]
+        scale = 40 / longer_side(tile.polygon)
+        flip = np.array([1.0, 1.0 if y_down else -1.0])
+        images = [g(tile.polygon) * flip * scale for g in tile.group.cosets]
+        apart = []
+        for image in images:
+            moved = image - (image.min(axis=0) + image.max(axis=0)) / 2
+            own = line.points - (line.points.min(axis=0) + line.points.max(axis=0)) / 2
+            rings = shapely.LinearRing(moved), shapely.LinearRing(own)
+            apart.append(shapely.hausdorff_distance(*rings))
+        assert min(apart) < 0.15
+
+
+def test_ten_thousand_tiles_are_a_small_file() -> None:
+    text = text_of(tile_of("IH5"), tile_size=5.0, area=(450.0, 450.0), clip=True)
+    count = text.count("<use ")
+    assert 10_000 < count < 20_000
+    assert len(text) < 110 * count
+
+
+def test_decimals_follow_the_tolerance() -> None:
+    tile = tile_of("IH7")
+    coarse, fine = (text_of(tile, tolerance=t) for t in (0.5, 0.0005))
+    assert re.search(r"\d\.\d{5}", fine.split("<use")[0])
+    assert not re.search(r"\d\.\d{4}", coarse.split("<use")[0])
+    assert math.log10(len(fine)) > math.log10(len(coarse))
+
+
+def test_what_the_user_should_know_is_noted() -> None:
+    tile = tile_of("IH4")
+    few = ExportSettings(tile_size=20, area=(100, 80), palette="ff0000")
+    assert "the palette has 1" in scenes(tile, few)[1][-1]
+    assert scenes(tile, ExportSettings(tile_size=20, area=(100, 80)))[1] == ()
+    thin = ExportSettings.preset("laser", tile_size=20, area=(100, 80))
+    assert "0.01 mm hardly show" in scenes(tile, thin)[1][-1]

@@ -1,0 +1,53 @@
+"""Faithfulness: any shape against a silhouette, wherever it lies and its limbs point."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from orbiflow.errors import OrbiflowError
+from orbiflow.tiles import faithfulness, plane_points
+from outlines import animal, bent_squirrel, limb
+
+SQUIRREL = np.asarray(animal("squirrel.dat").normal)
+
+
+@settings(max_examples=4, deadline=None)  # two seconds each: both hands, every turn
+@given(st.floats(0.1, 10), st.floats(-3.2, 3.2), st.booleans(), st.integers(0, len(SQUIRREL) - 1))
+def test_motions_mirrors_and_scale_cost_nothing(
+    scale: float, turn: float, mirrored: bool, first: int
+) -> None:
+    z = np.roll(SQUIRREL, first, axis=0) @ [1, 1j] * scale * np.exp(1j * turn) + 3
+    found = faithfulness(SQUIRREL, plane_points(np.conj(z) if mirrored else z))
+    assert found.score > 0.995
+
+
+def test_a_mirror_image_may_be_asked_to_count() -> None:
+    flipped = SQUIRREL * (-1, 1)
+    assert faithfulness(SQUIRREL, flipped, mirror=False).score < 0.9
+
+
+@pytest.mark.parametrize("name", ["IH1", "IH4", "IH6", "IH28"])
+def test_a_tile_is_judged_as_by_the_points_that_it_was_bent_by(name: str) -> None:
+    case = bent_squirrel(name, False)
+    known = case.bent.fidelity
+    found = faithfulness(SQUIRREL, case.tile.polygon)
+    assert known.score - 0.12 < found.score < known.score + 0.3  # points may lie better
+
+
+def test_a_lost_limb_costs_more_than_a_bent_one() -> None:
+    whole = plane_points(limb())
+    bent, lost = (
+        faithfulness(whole, plane_points(shape)) for shape in (limb(0.2), limb(length=0.05))
+    )
+    assert lost.score < bent.score
+
+
+def test_mistakes_are_named() -> None:
+    bow = [[0, 0], [1, 1], [1, 0], [0, 1]]
+    with pytest.raises(OrbiflowError, match=r"the shape: not a valid polygon"):
+        faithfulness(SQUIRREL, bow)
+    with pytest.raises(OrbiflowError, match=r"the silhouette: needs shape"):
+        faithfulness([1.0, 2.0], SQUIRREL)

@@ -1,0 +1,145 @@
+"""Metrics against closed forms, each other, and a dense sampling."""
+
+import json
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from shapely.geometry import MultiPolygon, Polygon, box
+
+from orbiflow.errors import OrbiflowError
+from orbiflow.tiles import (
+    compare,
+    dice,
+    hausdorff,
+    iou,
+    pixel_accuracy,
+)
+from orbiflow.tiles.likeness.metrics import default_window
+
+SQUARE = np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]])
+
+
+@st.composite
+def star_shapes(draw: st.DrawFn) -> np.ndarray:
+    n = draw(st.integers(3, 24))
+    radii = np.array(draw(st.lists(st.floats(0.3, 1.0), min_size=n, max_size=n)))
+    angle = 2 * np.pi * (np.arange(n) + 0.5) / n
+    return radii[:, None] * np.stack([np.cos(angle), np.sin(angle)], 1)
+
+
+@given(star_shapes(), star_shapes())
+def test_overlap_identities(a: np.ndarray, b: np.ndarray) -> None:
+    value = iou(a, b)
+    assert 0 < value <= 1
+    assert value == pytest.approx(iou(b, a), abs=1e-12)
+    assert iou(a, a) == pytest.approx(1, abs=1e-12)
+    assert dice(a, b) == pytest.approx(2 * value / (1 + value), abs=1e-12)
+    assert pixel_accuracy(a, a) == pytest.approx(1, abs=1e-12)
+
+
+@given(star_shapes(), star_shapes(), st.floats(0, 6.3), st.floats(-5, 5), st.floats(-5, 5))
+@settings(deadline=None)
+def test_rigid_motions_change_nothing(
+    a: np.ndarray, b: np.ndarray, angle: float, dx: float, dy: float
+) -> None:
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    a2, b2 = a @ turn.T + [dx, dy], b @ turn.T + [dx, dy]
+    assert iou(a2, b2) == pytest.approx(iou(a, b), abs=1e-9)
+    assert dice(a2, b2) == pytest.approx(dice(a, b), abs=1e-9)
+    assert hausdorff(a2, b2) == pytest.approx(hausdorff(a, b), abs=1e-5)
+
+
+@given(star_shapes(), star_shapes())
+@settings(max_examples=40, deadline=None)
+def test_hausdorff_is_that_of_the_curves(a: np.ndarray, b: np.ndarray) -> None:
+    value = hausdorff(a, b)
+    assert value == pytest.approx(hausdorff(b, a), abs=4e-6)
+    assert hausdorff(a, a) <= 4e-6
+    # Points every 1e-3 along both boundaries: too small by at most half of that.
+    rings = [shapely.segmentize(Polygon(ring).exterior, 1e-3) for ring in (a, b)]
+    first, second = (shapely.points(shapely.get_coordinates(ring)) for ring in rings)
+    sampled = max(
+        float(shapely.distance(first, Polygon(b).exterior).max()),
+        float(shapely.distance(second, Polygon(a).exterior).max()),
+    )
+    assert sampled - 4e-6 <= value <= sampled + 5e-4
+
+
+def test_hausdorff_inside_an_edge() -> None:
+    # A triangle over the base of a wide roof: every vertex of one is near the other, the farthest
+    # point of the base is in the middle of the edge.
+    base = [[0, 0], [4, 0], [4, -1], [0, -1]]
+    notched = [[0, 0], [2, -0.9], [4, 0], [4, -1], [0, -1]]
+    slope = np.hypot(2, 0.9)
+    # The middle (2, 0) of the edge is 2 * 0.9 / slope from either side of the notch.
+    exact = max(2 * 0.9 / slope, 0.1)
+    assert hausdorff(base, notched) == pytest.approx(exact, abs=1e-5)
+
+
+def test_pixel_accuracy_depends_on_its_window() -> None:
+    half = SQUARE * [1, 0.5]
+    assert default_window(SQUARE).bounds == pytest.approx((-0.4, -0.4, 4.4, 4.4))
+    assert pixel_accuracy(half, SQUARE) == pytest.approx(1 - 8 / 4.8**2)
+    assert pixel_accuracy(half, SQUARE, (0, 0, 4, 4)) == pytest.approx(0.5)
+    assert pixel_accuracy(half, SQUARE, box(0, 0, 8, 8)) == pytest.approx(1 - 8 / 64)
+    assert pixel_accuracy(half, SQUARE, [[0, 0], [4, 0], [4, 2], [0, 2]]) == 1
+
+
+def test_compare() -> None:
+    metrics = compare(SQUARE * [1, 0.5], SQUARE)
+    assert metrics.iou == pytest.approx(0.5)
+    assert metrics.dice == pytest.approx(2 / 3)
+    assert metrics.hausdorff == pytest.approx(2 / 4)
+    assert metrics.window == pytest.approx((-0.4, -0.4, 4.4, 4.4))
+    assert json.loads(json.dumps(metrics.as_dict()))["window"] == list(metrics.window)
+    scaled = compare(SQUARE * [100, 50], SQUARE * 100)
+    assert scaled.hausdorff == pytest.approx(metrics.hausdorff)
+
+
+def test_shapes_with_holes_and_parts() -> None:
+    ring = box(0, 0, 3, 3).difference(box(1, 1, 2, 2))
+    assert isinstance(ring, Polygon)
+    assert iou(ring, box(0, 0, 3, 3)) == pytest.approx(8 / 9)
+    assert hausdorff(ring, box(0, 0, 3, 3)) == pytest.approx(1)
+    two = MultiPolygon([box(0, 0, 1, 1), box(2, 0, 3, 1)])
+    assert dice(two, box(0, 0, 3, 1)) == pytest.approx(4 / 5)
+    assert iou(box(0, 0, 1, 1), box(5, 5, 6, 6)) == 0
+
+
+BOWTIE = [[0, 0], [2, 2], [2, 0], [0, 2]]
+
+
+@pytest.mark.parametrize(
+    ("bad", "message"),
+    [
+        (BOWTIE, "not a valid polygon: Self-intersection"),
+        (Polygon(BOWTIE), "not a valid polygon"),
+        ([[0, 0], [1, 1]], r"\(N, 2\)"),
+        ([[0, 0], [1, 1], [np.nan, 0]], "finite"),
+        (Polygon(), "no area"),
+        ("circle", "not a polygon"),
+        ([[0, 0], [1, 0], [2]], "not a polygon"),
+    ],
+)
+@pytest.mark.parametrize("metric", [iou, dice, pixel_accuracy, hausdorff])
+def test_the_bad_argument_is_named(metric, bad: object, message: str) -> None:
+    with pytest.raises(OrbiflowError, match=f"^a: .*{message}"):
+        metric(bad, SQUARE)
+    with pytest.raises(OrbiflowError, match=f"^b: .*{message}"):
+        metric(SQUARE, bad)
+
+
+def test_compare_names_its_own_arguments() -> None:
+    with pytest.raises(OrbiflowError, match=r"^tile: "):
+        compare(BOWTIE, SQUARE)
+    with pytest.raises(OrbiflowError, match=r"^target: "):
+        compare(SQUARE, BOWTIE)
+
+
+@pytest.mark.parametrize("window", [(0, 0, np.inf, 1), (0, 0, 0, 1), (1, 2, 3), BOWTIE])
+def test_bad_windows(window: object) -> None:
+    with pytest.raises(OrbiflowError, match=r"^window: "):
+        pixel_accuracy(SQUARE, SQUARE, window)  # type: ignore[arg-type]

@@ -1,0 +1,123 @@
+"""The ranking score, and short lists without twins."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from shapely.geometry import Polygon, box
+
+from orbiflow.errors import OrbiflowError
+from orbiflow.tiles import (
+    diverse,
+    rank_score,
+    tile_similarity,
+)
+from orbiflow.tiles.likeness.ranking import OTHER_CLASS
+
+SHARES = st.floats(0, 1)
+
+
+@given(SHARES, SHARES, SHARES)
+def test_rank_score_rises_with_both(iou: float, found: float, more: float) -> None:
+    value = rank_score(iou, found)
+    assert 0 <= value <= 1
+    assert min(iou, found) - 1e-12 <= value <= max(iou, found) + 1e-12
+    assert rank_score(max(iou, more), found) >= value
+    assert rank_score(iou, max(found, more)) >= value
+    assert rank_score(iou, 0) == rank_score(0, found) == 0
+
+
+@pytest.mark.parametrize("bad", [-0.1, 1.1, np.nan])
+def test_rank_score_names_what_is_out_of_range(bad: float) -> None:
+    with pytest.raises(OrbiflowError, match=r"^iou must be from 0 to 1"):
+        rank_score(bad, 0.5)
+    with pytest.raises(OrbiflowError, match=r"^recognisability must be from 0 to 1"):
+        rank_score(0.5, bad)
+
+
+@st.composite
+def pools(draw: st.DrawFn) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Scores (n,) and a symmetric matrix (n, n) of similarities."""
+    n = draw(st.integers(1, 10))
+    scores = draw(st.lists(SHARES, min_size=n, max_size=n))
+    upper = np.array(draw(st.lists(SHARES, min_size=n * n, max_size=n * n))).reshape(n, n)
+    return np.array(scores), np.maximum(upper, upper.T)
+
+
+@given(pools(), st.integers(1, 12), SHARES, st.floats(0, 2))
+def test_the_best_is_first_and_no_two_are_twins(
+    pool: tuple[NDArray[np.float64], NDArray[np.float64]], count: int, twin: float, variety: float
+) -> None:
+    scores, alike = pool
+    chosen = diverse(scores, count, lambda i, j: alike[i, j], twin=twin, variety=variety)
+    assert chosen[0] == np.argmax(scores)
+    assert len(set(chosen)) == len(chosen) <= count
+    assert all(alike[i, j] <= twin for k, i in enumerate(chosen) for j in chosen[:k])
+    if len(chosen) < count:  # then every other one is the twin of a chosen one
+        rest = set(range(len(scores))) - set(chosen)
+        assert all(max(alike[i, j] for j in chosen) > twin for i in rest)
+
+
+@given(pools(), st.integers(1, 12))
+def test_without_variety_and_twins_it_is_a_sort(
+    pool: tuple[NDArray[np.float64], NDArray[np.float64]], count: int
+) -> None:
+    scores, alike = pool
+    chosen = diverse(scores, count, lambda i, j: alike[i, j], twin=1, variety=0)
+    assert chosen == list(np.argsort(-scores, kind="stable")[:count])
+
+
+def test_variety_is_weighed_against_the_score() -> None:
+    alike = np.array([[1, 0.9, 0.4], [0.9, 1, 0.4], [0.4, 0.4, 1]])
+    scores = [0.8, 0.79, 0.75]
+    assert diverse(scores, 2, lambda i, j: alike[i, j], variety=0.05) == [0, 1]
+    assert diverse(scores, 2, lambda i, j: alike[i, j], variety=0.1) == [0, 2]
+
+
+@given(st.floats(0.01, 1), st.floats(0.01, 1))
+@settings(max_examples=30)
+def test_tile_similarity_is_iou_and_less_between_classes(a: float, b: float) -> None:
+    tiles = [box(0, 0, a, 1), box(0, 0, b, 1), box(0, 0, b, 1)]
+    alike = tile_similarity(tiles, ["IH4", "IH4", "IH6"])
+    share = min(a, b) / max(a, b)
+    assert alike(0, 1) == pytest.approx(share)
+    assert alike(1, 0) == pytest.approx(share)
+    assert alike(0, 2) == pytest.approx(OTHER_CLASS * share)
+
+
+def test_twins_of_one_class_only() -> None:
+    square, other = box(0, 0, 1, 1), Polygon([(0, 0), (1, 0), (1, 1.01), (0, 1)])
+    scores = [0.8, 0.79, 0.78, 0.1]
+    tiles = [square, other, other, box(0, 0, 3, 1)]
+    chosen = diverse(scores, 9, tile_similarity(tiles, ["IH4", "IH4", "IH1", "IH4"]))
+    assert chosen == [0, 2, 3]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"scores": [[0.1]]}, "^scores: "),
+        ({"scores": [np.nan]}, "^scores: "),
+        ({"scores": ["best"]}, "^scores: "),
+        ({"count": 0}, "^count must be at least 1"),
+        ({"twin": 1.5}, "^twin must be from 0 to 1"),
+        ({"variety": -1.0}, "^variety must be at least 0"),
+        ({"variety": np.inf}, "^variety must be at least 0"),
+    ],
+)
+def test_bad_arguments(change: dict[str, object], message: str) -> None:
+    arguments: dict[str, object] = {"scores": [0.5], "count": 1, "similarity": lambda _i, _j: 0.0}
+    with pytest.raises(OrbiflowError, match=message):
+        diverse(**(arguments | change))  # type: ignore[arg-type]
+
+
+def test_bad_tiles() -> None:
+    with pytest.raises(OrbiflowError, match="2 tiles but 1 classes"):
+        tile_similarity([box(0, 0, 1, 1)] * 2, ["IH4"])
+    with pytest.raises(OrbiflowError, match=r"^tile 1: not a valid polygon"):
+        tile_similarity([box(0, 0, 1, 1), [[0, 0], [2, 2], [2, 0], [0, 2]]], ["IH4", "IH4"])
+
+
+def test_no_candidates() -> None:
+    assert diverse([], 3, lambda _i, _j: 0.0) == []

@@ -1,0 +1,164 @@
+"""The narrowest places of polygons, and how much of their outline is hair."""
+
+import time
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from awkward import NOT_SIMPLE, USELESS
+from orbiflow.arrays import Array
+from orbiflow.errors import OrbiflowError
+from orbiflow.symmetry import rotation_matrix
+from orbiflow.tiles import (
+    hair_share,
+    narrowest_neck,
+    narrowest_slit,
+    resampled,
+    ring_length,
+    signed_area,
+    slit_share,
+)
+from orbiflow.tiles.likeness import least_neck
+from orbiflow.tiles.likeness.thinnest import APART, STEP
+from outlines import ANIMALS, SHAPES, animal, bar, comb, disc, dumbbell, slit_square, star
+
+widths = st.floats(0.005, 0.2)
+
+
+@given(st.floats(0.01, 1.0), st.floats(1.0, 30.0))
+def test_a_bar_is_as_thin_as_it_is_wide(width: float, aspect: float) -> None:
+    found = narrowest_neck(bar(aspect * width, width))
+    assert found.width == pytest.approx(width, rel=2e-4)
+    assert found.share == pytest.approx(aspect**-0.5, rel=2e-4)
+    assert np.linalg.norm(found.ends[1] - found.ends[0]) == pytest.approx(found.width)
+    assert narrowest_slit(bar(aspect * width, width)) is None
+
+
+@given(widths, st.floats(0.001, 2.0))
+def test_a_dumbbell_is_as_thin_as_its_neck(neck: float, length: float) -> None:
+    found = narrowest_neck(dumbbell(neck, length))
+    assert found.width == pytest.approx(neck, rel=1e-9)
+    x, y = found.place
+    assert 1 <= round(x, 9) <= 1 + length + 1e-9
+    assert y == pytest.approx(0.5)
+
+
+@given(widths, widths, st.floats(1.2, 2.0))
+def test_a_comb_has_necks_and_slits(width: float, gap: float, length: float) -> None:
+    ring = comb(5, width, gap, length, back=0.3)
+    slit = narrowest_slit(ring)
+    assert narrowest_neck(ring).width == pytest.approx(width, rel=1e-9)
+    assert slit is not None
+    assert slit.width == pytest.approx(gap, rel=1e-9)
+
+
+@given(st.floats(0.001, 0.1))
+def test_a_slit_is_seen_from_outside(width: float) -> None:
+    ring = slit_square(width, 0.8)
+    slit = narrowest_slit(ring)
+    assert slit is not None
+    assert slit.width == pytest.approx(width, rel=1e-9)
+    assert slit.place[0] == pytest.approx(0.5)
+    assert narrowest_neck(ring).width == pytest.approx(0.2)
+
+
+@pytest.mark.parametrize("name", ["triangle", "square", "disc", "star"])
+def test_corners_are_no_necks(name: str) -> None:
+    found = narrowest_neck(SHAPES[name])
+    assert found.share > 0.6
+    assert narrowest_slit(SHAPES[name]) is None
+    assert hair_share(SHAPES[name], 0.02) == 0
+    assert slit_share(SHAPES[name], 0.02) == 0
+
+
+def test_a_spike_is_measured_where_it_is_long_enough() -> None:
+    ring = star(9, 0.25)
+    edges = np.diff(np.vstack([ring[-1:], ring[:2]]), axis=0)
+    cosine = -(edges[0] @ edges[1]) / np.prod(np.linalg.norm(edges, axis=1))
+    opening = np.arccos(cosine)
+    exact = APART * np.sin(opening / 2)
+    assert exact <= narrowest_neck(ring).share <= (1 + 2 * STEP / APART) * exact
+
+
+@pytest.mark.parametrize("name", [*SHAPES, *ANIMALS])
+@settings(max_examples=4)
+@given(turn=st.floats(-3, 3), scale=st.floats(1e-3, 1e3), x=st.floats(-10, 10))
+def test_similar_shapes_are_alike(name: str, turn: float, scale: float, x: float) -> None:
+    ring = SHAPES[name] if name in SHAPES else np.asarray(animal(name).normal)
+    moved = scale * (ring @ rotation_matrix(turn).T + [x, -x])
+    for function in (narrowest_neck, narrowest_slit):
+        before, after = function(ring), function(moved[::-1])
+        assert (before is None) == (after is None)
+        if before is not None and after is not None:
+            assert after.width == pytest.approx(scale * before.width, rel=2e-3)
+            assert after.share == pytest.approx(before.share, rel=2e-3)
+    for share in (hair_share, slit_share):
+        assert share(moved, 0.03 * scale) == pytest.approx(share(ring, 0.03), abs=1e-3)
+
+
+@given(st.floats(0.002, 0.009), st.floats(0.1, 1.5))
+def test_hairs_are_counted_by_length(width: float, length: float) -> None:
+    ring = comb(4, width, 0.3, length)
+    expected = 4 * (2 * length + width) / ring_length(ring)
+    # a disc in the back does not reach where the outer teeth's sides go on
+    assert hair_share(ring, 0.01) == pytest.approx(expected, abs=0.025 / ring_length(ring))
+    assert hair_share(ring, 0.9 * width) == 0
+    assert slit_share(ring, 0.2) == 0
+    assert slit_share(ring, 0.31) == pytest.approx(
+        3 * (2 * length + 0.3) / ring_length(ring) if 2 * length + 0.3 > 5 * 0.31 else 0, rel=2e-2
+    )
+
+
+@pytest.mark.parametrize("width", [0.005, 0.009])
+def test_a_thin_neck_is_hair(width: float) -> None:
+    ring = dumbbell(width, 0.5)
+    assert hair_share(ring, 0.01) == pytest.approx(1.0 / ring_length(ring), rel=1e-2)
+
+
+def test_a_slit_is_counted_by_length() -> None:
+    ring = slit_square(0.005, 0.8)
+    assert slit_share(ring, 0.01) == pytest.approx(1.605 / ring_length(ring), rel=1e-2)
+    assert hair_share(ring, 0.01) == 0
+
+
+def blob(count: int) -> Array:
+    turns = 2 * np.pi * np.arange(count) / count
+    radii = 1 + 0.3 * np.cos(7 * turns) + 0.1 * np.sin(12 * turns)
+    return radii[:, None] * np.stack([np.cos(turns), np.sin(turns)], axis=-1)
+
+
+@pytest.mark.parametrize(
+    "ring", [disc(1000), blob(1000), resampled(animal(ANIMALS[1]).normal, 1000)]
+)
+def test_quick_enough_for_a_list_of_tiles(ring: Array) -> None:
+    start = time.process_time()  # what else runs on the machine does not count
+    narrowest_neck(ring)
+    hair_share(ring, 0.01 * float(np.sqrt(abs(signed_area(ring)))))
+    assert time.process_time() - start < 1.0  # about 0.05 s
+
+
+@pytest.mark.parametrize("case", [*USELESS, *NOT_SIMPLE])
+def test_what_is_no_polygon_is_refused(case: str) -> None:
+    ring = USELESS[case] if case in USELESS else NOT_SIMPLE[case]
+    for function in (narrowest_neck, narrowest_slit):
+        with pytest.raises(OrbiflowError):
+            function(ring)
+    for share in (hair_share, slit_share):
+        with pytest.raises(OrbiflowError):
+            share(ring, 0.01)
+
+
+def test_a_width_is_positive() -> None:
+    for share in (hair_share, slit_share):
+        with pytest.raises(OrbiflowError, match="width must be"):
+            share(SHAPES["square"], 0.0)
+
+
+def test_the_least_neck_of_an_outline_with_very_many_points() -> None:
+    """A photo's outline: its steps are smaller than what is looked for."""
+    plain = bar(20.0, 0.2)
+    dense = resampled(plain, 20_000)
+    assert least_neck(dense, 0.01) == pytest.approx(least_neck(plain, 0.01), rel=0.05)
+    assert least_neck(dense, 0.1) == 0.1

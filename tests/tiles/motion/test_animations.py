@@ -1,0 +1,219 @@
+"""Animations: loops of the length asked for, full of tiles, in files that programs open."""
+
+from __future__ import annotations
+
+import io
+import itertools
+import re
+import stat
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from PIL import Image, ImageSequence
+
+from orbiflow.drawing import palette
+from orbiflow.errors import CertificationError, OrbiflowError
+from orbiflow.tiles import (
+    AnimationSettings,
+    BendingSettings,
+    EscherTile,
+    Target,
+    Tile,
+    animate,
+    animation,
+    escherize_class,
+)
+from orbiflow.tiles.motion.animations import motion
+from orbiflow.tiles.motion.kinds import (
+    eased,
+    frames,
+    morph,
+    progress,
+)
+from orbiflow.tiles.motion.writers import picture
+from orbiflow.tiles.pictures import BendingWay
+from swirled_tiles import is_sound, swirled, swirled_tile
+
+BOOT = [(60, 20), (210, 20), (230, 80), (170, 95), (160, 190), (100, 145), (45, 80)]
+SVG = "{http://www.w3.org/2000/svg}"
+SMALL = {"seconds": 1.0, "fps": 10.0, "size": 120}
+
+
+@pytest.fixture(scope="module", name="bent")
+def bent_fixture() -> EscherTile:
+    small = BendingSettings(placements=20, held=4, finalists=1, rounds=4)
+    found = escherize_class(Target.from_polygon(BOOT, y_down=True), "IH4", small)
+    assert isinstance(found, EscherTile)
+    return found
+
+
+@settings(max_examples=20)
+@given(swirled, st.floats(0, 1), st.booleans())
+def test_every_picture_of_a_morph_is_full(tile: Tile, share: float, steady: bool) -> None:
+    assume(is_sound(tile))
+    moving = morph(tile, 150, steady=steady)
+    own = palette("lagoon")._replace(paper="#ff00ff")
+    image = np.asarray(picture(moving, own, share).image()).astype(int)
+    paper = np.abs(image - (255, 0, 255)).max(axis=-1) < 40
+    assert paper.sum() == 0
+    assert len(moving.colours) == len(moving.places(share).offset)
+
+
+@given(st.floats(0.5, 20), st.floats(1, 40))
+def test_a_loop_lasts_as_long_as_asked(seconds: float, fps: float) -> None:
+    loop = frames(seconds, fps)
+    assert sum(frame.seconds for frame in loop) == pytest.approx(seconds)
+    assert loop[0].progress == 0
+    assert [f.progress for f in loop[1:]] == [f.progress for f in reversed(loop[1:])]
+    assert max(f.progress for f in loop) == 1
+
+
+@given(st.floats(0, 1))
+def test_progress_is_there_and_back(time: float) -> None:
+    assert 0 <= progress(time) <= 1
+    assert eased(1 - time) == pytest.approx(1 - eased(time), abs=1e-12)
+
+
+@pytest.mark.parametrize("kind", ["morph", "bend", "grow"])
+def test_a_gif(bent: EscherTile, kind, tmp_path: Path) -> None:
+    out = animate(bent, tmp_path / "a.gif", AnimationSettings(kind=kind, **SMALL))
+    with Image.open(out) as image:
+        assert image.size == (120, 80)
+        assert image.info["loop"] == 0
+        shown = [np.asarray(f.convert("RGB")).astype(int) for f in ImageSequence.Iterator(image)]
+        lasting = [f.info["duration"] for f in ImageSequence.Iterator(image)]
+    assert sum(lasting) == pytest.approx(1000, abs=30)
+    middle = len(shown) // 2
+    assert np.abs(shown[0] - shown[middle]).mean() > 5  # something is seen to move
+    assert np.abs(shown[1] - shown[-1]).max() == 0  # there and back
+    assert [path.name for path in tmp_path.iterdir()] == ["a.gif"]
+
+
+def numbers(text: str | None) -> list[float]:
+    return [float(value) for value in (text or "").split(";")]
+
+
+@pytest.mark.parametrize("kind", ["morph", "bend", "grow"])
+def test_an_svg(bent: EscherTile, kind) -> None:
+    text = animation(bent, AnimationSettings(format="svg", kind=kind))
+    assert isinstance(text, str)
+    assert "prefers-reduced-motion: reduce" in text
+    assert "<script" not in text
+    assert "http" not in text.replace("http://www.w3.org/2000/svg", "")
+    root = ElementTree.fromstring(text)
+    ids = [e.get("id") for e in root.iter() if e.get("id")]
+    assert len(set(ids)) == len(ids)
+    assert all(name and name.startswith("ih4-") for name in ids)
+    assert {e.get("href", "")[1:] for e in root.iter(f"{SVG}use")} <= set(ids)
+    moving = [e for name in ("animate", "animateTransform") for e in root.iter(SVG + name)]
+    assert moving
+    for element in moving:
+        times = numbers(element.get("keyTimes"))
+        values = (element.get("values") or "").split(";")
+        assert len(times) == len(values)
+        assert times == sorted(times)
+        assert (times[0], times[-1]) == (0, 1)
+        assert values[0] == values[-1]
+        splines = element.get("keySplines")
+        assert splines is None or len(splines.split(";")) == len(times) - 1
+        if element.get("attributeName") == "d":
+            assert len({len(re.findall(",", value)) for value in values}) == 1
+    groups = {e.get("class"): e for e in root.iter(f"{SVG}g") if e.get("class")}
+    uses = [sum(1 for _ in groups[name].iter(f"{SVG}use")) for name in ("moving", "still")]
+    assert uses[0] == uses[1] > 5
+    assert len(text) < 500_000
+
+
+@pytest.mark.parametrize("name", ["IH1", "IH5", "IH21"])
+def test_colours_of_neighbours_differ_throughout(name: str) -> None:
+    moving = morph(swirled_tile(name, 3, 0.1), 200)
+    for share in (0.0, 0.5, 1.0):
+        shown = [(shapely.Polygon(ring), colour) for ring, colour, _ in moving.rings(share)]
+        size = shown[0][0].area ** 0.5
+        beside = 0
+        for (one, own), (other, its) in itertools.combinations(shown, 2):
+            shared = one.buffer(1e-3 * size).intersection(other.buffer(1e-3 * size)).area
+            if shared > 0.05 * 2e-3 * size * size:
+                beside += 1
+                assert own != its
+            assert one.intersection(other).area < 1e-6 * size**2
+        assert beside > len(shown)
+
+
+def test_a_silhouette_bends_from_rest_to_tile(bent: EscherTile) -> None:
+    bending = bent.bending
+    assert bending is not None
+    way = BendingWay(bending)
+    assert np.abs(way.at(0.0) - bending.rest[way.ring]).max() < 1e-9
+    assert np.abs(way.at(1.0) - bending.images[way.ring]).max() < 1e-9
+    whole = motion(bent, AnimationSettings(kind="bend", size=200))
+    ring = whole.outline(1.0) @ whole.places(1.0).linear[0].T + whole.places(1.0).offset[0]
+    assert ring.min() > 0
+    assert whole.grown(0.0).tolist()[0] == 1
+    assert whole.grown(0.0)[1:].max() == 0
+    assert whole.grown(1.0).min() == 1
+
+
+def test_what_cannot_be_animated_says_why(bent: EscherTile, monkeypatch) -> None:
+    plain = Tile(bent.tile.polygon, bent.tile.group)
+    with pytest.raises(OrbiflowError, match="class is not known"):
+        animation(plain, AnimationSettings(**SMALL))
+    with pytest.raises(
+        OrbiflowError, match="no bent silhouette: only tiles of a search for likeness"
+    ):
+        animation(EscherTile(bent.tile), AnimationSettings(kind="bend", **SMALL))
+    crossed = Tile(0.9 * bent.tile.polygon, bent.tile.group, "IH4")
+    with pytest.raises(CertificationError, match=r"is not certified .* --force animates it"):
+        animation(crossed, AnimationSettings(**SMALL))
+    monkeypatch.setenv("PATH", "")
+    with pytest.raises(OrbiflowError, match="an MP4 needs ffmpeg, which is not installed"):
+        animation(bent, AnimationSettings(format="mp4", **SMALL))
+
+
+@pytest.mark.parametrize(
+    ("bad", "message"),
+    [
+        ({"format": "webm"}, "format must be one of gif, mp4, svg"),
+        ({"kind": "jump"}, "kind must be one of"),
+        ({"seconds": 0}, "seconds"),
+        ({"fps": 1000}, "fps"),
+        ({"size": 801}, "size must be even"),
+        ({"size": 1.5}, "size"),
+        ({"palette": "mud"}, "unknown palette"),
+        ({"seconds": 120, "fps": 60}, "more than 2400"),
+    ],
+)
+def test_settings_that_cannot_be_used(bad, message: str) -> None:
+    with pytest.raises(OrbiflowError, match=message):
+        AnimationSettings(**bad)
+
+
+FFMPEG = """#!/bin/sh
+for last; do :; done
+{ echo "$@"; wc -c; } > "$last"
+"""
+
+
+def test_an_mp4_is_what_ffmpeg_makes_of_all_frames(
+    bent: EscherTile, tmp_path: Path, monkeypatch
+) -> None:
+    fake = tmp_path / "bin" / "ffmpeg"
+    fake.parent.mkdir()
+    fake.write_text(FFMPEG)
+    fake.chmod(fake.stat().st_mode | stat.S_IXUSR)
+    monkeypatch.setenv("PATH", f"{fake.parent}:/usr/bin:/bin")
+    made = animation(bent, AnimationSettings(format="mp4", **SMALL))
+    assert isinstance(made, bytes)
+    said, size = io.BytesIO(made).read().decode().splitlines()
+    assert "-s 120x80 -r 10" in said
+    count, rest = divmod(int(size), 120 * 80 * 3)
+    assert rest == 0
+    assert count == pytest.approx(10, abs=2)
+    fake.write_text("#!/bin/sh\necho 'no such codec' >&2\nexit 1\n")
+    with pytest.raises(OrbiflowError, match="ffmpeg failed: no such codec"):
+        animation(bent, AnimationSettings(format="mp4", **SMALL))

@@ -1,0 +1,105 @@
+"""From template to tile: every frame tiles the plane, whichever way is taken."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from orbiflow.errors import OrbiflowError
+from orbiflow.tiles import (
+    CLASSES,
+    Tile,
+    certify,
+    isohedral_class,
+)
+from orbiflow.tiles.motion.morph import Morph, Orbits
+from orbiflow.tiles.search import OwnFrame
+from swirled_tiles import is_sound, swirled, swirled_tile
+
+
+@settings(max_examples=40)
+@given(swirled, st.lists(st.floats(0, 1), min_size=2, max_size=4))
+def test_every_frame_tiles(tile: Tile, shares: list[float]) -> None:
+    assume(is_sound(tile))
+    morph = Morph(OwnFrame.of(tile))
+    for share in (0.0, 1.0, *shares):
+        frame = morph.at(share)
+        frame.check()
+        assert certify(frame.tile(), tolerance=1e-6).valid
+
+
+@pytest.mark.parametrize("name", CLASSES)
+def test_where_the_straight_way_crosses_itself(name: str) -> None:
+    """Of each class a tile whose straight way does, and frame after frame of the other."""
+    for seed, strength in itertools.product(range(30), (0.3, 0.5, 0.7)):
+        tile = swirled_tile(name, seed, strength, per_edge=16)
+        if not is_sound(tile):
+            continue
+        morph = Morph(OwnFrame.of(tile))
+        if not morph.is_straight:
+            break
+    else:
+        pytest.skip("no such tile among these")
+    frames = [morph.at(float(share)) for share in np.linspace(0, 1, 13)]
+    for frame in frames:
+        certificate = certify(frame.tile(), tolerance=1e-6)
+        assert certificate.valid, certificate.reasons
+    steps = [
+        np.sqrt(((b.points - a.points) ** 2).sum(axis=1).mean())
+        for a, b in itertools.pairwise(frames)
+    ]
+    assert max(steps) < 4 * min(steps)  # it moves about evenly
+
+
+@given(swirled)
+def test_the_ends_are_the_template_and_the_tile(tile: Tile) -> None:
+    assume(is_sound(tile))
+    own = OwnFrame.of(tile)
+    assert np.abs(own.tile().polygon - tile.polygon).max() < 1e-9
+    morph = Morph(own)
+    end = morph.at(1.0).tile()
+    assert abs(abs(end.signed_area) - abs(tile.signed_area)) < 1e-9 * abs(tile.signed_area)
+    start = morph.at(0.0)
+    for k in range(len(start.starts)):
+        edge = start.edge(k)
+        along, away = edge[-1] - edge[0], edge - edge[0]
+        off = np.abs(along[0] * away[:, 1] - along[1] * away[:, 0]) / (along @ along)
+        assert off.max() < 2e-2  # straight, or nearly
+    if morph.is_straight:
+        corners = start.points[list(start.starts)]
+        assert np.abs(corners - own.kind.template()).max() < 1e-12
+
+
+@given(swirled, st.sets(st.integers(0, 119), min_size=1, max_size=9))
+def test_refining_keeps_edges_identified(tile: Tile, sides: set[int]) -> None:
+    own = OwnFrame.of(tile)
+    finer = own.refined(sides)
+    finer.check()
+    assert len(finer.points) >= len(own.points) + len(sides)
+    assert np.abs(finer.tile().signed_area - tile.signed_area) < 1e-9 * abs(tile.signed_area)
+
+
+@given(swirled)
+def test_orbits_give_the_vertices_back(tile: Tile) -> None:
+    own = OwnFrame.of(tile)
+    orbits = Orbits.of(own)
+    assert np.abs(orbits.spread(own.points) - own.points).max() < 1e-6
+    assert (orbits.source[orbits.source] == orbits.source).all()
+
+
+def test_tiles_of_no_class_are_refused() -> None:
+    kind = isohedral_class("IH4")
+    template = kind.template()
+    with pytest.raises(OrbiflowError, match="class is not known"):
+        OwnFrame.of(Tile(template, kind.group()))
+    with pytest.raises(OrbiflowError, match="corners or group"):
+        OwnFrame.of(Tile(template, kind.group(), "IH4", (0, 1, 2)))
+    with pytest.raises(OrbiflowError, match="not in the order"):
+        OwnFrame.of(Tile(template, kind.group(), "IH4", (0, 1, 2, 3, 5, 4)))
+    bent = template + np.array([[0.0, 0.1], *[[0.0, 0.0]] * 5])
+    with pytest.raises(OrbiflowError, match="not images of each other"):
+        OwnFrame.of(Tile(bent, kind.group(), "IH4", (0, 1, 2, 3, 4, 5)))

@@ -1,0 +1,188 @@
+"""The overview and the page of a run: complete, self-contained, and proof against odd names."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from orbiflow.tiles import (
+    BendingSettings,
+    ClassFailure,
+    EscherTile,
+    OccupancySettings,
+    Target,
+    escherize_class,
+    folder_names,
+    index_page,
+    is_poor,
+    overview_png,
+    write_gallery,
+    written_files,
+)
+from orbiflow.tiles.pages.overview import measures
+
+BOOT = [(60, 20), (210, 20), (230, 80), (170, 95), (160, 190), (100, 145), (45, 80)]
+VOID = {"meta", "link", "img", "br", "path", "hr"}
+ODD = 'a "boot" <script>&.png'
+
+
+class Page(HTMLParser):
+    """What a page holds; every tag must be closed."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
+        self.words = ""
+        self.feed(text)
+        self.close()
+        assert self.open == []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append((tag, dict(attrs)))
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        if tag not in VOID:
+            assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        if self.open and self.open[-1] != "style":
+            self.words += data
+
+    def all(self, tag: str) -> list[dict[str, str | None]]:
+        return [attributes for name, attributes in self.tags if name == tag]
+
+
+@pytest.fixture(scope="module", name="target")
+def target_fixture() -> Target:
+    return Target.from_polygon(BOOT, y_down=True, source=f"some/{ODD}")
+
+
+@pytest.fixture(scope="module", name="bent")
+def bent_fixture(target: Target) -> EscherTile:
+    small = BendingSettings(placements=20, held=4, finalists=1, rounds=4)
+    found = escherize_class(target, "IH4", small)
+    assert isinstance(found, EscherTile)
+    return found
+
+
+@pytest.fixture(scope="module", name="flowed")
+def flowed_fixture(target: Target) -> EscherTile:
+    few = OccupancySettings(iterations=4, turns=1, max_frequency=2)
+    found = escherize_class(target, "IH6", few)
+    assert isinstance(found, EscherTile)
+    return found
+
+
+def test_a_page_names_everything_and_refers_to_what_is_there(
+    target: Target, bent: EscherTile, flowed: EscherTile, tmp_path: Path
+) -> None:
+    failed = [ClassFailure("IH21", "it <crosses> itself")]
+    write_gallery([bent, flowed, bent], target, tmp_path, failures=failed, figures=True)
+    (tmp_path / "result.json").write_text("{}")
+    page = Page((tmp_path / "index.html").read_text("utf-8"))
+    assert ODD in page.words
+    assert "IH21: it <crosses> itself" in page.words
+    assert {"html", "title", "main", "header", "nav", "style"} <= {tag for tag, _ in page.tags}
+    assert page.all("html")[0]["lang"] == "en"
+    assert page.all("script") == page.all("link") == []
+    pictures = page.all("img")
+    assert all(picture["alt"] for picture in pictures)
+    assert len(pictures) == 3 * 3 + 1  # one has a flow
+    ids = {attributes.get("id") for _, attributes in page.tags}
+    assert [a["id"] for a in page.all("article")[:3]] == ["IH4", "IH6", "IH4-2"]
+    for reference in [a["href"] for a in page.all("a")] + [p["src"] for p in pictures]:
+        assert reference
+        if reference.startswith("#"):
+            assert reference[1:] in ids
+        else:
+            assert (tmp_path / reference).is_file()
+    written = {p.relative_to(tmp_path).as_posix() for p in tmp_path.rglob("*") if p.is_file()}
+    assert sum("field.png" in name for name in written) == 1
+    assert {"IH4-2/tile.svg", "overview.png", "index.html"} <= written
+
+
+def test_what_is_not_certified_says_so(target: Target, flowed: EscherTile) -> None:
+    bad = replace(flowed.certificate, reasons=("it <overlaps> itself",))
+    uncertified = replace(flowed)
+    vars(uncertified)["certificate"] = bad  # no real reason has characters to escape
+    page = Page(index_page([uncertified], target, ["IH6"]))
+    assert "Not certified: it <overlaps> itself." in page.words
+
+
+def test_after_a_search_for_both_the_page_says_what_for(
+    target: Target, bent: EscherTile, flowed: EscherTile
+) -> None:
+    both = [replace(bent, front=True), replace(flowed, front=False)]
+    page = Page(index_page(both, target, ["IH4", "IH6"]))
+    assert "found for likeness: no other beats it in both" in page.words
+    assert "found for overlap: near the best" in page.words
+    assert {"href": "front.png"} in page.all("a")
+    assert {"href": "front.png"} not in Page(index_page([bent], target, ["IH4"])).all("a")
+
+
+def test_measures_have_words(bent: EscherTile, flowed: EscherTile) -> None:
+    for result in (bent, flowed):
+        for measure in measures(result):
+            assert all(measure)
+    names = [measure.name for measure in measures(bent)]
+    assert names[:2] == ["Score", "Deformation"]
+    assert "Deformation" not in [measure.name for measure in measures(flowed)]
+
+
+@pytest.mark.parametrize(("count", "size"), [(1, 1320), (2, 1920), (3, 1920), (7, 1920)])
+def test_an_overview_of_any_number(
+    target: Target, bent: EscherTile, flowed: EscherTile, count: int, size: int
+) -> None:
+    picture = Image.open(io.BytesIO(overview_png(([bent, flowed] * 4)[:count], target)))
+    assert picture.width == size
+    assert 600 < picture.height < 2100
+    assert len(picture.getcolors(2**24) or []) > 50
+
+
+@pytest.mark.parametrize("wide", [1.0, 90.0, 1 / 90])
+def test_an_overview_of_a_long_silhouette(flowed: EscherTile, wide: float) -> None:
+    ring = np.array(BOOT) * (wide**0.5, wide**-0.5)
+    picture = overview_png([flowed], Target.from_polygon(ring))
+    assert Image.open(io.BytesIO(picture)).width == 1320
+
+
+def test_the_page_is_one_of_the_files_of_a_run(tmp_path: Path) -> None:
+    (tmp_path / "result.json").write_text('{"schema_version": 1, "tiles": [{"class": "IH4"}]}')
+    known = written_files(tmp_path)
+    assert {"index.html", "overview.png", "IH4/field.png", "IH4/tiling.png"} <= known
+    assert folder_names(["IH4", "IH4"]) == ["IH4", "IH4-2"]
+
+
+def test_what_was_decided_and_what_failed_is_on_the_sheets(
+    target: Target, bent: EscherTile
+) -> None:
+    noted = replace(target, notes=("filled 3 holes <of> it",))
+    page = Page(index_page([bent], noted, ["IH4"]))
+    assert "filled 3 holes <of> it" in page.words
+    assert not [item for item in Page(index_page([bent], target, ["IH4"])).all("ul")
+                if item.get("class") == "notes"]  # fmt: skip
+    plain = overview_png([bent], target)
+    assert overview_png([bent], target, failures=[ClassFailure("IH7", "no tile")]) != plain
+
+
+def test_scores_are_called_poor_where_the_words_say_so(
+    bent: EscherTile, flowed: EscherTile
+) -> None:
+    assert bent.fidelity is not None
+    said = set()
+    for cost in np.geomspace(1e-3, 1e3, 13):
+        scored = replace(bent, fidelity=replace(bent.fidelity, cost=float(cost)), thinnest=None)
+        poor = is_poor(scored)
+        assert poor == measures(scored)[0].words.startswith("a poor")
+        said.add(poor)
+    assert said == {False, True}
+    assert is_poor(flowed) == measures(flowed)[0].words.startswith("a poor")

@@ -1,0 +1,88 @@
+"""Pictures of tilings with symmetric tiles and several prototiles; the example and its page."""
+
+from __future__ import annotations
+
+import io
+import re
+import runpy
+import sys
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from orbiflow.drawing import PALETTES, rgb
+from orbiflow.errors import OrbiflowError
+from orbiflow.tiles import (
+    Tiling,
+    colouring,
+    copies_meeting,
+    tiling_picture,
+    tiling_png,
+    tiling_svg,
+    tilings_png,
+)
+from some_tilings import NAMED
+
+ROOT = Path(__file__).parents[3]
+
+
+@pytest.mark.parametrize("name", NAMED)
+def test_each_tile_has_its_colour(name: str) -> None:
+    """In the middle of each tile the picture has the colour that the colouring says."""
+    tiling = NAMED[name][0]
+    window = (-1.3, -1.1, 1.2, 0.9)
+    picture = Image.open(io.BytesIO(tiling_png(tiling, window, width_px=500))).convert("RGB")
+    copies = copies_meeting(tiling, window)
+    colours = colouring(tiling).colours(copies)
+    seen = 0
+    for ring, number in zip(copies.rings(), colours.tolist(), strict=True):
+        x, y = (ring.mean(axis=0) - (window[0], window[3])) * (200, -200)
+        if 0 <= x < 500 and 0 <= y < picture.height:
+            seen += 1
+            assert picture.getpixel((int(x), int(y))) == rgb(PALETTES["delft"].fill(number))
+    assert seen > 5
+
+
+def test_in_print_and_as_drawing() -> None:
+    tiling = NAMED["hexagons and triangles"][0]
+    assert tiling_picture(tiling).file().startswith(b"%PDF")
+    window = (-1.0, -1.0, 1.0, 1.0)
+    text = tiling_svg(tiling, window)
+    paths = re.findall(r' d="([^"]*)"', text)
+    assert len(paths) == len(copies_meeting(tiling, window))
+    assert {path.count("L") for path in paths} == {2, 5}  # triangles and hexagons
+    ElementTree.fromstring(text)
+    assert "A tiling of the plane (p6m)" in text
+
+
+def test_a_sheet() -> None:
+    shown = {name: tiling for name, (tiling, _) in NAMED.items()}
+    picture = Image.open(io.BytesIO(tilings_png(shown, columns=3, width_px=600)))
+    assert picture.width == 600
+    pixels = np.asarray(picture.convert("RGB")).reshape(-1, 3)
+    paper = (pixels == 255).all(axis=1).mean()
+    assert 0.2 < paper < 0.8  # five panels of six, names, gaps
+    with pytest.raises(OrbiflowError, match="one at least"):
+        tilings_png({})
+    with pytest.raises(OrbiflowError, match="columns"):
+        tilings_png(shown, columns=0)
+
+
+def test_the_example(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys) -> None:
+    out = tmp_path / "tilings.png"
+    monkeypatch.setattr(sys, "argv", ["draw.py", "--out", str(out)])
+    runpy.run_path(str(ROOT / "examples" / "tilings" / "draw.py"), run_name="__main__")
+    assert len(capsys.readouterr().out.splitlines()) == 28
+    with Image.open(out) as picture:
+        assert picture.width == 1600
+
+
+def test_the_page() -> None:
+    text = (ROOT / "docs" / "tilings.md").read_text(encoding="utf-8")
+    names: dict[str, object] = {}
+    for snippet in re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL):
+        exec(compile(snippet, "tilings.md", "exec"), names)
+    assert isinstance(names["several"], Tiling)

@@ -1,0 +1,120 @@
+"""From a candidate to a polygon."""
+
+import numpy as np
+import pytest
+import scipy.spatial
+import shapely
+import torch
+
+from orbiflow.errors import CertificationError
+from orbiflow.tiles import CLASSES, TileModel, certify
+from orbiflow.tiles.search import boundary
+from orbiflow.tiles.search.boundary import (
+    DENSE,
+    TOLERANCES,
+    converge,
+    extract_tile,
+)
+
+
+def bent(name: str, rms: float = 0.15, seed: int = 0) -> TileModel:
+    """A turned candidate whose fields have the given root mean square."""
+    model = TileModel(CLASSES[name], torch.tensor([0.7]), max_frequency=2, smoothness=0.0)
+    rng = np.random.default_rng(seed)
+    with torch.no_grad():
+        for field in model.flow.parameters():
+            values = torch.tensor(rng.normal(size=field.shape))
+            field.copy_(rms * values / values.norm())
+    return model
+
+
+def crossed() -> TileModel:
+    """A candidate whose template crosses itself."""
+    model = TileModel(CLASSES["IH21"], torch.tensor([0.7]), max_frequency=1)
+    with torch.no_grad():
+        model.shape.add_(2.0)
+    return model
+
+
+def test_converge_doubles_until_accurate() -> None:
+    model = bent("IH4")
+    points = model.boundary(4).detach()
+    model.flow = model.flow.with_steps(2)
+    _, error = converge(model, points, tolerance=1e-7)
+    assert error <= 1e-7
+    chosen = model.flow.steps
+    with torch.no_grad():
+        moved = model.flow(points)
+        exact = model.flow.with_steps(16 * chosen)(points)
+    assert (moved - exact).norm(dim=-1).max().item() <= 1e-7
+    # no finer than need be: an eighth of the steps is too coarse
+    assert model.flow.with_steps(max(1, chosen // 8)).error_estimate(points) > 1e-7
+
+
+def test_converge_gives_up_on_a_steep_field() -> None:
+    model = bent("IH1", rms=3000.0)
+    model.flow = model.flow.with_steps(512, method="euler")
+    with pytest.raises(CertificationError, match=r"not accurate after 1024 steps .*too steep"):
+        converge(model, model.boundary(1).detach())
+
+
+def test_converge_refuses_a_field_that_is_not_finite() -> None:
+    model = bent("IH1")
+    with torch.no_grad():
+        next(model.flow.parameters()).fill_(float("nan"))
+    steps = model.flow.steps
+    with pytest.raises(CertificationError, match="no finite values"):
+        converge(model, model.boundary(1).detach())
+    assert model.flow.steps == steps
+    for force in (False, True):
+        with pytest.raises(CertificationError, match="finite"):
+            extract_tile(model, force=force)
+
+
+@pytest.mark.parametrize("name", CLASSES)
+def test_polygon_follows_the_curve(name: str) -> None:
+    model = bent(name)
+    settings_before = (model.flow.steps, model.flow.method)
+    tile, fine = extract_tile(model)
+    assert (model.flow.steps, model.flow.method) == settings_before
+    kind = CLASSES[name]
+    with torch.no_grad():
+        pieces = 2 * -(-DENSE[0] // (2 * len(kind.template())))
+        curve = fine(fine.boundary(pieces))[0].numpy()
+    assert tile.isohedral_class == name
+    assert len(tile.corners) == len(kind.template())
+    assert np.allclose(tile.polygon[list(tile.corners)], curve[::pieces], atol=1e-12)
+    nearest = np.asarray(scipy.spatial.KDTree(curve).query(tile.polygon)[0])
+    assert nearest.max() < 1e-12
+    ring = shapely.Polygon(tile.polygon).exterior
+    # the model has area 1, so tolerances are lengths; a partner edge is no worse
+    assert shapely.distance(shapely.points(curve), ring).max() <= TOLERANCES[0] * 1.001
+    assert len(tile.polygon) < len(curve) / 2
+    assert certify(tile).edge_matching == "segments"
+
+
+@pytest.mark.parametrize("name", CLASSES)
+def test_straight_edges_keep_few_vertices(name: str) -> None:
+    kind = CLASSES[name]
+    model = TileModel(kind, torch.zeros(1), max_frequency=1)
+    # the corners, and the midpoint of an edge that turns about it
+    centres = sum(pair.first == pair.second for pair in kind.identified_edges)
+    assert len(extract_tile(model)[0].polygon) == len(kind.template()) + centres
+
+
+def test_a_crossing_boundary_is_refused_unless_forced() -> None:
+    with pytest.raises(CertificationError, match="IH21: the boundary crosses itself"):
+        extract_tile(crossed())
+    tile, _ = extract_tile(crossed(), force=True)
+    assert len(tile.polygon) == DENSE[-1]
+    certificate = certify(tile)
+    assert not certificate.valid
+    assert "not simple: self-intersection" in certificate.reasons[0]
+
+
+def test_force_takes_an_inaccurate_flow(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(boundary, "MAX_STEPS", 8)
+    with pytest.raises(CertificationError, match="not accurate"):
+        extract_tile(bent("IH3"))
+    # edges match at any number of steps (design point 5)
+    assert certify(extract_tile(bent("IH3"), force=True)[0]).edge_mismatch < 1e-12

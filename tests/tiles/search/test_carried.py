@@ -1,0 +1,203 @@
+"""The map from the silhouette to its tile."""
+
+import pickle
+from typing import Any
+
+import numpy as np
+import pytest
+import shapely
+import torch
+from hypothesis import given
+from hypothesis import strategies as st
+
+from orbiflow.arrays import Array
+from orbiflow.errors import OrbiflowError
+from orbiflow.tiles import CLASSES, Bending, EscherTile, Frame, TileMap, signed_area
+from orbiflow.tiles.search.bent_map import map_of_bent, onto_polygon
+from orbiflow.tiles.silhouette import triangulate, unfolded
+from orbiflow.tiles.silhouette.bending import MAX_POINTS
+from orbiflow.tiles.silhouette.unfolding import folded
+from outlines import BentTile, animal, bent_squirrel, disc
+from strategies import seeds
+
+CASES = [*((name, False) for name in CLASSES), ("IH4", True), ("IH21", True)]
+
+
+def bending(name: str, mirrored: bool = False) -> tuple[BentTile, Bending]:
+    case = bent_squirrel(name, mirrored)
+    return case, map_of_bent(case.bent, case.factor, case.shift, case.tile)
+
+
+def outline(case: BentTile) -> Array:
+    hand = case.bent.hand
+    ring = np.asarray(hand.samples.fine)
+    return ring * (1.0, -1.0) if hand.mirrored else ring
+
+
+def points_in(ring: Array, count: int, seed: int = 0) -> Array:
+    rng = np.random.default_rng(seed)
+    points = rng.uniform(ring.min(axis=0), ring.max(axis=0), (4 * count, 2))
+    return points[shapely.contains_xy(shapely.Polygon(ring), *points.T)][:count]
+
+
+@pytest.mark.parametrize(("name", "mirrored"), CASES)
+def test_the_outline_lands_on_the_certified_polygon(name: str, mirrored: bool) -> None:
+    case, carried = bending(name, mirrored)
+    tile = shapely.Polygon(case.tile.polygon)
+    ring = outline(case)
+    dense = np.concatenate([ring + t * (np.roll(ring, -1, axis=0) - ring) for t in (0, 0.3, 0.8)])
+    images = carried.forward(dense)
+    assert shapely.distance(shapely.points(images), tile.exterior).max() < 1e-12
+    # and covers it: every vertex of the polygon comes from the outline
+    back = carried.inverse(case.tile.polygon)
+    assert shapely.distance(shapely.points(back), shapely.LinearRing(ring)).max() < 1e-9
+    pieces = np.asarray(shapely.polygons(carried.images[carried.triangles]))
+    assert abs(shapely.area(pieces).sum() - tile.area) < 1e-12
+    assert abs(shapely.union_all(pieces).symmetric_difference(tile).area) < 1e-9
+
+
+@pytest.mark.parametrize(("name", "mirrored"), CASES)
+def test_round_trip(name: str, mirrored: bool) -> None:
+    case, carried = bending(name, mirrored)
+    points = points_in(outline(case), 2000)
+    assert abs(carried.inverse(carried.forward(points)) - points).max() < 1e-9
+    images = points_in(case.tile.polygon, 2000)
+    assert abs(carried.forward(carried.inverse(images)) - images).max() < 1e-9
+
+
+@pytest.mark.parametrize(("name", "mirrored"), [("IH4", False), ("IH21", True)])
+def test_points_of_the_body_go_where_it_was_bent(name: str, mirrored: bool) -> None:
+    case, carried = bending(name, mirrored)
+    rest = case.bent.hand.fine.mesh.points * ((1.0, -1.0) if mirrored else (1.0, 1.0))
+    apart = np.linalg.norm(carried.forward(rest) - case.images, axis=1)
+    assert np.median(apart) < 0.02  # what is inside moves where it was folded
+    assert apart[: case.bent.hand.fine.size].max() < 1e-3  # the polygon is simplified by 5e-4
+
+
+@given(seeds)
+def test_continuous_across_sides_and_the_outline(seed: int) -> None:
+    case, carried = bending("IH5")
+    rng = np.random.default_rng(seed)
+    edges = carried.triangles[rng.integers(len(carried.triangles), size=50)][:, :2]
+    share = rng.uniform(0.05, 0.95, (50, 1))
+    for there, start in ((carried.forward, carried.rest), (carried.inverse, carried.images)):
+        a, b = start[edges[:, 0]], start[edges[:, 1]]
+        across = (b - a)[:, ::-1] * (-1e-9, 1e-9)
+        middle = a + share * (b - a)
+        apart = there(middle + across) - there(middle - across)
+        assert abs(apart).max() < 1e-6
+    # a point outside goes beside the outline's nearest point
+    far = outline(case)[:50] * 1.001
+    ends = carried.forward(far)
+    assert abs(ends - carried.forward(far / 1.001)).max() < 0.05
+    assert np.isfinite(carried.forward(1e3 * rng.normal(size=(5, 2)))).all()
+
+
+def test_tensors_lists_and_shapes() -> None:
+    case, carried = bending("IH4")
+    points = points_in(outline(case), 12).reshape(3, 4, 2)
+    there = carried.forward(points)
+    assert there.shape == points.shape
+    assert isinstance(there, np.ndarray)
+    tensor = carried.forward(torch.tensor(points, dtype=torch.float32))
+    assert tensor.dtype == torch.float32
+    assert abs(tensor.numpy() - there).max() < 1e-5
+    assert carried.forward(torch.zeros(2, dtype=torch.int64)).dtype == torch.float64
+    assert np.array_equal(carried.forward(points.tolist()), there)
+    assert carried.forward(np.zeros((0, 2))).shape == (0, 2)
+    assert np.isnan(carried.inverse([[np.nan, 0.0], [np.inf, 0.0], [0.0, 0.0]])).any(
+        axis=1
+    ).tolist() == [True, True, False]
+    with pytest.raises(OrbiflowError, match="points"):
+        carried.forward(np.zeros(3))
+
+
+def test_sent_between_processes() -> None:
+    _, carried = bending("IH4")
+    carried.forward([0.0, 0.0])  # trees are not sent
+    sent = pickle.dumps(carried)
+    assert len(sent) < 2 * sum(a.nbytes for a in (carried.rest, carried.images, carried.triangles))
+    again = pickle.loads(sent)
+    assert np.array_equal(again.forward([0.1, 0.2]), carried.forward([0.1, 0.2]))
+
+
+def test_in_the_input_s_coordinates() -> None:
+    case = bent_squirrel("IH4")
+    frame = animal("squirrel.dat").frame
+    placed = case.tile.transformed(frame.linear, frame.offset)
+    bending = map_of_bent(case.bent, case.factor, case.shift, case.tile)
+    carried = EscherTile(placed, map_source=TileMap(frame=frame, bending=bending))
+    assert carried.map is not None
+    assert carried.map.ends_on(placed)
+    points = frame.to_input(points_in(outline(case), 100))
+    images = carried.forward(points)
+    assert shapely.contains_xy(shapely.Polygon(carried.tile.polygon), *images.T).all()
+    extent = np.ptp(carried.tile.polygon)
+    assert abs(carried.inverse(images) - points).max() < 1e-9 * extent
+    assert torch.is_tensor(carried.forward(torch.tensor(points)))
+
+
+def test_no_map_says_why() -> None:
+    case = bent_squirrel("IH4")
+    crossed = case.tile.polygon[::-1]  # against the outline's sense: nothing can follow
+    tile = type(case.tile)(crossed, case.tile.group, case.tile.isohedral_class, case.tile.corners)
+    with pytest.raises(OrbiflowError, match=r"too thin.*without folds|without folds.*too thin"):
+        map_of_bent(case.bent, case.factor, case.shift, tile)
+    bare = EscherTile(tile, map_source=TileMap(frame=Frame(np.eye(2), np.zeros(2))))
+    with pytest.raises(OrbiflowError, match="left no map"):
+        bare.forward([0.0, 0.0])
+
+
+@given(seeds, st.integers(3, 40))
+def test_a_polygon_with_vertices_of_its_own(seed: int, count: int) -> None:
+    """Where the polygon bends between points of the outline, the outline gets points there."""
+    rng = np.random.default_rng(seed)
+    ring = disc(24)
+    mesh = triangulate(ring)
+    turns = np.sort(rng.uniform(0, 2 * np.pi, count))
+    turns[0] = 0
+    radii = rng.uniform(0.5, 0.6, count)
+    polygon = radii[:, None] * np.stack([np.cos(turns), np.sin(turns)], axis=-1)
+    if not shapely.Polygon(polygon).contains(shapely.Point(0, 0)):
+        return
+    fitted, images = onto_polygon(mesh, mesh.points, polygon, np.array([0]), np.array([0]))
+    assert not folded(fitted, fitted.points).any()
+    assert abs(signed_area(fitted.points[fitted.triangles]).sum() - 1) < 1e-12
+    boundary = fitted.size + len(fitted.sides)
+    tile = shapely.Polygon(polygon)
+    assert shapely.distance(shapely.points(images[:boundary]), tile.exterior).max() < 1e-12
+    there = images[:boundary]
+    for vertex in polygon:
+        assert np.linalg.norm(there - vertex, axis=1).min() < 1e-12
+    rest = shapely.LinearRing(ring)
+    assert shapely.distance(shapely.points(fitted.points[:boundary]), rest).max() < 1e-12
+    assert len(fitted.points) - len(mesh.points) == boundary - len(mesh.sides) - mesh.size
+    signed = signed_area(unfolded(fitted, images)[fitted.triangles])
+    assert (signed > 0).all()
+    assert abs(signed.sum() - tile.area) < 1e-12
+
+
+SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+TWO = np.array([[0, 1, 2], [0, 2, 3]])
+BAD: dict[str, tuple[Any, Any, Any, str]] = {
+    "shape": (SQUARE[:, :1], SQUARE, TWO, "rest must be .*shape"),
+    "count": (SQUARE, SQUARE[:3], TWO, r"images must be .*shape \(4, 2\)"),
+    "not finite": (SQUARE, SQUARE * np.nan, TWO, "finite"),
+    "fractions": (SQUARE, SQUARE, TWO + 0.5, "whole numbers"),
+    "pairs": (SQUARE, SQUARE, TWO[:, :2], "whole numbers of shape"),
+    "none": (SQUARE, SQUARE, TWO[:0], "1 to 200000 triangles"),
+    "range": (SQUARE, SQUARE, TWO + 1, "indices of its 4 points"),
+    "negative": (SQUARE, SQUARE, TWO - 1, "indices of its 4 points"),
+    "many": (np.zeros((MAX_POINTS + 1, 2)), np.zeros((MAX_POINTS + 1, 2)), TWO, "has 3 to 100000"),
+    "turned over": (SQUARE, SQUARE, TWO[:, ::-1], "rest: 2 triangles are flat or turned over"),
+    "mirrored": (SQUARE, SQUARE * (-1, 1), TWO, "images: 2 triangles are flat or turned over"),
+    "flat": (SQUARE, SQUARE * (1, 0), TWO, "flat"),
+    "huge": (SQUARE, SQUARE * 1e300, TWO, "flat or turned over"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_what_is_no_map_is_refused(case: str) -> None:
+    rest, images, triangles, message = BAD[case]
+    with pytest.raises(OrbiflowError, match=message):
+        Bending(rest, images, triangles)

@@ -1,0 +1,159 @@
+"""A silhouette that bends until it is a tile."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+
+from orbiflow.arrays import Array, Complex
+from orbiflow.tiles import (
+    CLASSES,
+    BendingSettings,
+    certify,
+    complex_points,
+    plane_points,
+    resampled,
+    signed_area,
+)
+from orbiflow.tiles.likeness import Elastic
+from orbiflow.tiles.search.bending import bent_tiles
+from orbiflow.tiles.search.boundary import extract_tile
+from orbiflow.tiles.search.co_deformation import drawn_to_tiles, held_on_tiles
+from orbiflow.tiles.search.placements import Placements, best_placements
+from orbiflow.tiles.search.tile_space import TileSpace
+from outlines import SMALL, animal, bent_squirrel, flowless, squirrel_hands
+from strategies import seeds
+
+RING = resampled(animal("squirrel.dat").normal, 60)
+BODY = Elastic(RING)
+
+
+def placements(name: str, count: int = 10) -> Placements:
+    return best_placements(CLASSES[name], complex_points(RING), count)
+
+
+def objective(body: Elastic, z: Complex) -> Array:
+    copies, _ = body.copies(z)
+    return body.energy(z) + body.stiffness.pose * (abs(z - copies) ** 2).mean(axis=0)
+
+
+def off_the_space(space: TileSpace, z: Complex) -> float:
+    outlines = z[: space.size].T
+    return float(abs(space.in_order(space.nearest(outlines).vertices) - outlines).max())
+
+
+@pytest.mark.parametrize("name", CLASSES)
+def test_springs_draw_to_tiles(name: str) -> None:
+    z, space = drawn_to_tiles(BODY, CLASSES[name], placements(name))
+    assert z.shape == (len(BODY), 10)
+    rest = np.repeat(BODY.rest[:, None], 10, axis=1)
+    assert off_the_space(space, z) < 0.2 * off_the_space(space, rest)
+
+
+@pytest.mark.parametrize("name", CLASSES)
+def test_the_energy_never_grows(name: str) -> None:
+    z, space = drawn_to_tiles(BODY, CLASSES[name], placements(name))
+    z = held_on_tiles(BODY, space, z, 1).points  # on the tiles
+    before = objective(BODY, z)
+    for _ in range(12):
+        tiles = held_on_tiles(BODY, space, z, 1)
+        z = tiles.points
+        assert off_the_space(space, z) < 1e-7
+        after = objective(BODY, z)
+        assert (after <= before * (1 + 1e-7) + 1e-12).all()
+        before = after
+    assert tiles.linear.shape == (10, 2, 2)
+    assert tiles.offset.shape == (10, 2)
+
+
+@pytest.mark.parametrize("name", CLASSES)
+def test_several_rounds_are_the_same_as_one_by_one(name: str) -> None:
+    z, space = drawn_to_tiles(BODY, CLASSES[name], placements(name, 3))
+    single = z
+    for _ in range(4):
+        single = held_on_tiles(BODY, space, single, 1).points
+    assert held_on_tiles(BODY, space, z, 4).points == pytest.approx(single, abs=1e-9)
+
+
+@pytest.mark.parametrize("name", CLASSES)
+@settings(max_examples=4)
+@given(seed=seeds)
+def test_a_tile_stays_as_it_is(name: str, seed: int) -> None:
+    """An outline that is a tile already: nothing has to bend."""
+    first = TileSpace(CLASSES[name], placements(name, 40))
+    found = first.nearest(np.tile(complex_points(RING), (40, 1)))
+    rings = plane_points(first.in_order(found.vertices))
+    sound = shapely.is_valid(shapely.polygons(rings)) & (signed_area(rings) > 0.3)
+    sound &= np.linalg.det(found.linear) > 1e-3
+    chosen = np.flatnonzero(sound)[:1]
+    body = Elastic(rings[chosen[0]])
+    own = first.placements._replace(turns=first.turns).take(chosen)
+    space = TileSpace(CLASSES[name], own)
+    rng = np.random.default_rng(seed)
+    z = body.rest[:, None] + 0.005 * rng.normal(size=(len(body), 1))
+    tiles = held_on_tiles(body, space, z, 200)
+    assert body.energy(tiles.points)[0] < 1e-6
+    assert objective(body, tiles.points)[0] < 1e-6
+    assert body.displacement(tiles.points)[0] < 1e-6
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+@pytest.mark.parametrize("name", CLASSES)
+def test_bent_squirrels_certify(name: str, mirrored: bool) -> None:
+    case = bent_squirrel(name, mirrored)
+    bent, n = case.bent, case.bent.hand.fine.size
+    assert bent.hand.mirrored == mirrored
+    certificate = certify(case.tile)
+    assert certificate.valid
+    ring = case.images[:n]
+    assert abs(abs(signed_area(ring)) - abs(case.tile.signed_area)) < 0.01
+    apart = shapely.distance(shapely.points(ring), shapely.LinearRing(case.tile.polygon))
+    assert apart.max() < 1e-3
+
+
+def test_the_model_keeps_every_vertex() -> None:
+    """Without a field the start tile is the bent outline, in the group's own frame."""
+    case = bent_squirrel("IH4")
+    model = flowless("IH4", case.bent, case.factor, case.shift)
+    place = model.place(model.prototile()[0]).detach().numpy()[0]
+    n = case.bent.hand.fine.size
+    order = (np.arange(n) + case.bent.placement.starts[0]) % n
+    assert abs(place - case.images[:n][order]).max() < 1e-12
+    assert certify(extract_tile(model)[0]).valid
+
+
+def test_finalists_are_in_order_and_told() -> None:
+    told: list[float] = []
+    several = BendingSettings(
+        placements=40, held=12, finalists=3, rounds=8, multiples=(4,), below=1
+    )
+    found, dropped = bent_tiles(squirrel_hands(), CLASSES["IH4"], several, told.append)
+    assert told == sorted(told)
+    assert told[-1] == pytest.approx(1.0)
+    scores = [bent.fidelity.score for bent in found]
+    assert scores == sorted(scores, reverse=True)
+    assert 1 <= len(found) <= 10 - dropped
+    again, _ = bent_tiles(squirrel_hands(), CLASSES["IH4"], several)
+    assert [bent.fidelity.score for bent in again] == scores
+
+
+def test_more_rounds_cost_no_more() -> None:
+    few = bent_squirrel("IH5").bent
+    settings = replace(SMALL, rounds=40)
+    (more,), _ = bent_tiles([squirrel_hands()[0]], CLASSES["IH5"], settings)
+    assert more.fidelity.cost <= few.fidelity.cost * 1.02
+    assert SMALL.rounds < 40
+
+
+@pytest.mark.parametrize("name", ["IH4", "IH21"])
+def test_more_effort_never_scores_less(name: str) -> None:
+    found = [
+        bent_tiles(squirrel_hands(), CLASSES[name], BendingSettings.for_effort(effort))[0]
+        for effort in ("fast", "normal")
+    ]
+    fast, normal = ([bent.score(BendingSettings.min_neck) for bent in tiles] for tiles in found)
+    assert normal[0] >= fast[0]
+    assert normal == sorted(normal, reverse=True)
+    assert len(normal) > len(fast)

@@ -1,0 +1,247 @@
+"""The descent: symmetric, injective, uphill; settings; the whole fit."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+import shapely
+import torch
+
+from orbiflow.errors import OrbiflowError
+from orbiflow.runtime import Cancel
+from orbiflow.tiles import (
+    CLASSES,
+    DescentSettings,
+    Event,
+    OccupancySettings,
+    SoftTarget,
+    Target,
+    TileMap,
+    as_map,
+    as_model,
+    certify,
+    escherize,
+    escherize_class,
+    fit_descent,
+    iou,
+    isohedral_class,
+)
+from orbiflow.tiles.likeness import boundary_iou
+from orbiflow.tiles.search.boundary import extract_tile
+from orbiflow.tiles.search.descent import CALM, Descent
+from orbiflow.tiles.search.methods import fit, method_name
+from orbiflow.tiles.search.settings import DESCENT_EFFORTS
+from orbiflow.tiles.search.starts import template_starts
+from orbiflow.tiles.search.steps import quick_tile
+
+BOOT = [[0, 0], [3, 0], [3.4, 1.2], [2.2, 1.5], [2.0, 2.8], [0.8, 2.5], [-0.3, 1.2]]
+TARGET = Target.from_polygon(BOOT)
+QUICK = DescentSettings.for_effort(
+    "fast", max_frequency=4, candidates=4, stages=((8, 2), (8, 1)), projected=100, measured=20
+)
+
+
+@pytest.fixture(scope="module")
+def soft() -> SoftTarget:
+    return SoftTarget(TARGET)
+
+
+def descent(name: str, settings: DescentSettings = QUICK) -> Descent:
+    kind = isohedral_class(name)
+    starts = template_starts(kind, turns=3, stretch=0.2, vertices=settings.boundary)
+    return Descent(kind, starts, settings)
+
+
+@pytest.mark.parametrize("name", CLASSES)
+def test_the_record_is_the_flow(name: str, soft: SoftTarget) -> None:
+    # the recorded fields, followed by the flow's own integrator, end where the boundary did
+    state = descent(name)
+    start = state.points.clone()
+    for _ in range(10):
+        state.step(soft)
+    model = state.flow_model()
+    assert model.segments == 10
+    with torch.no_grad():
+        moved = model.flow(start)
+    assert (moved - state.points).abs().max() < 1e-4
+    assert torch.equal(model.prototile()[0], start)
+
+
+@pytest.mark.parametrize("name", ["IH1", "IH5", "IH21"])
+def test_steps_are_injective(name: str, soft: SoftTarget) -> None:
+    # a displacement whose Jacobian is smaller than one cannot fold
+    state = descent(name)
+    torch.manual_seed(0)
+    for _ in range(6):
+        state.step(soft)
+        last = state.record[-1]
+        state.field.parameters_.data.copy_(last)
+        points = torch.rand(state.size, 60, 2) * 3
+        columns = []
+        for direction in torch.eye(2):
+            h = 1e-3
+            ahead, behind = (state.field(points + s * h * direction) for s in (1, -1))
+            columns.append((ahead - behind) / (2 * h))
+        jacobian = torch.stack(columns, dim=-1)
+        norms = torch.linalg.matrix_norm(jacobian, ord=2)
+        assert norms.max() <= CALM * 1.01
+        assert norms.max() * (1 + CALM / 2) < 1
+
+
+def test_descent_climbs(soft: SoftTarget) -> None:
+    state = descent("IH4", dataclasses.replace(QUICK, stages=((60, 1),)))
+    goal = shapely.Polygon(TARGET.normal)
+    before = boundary_iou(goal, state.placed())
+    for _ in range(60):
+        state.step(soft)
+    after = boundary_iou(goal, state.placed())
+    assert after.max() > before.max() + 0.05
+    assert np.median(after) > np.median(before)
+
+
+def test_the_lattice_can_be_held(soft: SoftTarget) -> None:
+    for lattice in (False, True):
+        state = descent("IH1", dataclasses.replace(QUICK, lattice=lattice))
+        before = state.model.stretch.detach().clone()
+        state.step(soft)
+        assert torch.equal(state.model.stretch.detach(), before) != lattice
+
+
+def test_keep_selects_everything_alike(soft: SoftTarget) -> None:
+    state = descent("IH6")
+    for _ in range(3):
+        state.step(soft)
+    boundaries = state.placed()
+    state.keep([4, 1], np.full(state.size, 0.8))
+    assert state.size == 2
+    assert np.allclose(state.placed(), boundaries[[4, 1]], atol=1e-6)
+    assert torch.allclose(state.threshold, torch.tensor(0.8 / 1.8))
+    state.step(soft)
+    assert all(len(fields) == 2 for fields in state.record)
+
+
+@pytest.mark.parametrize("name", CLASSES)
+def test_a_fit_certifies_and_survives_storage(name: str) -> None:
+    found = fit_descent(TARGET, isohedral_class(name), QUICK)
+    tile, fine = extract_tile(found.model.take([0]))
+    certificate = certify(tile)
+    assert certificate.valid
+    assert certificate.edge_mismatch < 1e-12
+    assert iou(tile.polygon, TARGET.normal) > 0.75
+    assert found.starts >= 1
+    saved = as_map(fine)
+    again = extract_tile(as_model(saved))[0]
+    assert np.allclose(again.polygon, tile.polygon, atol=1e-12)
+
+
+def test_the_inverse_of_the_flow_takes_the_tile_back() -> None:
+    model = fit_descent(TARGET, isohedral_class("IH6"), QUICK).model.take([0]).double()
+    model.flow = model.flow.with_steps(4, method="rk4")
+    with torch.no_grad():
+        points = model.prototile()[0]
+        assert (model.inverse(model(points)) - points).abs().max() < 1e-6
+
+
+def test_broken_prototiles_are_refused() -> None:
+    saved = as_map(fit_descent(TARGET, isohedral_class("IH4"), QUICK).model.take([0]))
+    outline, corners = saved.arrays["prototile.outline"], saved.arrays["prototile.corners"]
+    broken = {
+        "shape": {"prototile.outline": outline[:, :1]},
+        "entries": {"prototile.outline": np.full_like(outline, np.nan)},
+        "increasing": {"prototile.corners": corners[::-1].copy()},
+        "indices": {"prototile.corners": corners + len(outline)},
+    }
+    for word, arrays in broken.items():
+        with pytest.raises(OrbiflowError, match=word):
+            as_model(TileMap(saved.settings, {**saved.arrays, **arrays}))
+
+
+def test_the_same_seed_gives_the_same_tile() -> None:
+    one, two = (escherize_class(TARGET, "IH5", QUICK) for _ in range(2))
+    other = escherize_class(TARGET, "IH5", dataclasses.replace(QUICK, seed=1))
+    polygons = [getattr(o, "tile").polygon for o in (one, two, other)]  # noqa: B009
+    assert np.array_equal(polygons[0], polygons[1])
+    assert polygons[0].shape != polygons[2].shape or not np.array_equal(polygons[0], polygons[2])
+
+
+def test_several_tiles_of_a_class_are_not_twins() -> None:
+    results, failures = escherize(TARGET, ["IH4", "IH6"], QUICK, per_class=3)
+    assert not failures
+    assert [r.score for r in results] == sorted((r.score for r in results), reverse=True)
+    for name in ("IH4", "IH6"):
+        own = [r.tile.polygon for r in results if r.name == name]
+        assert 1 <= len(own) <= 3
+        for i, first in enumerate(own):
+            assert all(iou(first, second) <= 0.97 for second in own[i + 1 :])
+
+
+def test_a_first_tile_comes_at_once_and_survives_an_interrupt() -> None:
+    cancel = Cancel()
+
+    def interrupt(event: Event) -> None:
+        if event.preview is None:
+            cancel.cancel()
+
+    results, failures = escherize(TARGET, ["IH4", "IH6"], QUICK, watch=interrupt, cancel=cancel)
+    assert [r.name for r in results] == ["IH6"]
+    assert results[0].certificate.valid
+    assert {f.name for f in failures} == {"IH4", "IH6"}
+
+
+def test_a_preview_is_certified() -> None:
+    for names in (["IH1"], ["IH28", "IH21"]):
+        tile = quick_tile(TARGET, names)
+        assert tile is not None
+        assert tile.name in names
+        assert tile.certificate.valid
+
+
+def test_methods_have_names() -> None:
+    assert method_name(QUICK) == "descent"
+    assert method_name(OccupancySettings()) == "occupancy"
+    assert fit(TARGET, isohedral_class("IH1"), QUICK, per_class=2).enough == 4
+
+
+def test_soft_target_agrees_with_the_polygon(soft: SoftTarget) -> None:
+    rng = np.random.default_rng(0)
+    region = shapely.Polygon(TARGET.normal)
+    points = rng.uniform(-1, 1, (400, 2))
+    inside = shapely.contains_xy(region, points[:, 0], points[:, 1])
+    far = shapely.distance(shapely.points(points), region.exterior) > 0.01
+    occupancy = soft.occupancy(torch.tensor(points, dtype=torch.float32), 0.01).numpy()
+    assert ((occupancy > 0.5) == inside)[far].all()
+    assert soft.weight(torch.zeros(3, 2)).tolist() == [1.0, 1.0, 1.0]
+    rings = torch.tensor(np.stack([TARGET.normal, TARGET.normal * 0.9 + 0.05]), dtype=torch.float32)
+    exact = [iou(ring, TARGET.normal) for ring in rings.double().numpy()]
+    assert np.allclose(soft.weighted_iou(rings).numpy(), exact, atol=5e-3)
+
+
+@pytest.mark.parametrize("effort", DESCENT_EFFORTS)
+def test_efforts_are_valid_settings(effort: str) -> None:
+    settings = DescentSettings.for_effort(effort, seed=7)
+    assert settings.seed == 7
+    assert settings.with_survivors(9).stages[-1][1] >= 9
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"max_frequency": -1}, "max_frequency must be at least 0"),
+        ({"max_frequency": 61}, "from 0 to 60"),
+        ({"candidates": 0}, "candidates must be at least 1"),
+        ({"starts": "random"}, 'starts must be "outline" or "template"'),
+        ({"boundary": 100}, "multiple of 30"),
+        ({"resolutions": (50,)}, "divide boundary"),
+        ({"stages": ()}, "stages need steps"),
+        ({"stages": ((3000, 1),)}, "less than 2000"),
+        ({"polish": -1}, "polish must be"),
+        ({"seed": -1}, "seed must be"),
+    ],
+)
+def test_settings_are_checked(changes: dict[str, object], message: str) -> None:
+    with pytest.raises(OrbiflowError, match=message):
+        DescentSettings(**changes)  # type: ignore[arg-type]
+    with pytest.raises(OrbiflowError, match="effort must be one of fast, normal, best"):
+        DescentSettings.for_effort("heroic")
+    with pytest.raises(OrbiflowError, match="unknown settings magic"):
+        DescentSettings.for_effort("fast", magic=1)

@@ -1,0 +1,90 @@
+"""From a fit, by any method, to certified polygons."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+
+from orbiflow.errors import CertificationError, OrbiflowError
+from orbiflow.tiles import (
+    BendingSettings,
+    BothSettings,
+    DescentSettings,
+    OccupancySettings,
+    Target,
+    TileModel,
+    certified_tiles,
+    certify,
+    escherize,
+    fit_descent,
+    fit_occupancy,
+    fit_tile,
+)
+
+BOOT = [[0, 0], [3, 0], [3.4, 1.2], [2.2, 1.5], [2.0, 2.8], [0.8, 2.5], [-0.3, 1.2]]
+TARGET = Target.from_polygon(BOOT)
+SETTINGS = {
+    "bending": BendingSettings(placements=20, held=4, finalists=1, rounds=2),
+    "descent": DescentSettings.for_effort("fast", stages=((2, 2), (2, 1)), polish=0),
+    "occupancy": OccupancySettings(
+        max_frequency=3, turns=3, finalists=2, iterations=15, affine_iterations=20, points=200
+    ),
+}
+
+
+@pytest.mark.parametrize("method", SETTINGS)
+def test_the_two_steps_give_what_the_search_gives(method: str) -> None:
+    settings = SETTINGS[method]
+    found = fit_tile(TARGET, "IH4", settings)
+    tiles = certified_tiles(TARGET, found)
+    assert all(certify(tile.tile).valid for tile in tiles)
+    (best,), _ = escherize(TARGET, "IH4", settings)
+    assert np.array_equal(tiles[0].tile.polygon, best.tile.polygon)
+
+
+def test_what_the_methods_of_their_own_give() -> None:
+    descent, occupancy = SETTINGS["descent"], SETTINGS["occupancy"]
+    assert isinstance(descent, DescentSettings)
+    assert isinstance(occupancy, OccupancySettings)
+    for found in (
+        fit_descent(TARGET, "IH4", descent),
+        fit_occupancy(TARGET, "IH4", occupancy),
+    ):
+        tiles = certified_tiles(TARGET, found)
+        assert tiles[0].certificate.valid
+        scores = [tile.score for tile in tiles]
+        assert scores == sorted(scores, reverse=True)
+
+
+def test_a_model_may_be_trained_before_it_is_certified() -> None:
+    model = fit_tile(TARGET, 4, SETTINGS["occupancy"]).model
+    before = certified_tiles(TARGET, model)[0]
+    with torch.no_grad():
+        model.angle.add_(0.3)
+    after = certified_tiles(TARGET, model)[0]
+    assert after.certificate.valid
+    assert not np.allclose(after.tile.polygon[0], before.tile.polygon[0])
+
+
+def test_folded_candidates_are_refused_unless_forced() -> None:
+    model = TileModel("IH21", torch.zeros(2), max_frequency=1)
+    with torch.no_grad():
+        model.shape.add_(2.0)
+    with pytest.raises(CertificationError, match="IH21"):
+        certified_tiles(TARGET, model)
+    forced = certified_tiles(TARGET, model, force=True)
+    assert not forced[0].certificate.valid
+    assert forced[0].certificate.reasons
+
+
+def test_arguments_are_checked() -> None:
+    with pytest.raises(OrbiflowError, match="the target must be a Target, got 'boot'"):
+        fit_tile("boot", "IH4")  # pyright: ignore[reportArgumentType]
+    with pytest.raises(OrbiflowError, match="unknown isohedral class 'IH8'"):
+        fit_tile(TARGET, "IH8")
+    for wrong in ("fast", BothSettings()):
+        with pytest.raises(OrbiflowError, match="settings must be of one method, got"):
+            fit_tile(TARGET, "IH4", wrong)  # pyright: ignore[reportArgumentType]
+    with pytest.raises(OrbiflowError, match="what was found must be a Fit, got 3"):
+        certified_tiles(TARGET, 3)  # pyright: ignore[reportArgumentType]

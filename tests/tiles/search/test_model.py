@@ -1,0 +1,202 @@
+"""Candidate tiles: D = A o L o flow."""
+
+import itertools
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from orbiflow.errors import OrbiflowError
+from orbiflow.flows import Flow
+from orbiflow.symmetry import CrystallographicGroup
+from orbiflow.tiles import (
+    CLASSES,
+    IsohedralClass,
+    Tile,
+    TileModel,
+    certify,
+)
+from orbiflow.tiles.search.boundary import extract_tile
+from strategies import largest, random_field, random_points, random_tensor, seeds
+
+GLIDES = ["IH2", "IH3", "IH5", "IH6"]
+kinds = st.sampled_from(list(CLASSES.values()))
+
+
+def random_model(
+    kind: IsohedralClass, seed: int, size: int = 1, *, dtype: torch.dtype = torch.float64, **options
+) -> TileModel:
+    """Candidates with every parameter away from its start; the flow moves points by about 0.1."""
+    rng = np.random.default_rng(seed)
+    model = TileModel(
+        kind,
+        torch.tensor(rng.uniform(-3, 3, size)),
+        mirrored=torch.tensor(rng.random(size) < 0.5),
+        max_frequency=2,
+        dtype=dtype,
+        **options,
+    )
+    spread = {"log_scale": 0.5, "offset": 2.0, "shape": 0.1, "stretch": 0.3}
+    with torch.no_grad():
+        for name, parameter in model.named_parameters():
+            noise = torch.tensor(rng.uniform(-1, 1, parameter.shape))
+            if name.startswith("flow."):
+                noise *= 0.15 / max(parameter.shape[-1], 1) ** 0.5
+            parameter.add_(spread.get(name, 1.0) * noise)
+    return model
+
+
+def same_isometries(a: CrystallographicGroup, b: CrystallographicGroup) -> bool:
+    return a.order == b.order and all(b.contains(g) for g in a.cosets)
+
+
+@settings(max_examples=12)
+@given(kinds, seeds, st.integers(1, 2))
+def test_inverse_undoes_forward(kind: IsohedralClass, seed: int, segments: int) -> None:
+    model = random_model(kind, seed, 2, segments=segments, steps=32)
+    points = random_tensor(seed, 2, 9, 2)
+    assert largest(model.inverse(model(points)) - points) < 1e-6
+    assert largest(model.unplace(model.place(points)) - points) < 1e-13
+
+
+@settings(max_examples=15)
+@given(kinds, seeds)
+def test_place_is_a_stretch_then_a_similarity(kind: IsohedralClass, seed: int) -> None:
+    model = random_model(kind, seed, 3)
+    similarity = model.linear() @ torch.linalg.inv(kind.stretch(model.stretch))
+    squared = model.log_scale.mul(2).exp()[:, None, None] * torch.eye(2, dtype=torch.float64)
+    assert largest(similarity @ similarity.mT - squared) < 1e-13 * largest(squared)
+    negative = torch.linalg.det(similarity) < 0
+    assert torch.equal(negative, model.mirror)
+
+
+@pytest.mark.parametrize("name", CLASSES)
+def test_starts_from_the_centred_template_of_area_one(name: str) -> None:
+    kind = CLASSES[name]
+    mirrored = torch.tensor([False, True, False])
+    model = TileModel(kind, torch.tensor([0.0, 1.0, -2.5]), mirrored=mirrored, max_frequency=1)
+    corners = model(model.template()).detach()
+    assert largest(corners.mean(dim=1)) < 1e-14
+    x, y = corners.unbind(dim=-1)
+    area = 0.5 * (x * y.roll(-1, 1) - x.roll(-1, 1) * y).sum(dim=1)
+    assert largest(area - torch.tensor([1.0, -1.0, 1.0])) < 1e-13
+
+
+@settings(max_examples=18)
+@given(kinds, seeds)
+def test_tiles_of_any_parameters_are_certified(kind: IsohedralClass, seed: int) -> None:
+    model = random_model(kind, seed)
+    tile, fine = extract_tile(model)
+    certificate = certify(tile, tolerance=1e-9)
+    assert certificate.valid, certificate.reasons
+    area = model.log_scale.mul(2).exp().item() * kind.group().cell_volume / kind.group().order
+    assert abs(tile.signed_area) == pytest.approx(area, rel=1e-12)
+    assert (tile.signed_area < 0) == bool(model.mirror[0])
+    assert same_isometries(tile.group, model.placed_group())
+    linear, offset = model.linear().detach().numpy()[0], model.offset.detach().numpy()[0]
+    assert same_isometries(tile.group, kind.group().conjugate(linear, offset))
+    # every element moves the diffeomorphism's image as the class's group moves its argument
+    points = random_points(seed, 1, 5, 2)
+    for g in kind.group().cosets:
+        with torch.no_grad():
+            left, right = fine(torch.tensor(g(points))).numpy(), fine(torch.tensor(points)).numpy()
+        moved = g.inverse().linear @ linear.T  # (A R A^-1) q on rows is q A^-T R^T A^T
+        pushed = (right - offset) @ np.linalg.inv(linear.T) @ moved + g.translation @ linear.T
+        assert np.abs(left - pushed - offset).max() < 1e-10
+
+
+@settings(max_examples=12)
+@given(kinds, seeds)
+def test_identified_edges_match(kind: IsohedralClass, seed: int) -> None:
+    model = random_model(kind, seed)
+    tile, _ = extract_tile(model)
+    linear, offset = model.linear().detach().numpy()[0], model.offset.detach().numpy()[0]
+    closed = np.concatenate([tile.polygon, tile.polygon[:1]])
+    ends = [*tile.corners, len(tile.polygon)]
+    edges = [closed[a : b + 1] for a, b in itertools.pairwise(ends)]
+    assert len(edges) == len(kind.template())
+    for pair in kind.identified_edges:
+        inside = (edges[pair.first] - offset) @ np.linalg.inv(linear.T)
+        image = pair.isometry(inside) @ linear.T + offset
+        partner = edges[pair.second][::-1] if pair.reversed else edges[pair.second]
+        assert image.shape == partner.shape
+        assert np.abs(image - partner).max() < 1e-11
+
+
+@settings(max_examples=10)
+@given(kinds, seeds)
+def test_single_precision_models_are_certified_in_double(kind: IsohedralClass, seed: int) -> None:
+    model = random_model(kind, seed, dtype=torch.float32)
+    tile, fine = extract_tile(model)
+    assert fine.angle.dtype == torch.float64
+    assert model.angle.dtype == torch.float32
+    certificate = certify(tile)
+    assert certificate.valid, certificate.reasons
+    assert certificate.edge_mismatch < 1e-12
+    certificate = certify(extract_tile(model.double())[0])
+    assert certificate.valid, certificate.reasons
+
+
+@settings(max_examples=15)
+@given(kinds, seeds)
+def test_take_keeps_the_values(kind: IsohedralClass, seed: int) -> None:
+    model = random_model(kind, seed, 4, segments=2, smoothness=1.5, steps=3, method="rk3")
+    taken = model.take([2, 0])
+    points = random_tensor(seed, 4, 6, 2)
+    assert taken.size == 2
+    assert torch.equal(taken.mirror, model.mirror[[2, 0]])
+    own = dict(model.named_parameters())
+    for name, parameter in taken.named_parameters():
+        assert torch.equal(parameter, own[name][[2, 0]])
+    # products of stacks of another size may round otherwise
+    assert largest(taken(points[[2, 0]]) - model(points)[[2, 0]]) < 1e-12
+    with torch.no_grad():  # a copy, not a view
+        taken.offset.add_(1.0)
+    assert largest(taken.offset - model.offset[[2, 0]] - 1.0) < 1e-12
+
+
+def test_boundary_is_even_on_every_edge() -> None:
+    model = random_model(CLASSES["IH28"], 3, 2)
+    points = model.boundary(4).detach()
+    corners = model.template().detach()
+    assert points.shape == (2, 20, 2)
+    assert torch.equal(points[:, ::4], corners)
+    assert largest(points[:, 1] - (0.75 * corners[:, 0] + 0.25 * corners[:, 1])) < 1e-14
+    assert largest(points[:, 19] - (0.25 * corners[:, 4] + 0.75 * corners[:, 0])) < 1e-14
+
+
+def test_a_stack_has_no_single_group() -> None:
+    model = random_model(CLASSES["IH4"], 0, 2)
+    with pytest.raises(OrbiflowError, match="take one candidate first: this model holds 2"):
+        model.placed_group()
+
+
+@pytest.mark.parametrize("name", GLIDES)
+@pytest.mark.parametrize("angle", [0.0, 0.5])
+def test_rotating_inside_the_field_breaks_glides(name: str, angle: float) -> None:
+    """The paper's V(z) = V_sym(A^-1 z), against A o flow (design point 6)."""
+    kind = CLASSES[name]
+    field = random_field(kind.group(), 2, 5, rms=0.1)
+    model = TileModel(kind, torch.tensor([angle]), max_frequency=2)
+    model.log_scale.data.zero_()
+    model.offset.data.zero_()
+    corners = torch.tensor(kind.template())
+    share = torch.linspace(0, 1, 41, dtype=torch.float64)[:-1, None]
+    boundary = (corners[:, None] + share * (corners.roll(-1, 0) - corners)[:, None]).flatten(0, 1)
+    turn = model.linear().detach()[0]
+    mixed = Flow(lambda z: field(z @ torch.linalg.inv(turn).T))
+    polygons = {
+        "composed": Flow(field)(boundary) @ turn.T,
+        "mixed": mixed(boundary @ turn.T),
+    }
+    certificates = {
+        how: certify(Tile(polygon.detach().numpy(), model.placed_group(), name))
+        for how, polygon in polygons.items()
+    }
+    assert certificates["composed"].valid, certificates["composed"].reasons
+    assert certificates["mixed"].valid is (angle == 0.0)
+    if angle:
+        assert certificates["mixed"].edge_mismatch > 1e-3
+        assert certificates["mixed"].simple

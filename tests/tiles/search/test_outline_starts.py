@@ -1,0 +1,212 @@
+"""Placements, nearest tiles and start tiles."""
+
+import itertools
+
+import numpy as np
+import pytest
+import shapely
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from orbiflow.arrays import Array
+from orbiflow.tiles import (
+    CLASSES,
+    Target,
+    Tile,
+    TileModel,
+    certify,
+    resampled,
+)
+from orbiflow.tiles.search.placements import (
+    Placements,
+    _compositions,
+    _count,
+    best_placements,
+    edge_lengths,
+)
+from orbiflow.tiles.search.prototiles import Prototiles
+from orbiflow.tiles.search.starts import (
+    mirror_closed,
+    outline_starts,
+    template_starts,
+)
+from orbiflow.tiles.search.tile_space import nearest_tiles
+
+BOOT = np.array([[0, 0], [3, 0], [3.4, 1.2], [2.2, 1.5], [2.0, 2.8], [0.8, 2.5], [-0.3, 1.2]])
+TARGET = Target.from_polygon(BOOT)
+OUTLINE = resampled(TARGET.normal, 60) @ np.array([1, 1j])
+
+
+def exact_tile(name: str, seed: int) -> tuple[Array, Placements]:
+    """A bent tile of the class in a random pose, 60 or 40 vertices, and its placement."""
+    kind = CLASSES[name]
+    torch.manual_seed(seed)
+    pieces = 10 if len(kind.template()) == 6 else 8
+    model = TileModel(kind, torch.rand(1) * 6, max_frequency=2, smoothness=2.0)
+    with torch.no_grad():
+        field = model.fourier_fields()[0]
+        field.parameters_.copy_(0.04 * torch.randn_like(field.parameters_))
+        model.log_scale.add_(0.3)
+        model.stretch.normal_(std=0.1)
+        ring = model(model.boundary(pieces))[0].numpy()
+        turn = float(model.angle) if kind.stretch_dim == 1 else 0.0
+    lengths = np.full((1, len(kind.template())), pieces)
+    return ring, Placements(lengths, np.zeros(1, int), np.array([turn]), np.ones(1))
+
+
+@pytest.mark.parametrize("multiplicities", [(2, 2, 2), (1, 2, 1, 1, 1), (2, 2, 1, 1), (2, 1)])
+def test_compositions_are_all_there(multiplicities: tuple[int, ...]) -> None:
+    for total in (4, 9, 12):
+        brute = {
+            row
+            for row in itertools.product(range(1, total), repeat=len(multiplicities))
+            if np.dot(row, multiplicities) == total
+        }
+        found = _compositions(multiplicities, total)
+        assert {tuple(row) for row in found.tolist()} == brute
+        assert len(found) == len(brute) == _count(multiplicities, total)
+
+
+@pytest.mark.parametrize("name", CLASSES)
+def test_lengths_fit_the_class(name: str) -> None:
+    lengths = edge_lengths(CLASSES[name], 24)
+    assert (lengths.sum(axis=1) == 24).all()
+    for pair in CLASSES[name].identified_edges:
+        assert (lengths[:, pair.first] == lengths[:, pair.second]).all()
+
+
+@pytest.mark.parametrize("name", CLASSES)
+def test_a_tile_is_found_as_one(name: str) -> None:
+    ring, placement = exact_tile(name, 1)
+    outline = ring @ np.array([1, 1j])
+    found = best_placements(CLASSES[name], outline, 50)
+    assert found.gains[0] == pytest.approx(1.0, abs=1e-9)
+    assert (np.diff(found.gains) <= 0).all()
+    assert found.gains.max() <= 1 + 1e-9
+    # and it is its own nearest tile
+    own = nearest_tiles(CLASSES[name], outline, placement)
+    assert own.distance[0] < 1e-12
+    assert np.allclose(own.vertices[0], outline, atol=1e-7)
+
+
+@settings(max_examples=10, deadline=None)
+@given(st.sampled_from(list(CLASSES)), st.floats(0.1, 6), st.floats(0.2, 5), st.integers(0, 59))
+def test_gains_do_not_depend_on_the_pose(name: str, turn: float, scale: float, roll: int) -> None:
+    moved = np.roll(OUTLINE, roll) * scale * np.exp(1j * turn) + 3
+    one, two = (best_placements(CLASSES[name], o, 5) for o in (OUTLINE, moved))
+    if name != "IH4":  # starts run in steps of two points there
+        assert np.allclose(one.gains, two.gains, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", CLASSES)
+def test_nearest_tiles_tile(name: str) -> None:
+    kind = CLASSES[name]
+    found = best_placements(kind, OUTLINE, 60)
+    tiles = nearest_tiles(kind, OUTLINE, found)
+    checked = 0
+    for i, vertices in enumerate(tiles.vertices):
+        polygon = np.stack([vertices.real, vertices.imag], axis=-1)
+        start = np.roll(OUTLINE, -found.starts[i])
+        assert tiles.distance[i] == pytest.approx((abs(vertices - start) ** 2).sum(), rel=1e-6)
+        if np.linalg.det(tiles.linear[i]) <= 0 or not shapely.Polygon(polygon).is_valid:
+            continue
+        group = kind.group().conjugate(tiles.linear[i], tiles.offset[i])
+        tile = Tile(polygon, group, name, tuple(tiles.corners[i].tolist()))
+        assert certify(tile).valid
+        checked += 1
+    assert checked > 5
+
+
+@settings(max_examples=15, deadline=None)
+@given(st.sampled_from(list(CLASSES)), st.integers(0, 10**6))
+def test_no_tile_of_the_placement_is_nearer(name: str, seed: int) -> None:
+    kind = CLASSES[name]
+    rng = np.random.default_rng(seed)
+    found = best_placements(kind, OUTLINE, 3)
+    tiles = nearest_tiles(kind, OUTLINE, found)
+    noise = 0.05 * (rng.standard_normal(60) + 1j * rng.standard_normal(60))
+    others = nearest_tiles(kind, OUTLINE + noise, found)
+    for i in range(len(found.starts)):
+        distance = (abs(others.vertices[i] - np.roll(OUTLINE, -found.starts[i])) ** 2).sum()
+        assert distance >= tiles.distance[i] - 1e-9
+
+
+def test_heavy_points_are_met_better() -> None:
+    found = best_placements(CLASSES["IH5"], OUTLINE, 20)
+    weights = np.ones(60)
+    weights[:15] = 100.0
+    plain, heavy = (nearest_tiles(CLASSES["IH5"], OUTLINE, found, w) for w in (None, weights))
+    gaps = []
+    for tiles in (plain, heavy):
+        moved = np.stack([np.roll(v, s) for v, s in zip(tiles.vertices, found.starts, strict=True)])
+        gaps.append((abs(moved - OUTLINE)[:, :15] ** 2).sum(axis=1))
+    assert (gaps[1] <= gaps[0] + 1e-12).all()
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+@pytest.mark.parametrize("name", CLASSES)
+def test_prototiles_are_placed_where_the_tiles_are(name: str, mirrored: bool) -> None:
+    kind = CLASSES[name]
+    tiles = nearest_tiles(kind, OUTLINE, best_placements(kind, OUTLINE, 40))
+    tiles = tiles.take(np.flatnonzero(np.linalg.det(tiles.linear) > 0)[:5])
+    prototiles = Prototiles.of(kind, tiles, 60, mirrored=mirrored)
+    model = TileModel(kind, max_frequency=1, prototiles=prototiles)
+    with torch.no_grad():
+        placed = model.place(model.prototile()[0]).numpy() @ np.array([1, 1j])
+    assert np.allclose(np.conj(placed) if mirrored else placed, tiles.vertices, atol=1e-8)
+    twice = Prototiles.joined([prototiles, prototiles.take([0])])
+    assert len(twice) == len(prototiles) + 1
+    assert np.array_equal(twice.vertices[-1], prototiles.vertices[0])
+
+
+@pytest.mark.parametrize("name", CLASSES)
+def test_template_starts_are_centred(name: str) -> None:
+    kind = CLASSES[name]
+    starts = template_starts(kind, turns=4, stretch=0.3, vertices=60)
+    model = TileModel(kind, max_frequency=1, prototiles=starts)
+    with torch.no_grad():
+        placed = model.place(model.prototile()[0]).numpy()
+    corners = np.take_along_axis(placed, starts.corners[:, :, None], axis=1)
+    assert abs(corners.mean(axis=1)).max() < 1e-9
+    assert np.allclose(shapely.area(shapely.polygons(placed)), 1.0)
+
+
+@pytest.mark.parametrize("name", CLASSES)
+def test_starts_are_simple_different_and_best_first(name: str) -> None:
+    kind = CLASSES[name]
+    found = outline_starts(TARGET, kind, count=8, resolutions=(40, 60), projected=200, measured=40)
+    assert 1 <= len(found.prototiles) <= 8
+    assert (np.diff(found.iou) <= 0).all()
+    model = TileModel(kind, max_frequency=1, prototiles=found.prototiles)
+    with torch.no_grad():
+        placed = model.place(model.prototile()[0]).numpy()
+    goal = shapely.Polygon(TARGET.normal)
+    for ring, value in zip(placed, found.iou, strict=True):
+        polygon = shapely.Polygon(ring)
+        assert polygon.is_valid
+        iou = polygon.intersection(goal).area / polygon.union(goal).area
+        assert iou == pytest.approx(value, abs=1e-9)
+    shifted = outline_starts(
+        TARGET, kind, count=8, resolutions=(40, 60), projected=200, measured=40, phase=0.5
+    )
+    assert shifted.iou.shape != found.iou.shape or not np.allclose(shifted.iou, found.iou)
+
+
+def test_thin_limbs_still_give_starts() -> None:
+    angle = np.linspace(0, 2 * np.pi, 160, endpoint=False)
+    radius = 0.25 + np.cos(4 * angle) ** 16
+    star = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=-1)
+    found = outline_starts(Target.from_polygon(star), CLASSES["IH4"], count=10)
+    assert len(found.prototiles) == 10
+
+
+def test_only_ih21_needs_mirror_images() -> None:
+    assert [name for name, kind in CLASSES.items() if not mirror_closed(kind)] == ["IH21"]
+    image = Target.from_polygon(BOOT * (-1, 1))
+    one, two = (
+        outline_starts(t, CLASSES["IH21"], count=40, resolutions=(60,)) for t in (TARGET, image)
+    )
+    assert one.prototiles.mirrored.any()
+    assert not one.prototiles.mirrored.all()
+    assert one.iou[0] == pytest.approx(two.iou[0], abs=0.02)  # the points differ

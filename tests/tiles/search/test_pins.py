@@ -1,0 +1,118 @@
+"""Searches for likeness with parts that must not bend."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import shapely
+
+from orbiflow.errors import OrbiflowError
+from orbiflow.tiles import (
+    BendingSettings,
+    DescentSettings,
+    Emphasis,
+    EscherTile,
+    Pins,
+    escherize,
+)
+from outlines import animal
+
+SQUIRREL = animal("squirrel.dat")
+HEAD = (230, 190, 140)
+QUICK = BendingSettings(placements=80, held=12, starts=4, finalists=2, rounds=12, multiples=(4,))
+CLASSES = ["IH4", "IH5"]
+
+
+def head_misfit(result: EscherTile, pins: Pins) -> tuple[float, float]:
+    """How far the head's outline is from similar to what it was, and its turn in radians."""
+    assert result.rest is not None
+    assert result.bent is not None
+    held = pins.holds(SQUIRREL.to_normal(result.rest))
+    x, z = (SQUIRREL.to_normal(ring)[held] @ [1, 1j] for ring in (result.rest, result.bent))
+    x, z = x - x.mean(), z - z.mean()
+    a = np.vdot(x, z) / np.vdot(x, x)
+    return float(np.sqrt((abs(z - a * x) ** 2).sum() / (abs(z) ** 2).sum())), float(np.angle(a))
+
+
+@pytest.fixture(scope="module", name="free")
+def free_fixture() -> list[EscherTile]:
+    return escherize(SQUIRREL, CLASSES, QUICK)[0]
+
+
+@pytest.fixture(scope="module", name="pinned")
+def pinned_fixture() -> list[EscherTile]:
+    return escherize(SQUIRREL, CLASSES, QUICK, pins=Pins.at(SQUIRREL, [HEAD]))[0]
+
+
+def test_a_pinned_head_keeps_its_shape(free: list[EscherTile], pinned: list[EscherTile]) -> None:
+    pins = Pins.at(SQUIRREL, [HEAD])
+    assert len(free) == len(pinned) == 2
+    for result in pinned:
+        assert result.certificate.valid
+        assert result.pinned is not None
+        assert result.pinned < 0.02
+    worst = max(head_misfit(result, pins)[0] for result in pinned)
+    best = min(head_misfit(result, pins)[0] for result in free)
+    assert worst < best / 5
+    assert {result.pinned for result in free} == {None}
+
+
+def test_the_tile_itself_has_the_head(pinned: list[EscherTile]) -> None:
+    """Not only the bent silhouette: the certified polygon holds a copy of the pinned outline."""
+    pins = Pins.at(SQUIRREL, [HEAD])
+    for result in pinned:
+        assert result.rest is not None
+        assert result.bent is not None
+        held = pins.holds(SQUIRREL.to_normal(result.rest))
+        x, z = (ring[held] @ [1, 1j] for ring in (result.rest, result.bent))
+        a = np.vdot(x - x.mean(), z - z.mean()) / np.vdot(x - x.mean(), x - x.mean())
+        copy = a * (x - x.mean()) + z.mean()
+        boundary = shapely.Polygon(result.tile.polygon).exterior
+        far = shapely.distance(shapely.points(np.stack([copy.real, copy.imag], 1)), boundary)
+        assert far.mean() < 0.01 * np.sqrt(SQUIRREL.area)
+
+
+def test_a_pinned_head_keeps_its_angle() -> None:
+    pins = Pins.at(SQUIRREL, [HEAD], keep_angle=True)
+    held, _ = escherize(SQUIRREL, CLASSES, QUICK, pins=pins)
+    assert len(held) == 2
+    assert max(abs(head_misfit(result, pins)[1]) for result in held) < np.radians(5)
+    assert all(result.pinned is not None and result.pinned < 0.02 for result in held)
+
+
+@pytest.mark.parametrize("name", ["IH1", "IH2"])
+def test_a_head_that_would_turn_does_not(name: str) -> None:
+    turns = []
+    for keep in (False, True):
+        pins = Pins.at(SQUIRREL, [HEAD], keep_angle=keep)
+        (result,) = escherize(SQUIRREL, [name], replace(QUICK, starts=12), pins=pins)[0]
+        turns.append(abs(head_misfit(result, pins)[1]))
+    assert turns[0] > np.radians(5)
+    assert turns[0] > 2 * turns[1]
+
+
+def test_pins_need_a_search_where_something_bends() -> None:
+    pins = Pins.at(SQUIRREL, [HEAD])
+    with pytest.raises(OrbiflowError, match="pins belong to the search for likeness"):
+        escherize(SQUIRREL, ["IH4"], DescentSettings.for_effort("fast"), pins=pins)
+    with pytest.raises(OrbiflowError, match="pins must be a Pins"):
+        escherize(SQUIRREL, ["IH4"], QUICK, pins=HEAD)  # pyright: ignore[reportArgumentType]
+
+
+@pytest.mark.parametrize("strength", [1.001, 100.0])
+@pytest.mark.parametrize("white", ["all", "half", "corner"])
+@pytest.mark.parametrize("name", ["squirrel.dat", "nagata/octpus_94.dat"])
+def test_emphasis_of_any_strength_can_be_searched_with(
+    name: str, white: str, strength: float
+) -> None:
+    target = animal(name)
+    mask = np.ones((16, 16))
+    if white != "all":
+        mask[:, 8:] = 0
+    if white == "corner":
+        mask[3:] = 0
+    low, high = target.normal.min(axis=0), target.normal.max(axis=0)
+    emphasis = Emphasis(mask, (*low.tolist(), *high.tolist()), strength)
+    hasty = BendingSettings(placements=30, held=4, starts=1, finalists=1, rounds=6, multiples=(4,))
+    results, _ = escherize(target, ["IH4"], hasty, emphasis=emphasis)
+    assert all(result.certificate.valid for result in results)

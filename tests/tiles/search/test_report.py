@@ -1,0 +1,224 @@
+"""result.json: its schema, its metrics, and that what it states tiles the plane."""
+
+import json
+import re
+import runpy
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import numpy as np
+import pytest
+import shapely
+from shapely import affinity
+
+from orbiflow.tiles import ClassFailure, OccupancySettings, Target, escherize, report
+
+DOCS = Path(__file__).parents[3] / "docs"
+SCHEMA = json.loads((DOCS / "result.schema.json").read_text(encoding="utf-8"))
+SNIPPET = re.findall(r"```python\n(.*?)```", (DOCS / "result.md").read_text("utf-8"), re.DOTALL)
+
+# pixels far from the origin, so that translations of the group are large beside the tile
+BOOT = 40 * np.array([[0, 0], [3, 0], [3.4, 1.2], [2.2, 1.5], [2, 2.8], [0.8, 2.5], [-0.3, 1.2]])
+BOOT += [700, 300]
+CLASSES = ["IH6", "IH21", "IH1"]
+QUICK = OccupancySettings(
+    max_frequency=3, turns=2, finalists=1, iterations=12, affine_iterations=20, points=200, seed=3
+)
+
+
+@pytest.fixture(scope="module", params=[False, True], ids=["y up", "y down"])
+def case(request: pytest.FixtureRequest) -> tuple[Target, dict[str, Any]]:
+    """A target and its document as read back from JSON."""
+    target = Target.from_polygon(BOOT, y_down=request.param)
+    results, failures = escherize(target, CLASSES, QUICK)
+    assert len(results) == 3
+    failures = [*failures, ClassFailure("IH2", "the boundary crosses itself")]
+    document = report(target, results, failures, QUICK, seconds=12.3456, workers=2)
+    return target, json.loads(json.dumps(document, allow_nan=False))
+
+
+def validator() -> jsonschema.Draft202012Validator:
+    return jsonschema.Draft202012Validator(SCHEMA)
+
+
+def tiling_errors(entry: dict[str, Any]) -> tuple[float, float]:
+    """Relative overlap and gap in a window of about six tiles: shapely and the document alone."""
+    tile = shapely.Polygon(entry["polygon"])
+    (a, b), (c, d) = entry["group"]["lattice"]
+    size = tile.area**0.5
+    x, y = tile.centroid.coords[0]
+    window = shapely.box(x - 1.3 * size, y - 1.1 * size, x + 1.2 * size, y + 1.4 * size)
+    images = []
+    for coset in entry["group"]["cosets"]:
+        (p, q), (r, s) = coset["linear"]
+        u, v = coset["translation"]
+        image = affinity.affine_transform(tile, [p, q, r, s, u, v])
+        # whole lattice vectors that bring the image's centroid nearest to the tile's
+        right, up = x - image.centroid.x, y - image.centroid.y
+        det = a * d - b * c
+        i0, j0 = round((d * right - b * up) / det), round((a * up - c * right) / det)
+        for i in range(i0 - 9, i0 + 10):
+            for j in range(j0 - 9, j0 + 10):
+                moved = affinity.translate(image, a * i + b * j, c * i + d * j)
+                if moved.intersects(window):
+                    images.append(moved)
+    overlap = sum(
+        one.intersection(other).area for k, one in enumerate(images) for other in images[:k]
+    )
+    gap = window.difference(shapely.union_all(images)).area
+    return overlap / tile.area, gap / tile.area
+
+
+def test_schema_is_a_schema() -> None:
+    jsonschema.Draft202012Validator.check_schema(SCHEMA)
+
+
+def test_documents_are_valid(case: tuple[Target, dict[str, Any]]) -> None:
+    _, document = case
+    validator().validate(document)
+    assert document["seed"] == QUICK.seed
+    assert document["timings"]["wall_seconds"] == 12.346
+    assert [entry["class"] for entry in document["failed"]] == ["IH2"]
+    scores = [entry["score"] for entry in document["tiles"]]
+    assert scores == sorted(scores, reverse=True)
+    assert {entry["class"] for entry in document["tiles"]} == set(CLASSES)
+
+
+def test_a_document_without_tiles_is_valid() -> None:
+    target = Target.from_polygon(BOOT)
+    own = replace(QUICK, segments=2)
+    document = report(target, [], [ClassFailure("IH4", "no")], own, seconds=0.0, workers=1)
+    document = json.loads(json.dumps(document))
+    validator().validate(document)
+    assert document["timings"]["core_seconds"] == 0
+
+
+@pytest.mark.parametrize(
+    ("path", "value"),
+    [
+        (["schema_version"], 2),
+        (["seed"], -1),
+        (["tiles", 0, "class"], "IH8"),
+        (["tiles", 0, "polygon", 0], [0.0, 0.0, 0.0]),
+        (["tiles", 0, "metrics", "iou"], 1.5),
+        (["tiles", 0, "certificate", "reasons"], ["it overlaps"]),
+        (["tiles", 0, "certificate", "valid"], False),
+        (["tiles", 0, "group", "lattice"], [[1.0, 0.0]]),
+        (["tiles", 0, "unknown"], 1),
+        (["input", "kind"], "pdf"),
+        (["settings", "max_frequency"], 61),
+    ],
+)
+def test_the_schema_notices(
+    case: tuple[Target, dict[str, Any]], path: list[str | int], value: object
+) -> None:
+    document = json.loads(json.dumps(case[1]))
+    inner: Any = document
+    for key in path[:-1]:
+        inner = inner[key]
+    inner[path[-1]] = value
+    assert not validator().is_valid(document)
+
+
+def test_every_field_is_required(case: tuple[Target, dict[str, Any]]) -> None:
+    _, document = case
+    for key in document.keys() - {"objective"}:  # newer than the first version of the layout
+        assert not validator().is_valid({k: v for k, v in document.items() if k != key})
+
+
+def test_polygons_lie_on_the_input(case: tuple[Target, dict[str, Any]]) -> None:
+    target, document = case
+    goal = shapely.Polygon(BOOT)
+    assert document["input"]["y_down"] is target.y_down
+    assert document["input"]["area"] == pytest.approx(goal.area, rel=1e-12)
+    for entry in document["tiles"]:
+        assert entry["polygon"][0] == entry["polygon"][-1]
+        tile = shapely.Polygon(entry["polygon"])
+        assert tile.is_valid
+        corners = entry["corners"]
+        assert corners == sorted(set(corners))
+        assert corners[0] == 0
+        assert corners[-1] < len(entry["polygon"]) - 1
+        metrics = entry["metrics"]
+        assert metrics["iou"] > 0.6
+        common = tile.intersection(goal).area
+        assert metrics["iou"] == pytest.approx(common / tile.union(goal).area, abs=1e-12)
+        assert metrics["dice"] == pytest.approx(2 * common / (tile.area + goal.area), abs=1e-12)
+        window = shapely.box(*metrics["window"])
+        xmin, ymin, xmax, ymax = goal.bounds
+        dx, dy = 0.1 * (xmax - xmin), 0.1 * (ymax - ymin)
+        expected = (xmin - dx, ymin - dy, xmax + dx, ymax + dy)
+        assert window.bounds == pytest.approx(expected, abs=1e-9)
+        wrong = tile.symmetric_difference(goal).intersection(window).area
+        assert metrics["pixel_accuracy"] == pytest.approx(1 - wrong / window.area, abs=1e-12)
+        # shapely samples the curves here: a lower bound, short by at most half a sample's spacing
+        distance = shapely.hausdorff_distance(tile.exterior, goal.exterior, densify=0.002)
+        length = max(tile.exterior.length, goal.exterior.length)
+        scaled = metrics["hausdorff"] * goal.area**0.5
+        assert distance - 1e-3 <= scaled <= distance + 0.002 * length
+
+
+def test_certificates_are_of_the_stated_polygon(case: tuple[Target, dict[str, Any]]) -> None:
+    for entry in case[1]["tiles"]:
+        certificate, group = entry["certificate"], entry["group"]
+        assert certificate["valid"] is True
+        x, y = np.array(entry["polygon"][:-1]).T
+        area = 0.5 * np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)
+        assert certificate["signed_area"] == pytest.approx(area, rel=1e-9)
+        expected = abs(np.linalg.det(np.array(group["lattice"]))) / len(group["cosets"])
+        assert certificate["expected_area"] == pytest.approx(expected, rel=1e-12)
+        assert abs(area) == pytest.approx(expected, rel=1e-9)
+
+
+def test_the_stated_group_tiles_the_plane(case: tuple[Target, dict[str, Any]]) -> None:
+    orders = {"IH1": 1, "IH6": 4, "IH21": 6}
+    for entry in case[1]["tiles"]:
+        assert len(entry["group"]["cosets"]) == orders[entry["class"]]
+        dets = [np.linalg.det(np.array(c["linear"])) for c in entry["group"]["cosets"]]
+        assert np.allclose(np.abs(dets), 1, atol=1e-12)
+        assert sum(det < 0 for det in dets) == (2 if entry["class"] == "IH6" else 0)
+        assert max(tiling_errors(entry)) < 1e-9
+
+
+def test_the_check_notices_a_wrong_tile(case: tuple[Target, dict[str, Any]]) -> None:
+    for entry in json.loads(json.dumps(case[1]["tiles"])):
+        size = shapely.Polygon(entry["polygon"]).area ** 0.5
+        entry["polygon"][1][0] += 0.05 * size
+        assert max(tiling_errors(entry)) > 1e-5
+
+
+def test_the_snippet_of_the_manual(
+    case: tuple[Target, dict[str, Any]],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    (snippet,) = SNIPPET
+    assert "orbiflow" not in snippet
+    script, path = tmp_path / "check.py", tmp_path / "result.json"
+    script.write_text(snippet, "utf-8")
+    monkeypatch.setattr(sys, "argv", ["check.py", str(path)])
+    path.write_text(json.dumps(case[1]), "utf-8")
+    runpy.run_path(str(script))
+    assert [line.split()[0] for line in capsys.readouterr().out.splitlines()] == [
+        entry["class"] for entry in case[1]["tiles"]
+    ]
+    broken = json.loads(json.dumps(case[1]))
+    broken["tiles"][2]["group"]["lattice"][0][0] *= 1.01
+    path.write_text(json.dumps(broken), "utf-8")
+    with pytest.raises(AssertionError):
+        runpy.run_path(str(script))
+
+
+@pytest.mark.parametrize("part", ["", "input", "tile", "metrics", "certificate", "group"])
+def test_the_manual_names_every_field(part: str) -> None:
+    manual = (DOCS / "result.md").read_text(encoding="utf-8")
+    properties = (SCHEMA["$defs"][part] if part else SCHEMA)["properties"]
+    prefix = {"input": "input.", "group": "group."}.get(part, "")
+    for name in properties:
+        names = {f"`{prefix}{name}`", f"`{name}`", f"`{prefix}{name}.", f"`{part}.{name}`"}
+        starts = {f"`{name}."}
+        assert any(text in manual for text in names | starts), name

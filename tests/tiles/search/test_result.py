@@ -1,0 +1,117 @@
+"""The choice among finalists."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.spatial
+import shapely
+import torch
+
+from orbiflow.errors import CertificationError
+from orbiflow.tiles import CLASSES, EscherTile, Fit, Target, TileMap, TileModel, as_model, certify
+from orbiflow.tiles.result_file import tile_json
+from orbiflow.tiles.search.boundary import DENSE
+from orbiflow.tiles.search.result import best_tiles
+from strategies import random_tensor
+
+KIND = CLASSES["IH21"]
+
+
+def best_tile(
+    target: Target, model: TileModel, *, starts: int, seconds: float, force: bool = False
+) -> EscherTile:
+    fit = Fit(model, starts, 0, model.size)
+    return best_tiles(target, fit, seconds=seconds, force=force)[0]
+
+
+def finalists(*shapes: float, angles: tuple[float, ...] | None = None) -> TileModel:
+    """Candidates without a flow; a shape of 2 makes the template cross itself."""
+    turns = torch.tensor(angles or (0.0,) * len(shapes), dtype=torch.float64)
+    model = TileModel(KIND, turns, max_frequency=1)
+    with torch.no_grad():
+        model.shape.add_(torch.tensor(shapes)[:, None])
+    return model
+
+
+@pytest.mark.parametrize("y_down", [False, True])
+def test_the_best_of_the_certified_wins(y_down: bool) -> None:
+    # input units 30 times larger and far from the origin
+    target = Target.from_polygon(30 * KIND.template() + 500, y_down=y_down)
+    sign = -1.0 if y_down else 1.0
+    model = finalists(2.0, 0.0, 0.02, -0.02, angles=(0.0, 0.4, 0.1, 0.9))
+    result = best_tile(target, model, starts=24, seconds=1.5)
+    single = [
+        best_tile(target, model.take([i]), starts=24, seconds=1.5).metrics.iou for i in (1, 2, 3)
+    ]
+    assert result.metrics.iou == max(single)
+    assert min(single) < max(single)
+    assert (result.dropped, result.starts, result.seconds) == (1, 24, 1.5)
+    assert (result.name, result.group_name) == ("IH21", "p6")
+    assert result.certificate.valid
+    # the same tile in both frames
+    moved = target.to_input(result.normal_tile.polygon)
+    assert abs(result.tile.polygon - moved).max() < 1e-9
+    assert sign * result.tile.signed_area == pytest.approx(target.area, rel=1e-9)
+    assert certify(result.normal_tile).valid
+    tile, goal = shapely.Polygon(result.tile.polygon), shapely.Polygon(target.outline)
+    iou = tile.intersection(goal).area / tile.union(goal).area
+    assert result.metrics.iou == pytest.approx(iou, abs=1e-12)
+
+
+def test_no_certified_finalist() -> None:
+    target = Target.from_polygon(KIND.template())
+    with pytest.raises(CertificationError, match="crosses itself") as caught:
+        best_tile(target, finalists(2.0, 2.5), starts=2, seconds=0.0)
+    assert str(caught.value).count("crosses itself") == 1  # the same reason is given once
+
+
+def test_force_keeps_the_uncertified_and_says_so() -> None:
+    target = Target.from_polygon(KIND.template())
+    result = best_tile(target, finalists(2.0), starts=1, seconds=0.0, force=True)
+    assert not result.certificate.valid
+    assert "not simple" in result.certificate.reasons[0]
+    assert 0 < result.metrics.iou < 1
+
+
+def test_force_prefers_the_certified() -> None:
+    # the crossing tile covers the target better than the certified one, which is moved away
+    target = Target.from_polygon(KIND.template())
+    model = finalists(2.0, 0.0)
+    with torch.no_grad():
+        model.offset[1] += 0.8
+    worse = best_tile(target, model.take([0]), starts=1, seconds=0.0, force=True)
+    result = best_tile(target, model, starts=1, seconds=0.0, force=True)
+    assert result.certificate.valid
+    assert result.metrics.iou < worse.metrics.iou
+    assert result.dropped == 0
+
+
+@pytest.mark.parametrize("name", ["IH4", "IH6", "IH28"])
+@pytest.mark.parametrize("y_down", [False, True])
+def test_a_file_alone_places_the_tile_in_the_input(name: str, y_down: bool, tmp_path: Path) -> None:
+    kind = CLASSES[name]
+    target = Target.from_polygon(30 * kind.template() + 500, y_down=y_down)
+    model = TileModel(kind, torch.tensor([0.3]), max_frequency=2, smoothness=0.0)
+    with torch.no_grad():
+        for parameter in model.flow.parameters():
+            parameter.add_(0.02 * random_tensor(4, *parameter.shape, size=1.0))
+    result = best_tile(target, model, starts=1, seconds=0.0)
+    polygon = np.array(tile_json(result)["polygon"])[:-1]
+    path = tmp_path / "model.safetensors"
+    assert result.map is not None
+    path.write_bytes(result.map.to_bytes())
+
+    saved = TileMap.read(path)
+    assert saved.frame is not None
+    loaded = as_model(saved)
+    pieces = 2 * -(-DENSE[0] // (2 * len(kind.template())))
+    with torch.no_grad():
+        curve = saved.frame.to_input(loaded(loaded.boundary(pieces)))[0].numpy()
+    # half of the polygon is flowed, the other half its image: the map has both
+    nearest = np.asarray(scipy.spatial.KDTree(curve).query(polygon)[0])
+    assert nearest.max() < 1e-9
+    assert np.abs(curve[::pieces] - polygon[list(result.tile.corners)]).max() < 1e-9
+    back = loaded.inverse(torch.tensor(saved.frame.to_normal(polygon))[None]).detach()
+    on_template = shapely.Polygon(kind.template()).exterior
+    assert shapely.distance(shapely.points(back[0].numpy()), on_template).max() < 1e-6

@@ -1,0 +1,322 @@
+"""Searches over classes, in this process and in others."""
+
+import math
+import multiprocessing
+import threading
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from orbiflow.errors import OrbiflowError
+from orbiflow.runtime import Cancel, Cancelled
+from orbiflow.tiles import (
+    CLASSES,
+    BendingSettings,
+    BothSettings,
+    ClassFailure,
+    DescentSettings,
+    EscherTile,
+    Event,
+    OccupancySettings,
+    Target,
+    TileModel,
+    escherize,
+    escherize_class,
+    isohedral_class,
+)
+from orbiflow.tiles.likeness import mutual_iou
+from orbiflow.tiles.search import methods
+from orbiflow.tiles.search.steps import SKETCH
+from outlines import animal
+
+BOOT = [[0, 0], [3, 0], [3.4, 1.2], [2.2, 1.5], [2.0, 2.8], [0.8, 2.5], [-0.3, 1.2]]
+QUICK = OccupancySettings(
+    max_frequency=3, turns=3, finalists=2, iterations=15, affine_iterations=20, points=200
+)
+BRIEF = DescentSettings.for_effort(
+    "fast", stages=((6, 2), (6, 1)), polish=5, projected=100, measured=30
+)
+TARGET = Target.from_polygon(BOOT, y_down=True)
+SQUIRREL = animal("squirrel.dat")
+
+
+def crossed(*_: object, **__: object) -> TileModel:
+    model = TileModel(CLASSES["IH21"], torch.zeros(2), max_frequency=1)
+    with torch.no_grad():
+        model.shape.add_(2.0)
+    return model
+
+
+def test_the_same_tiles_whatever_the_number_of_workers() -> None:
+    events: list[Event] = []
+    here, none = escherize(TARGET, ["ih4", "28", "IH4"], QUICK, watch=events.append)
+    assert none == []
+    assert sorted(r.name for r in here) == ["IH28", "IH4"]
+    assert here[0].metrics.iou > here[1].metrics.iou > 0.7
+    for name in ("IH4", "IH28"):
+        own = [event for event in events if event.name == name]
+        shares = [event.share for event in own]
+        assert shares == sorted(shares)
+        assert shares[-1] == 1.0
+        assert isinstance(own[-1].outcome, EscherTile)
+        assert all(event.outcome is None and math.isfinite(event.loss) for event in own[:-1])
+    elsewhere, none = escherize(TARGET, ["IH28", "IH4"], QUICK, workers=2)
+    assert none == []
+    for one, other in zip(here, elsewhere, strict=True):
+        assert one.name == other.name
+        assert np.array_equal(one.tile.polygon, other.tile.polygon)
+        assert one.metrics == other.metrics
+        assert (one.map and one.map.settings) == (other.map and other.map.settings)
+
+
+def test_every_seed_that_settings_take_can_be_searched_with() -> None:
+    own = replace(QUICK, seed=2**32 - 1, iterations=1, affine_iterations=1, turns=1, points=20)
+    assert isinstance(escherize_class(TARGET, "IH21", own), EscherTile)
+
+
+def test_the_number_of_threads_is_put_back() -> None:
+    before = torch.get_num_threads()
+    torch.set_num_threads(2)
+    try:
+        own = replace(QUICK, iterations=1, affine_iterations=1, turns=1, points=20)
+        escherize_class(TARGET, "IH1", own)
+        assert torch.get_num_threads() == 2
+    finally:
+        torch.set_num_threads(before)
+
+
+@pytest.mark.parametrize("force", [False, True])
+def test_a_fit_that_runs_away_is_a_failure(force: bool) -> None:
+    outcome = escherize_class(TARGET, "IH4", replace(QUICK, learning_rate=1e4), force=force)
+    assert isinstance(outcome, ClassFailure)
+    assert outcome.name == "IH4"
+    assert "no finite values" in outcome.reason or "finite coordinates" in outcome.reason
+
+
+def test_a_class_whose_finalists_all_fold(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(methods, "fit_occupancy", crossed)
+    events: list[Event] = []
+    results, failures = escherize(TARGET, ["IH21"], QUICK, watch=events.append)
+    assert results == []
+    assert [f.name for f in failures] == ["IH21"]
+    assert "crosses itself" in failures[0].reason
+    assert events == [Event("IH21", 1.0, events[0].loss, failures[0])]
+    results, failures = escherize(TARGET, ["IH21"], QUICK, force=True)
+    assert failures == []
+    assert not results[0].certificate.valid
+    assert "not simple" in results[0].certificate.reasons[0]
+
+
+NAMES = ["IH2", "IH7", "IH3", "IH4"]
+SHORT = replace(QUICK, iterations=2, affine_iterations=1, turns=1)
+both = pytest.mark.parametrize("workers", [1, 2])
+
+
+def checked(events: list[Event], names: list[str]) -> None:
+    """The order that `Event` promises."""
+    previews = [k for k, event in enumerate(events) if event.preview is not None]
+    assert previews in ([], [0])
+    for name in names:
+        own = [event for event in events if event.name == name and event.preview is None]
+        shares = [event.share for event in own]
+        assert shares == sorted(shares)
+        assert [event.outcome is not None for event in own] == [False] * (len(own) - 1) + [True]
+        assert own[-1].outcome is not None
+        assert own[-1].outcome.name == name
+
+
+@both
+def test_events_come_in_order_and_in_this_thread(workers: int) -> None:
+    events: list[Event] = []
+    threads: set[int] = set()
+
+    def watch(event: Event) -> None:
+        events.append(event)
+        threads.add(threading.get_ident())
+
+    escherize(TARGET, NAMES, QUICK, workers=workers, watch=watch)
+    checked(events, NAMES)
+    assert threads == {threading.get_ident()}
+    assert {event.share for event in events if event.outcome is not None} == {1.0}
+    assert len(events) > 2 * len(NAMES)
+
+
+@both
+@pytest.mark.parametrize("error", [ZeroDivisionError, KeyboardInterrupt])
+@pytest.mark.parametrize("with_outcome", [False, True])
+def test_what_watch_raises_ends_the_search(
+    workers: int, error: type[BaseException], with_outcome: bool
+) -> None:
+    told: list[Event] = []
+
+    def watch(event: Event) -> None:
+        told.append(event)
+        if (event.outcome is not None) == with_outcome:
+            raise error
+
+    with pytest.raises(error):
+        escherize(TARGET, NAMES, QUICK, workers=workers, watch=watch)
+    assert sum((event.outcome is not None) == with_outcome for event in told) == 1
+    assert multiprocessing.active_children() == []
+
+
+@both
+def test_cancelling_keeps_what_was_finished(workers: int) -> None:
+    cancel, events = Cancel(), []
+
+    def watch(event: Event) -> None:
+        events.append(event)
+        if event.outcome is not None:
+            cancel.cancel()
+
+    results, failures = escherize(TARGET, NAMES, SHORT, workers=workers, watch=watch, cancel=cancel)
+    checked(events, NAMES)
+    # what workers had in hand when they were told may have been finished, too
+    assert 1 <= len(results) < len(NAMES)
+    assert {f.reason for f in failures} == {"interrupted"}
+    assert sorted([r.name for r in results] + [f.name for f in failures]) == sorted(NAMES)
+
+
+@both
+def test_a_fit_is_left_between_two_steps(workers: int) -> None:
+    """A million steps would take hours."""
+    cancel, events = Cancel(), []
+
+    def watch(event: Event) -> None:
+        events.append(event)
+        cancel.cancel()
+
+    endless = replace(QUICK, iterations=10**6, affine_iterations=1, turns=1)
+    results, failures = escherize(
+        TARGET, NAMES, endless, workers=workers, watch=watch, cancel=cancel
+    )
+    assert results == []
+    assert failures == [ClassFailure(name, "interrupted") for name in NAMES]
+    checked(events, NAMES)
+    assert multiprocessing.active_children() == []
+
+
+@both
+def test_a_search_may_be_cancelled_before_it_begins(workers: int) -> None:
+    cancel = Cancel()
+    cancel.cancel()
+    events: list[Event] = []
+    results, failures = escherize(
+        TARGET, NAMES, QUICK, workers=workers, watch=events.append, cancel=cancel
+    )
+    assert results == []
+    assert [f.name for f in failures] == NAMES
+    assert len(events) == len(NAMES)
+
+
+def test_one_class_alone_is_cancelled_by_an_exception() -> None:
+    cancel = Cancel()
+    endless = replace(QUICK, iterations=10**6, affine_iterations=1, turns=1)
+    with pytest.raises(Cancelled):
+        escherize_class(TARGET, "IH2", endless, watch=lambda _: cancel.cancel(), cancel=cancel)
+
+
+def test_one_class_may_be_given_by_its_name() -> None:
+    for given in ("IH4", 4, isohedral_class("ih4")):
+        results, failures = escherize(TARGET, given, QUICK)
+        assert [r.name for r in results] == ["IH4"]
+        assert not failures
+    with pytest.raises(OrbiflowError, match="unknown isohedral class 'IH8'"):
+        escherize(TARGET, "IH8", QUICK)
+    with pytest.raises(OrbiflowError, match='classes must be a name such as "IH4", or a list'):
+        escherize(TARGET, 1.5, QUICK)  # pyright: ignore[reportArgumentType]
+
+
+def test_arguments_are_checked() -> None:
+    with pytest.raises(OrbiflowError, match=r"unknown isohedral class 'IH8'; the nine are IH1, .*"):
+        escherize(TARGET, ["IH4", "IH8"], QUICK)
+    with pytest.raises(OrbiflowError, match="no isohedral class was given"):
+        escherize(TARGET, [], QUICK)
+    for workers in (0, -1):
+        with pytest.raises(OrbiflowError, match=f"workers must be at least 1, got {workers}"):
+            escherize(TARGET, ["IH4"], QUICK, workers=workers)
+
+
+@pytest.mark.parametrize("wrong", ["fast", 3, {"placements": 5}])
+def test_settings_of_no_method_are_refused(wrong: object) -> None:
+    with pytest.raises(OrbiflowError, match="settings must be of a method, got"):
+        escherize(TARGET, ["IH1"], wrong)  # pyright: ignore[reportArgumentType]
+    with pytest.raises(OrbiflowError, match="the target must be a Target"):
+        escherize("turtle.png", ["IH1"])  # pyright: ignore[reportArgumentType]
+
+
+def test_of_both_objectives_one_may_fail() -> None:
+    bar = Target.from_polygon([[0, 0], [60, 0], [60, 1], [0, 1]])
+    likeness = BendingSettings(placements=20, held=4, starts=1, finalists=1, rounds=4)
+    alone = escherize_class(bar, "IH7", likeness)
+    assert isinstance(alone, ClassFailure)
+    both = escherize_class(bar, "IH7", BothSettings(likeness, BRIEF))
+    assert isinstance(both, EscherTile)
+    assert {tile.objective for tile in both.family()} == {"overlap"}
+    assert all(tile.deformation is not None for tile in both.family())
+
+
+def test_both_objectives_give_a_short_list_likeness_first() -> None:
+    likeness = BendingSettings(placements=40, held=8, starts=4, finalists=3, rounds=6)
+    settings = BothSettings(likeness, BRIEF)
+    events: list[Event] = []
+    results, failures = escherize(SQUIRREL, ["IH4", "IH6"], settings, watch=events.append)
+    assert not failures
+    assert max(event.share for event in events) <= 1
+    objectives = [r.objective for r in results]
+    assert objectives == sorted(objectives)  # alphabet is on our side
+    assert set(objectives) == {"likeness", "overlap"}
+    for kind in ("likeness", "overlap"):
+        scores = [r.score for r in results if r.objective == kind]
+        assert scores == sorted(scores, reverse=True)
+    found = [
+        tile for e in events if isinstance(e.outcome, EscherTile) for tile in e.outcome.family()
+    ]
+    assert len(found) >= len(results)
+    places = [(r.deformation or 0.0, r.metrics.iou) for r in found]
+    for r in results:
+        assert r.deformation is not None
+        beaten = any(d < r.deformation and iou > r.metrics.iou for d, iou in places)
+        assert r.front == (not beaten)
+        assert r.certificate.valid
+    assert results[objectives.index("overlap")].deformation != 0
+    alike = mutual_iou([r.normal_tile.polygon for r in results])
+    assert all(alike(i, j) < 0.9 for i in range(len(results)) for j in range(i))
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        BendingSettings(placements=80, held=20, starts=8, finalists=8, rounds=6, multiples=(4,)),
+        BRIEF,
+    ],
+    ids=["likeness", "overlap"],
+)
+def test_several_of_a_class_differ(settings: BendingSettings | DescentSettings) -> None:
+    results, _ = escherize(SQUIRREL, ["IH4", "IH6"], settings, per_class=4)
+    for name in ("IH4", "IH6"):
+        own = [r for r in results if r.name == name]
+        assert 1 <= len(own) <= 4
+        alike = mutual_iou([r.normal_tile.polygon for r in own])
+        assert all(alike(i, j) < 0.9 for i in range(len(own)) for j in range(i))
+    assert len(results) > 2
+
+
+def test_more_effort_never_scores_less() -> None:
+    """Through the search itself, also where several tiles of a class are asked for."""
+    for per_class in (1, 2):
+        scores = []
+        for effort in ("fast", "normal"):
+            settings = BendingSettings.for_effort(effort)
+            tile = escherize_class(SQUIRREL, "IH5", settings, per_class=per_class)
+            assert isinstance(tile, EscherTile)
+            scores.append(tile.score)
+        assert scores[1] >= scores[0]
+
+
+def test_a_first_look_is_one_small_search() -> None:
+    own = replace(BendingSettings.for_effort("best"), **SKETCH)
+    assert own.searches() == (own,)
+    assert own.finalists == own.starts == 1

@@ -1,0 +1,330 @@
+"""Fitted tiles on disk."""
+
+import json
+import pickle
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from safetensors.numpy import save
+
+from orbiflow.errors import InputFileError, OrbiflowError
+from orbiflow.tiles import (
+    CLASSES,
+    Bending,
+    Frame,
+    TileMap,
+    TileModel,
+    as_map,
+    as_model,
+    certify,
+    load_model,
+)
+from orbiflow.tiles.search.boundary import extract_tile
+from orbiflow.tiles.tile_map import BENDING, FORMAT, MAX_BYTES
+from strategies import seeds
+
+
+def candidate(name: str, seed: int = 0, segments: int = 1, size: int = 1) -> TileModel:
+    """Candidates with random parameters and a small flow."""
+    rng = np.random.default_rng(seed)
+    model = TileModel(
+        CLASSES[name],
+        torch.tensor(rng.uniform(-3, 3, size)),
+        mirrored=torch.tensor(rng.random(size) < 0.5),
+        max_frequency=2,
+        segments=segments,
+        smoothness=1.25,
+        steps=12,
+        method="rk3",
+    )
+    with torch.no_grad():
+        for parameter in model.parameters():
+            parameter.add_(torch.tensor(rng.uniform(-0.05, 0.05, parameter.shape)))
+    return model
+
+
+def assert_same(one: TileModel, other: TileModel) -> None:
+    assert one.isohedral_class is other.isohedral_class
+    assert torch.equal(one.mirror, other.mirror)
+    for what in ("max_frequency", "segments", "smoothness"):
+        assert getattr(one, what) == getattr(other, what)
+    assert (one.flow.steps, one.flow.method) == (other.flow.steps, other.flow.method)
+    mine, theirs = dict(one.named_parameters()), dict(other.named_parameters())
+    assert list(mine) == list(theirs)
+    assert all(torch.equal(mine[name], theirs[name]) for name in mine)
+
+
+@settings(max_examples=15)
+@given(st.sampled_from(list(CLASSES)), seeds, st.integers(1, 3))
+def test_round_trip(name: str, seed: int, segments: int) -> None:
+    model = candidate(name, seed, segments)
+    assert_same(model, as_model(as_map(model)))
+
+
+@pytest.mark.parametrize("name", CLASSES)
+def test_round_trip_through_a_file(name: str, tmp_path: Path) -> None:
+    model = candidate(name, 7, 2)
+    path = tmp_path / "model.safetensors"
+    path.write_bytes(as_map(model).to_bytes())
+    loaded = load_model(path)
+    assert_same(model, loaded)
+
+
+def test_a_restored_model_gives_the_same_polygon(tmp_path: Path) -> None:
+    tile, fine = extract_tile(candidate("IH6", 3))
+    path = tmp_path / "model.safetensors"
+    path.write_bytes(as_map(fine).to_bytes())
+    again, _ = extract_tile(load_model(str(path)))
+    assert np.array_equal(tile.polygon, again.polygon)
+    assert np.array_equal(tile.group.lattice, again.group.lattice)
+
+
+OLD = Path(__file__).parent / "data" / "tile-1"
+
+
+def test_a_file_of_version_0_1_is_read_as_it_was() -> None:
+    path = OLD.with_suffix(".safetensors")
+    expected = json.loads(OLD.with_suffix(".json").read_text())
+    assert TileMap.read(path).frame is None
+    model = load_model(path)
+    with torch.no_grad():
+        images = model(torch.tensor(expected["points"], dtype=torch.float64)[None])[0].numpy()
+    assert np.abs(images - expected["images"]).max() < 1e-12
+    tile, _ = extract_tile(model)
+    assert np.abs(tile.polygon[list(tile.corners)] - expected["corners"]).max() < 1e-9
+    assert certify(tile).valid
+
+
+def test_the_frame_is_kept_bit_for_bit(tmp_path: Path) -> None:
+    frame = Frame(np.diag([0.1, -0.1]), np.array([1 / 3, 1e7]), "image", (640, 480))
+    path = tmp_path / "model.safetensors"
+    saved = as_map(candidate("IH4"), frame)
+    path.write_bytes(saved.to_bytes())
+    loaded = TileMap.read(path)
+    assert loaded.frame is not None
+    assert loaded.frame.as_dict() == frame.as_dict()
+    assert loaded.settings == saved.settings
+    assert_same(as_model(loaded), as_model(saved))
+
+
+def two_triangles() -> Bending:
+    square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+    sheared = square @ [[1.0, 0.0], [1 / 3, 1.0]]
+    return Bending(square, sheared, np.array([[0, 1, 2], [0, 2, 3]]))
+
+
+def test_the_bending_is_kept_bit_for_bit(tmp_path: Path) -> None:
+    path = tmp_path / "model.safetensors"
+    bending = two_triangles()
+    saved = as_map(candidate("IH4"), bending=bending)
+    path.write_bytes(saved.to_bytes())
+    for again in (TileMap.read(path), pickle.loads(pickle.dumps(saved))):
+        assert again.bending is not None
+        for name in ("rest", "images", "triangles"):
+            assert np.array_equal(getattr(again.bending, name), getattr(bending, name))
+        assert set(again.arrays) == set(saved.arrays)
+        assert_same(as_model(again), as_model(saved))
+
+
+def test_files_without_a_bending_have_none(tmp_path: Path) -> None:
+    path = tmp_path / "model.safetensors"
+    path.write_bytes(good())
+    assert TileMap.read(path).bending is None
+    assert TileMap.read(OLD.with_suffix(".safetensors")).bending is None
+
+
+def with_bending(name: str, array: np.ndarray | None) -> Callable[[], bytes]:
+    bending = two_triangles()
+    arrays = dict(zip(BENDING, (bending.rest, bending.images, bending.triangles), strict=True))
+
+    def make() -> bytes:
+        saved = as_map(candidate("IH4"))
+        own = {**arrays, name: array}
+        stored = {key: np.array(value) for key, value in own.items() if value is not None}
+        return TileMap(saved.settings, {**saved.arrays, **stored}).to_bytes()
+
+    return make
+
+
+REST, IMAGES, TRIANGLES = BENDING
+BAD_BENDINGS: dict[str, tuple[Callable[[], bytes], str]] = {
+    "rest missing": (with_bending(REST, None), "the model's bending.rest is missing"),
+    "images missing": (with_bending(IMAGES, None), "the model's bending.images is missing"),
+    "triangles missing": (with_bending(TRIANGLES, None), "bending.triangles is missing"),
+    "too many points": (with_bending(REST, np.zeros((100_001, 2))), "images must be .*shape"),
+    "too many triangles": (
+        with_bending(TRIANGLES, np.zeros((200_001, 3), dtype=np.int64)),
+        "1 to 200000 triangles, got 4 and 200001",
+    ),
+    "no triangles": (with_bending(TRIANGLES, np.zeros((0, 3), dtype=np.int64)), "got 4 and 0"),
+    "index too large": (with_bending(TRIANGLES, np.array([[0, 1, 4]])), "indices of its 4"),
+    "index negative": (with_bending(TRIANGLES, np.array([[0, 1, -1]])), "indices of its 4"),
+    "index huge": (
+        with_bending(TRIANGLES, np.array([[0, 1, 2**64 - 1]], dtype=np.uint64)),
+        "indices of its 4",
+    ),
+    "index a float": (with_bending(TRIANGLES, np.array([[0.0, 1.0, 2.0]])), "whole numbers"),
+    "turned over": (with_bending(TRIANGLES, np.array([[2, 1, 0]])), "flat or turned over"),
+    "flat": (with_bending(TRIANGLES, np.array([[0, 0, 1]])), "flat or turned over"),
+    "images folded": (
+        with_bending(IMAGES, np.array([[0, 0], [1, 0], [0.2, 0.5], [0.5, 0.0]])),
+        "images: 1 triangles are flat or turned over",
+    ),
+    "rest NaN": (with_bending(REST, np.full((4, 2), np.nan)), "finite"),
+    "rest in 3-D": (with_bending(REST, np.zeros((4, 3))), "rest must be .*shape"),
+}
+
+
+@pytest.mark.parametrize("case", BAD_BENDINGS)
+def test_bad_bendings_are_refused(case: str, tmp_path: Path) -> None:
+    make, message = BAD_BENDINGS[case]
+    path = tmp_path / "model.safetensors"
+    path.write_bytes(make())
+    with pytest.raises(InputFileError, match=message) as caught:
+        TileMap.read(path)
+    assert str(path) in str(caught.value)
+
+
+def test_single_precision_is_widened() -> None:
+    model = candidate("IH5").float()
+    restored = as_model(as_map(model))
+    assert restored.angle.dtype == torch.float64
+    assert torch.equal(restored.angle.float(), model.angle)
+
+
+def test_a_stack_is_refused() -> None:
+    with pytest.raises(OrbiflowError, match="take one candidate first: this model holds 2"):
+        as_map(candidate("IH4", size=2))
+
+
+def with_settings(**changes: Any) -> Callable[[], bytes]:
+    def make() -> bytes:
+        saved = as_map(candidate("IH4"))
+        return TileMap({**saved.settings, **changes}, saved.arrays).to_bytes()
+
+    return make
+
+
+def with_array(name: str, array: np.ndarray | None) -> Callable[[], bytes]:
+    def make() -> bytes:
+        saved = as_map(candidate("IH4"))
+        arrays = {key: value for key, value in saved.arrays.items() if key != name}
+        return TileMap(
+            saved.settings, arrays if array is None else {**arrays, name: array}
+        ).to_bytes()
+
+    return make
+
+
+def with_metadata(metadata: dict[str, str] | None) -> Callable[[], bytes]:
+    def make() -> bytes:
+        arrays = as_map(candidate("IH4")).arrays
+        return save({name: np.array(a) for name, a in arrays.items()}, metadata=metadata)
+
+    return make
+
+
+def good() -> bytes:
+    return as_map(candidate("IH4")).to_bytes()
+
+
+FIELD = "flow.segments.0.parameters_"
+NESTED = "[" * 100_000 + "]" * 100_000
+BAD_FILES: dict[str, tuple[Callable[[], bytes], str]] = {
+    "empty": (lambda: b"", "not a tile model saved by orbiflow"),
+    "pickle": (lambda: pickle.dumps({"angle": 0.0}), "not a tile model saved by orbiflow"),
+    "text": (lambda: b"hello, world, this is no model\n" * 9, "not a tile model saved by orbiflow"),
+    "cut in the header": (lambda: good()[:100], "not a tile model saved by orbiflow"),
+    "cut in the data": (lambda: good()[:-8], "not a tile model saved by orbiflow"),
+    "one byte more": (lambda: good() + b"\0", "not a tile model saved by orbiflow"),
+    "header length": (lambda: b"\xff" * 8 + good()[8:], "not a tile model saved by orbiflow"),
+    "no metadata": (with_metadata(None), "no 'orbiflow-tile/1'"),
+    "other format": (with_metadata({"format": "pt"}), "no 'orbiflow-tile/1'"),
+    "no settings": (with_metadata({FORMAT: "null"}), "not a tile model saved"),
+    "settings no JSON": (with_metadata({FORMAT: "{"}), "not a tile model saved"),
+    "settings a list": (with_metadata({FORMAT: "[1, 2]"}), "not a tile model saved by orbiflow"),
+    "settings empty": (with_metadata({FORMAT: "{}"}), "settings"),
+    "settings nested": (with_metadata({FORMAT: NESTED}), "not a tile model saved"),
+    "unknown class": (with_settings(**{"class": "IH8"}), "unknown isohedral class 'IH8'"),
+    "class a number": (with_settings(**{"class": 1e300}), "unknown isohedral class"),
+    "other class": (with_settings(**{"class": "IH28"}), "shape"),
+    "frequency huge": (with_settings(max_frequency=10**30), "from 0 to 60, got 1000"),
+    "frequency 61": (with_settings(max_frequency=61), "from 0 to 60, got 61"),
+    "frequency -1": (with_settings(max_frequency=-1), "from 0 to 60, got -1"),
+    "frequency 2.5": (with_settings(max_frequency=2.5), "whole number from 0 to 60, got 2.5"),
+    "frequency other": (with_settings(max_frequency=3), "should have shape"),
+    "segments huge": (with_settings(segments=10**9), "say 1000000000 segments"),
+    "segments two": (with_settings(segments=2), "say 2 segments, its arrays hold 1"),
+    "steps huge": (with_settings(steps=10**12), "from 1 to 1000000"),
+    "steps true": (with_settings(steps=True), "whole number from 1 to 1000000, got True"),
+    "method": (with_settings(method="rk99"), "rk99"),
+    "smoothness NaN": (with_settings(smoothness=float("nan")), "smoothness from 0 to 100"),
+    "smoothness huge": (with_settings(smoothness=1e308), "smoothness from 0 to 100"),
+    "smoothness null": (with_settings(smoothness=None), "settings"),
+    "frame a number": (with_settings(frame=7), "frame is incomplete"),
+    "frame empty": (with_settings(frame={}), "frame is incomplete: 'size'"),
+    "frame flat": (
+        with_settings(
+            frame={**Frame(np.eye(2), np.zeros(2)).as_dict(), "linear": [[1, 1], [1, 1]]}
+        ),
+        "has no inverse",
+    ),
+    "angle missing": (with_array("angle", None), "angle should have shape .* found nothing"),
+    "angle a vector": (with_array("angle", np.zeros(1)), "angle should have shape"),
+    "offset too long": (with_array("offset", np.zeros(3)), r"found shape \(3,\)"),
+    "field too long": (with_array(FIELD, np.zeros(7)), r"found shape \(7,\)"),
+    "angle NaN": (with_array("angle", np.array(np.nan)), "angle has NaN or infinite entries"),
+    "offset infinite": (with_array("offset", np.array([0.0, np.inf])), "offset has NaN or inf"),
+}
+
+
+@pytest.mark.parametrize("case", BAD_FILES)
+def test_bad_files_are_refused(case: str, tmp_path: Path) -> None:
+    make, message = BAD_FILES[case]
+    path = tmp_path / "model.safetensors"
+    path.write_bytes(make())
+    with pytest.raises(InputFileError, match=message) as caught:
+        load_model(path)
+    assert str(path) in str(caught.value)
+
+
+def test_files_that_cannot_be_read(tmp_path: Path) -> None:
+    with pytest.raises(InputFileError, match=r"cannot read .*none.safetensors: No such file"):
+        load_model(tmp_path / "none.safetensors")
+    with pytest.raises(InputFileError, match=r"cannot read .*: Is a directory"):
+        load_model(tmp_path)
+    large = tmp_path / "large.safetensors"
+    with large.open("wb") as file:
+        file.truncate(MAX_BYTES + 1)  # sparse
+    with pytest.raises(InputFileError, match="67,108,865 bytes, too large for a tile model"):
+        load_model(large)
+
+
+@settings(max_examples=60)
+@given(data=st.data())
+def test_a_damaged_file_never_gives_anything_but_an_error(
+    data: st.DataObject, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    content = bytearray(good())
+    header = 8 + int.from_bytes(content[:8], "little")
+    position = data.draw(st.integers(0, header - 1))
+    content[position] ^= data.draw(st.integers(1, 255))
+    path = tmp_path_factory.mktemp("damaged") / "model.safetensors"
+    path.write_bytes(content)
+    try:
+        model = load_model(path)
+    except InputFileError:
+        return
+    assert all(torch.isfinite(p).all() for p in model.parameters())
+
+
+def test_settings_are_plain_json() -> None:
+    saved = as_map(candidate("IH2", 5))
+    assert json.loads(json.dumps(saved.settings)) == saved.settings
+    assert all(array.dtype == np.float64 for array in saved.arrays.values())

@@ -1,0 +1,190 @@
+"""The linear space of a class's tiles."""
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from orbiflow.arrays import Array, Complex
+from orbiflow.tiles import (
+    CLASSES,
+    Tile,
+    certify,
+    complex_points,
+    plane_points,
+    resampled,
+    signed_area,
+)
+from orbiflow.tiles.search.placements import Placements, best_placements
+from orbiflow.tiles.search.tile_space import TileSpace
+from outlines import animal
+from strategies import angles, seeds
+
+COUNT = 48
+OUTLINE = complex_points(resampled(animal("squirrel.dat").normal, COUNT))
+GLIDES = [n for n, k in CLASSES.items() if any(not p.reversed for p in k.identified_edges)]
+TURNING = [n for n in GLIDES if CLASSES[n].stretch_dim == 1]
+
+
+def placements(name: str, count: int = 12) -> Placements:
+    return best_placements(CLASSES[name], OUTLINE, count)
+
+
+def space(name: str, count: int = 12) -> TileSpace:
+    return TileSpace(CLASSES[name], placements(name, count))
+
+
+def outlines(of: TileSpace, seed: int) -> Complex:
+    """(C, n) the squirrel, a little different for each placement."""
+    rng = np.random.default_rng(seed)
+    noise = rng.normal(size=(2, of.count, of.size)) * 0.02
+    return OUTLINE + noise[0] + 1j * noise[1]
+
+
+def tile_of(of: TileSpace, index: int, ring: Complex, linear: Array, offset: Array) -> Tile:
+    """A polygon of the space (n,), in the outline's order, with its group."""
+    vertices = plane_points(ring[of.order[index]])
+    group = of.kind.group().conjugate(linear, offset)
+    return Tile(vertices, group, of.kind.name, tuple(of.corners[index].tolist()))
+
+
+def edge_error(of: TileSpace, index: int, ring: Complex, linear: Array, offset: Array) -> float:
+    """Largest distance of an edge's vertices from the images of its partner's."""
+    vertices = plane_points(ring[of.order[index]])
+    own = (vertices - offset) @ np.linalg.inv(linear).T
+    closed = np.concatenate([own, own[:1]])
+    ends = [*of.corners[index].tolist(), of.size]
+    worst = 0.0
+    for pair in of.kind.identified_edges:
+        first, second = (closed[ends[k] : ends[k + 1] + 1] for k in (pair.first, pair.second))
+        image = pair.isometry(first)
+        image = image[::-1] if pair.reversed or pair.folded else image
+        worst = max(worst, np.abs((image - second) @ linear.T).max())
+    return worst
+
+
+@pytest.mark.parametrize("name", CLASSES)
+@settings(max_examples=5)
+@given(seed=seeds, turn=angles)
+def test_nearest_is_the_projection_by_the_matrices(name: str, seed: int, turn: float) -> None:
+    own = space(name)
+    own.turn(own.turns + turn)
+    goals = outlines(own, seed)
+    found = own.nearest(goals)
+    ordered = own.in_order(found.vertices)
+    for k in range(own.count):
+        real, imaginary = own.matrices(k)
+        stacked = np.concatenate([real, imaginary])
+        goal = np.concatenate([goals[k].real, goals[k].imag])
+        parameters = np.linalg.lstsq(stacked, goal, rcond=None)[0]
+        nearest = real @ parameters + 1j * (imaginary @ parameters)
+        assert abs(nearest - ordered[k]).max() < 1e-7
+        assert found.distance[k] == pytest.approx((abs(nearest - goals[k]) ** 2).sum(), rel=1e-7)
+        linear, offset = own.group(k, parameters)
+        assert linear == pytest.approx(found.linear[k], abs=1e-6)
+        if name != "IH1":  # which does not care where its group's origin is
+            assert offset == pytest.approx(found.offset[k], abs=1e-6)
+
+
+@pytest.mark.parametrize("name", CLASSES)
+@settings(max_examples=8)
+@given(seed=seeds, turn=angles)
+def test_every_point_of_the_space_is_a_tile(name: str, seed: int, turn: float) -> None:
+    own = space(name, 4)
+    own.turn(own.turns + turn)
+    rng = np.random.default_rng(seed)
+    for k in range(own.count):
+        real, imaginary = own.matrices(k)
+        parameters = rng.normal(size=real.shape[1])
+        ring = real @ parameters + 1j * (imaginary @ parameters)
+        linear, offset = own.group(k, parameters)
+        if np.linalg.cond(linear) < 1e3:
+            assert edge_error(own, k, ring, linear, offset) < 1e-10 * (1 + abs(ring).max())
+
+
+@pytest.mark.parametrize("name", CLASSES)
+def test_the_nearest_tiles_match_and_certify(name: str) -> None:
+    own = space(name, 200)
+    own.turn(own.best_turns(np.tile(OUTLINE, (own.count, 1))))
+    found = own.nearest(np.tile(OUTLINE, (own.count, 1)))
+    rings = own.in_order(found.vertices)
+    order = np.argsort(found.distance)
+    certified = 0
+    for k in order:
+        if np.linalg.det(found.linear[k]) < 1e-3:
+            continue
+        assert edge_error(own, k, rings[k], found.linear[k], found.offset[k]) < 1e-12
+        tile = tile_of(own, k, rings[k], found.linear[k], found.offset[k])
+        if shapely.Polygon(tile.polygon).is_valid and signed_area(tile.polygon) > 0:
+            assert certify(tile).valid
+            certified += 1
+        if certified == 3:
+            break
+    assert certified == 3
+
+
+@pytest.mark.parametrize("name", CLASSES)
+@given(seed=seeds)
+def test_a_tile_is_nearest_to_itself(name: str, seed: int) -> None:
+    own = space(name)
+    first = own.in_order(own.nearest(outlines(own, seed)).vertices)
+    again = own.nearest(first)
+    assert abs(own.in_order(again.vertices) - first).max() < 1e-7
+    assert again.distance.max() < 1e-12
+
+
+@given(seeds)
+def test_in_order_undoes_the_placements(seed: int) -> None:
+    own = space("IH4")
+    values = outlines(own, seed)
+    ordered = np.take_along_axis(values, own.order, axis=1)
+    assert np.array_equal(own.in_order(ordered), values)
+
+
+@pytest.mark.parametrize("name", TURNING)
+@settings(max_examples=10)
+@given(seed=seeds, turn=angles)
+def test_best_turns_go_with_the_outline(name: str, seed: int, turn: float) -> None:
+    own = space(name)
+    goals = outlines(own, seed)
+    still, turned = own.best_turns(goals), own.best_turns(goals * np.exp(1j * turn))
+    apart = np.exp(2j * (turned - still - turn))  # an axis, not an arrow
+    assert abs(apart - 1).max() < 1e-6
+
+
+@pytest.mark.parametrize("name", TURNING)
+@given(seed=seeds, error=st.floats(0.2, 1.4))
+def test_best_turns_suit_a_tile_turned_away(name: str, seed: int, error: float) -> None:
+    """The glides' directions of a tile are found from its edges alone."""
+    own = space(name)
+    own.turn(own.best_turns(outlines(own, seed)))
+    tiles = own.in_order(own.nearest(outlines(own, seed)).vertices)
+    right = own.turns.copy()
+    own.turn(right + error)
+    own.turn(own.best_turns(tiles))
+    assert own.nearest(tiles).distance.max() < 1e-9
+    assert abs(np.exp(2j * (own.turns - right)) - 1).max() < 1e-6
+
+
+def test_classes_without_glides_keep_their_turns() -> None:
+    for name in CLASSES:
+        if name not in GLIDES:
+            own = space(name)
+            own.turn(np.full(own.count, 0.3))
+            assert (own.best_turns(outlines(own, 0)) == 0.3).all()
+
+
+@settings(max_examples=5)
+@given(st.sampled_from(sorted(CLASSES)), seeds)
+def test_weights_hold_some_points_nearer(name: str, seed: int) -> None:
+    weights = np.ones(COUNT)
+    weights[:10] = 1e4
+    plain = space(name)
+    heavy = TileSpace(CLASSES[name], placements(name), weights)
+    goals = outlines(plain, seed)
+    away = [
+        abs(own.in_order(own.nearest(goals).vertices) - goals)[:, :10].max()
+        for own in (plain, heavy)
+    ]
+    assert away[1] <= away[0] + 1e-9

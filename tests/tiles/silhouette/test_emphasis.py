@@ -1,0 +1,319 @@
+"""Emphasis: which way round, sizes, weights, the weighted overlap."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from PIL import Image, ImageDraw
+from torch.nn.functional import grid_sample
+
+from mask_files import CORNERS, SIZE, assert_emphasised, drawing, mask, picture, polygon, save
+from orbiflow.errors import InputFileError, OrbiflowError
+from orbiflow.tiles import Emphasis, Target, iou
+from orbiflow.tiles.silhouette.emphasis import FADE, emphasised_iou
+
+# Which way round
+
+
+@pytest.mark.parametrize("corner", CORNERS)
+def test_image(tmp_path: Path, corner: str) -> None:
+    target = picture(tmp_path)
+    emphasis = Emphasis.read(save(tmp_path, mask(corner)), target)
+    assert_emphasised(emphasis, target, corner)
+    assert emphasis.notes == ()
+    assert emphasis.share == pytest.approx(0.25, abs=0.01)
+    nearest = target.normal[np.argmax(emphasis.weight(target.normal))]
+    assert ("left" in corner) == (nearest[0] < 0)
+    assert ("top" in corner) == (nearest[1] > 0)
+
+
+@pytest.mark.parametrize("corner", CORNERS)
+@pytest.mark.parametrize("y_down", [True, False])
+def test_polygon(tmp_path: Path, corner: str, y_down: bool) -> None:
+    target = polygon(tmp_path, y_down=y_down)
+    emphasis = Emphasis.read(save(tmp_path, mask(corner, (160, 80))), target)
+    up = {"top": "bottom", "bottom": "top"}
+    end, side = corner.split()
+    # CORNERS are named as seen with y down; a mask shows its top where the shape's top is.
+    assert_emphasised(emphasis, target, corner if y_down else f"{up[end]} {side}")
+    assert emphasis.notes == (
+        "laid the mask (160 x 80 pixels) over the outline's bounding box (160 x 80)",
+    )
+    assert emphasis.box == pytest.approx((*target.normal.min(axis=0), *target.normal.max(axis=0)))
+
+
+@pytest.mark.parametrize("corner", CORNERS)
+def test_drawing(tmp_path: Path, corner: str) -> None:
+    target = drawing(tmp_path, 'viewBox="0 0 200 100"')
+    emphasis = Emphasis.read(save(tmp_path, mask(corner)), target)
+    assert_emphasised(emphasis, target, corner)
+    assert emphasis.notes == ()
+
+
+def test_page_of_a_drawing_may_begin_anywhere(tmp_path: Path) -> None:
+    target = drawing(tmp_path, 'viewBox="-1000 500 200 100"', x=-980, y=510)
+    emphasis = Emphasis.read(save(tmp_path, mask(size=(400, 200))), target)
+    at = target.to_normal([(x - 1000, y + 500) for x, y in CORNERS.values()])
+    assert emphasis.weight(at) == pytest.approx([4, 1, 1, 1], abs=0.03)
+    assert target.to_input(emphasis.box[:2]) == pytest.approx([-1000, 600])
+    assert emphasis.notes == (
+        "laid the mask (400 x 200 pixels) over the drawing's page (200 x 100)",
+    )
+
+
+def test_drawing_without_a_page_is_covered_by_its_outline(tmp_path: Path) -> None:
+    target = drawing(tmp_path, "")
+    emphasis = Emphasis.read(save(tmp_path, mask(size=(160, 80))), target)
+    assert_emphasised(emphasis, target, "top left")
+    assert "the outline's bounding box" in emphasis.notes[0]
+
+
+def test_the_drawing_is_not_read_again(tmp_path: Path) -> None:
+    target = drawing(tmp_path, 'viewBox="0 0 200 100"')
+    Path(target.source).unlink()
+    assert_emphasised(Emphasis.read(save(tmp_path, mask()), target), target, "top left")
+
+
+def test_exif_orientation(tmp_path: Path) -> None:
+    target = picture(tmp_path)
+    exif = Image.Exif()
+    exif[0x0112] = 6  # turn by 90 degrees clockwise to show
+    stored = mask("top left").transpose(Image.Transpose.ROTATE_90)
+    path = save(tmp_path, stored, "mask.jpg", exif=exif, quality=95)
+    emphasis = Emphasis.read(path, target)
+    assert_emphasised(emphasis, target, "top left")
+    assert emphasis.notes == ("turned the image as its EXIF orientation asks",)
+
+
+# Sizes
+
+
+@pytest.mark.parametrize("scale", [0.1, 0.5, 3, 15, 15.37])
+def test_scaled_copies(tmp_path: Path, scale: float) -> None:
+    target = picture(tmp_path)
+    width, height = (round(side * scale) for side in SIZE)
+    emphasis = Emphasis.read(save(tmp_path, mask("bottom right", (width, height))), target)
+    assert_emphasised(emphasis, target, "bottom right")
+    assert emphasis.notes == (
+        f"laid the mask ({width} x {height} pixels) over the input picture (200 x 100)",
+    )
+    middle = emphasis.weight(target.to_normal([[100.0, 70.0], [150.0, 50.0]]))
+    assert middle == pytest.approx([2.5, 2.5], abs=0.1)
+
+
+def test_averaged_masks_keep_their_place(tmp_path: Path) -> None:
+    # 3002 pixels in threes leave a last column of 2.
+    target = picture(tmp_path)
+    emphasis = Emphasis.read(save(tmp_path, mask(size=(3002, 1501))), target)
+    assert emphasis.mask.shape == (501, 1001)
+    assert emphasis.weight(target.to_normal([100.0, 20.0])) == pytest.approx(2.5, abs=0.02)
+    assert target.to_input(emphasis.box[2:]) == pytest.approx([200 * 3003 / 3002, 0])
+    assert target.to_input(emphasis.box[:2]) == pytest.approx([0, 100 * 1503 / 1501])
+
+
+@pytest.mark.parametrize("size", [(100, 200), (200, 200), (200, 103), (204, 100), (1000, 2)])
+def test_another_aspect(tmp_path: Path, size: tuple[int, int]) -> None:
+    path = save(tmp_path, mask(size=size))
+    said = rf"mask is {size[0]} x {size[1]} pixels and the input picture is 200 x 100; .* copy of"
+    with pytest.raises(InputFileError, match=said) as caught:
+        Emphasis.read(path, picture(tmp_path))
+    assert str(caught.value).startswith(f"{path}: ")
+
+
+def test_aspect_within_one_percent(tmp_path: Path) -> None:
+    target = picture(tmp_path)
+    emphasis = Emphasis.read(save(tmp_path, mask(size=(199, 100))), target)
+    assert len(emphasis.notes) == 1
+    assert_emphasised(emphasis, target, "top left")
+
+
+@pytest.mark.parametrize(
+    ("make", "covered"),
+    [
+        (lambda folder: polygon(folder, y_down=False), r"outline's bounding box is 160 x 80"),
+        (
+            lambda folder: drawing(folder, 'viewBox="0 0 200 90.5"'),
+            r"drawing's page is 200 x 90\.5",
+        ),
+    ],
+)
+def test_another_aspect_without_a_picture(
+    tmp_path: Path, make: Callable[[Path], Target], covered: str
+) -> None:
+    with pytest.raises(InputFileError, match=rf"64 x 64 pixels and the {covered}"):
+        Emphasis.read(save(tmp_path, mask(size=(64, 64))), make(tmp_path))
+
+
+# Weights
+
+
+def test_weights_are_bilinear_between_pixel_centres() -> None:
+    rows, columns = np.mgrid[:8, :10]
+    emphasis = Emphasis((rows + columns) / 16.0, (-1.0, 2.0, 4.0, 6.0), strength=17.0)
+    rng = np.random.default_rng(3)
+    at = rng.uniform((-0.75, 2.25), (3.75, 5.75), (50, 4, 2))
+    expected = 1 + (at[..., 0] + 0.75) / 0.5 + (5.75 - at[..., 1]) / 0.5
+    assert np.allclose(emphasis.weight(at), expected, atol=1e-5)
+    centre = emphasis.weight([-1 + 0.5 * 3.5, 6 - 0.5 * 2.5])
+    assert centre.shape == ()
+    assert centre == pytest.approx(1 + 2 + 3)
+
+
+def test_weights_fade_to_one_beyond_the_frame() -> None:
+    emphasis = Emphasis(np.ones((4, 4)), (-1, -1, 1, 1), strength=5.0)
+    beyond = np.linspace(0, 2 * FADE, 201)
+    for ray in ([1, 0], [0, 1], [-1, 0], [0, -1]):
+        weights = emphasis.weight(np.multiply.outer(1 + beyond, ray))
+        assert weights[0] == pytest.approx(5)
+        assert (weights[beyond > FADE] == 1).all()
+        assert (np.diff(weights) <= 0).all()
+        assert np.abs(np.diff(weights)).max() < 0.07
+    assert emphasis.weight([1e9, -1e9]) == 1
+
+
+def test_no_points_and_no_numbers() -> None:
+    emphasis = Emphasis(np.eye(2), (-1, -1, 1, 1))
+    assert emphasis.weight(np.zeros((0, 2))).shape == (0,)
+    for points in ([1.0, 2.0, 3.0], 1.0, [[np.nan, 0.0]], [[np.inf, 0.0]]):
+        with pytest.raises(OrbiflowError, match=r"shape \(\.\.\., 2\) and finite"):
+            emphasis.weight(points)
+
+
+@given(st.integers(0, 2**32 - 1), st.floats(1.01, 100))
+def test_weights_lie_between_one_and_the_strength(seed: int, strength: float) -> None:
+    rng = np.random.default_rng(seed)
+    low = rng.uniform(-3, 0, 2)
+    frame = (*low, *(low + rng.uniform(0.01, 5, 2)))
+    emphasis = Emphasis(rng.random(rng.integers(1, 9, 2)), frame, strength)
+    at = rng.uniform(-4, 6, (60, 2))
+    weights = emphasis.weight(at)
+    assert (weights >= 1).all()
+    assert (weights <= strength * (1 + 1e-6)).all()
+    near = emphasis.weight(at + rng.uniform(-1e-7, 1e-7, at.shape))
+    assert np.allclose(near, weights, atol=1e-2 * strength)
+
+
+def test_an_edge_of_the_mask_is_drawn_out(tmp_path: Path) -> None:
+    target = picture(tmp_path)
+    emphasis = Emphasis.read(save(tmp_path, mask("top left", (1400, 700))), target)
+    x = np.linspace(-0.2, 0.2, 401)
+    weights = emphasis.weight(np.stack([x, np.full_like(x, 0.2)], axis=1))
+    assert weights[0] == pytest.approx(4)
+    assert weights[-1] == pytest.approx(1)
+    # A normal distribution's slope: the step over sqrt(2 pi) standard deviations.
+    steepest = np.abs(np.diff(weights)).max() / (x[1] - x[0])
+    assert steepest == pytest.approx(3 / (np.sqrt(2 * np.pi) * 0.02), rel=0.05)
+
+
+def test_image_lies_on_the_grid_of_grid_sample(tmp_path: Path) -> None:
+    target = picture(tmp_path)
+    emphasis = Emphasis.read(save(tmp_path, mask("top right")), target)
+    center, reach = np.array([0.1, -0.2]), 1.3
+    image = emphasis.image(center, reach, 256)
+    assert image.shape == (256, 256)
+    rng = np.random.default_rng(0)
+    at = rng.uniform(center - 0.95 * reach, center + 0.95 * reach, (500, 2))
+    sampled = grid_sample(
+        torch.tensor(image)[None, None],
+        torch.tensor((at - center) / reach)[None, None],
+        align_corners=False,
+    )
+    assert np.allclose(sampled[0, 0, 0].numpy(), emphasis.weight(at), atol=0.1)
+
+
+def test_mask_is_read_only_and_report_is_json_ready(tmp_path: Path) -> None:
+    path = save(tmp_path, mask(size=(100, 50)))
+    emphasis = Emphasis.read(path, picture(tmp_path))
+    with pytest.raises(ValueError, match="read-only"):
+        emphasis.mask[0] = 0
+    report = json.loads(json.dumps(emphasis.report()))
+    assert report == {
+        "source": str(path),
+        "strength": 4.0,
+        "share": pytest.approx(0.25, abs=0.01),
+        "notes": ["laid the mask (100 x 50 pixels) over the input picture (200 x 100)"],
+    }
+
+
+def test_a_shape_thinner_than_the_grid_is_still_met(tmp_path: Path) -> None:
+    needle = Target.from_polygon([[0, 0], [1000, 999.9], [1000, 1000], [999.9, 1000]])
+    emphasis = Emphasis.read(save(tmp_path, mask("bottom left", (90, 90))), needle)
+    assert emphasis.share is not None
+    assert 0.2 < emphasis.share < 0.8
+
+
+# The weighted overlap
+
+
+def star(seed: int) -> np.ndarray:
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(5, 40))
+    angle = 2 * np.pi * np.arange(n) / n
+    radii = rng.uniform(0.4, 1, n)
+    ring = radii[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    return Target.from_polygon(ring).normal + rng.uniform(-0.1, 0.1, 2)
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.integers(0, 2**32 - 1))
+def test_without_strength_it_is_the_plain_one(one: int, other: int) -> None:
+    even = Emphasis(np.eye(2), (-1, -1, 1, 1), strength=1 + 1e-9)
+    a, b = star(one), star(other)
+    assert emphasised_iou(a, b, even) == pytest.approx(iou(a, b), abs=2e-3)
+
+
+@settings(max_examples=10, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.floats(1.1, 100))
+def test_it_is_symmetric_and_one_for_the_target_itself(seed: int, strength: float) -> None:
+    emphasis = Emphasis(np.eye(2), (-1, -1, 1, 1), strength)
+    a, b = star(seed), star(seed + 1)
+    value = emphasised_iou(a, b, emphasis)
+    assert 0 < value < 1
+    assert value == emphasised_iou(b, a, emphasis)
+    assert emphasised_iou(a, a, emphasis) == 1
+
+
+def test_what_is_lost_counts_by_its_weight() -> None:
+    square = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) / 2
+    left = Emphasis(np.array([[1.0, 1.0, 0.0, 0.0]]), (-0.5, -0.5, 0.5, 0.5), strength=3.0)
+    lost_left, lost_right = square.copy(), square.copy()
+    lost_left[square[:, 0] < 0, 0] += 0.2
+    lost_right[square[:, 0] > 0, 0] -= 0.2
+    # The square weighs 2, a strip of 0.2 on its left 0.6, one on its right 0.2.
+    assert emphasised_iou(lost_left, square, left) == pytest.approx(1.4 / 2, abs=2e-3)
+    assert emphasised_iou(lost_right, square, left) == pytest.approx(1.8 / 2, abs=2e-3)
+
+
+def test_shapes_apart_and_shapes_that_are_none() -> None:
+    emphasis = Emphasis(np.eye(2), (-1, -1, 1, 1))
+    square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+    assert emphasised_iou(square, square + 2, emphasis) == 0
+    with pytest.raises(OrbiflowError, match=r"^tile: .*crosses"):
+        emphasised_iou(square[[0, 2, 1, 3]], square, emphasis)
+    with pytest.raises(OrbiflowError, match=r"^target: .*at least 3"):
+        emphasised_iou(square, square[:2], emphasis)
+
+
+PHYLOPIC = Path(__file__).parents[3].parent / "shared" / "data" / "silhouettes" / "phylopic"
+
+
+@pytest.mark.skipif(
+    not PHYLOPIC.is_dir(), reason="the shared silhouettes are not beside this checkout"
+)
+def test_a_real_head(tmp_path: Path) -> None:
+    # A rat-kangaroo that looks to the right: its head is at the right, its tail at the lower left.
+    target = Target.read(PHYLOPIC / "Potoroidae.png")
+    head = Image.new("L", (192, 192))
+    ImageDraw.Draw(head).ellipse((145, 58, 200, 96), fill=255)
+    emphasis = Emphasis.read(save(tmp_path, head), target)
+    weights = emphasis.weight(target.normal)
+    nose, tail = target.normal[:, 0].argmax(), target.normal[:, 0].argmin()
+    assert weights[nose] == pytest.approx(4, abs=0.01)
+    assert weights[tail] == 1
+    assert emphasis.share is not None
+    assert 0.1 < emphasis.share < 0.2

@@ -1,0 +1,91 @@
+"""Pins: spots and masks of what must not bend."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image, ImageDraw
+
+from mask_files import SIZE, picture, save
+from orbiflow.errors import InputFileError, OrbiflowError
+from orbiflow.tiles import Pins, Target
+from orbiflow.tiles.silhouette import triangulate
+from outlines import animal, bar
+
+SQUIRREL = animal("squirrel.dat")
+
+
+def half_mask(folder: Path) -> Path:
+    mask = Image.new("L", SIZE, 0)
+    ImageDraw.Draw(mask).rectangle((0, 0, 59, 99), fill=255)
+    return save(folder, mask)
+
+
+def test_a_mask_holds_what_is_white(tmp_path: Path) -> None:
+    target = picture(tmp_path)
+    pins = Pins.read([half_mask(tmp_path)], target)
+    points = [[25, 15], [55, 50], [65, 50], [170, 80]]
+    assert pins.holds(target.to_normal(points)).tolist() == [True, True, False, False]
+    assert pins.report()["sources"] == [str(tmp_path / "mask.png")]
+
+
+def test_spots_and_masks_together(tmp_path: Path) -> None:
+    target = picture(tmp_path)
+    pins = Pins.read([half_mask(tmp_path), "170, 80,12", "1.7e2,20"], target, keep_angle=True)
+    points = [[25, 15], [170, 85], [170, 55], [170, 12]]
+    assert pins.holds(target.to_normal(points)).tolist() == [True, True, False, True]
+    assert pins.keep_angle
+    # of 160 units, 8% are 12.8; the outline is 10 away, but for the pixels' slant, times 1.5
+    assert pins.spots[:, 2] * np.sqrt(target.area) == pytest.approx([12, 15], abs=1)
+
+
+def test_a_spot_inside_reaches_the_outline() -> None:
+    target = Target.from_polygon(bar(10, 4))
+    pins = Pins.at(target, [(5, 2)])
+    assert pins.holds(target.to_normal([[5, 0], [5, 4]])).all()
+    inside = Pins.at(target, [(5, 2, 0.5)])
+    assert any("touch no part of the outline" in note for note in inside.notes)
+
+
+def test_each_connected_part_is_one() -> None:
+    mesh = triangulate(SQUIRREL.normal)
+    ends = SQUIRREL.outline[[0, 30]]
+    parts = Pins.at(SQUIRREL, ends).parts(mesh.points, mesh.triangles)
+    assert len(parts) == 2
+    near = Pins.at(SQUIRREL, [ends[0], ends[0] + 10]).parts(mesh.points, mesh.triangles)
+    assert len(near) == 1
+    assert Pins.at(SQUIRREL, ends).holds(mesh.points[np.concatenate(parts)]).all()
+
+
+@pytest.mark.parametrize(
+    ("spots", "message"),
+    [
+        ([(0, 0)], r"the pin at 0,0 lies outside the silhouette, which spans x from 114 to 781"),
+        ([(300, 650, 20)], "lies outside the silhouette"),
+        ([(300, 300, 0)], "the radius of a pin must be positive, got 0"),
+        ([(300, 300, -5)], "the radius of a pin must be positive, got -5"),
+        ([(300,)], "a pin is x,y or x,y,radius, got 1 numbers"),
+        ([(1, 2, 3, 4)], "a pin is x,y or x,y,radius, got 4 numbers"),
+        ([(np.nan, 2)], "a pin.*finite"),
+        ([], "no pin was given"),
+        (
+            [(450, 450, 5000)],
+            "the pins hold 100.0% of the outline, so that nothing is left to bend",
+        ),
+    ],
+)
+def test_mistakes(spots: list, message: str) -> None:
+    with pytest.raises(OrbiflowError, match=message):
+        Pins.at(SQUIRREL, spots)
+
+
+def test_mistakes_of_masks(tmp_path: Path) -> None:
+    target = picture(tmp_path)
+    with pytest.raises(InputFileError, match=r"nowhere\.png"):
+        Pins.read(["nowhere.png"], target)
+    corner = Image.new("L", SIZE, 0)
+    ImageDraw.Draw(corner).rectangle((0, 0, 5, 5), fill=255)
+    with pytest.raises(InputFileError, match="does not touch the silhouette"):
+        Pins.read([save(tmp_path, corner)], target)
+    with pytest.raises(InputFileError, match=r"^12;80: a pin is x,y or x,y,radius or a mask, and"):
+        Pins.read(["12;80"], target)

@@ -1,0 +1,196 @@
+"""Polygon files, and files of no kind that is read."""
+
+import json
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from orbiflow.errors import InputFileError, OrbiflowError
+from orbiflow.tiles import read_outline
+
+SQUARE = [[0, 0], [2, 0], [2, 2], [0, 2]]
+
+
+def write(tmp_path: Path, content: str | bytes, name: str) -> Path:
+    path = tmp_path / name
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    return path
+
+
+@pytest.mark.parametrize(
+    ("content", "y_down", "notes"),
+    [
+        (SQUARE, False, ()),
+        ([*SQUARE, SQUARE[0]], False, ()),
+        ({"polygon": SQUARE}, False, ()),
+        ({"outline": SQUARE, "y_down": True}, True, ()),
+        ({"tile": SQUARE, "ih": 4}, False, ()),
+        ({"tile": SQUARE, "polygon": SQUARE}, False, ('took "polygon", left tile unread',)),
+        ({"type": "Polygon", "coordinates": [SQUARE]}, False, ()),
+        (
+            {"type": "Feature", "geometry": {"type": "Polygon", "coordinates": [SQUARE, [[1, 1]]]}},
+            False,
+            ("filled 1 hole",),
+        ),
+        (
+            {"type": "Polygon", "coordinates": [[[x, y, 7] for x, y in SQUARE]]},
+            False,
+            ("left the altitudes unread",),
+        ),
+    ],
+)
+def test_json(tmp_path: Path, content: object, y_down: bool, notes: tuple[str, ...]) -> None:
+    reading = read_outline(write(tmp_path, json.dumps(content), "a.json"))
+    assert reading.outline.tolist() == SQUARE
+    assert (reading.kind, reading.y_down, reading.notes) == ("json", y_down, notes)
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("[[0, 0], [1, 0], [NaN, 1]]", "vertex 2 .* finite"),
+        ("[[0, 0], [1e999, 0], [0, 1]]", "vertex 1 .* finite"),
+        ("[[0, 0], [1, 0]]", "at least 3 distinct vertices"),
+        ("[[0, 0], [0, 0], [1, 0], [0, 0]]", "at least 3 distinct vertices"),
+        ("[[0, 0], [1, 1], [2, 2]]", "all lie on one line"),
+        ("[[0, 0], [4, 4], [4, 0], [0, 4]]", r"near \(2, 2\)"),
+        ("[[0, 0], [1, 0], [0, 1, 2]]", r"vertex 2 .*\[0, 1, 2\]"),
+        ('[[0, 0], [1, 0], ["x", 1]]', "vertex 2"),
+        ("[[0, 0], [1, 0], [true, 1]]", "vertex 2"),
+        ("[[0, 0], [1, 0], null]", "vertex 2"),
+        ("[[0, 0], [1, 0], [0, 1" + "0" * 400 + "]]", "not numbers in pairs"),
+        ("[[0, 0], [1, 0], [0, 1" + "0" * 5000 + "]]", "not valid JSON"),
+        ("[[0, 0], [1, 0]", "line 1, column 16: not valid JSON"),
+        ("[" * 200_000, "nested too deeply"),
+        ('{"a": 1, "b": 2}', "none of \"polygon\".*'a', 'b'"),
+        ("{}", "it has nothing"),
+        ('{"polygon": 3}', "must be a list"),
+        ('{"polygon": [[0, 0], [1, 0], [0, 1]], "y_down": "yes"}', '"y_down" must be true or'),
+        ('{"type": "MultiPolygon", "coordinates": []}', "GeoJSON of type 'MultiPolygon'"),
+        ('{"type": "Feature", "geometry": null}', "GeoJSON of type 'Feature'"),
+        ('{"type": "Polygon", "coordinates": []}', "no ring"),
+        ("[" + "[0,0]," * 100_001 + "[0,1]]", "100002 vertices, at most 100000"),
+        (b"[[0, 0], [1, 0], \xff]", "not valid JSON"),
+    ],
+)
+def test_bad_json(tmp_path: Path, content: str | bytes, message: str) -> None:
+    path = write(tmp_path, content, "a.json")
+    with pytest.raises(InputFileError, match=message) as caught:
+        read_outline(path)
+    assert str(caught.value).startswith(f"{path}: ")
+    assert len(str(caught.value)) < len(str(path)) + 300
+
+
+def test_repeated_vertices_are_dropped_and_said(tmp_path: Path) -> None:
+    points = [[0, 0], [2, 0], [2, 0], [2, 0], [2, 2], [0, 2], [0, 0]]
+    reading = read_outline(write(tmp_path, json.dumps(points), "a.json"))
+    assert reading.outline.tolist() == SQUARE
+    assert reading.notes == ("dropped 2 repeated vertices",)
+
+
+@pytest.mark.parametrize("newline", ["\n", "\r\n", "\r"])
+def test_dat(tmp_path: Path, newline: str) -> None:
+    lines = ["4 ", "0.0 0.0", " 2.0\t0.0 ", "", "2e0 2.0", "0.0 2.0", "tour 1 2 3", ""]
+    reading = read_outline(write(tmp_path, newline.join(lines), "a.dat"))
+    assert reading.outline.tolist() == SQUARE
+    assert reading.y_down
+    assert reading.notes == ("left 1 line after the vertices unread (line 7 on)",)
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("3\n0 0\n1 0\n", "line 1 promises 3 vertices and 2 follow"),
+        ("3\n0 0\n1 0\n0 x\n", "line 4: '0 x' is not a vertex"),
+        ("3\n0 0\n1 0 5\n0 1\n", "line 3: '1 0 5' is not a vertex"),
+        ("3\n0 0\n1 0\nnan 1\n", "line 4: 'nan 1': every coordinate must be a finite"),
+        ("two\n0 0\n", "line 1: 'two' is not a number of vertices"),
+        ("2\n0 0\n1 0\n", "line 1: 2 vertices; from 3"),
+        ("999999999\n0 0\n", "line 1: 999999999 vertices; from 3 to 100000"),
+        ("4\n0 0\n1 1\n1 0\n0 1\n", r"near \(0\.5, 0\.5\)"),
+        ("\n\n", "only blank lines"),
+        (b"\xe9t\xe9\n0 0\n", "byte 0 is not UTF-8"),
+    ],
+)
+def test_bad_dat(tmp_path: Path, content: str | bytes, message: str) -> None:
+    path = write(tmp_path, content, "a.dat")
+    with pytest.raises(InputFileError, match=message) as caught:
+        read_outline(path)
+    assert str(caught.value).startswith(f"{path}: ")
+
+
+@pytest.mark.parametrize(
+    ("content", "name", "message"),
+    [
+        ("hello there", "a.png", r"holds text of no kind that is read although .* \.png"),
+        (b"\x00\x01\x02\x03" * 9, "a.bin", r"holds data of no kind that is read although .* \.bin"),
+        ("hello", "noname", "holds text of no kind that is read; give a PNG"),
+        (b"", "a.png", "the file is empty"),
+        (b"\x1f\x8b\x08\x00rest", "a.svgz", "gzip-compressed"),
+        (b"%PDF-1.7 ...", "a.svg", "a PDF file; convert it"),
+        ("<html><body/></html>", "a.html", "holds text of no kind"),
+    ],
+)
+def test_unknown_content(tmp_path: Path, content: str | bytes, name: str, message: str) -> None:
+    with pytest.raises(InputFileError, match=message):
+        read_outline(write(tmp_path, content, name))
+
+
+def test_no_file_to_read(tmp_path: Path) -> None:
+    with pytest.raises(InputFileError, match=r"missing\.png: no such file"):
+        read_outline(tmp_path / "missing.png")
+    with pytest.raises(InputFileError, match="is a directory"):
+        read_outline(tmp_path)
+    with pytest.raises(InputFileError, match="cannot be reached"):
+        read_outline("a\0b.png")
+    os.mkfifo(tmp_path / "pipe.png")
+    with pytest.raises(InputFileError, match="not a regular file"):
+        read_outline(tmp_path / "pipe.png")
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may read every file")
+def test_unreadable_file(tmp_path: Path) -> None:
+    path = write(tmp_path, "[]", "a.json")
+    path.chmod(0)
+    with pytest.raises(InputFileError, match="check its permissions"):
+        read_outline(path)
+
+
+def test_an_unreadable_file_by_its_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = write(tmp_path, "[]", "a.json")
+
+    def deny(*_: object, **__: object) -> None:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(Path, "open", deny)
+    with pytest.raises(InputFileError, match=r"cannot be read \(Permission denied\)"):
+        read_outline(path)
+
+
+@pytest.mark.parametrize("name", ["a.json", "a.dat", "a.svg"])
+def test_files_over_the_limit(tmp_path: Path, name: str) -> None:
+    starts = {"a.json": b"[[0,0]", "a.dat": b"3\n0 0\n", "a.svg": b"<svg>"}
+    path = write(tmp_path, starts[name] + b" " * 16 * 2**20, name)
+    with pytest.raises(InputFileError, match="larger than 16 MB"):
+        read_outline(path)
+
+
+def test_image_settings_are_refused_for_polygons(tmp_path: Path) -> None:
+    path = write(tmp_path, json.dumps(SQUARE), "a.json")
+    with pytest.raises(OrbiflowError, match="threshold applies to images only"):
+        read_outline(path, threshold=0.5)
+    with pytest.raises(OrbiflowError, match="invert applies to images only"):
+        read_outline(path, invert=True)
+
+
+def test_noise_never_raises_anything_else(tmp_path: Path) -> None:
+    rng = np.random.default_rng(2)
+    alphabet = np.frombuffer(b'[]{},:"01.5e-aN \n<>/svg', dtype=np.uint8)
+    starts = [b"", b"[", b"[[0,", b'{"tile":[', b"3\n", b"<svg ", b"<svg><path d='M", b"\xff\xfe<"]
+    for i in range(200):
+        noise = rng.choice(alphabet, size=60).tobytes()
+        path = write(tmp_path, starts[i % len(starts)] + noise, rng.choice(["a.dat", "a.json"]))
+        with pytest.raises(InputFileError):
+            read_outline(path)

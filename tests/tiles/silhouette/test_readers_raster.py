@@ -1,0 +1,258 @@
+"""Images of every mode, and images that cannot be read."""
+
+import io
+import os
+import struct
+import zlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image, ImageDraw
+
+from orbiflow.errors import InputFileError, OrbiflowError
+from orbiflow.tiles import iou, read_outline
+
+# An L whose long arm points down and whose foot points right, in pixels.
+SHAPE = np.array([[20, 10], [40, 10], [40, 70], [80, 70], [80, 90], [20, 90]], dtype=float)
+
+
+def draw(mode: str = "L", shape: object = 0, ground: object = 255, scale: int = 1) -> Image.Image:
+    image = Image.new(mode, (100 * scale, 100 * scale), ground)  # type: ignore[arg-type]
+    # Pillow fills the last row and column that it is given.
+    boxes = [(20, 10, 40, 90), (20, 70, 80, 90)]
+    for x0, y0, x1, y1 in boxes:
+        corners = (x0 * scale, y0 * scale, x1 * scale - 1, y1 * scale - 1)
+        ImageDraw.Draw(image).rectangle(corners, fill=shape)  # type: ignore[arg-type]
+    return image
+
+
+def save(tmp_path: Path, image: Image.Image, name: str = "shape.png", **options: Any) -> Path:
+    path = tmp_path / name
+    image.save(path, **options)
+    return path
+
+
+MODES: dict[str, Callable[[], Image.Image]] = {
+    "1": lambda: draw("1", 0, 1),
+    "L": draw,
+    "LA": lambda: draw("LA", (0, 255), (0, 0)),
+    "P": lambda: draw("RGB", (200, 30, 30), "white").quantize(8),
+    "RGB": lambda: draw("RGB", "navy", "ivory"),
+    "RGBA": lambda: draw("RGBA", (250, 250, 250, 255), (250, 250, 250, 0)),
+    "I;16": lambda: Image.fromarray(np.asarray(draw()).astype(np.uint16) * 257),
+    "opaque RGBA": lambda: draw("RGBA", (0, 0, 0, 255), (255, 255, 255, 255)),
+    "half-transparent": lambda: draw("RGBA", (0, 0, 0, 230), (255, 255, 255, 230)),
+}
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_every_mode_of_png(tmp_path: Path, mode: str) -> None:
+    reading = read_outline(save(tmp_path, MODES[mode]()))
+    assert reading.y_down
+    assert reading.kind == "image"
+    assert reading.size == (100, 100)
+    assert iou(reading.outline, SHAPE) > 0.995
+    # The edges of the pixels are the shape's edges: no half pixel is lost.
+    assert reading.outline.min(axis=0) == pytest.approx([20, 10], abs=0.05)
+    assert reading.outline.max(axis=0) == pytest.approx([80, 90], abs=0.05)
+
+
+def test_palette_with_transparent_colour(tmp_path: Path) -> None:
+    image = draw("P", 1, 0)
+    image.putpalette([255, 255, 255, 255, 255, 255])
+    reading = read_outline(save(tmp_path, image, transparency=0))
+    assert reading.notes[0] == "shape taken: the opaque part (alpha threshold 0.50)"
+    assert iou(reading.outline, SHAPE) > 0.995
+
+
+@pytest.mark.parametrize(
+    ("name", "mode"),
+    [("a.jpg", "L"), ("a.jpg", "CMYK"), ("a.webp", "RGBA"), ("a.bmp", "L"), ("a.gif", "P")],
+)
+def test_other_formats(tmp_path: Path, name: str, mode: str) -> None:
+    inks = {"CMYK": ((0, 0, 0, 255), (0, 0, 0, 0)), "RGBA": ((0, 0, 0, 255), (0, 0, 0, 0))}
+    image = draw(mode, *inks[mode]) if mode in inks else draw("L").convert(mode)
+    assert iou(read_outline(save(tmp_path, image, name)).outline, SHAPE) > 0.97
+
+
+def test_content_decides_not_the_name(tmp_path: Path) -> None:
+    path = tmp_path / "shape.svg"
+    path.write_bytes(save(tmp_path, draw()).read_bytes())
+    assert read_outline(path).kind == "image"
+
+
+def test_anti_aliased_edges_are_found_between_pixels(tmp_path: Path) -> None:
+    image = Image.new("L", (800, 800), 255)
+    ImageDraw.Draw(image).ellipse((101, 101, 698, 698), fill=0)
+    reading = read_outline(save(tmp_path, image.reduce(8)))
+    radii = np.hypot(*(reading.outline - 50).T)
+    assert radii == pytest.approx(299 / 8, abs=0.15)
+
+
+def test_polarity_is_detected_and_said(tmp_path: Path) -> None:
+    dark = read_outline(save(tmp_path, draw()))
+    light = read_outline(save(tmp_path, draw("L", 255, 0)))
+    assert dark.notes == ("shape detected: dark on light (threshold 0.50)",)
+    assert light.notes == ("shape detected: light on dark (threshold 0.50)",)
+    assert iou(dark.outline, light.outline) > 0.999
+
+
+def test_threshold_and_invert_override(tmp_path: Path) -> None:
+    image = draw("L", 100, 250)
+    ImageDraw.Draw(image).rectangle((20, 10, 39, 49), fill=20)
+    path = save(tmp_path, image)
+    reading = read_outline(path, threshold=0.2, invert=False)
+    assert reading.notes == ("shape taken as told: dark on light (threshold 0.20, as given)",)
+    # Interpolated towards a light ground, a low threshold draws the edge inwards.
+    assert iou(reading.outline, [[20, 10], [40, 10], [40, 50], [20, 50]]) > 0.9
+    with pytest.raises(InputFileError, match=r"fills the whole image .* set invert"):
+        read_outline(path, invert=True)
+
+
+@pytest.mark.parametrize("threshold", [0.0, 1.0, -3, float("nan")])
+def test_threshold_out_of_range(tmp_path: Path, threshold: float) -> None:
+    with pytest.raises(OrbiflowError, match="threshold must lie between 0 and 1"):
+        read_outline(save(tmp_path, draw()), threshold=threshold)
+
+
+def test_threshold_beyond_the_image(tmp_path: Path) -> None:
+    with pytest.raises(InputFileError, match=r"every pixel lies above .* 0\.20"):
+        read_outline(save(tmp_path, draw("L", 100, 250)), threshold=0.2)
+
+
+def test_largest_component_and_holes(tmp_path: Path) -> None:
+    image = draw()
+    pen = ImageDraw.Draw(image)
+    pen.rectangle((60, 10, 69, 19), fill=0)
+    pen.rectangle((25, 20, 29, 29), fill=255)
+    reading = read_outline(save(tmp_path, image))
+    assert reading.notes[1:] == (
+        "kept the largest of 2 components (96.0% of the filled area)",
+        "filled 1 hole (2.1% of the area)",
+    )
+    assert iou(reading.outline, SHAPE) > 0.995
+
+
+def test_a_drawn_line_is_read_as_what_it_encloses(tmp_path: Path) -> None:
+    image = Image.new("L", (100, 100), 255)
+    ImageDraw.Draw(image).polygon([tuple(xy) for xy in SHAPE], outline=0)
+    reading = read_outline(save(tmp_path, image))
+    # The pen is a pixel wide and lies half outside.
+    assert iou(reading.outline, SHAPE) > 0.94
+
+
+def test_shape_on_the_border_is_closed_along_it(tmp_path: Path) -> None:
+    image = Image.new("L", (100, 100), 255)
+    ImageDraw.Draw(image).rectangle((0, 20, 59, 99), fill=0)
+    reading = read_outline(save(tmp_path, image))
+    assert iou(reading.outline, [[0, 20], [60, 20], [60, 100], [0, 100]]) > 0.995
+    assert "touches the image's border" in reading.notes[-1]
+    assert reading.outline.min() >= 0
+    assert reading.outline.max() <= 100
+
+
+def test_large_images_are_averaged_down_in_original_pixels(tmp_path: Path) -> None:
+    reading = read_outline(save(tmp_path, draw(scale=20)))
+    assert reading.size == (2000, 2000)
+    assert "averaged 2 x 2 pixels into one before tracing" in reading.notes
+    assert iou(reading.outline, SHAPE * 20) > 0.995
+
+
+def test_exif_orientation(tmp_path: Path) -> None:
+    exif = Image.Exif()
+    exif[0x0112] = 6  # turn by 90 degrees clockwise to show
+    path = save(tmp_path, draw().crop((0, 0, 90, 100)), "turned.jpg", exif=exif, quality=95)
+    reading = read_outline(path)
+    assert reading.size == (100, 90)
+    turned = np.stack([100 - SHAPE[:, 1], SHAPE[:, 0]], axis=1)
+    assert iou(reading.outline, turned) > 0.97
+    assert "turned the image as its EXIF orientation asks" in reading.notes
+
+
+def test_first_frame_of_an_animation(tmp_path: Path) -> None:
+    path = save(tmp_path, draw(), "a.gif", save_all=True, append_images=[draw("L", 255, 0)])
+    reading = read_outline(path)
+    assert reading.notes[0] == "took the first frame of several"
+
+
+def test_outline_is_simple_where_pixels_meet_at_corners(tmp_path: Path) -> None:
+    rng = np.random.default_rng(5)
+    noise = np.where(rng.random((120, 120)) < 0.7, 0, 255).astype(np.uint8)
+    framed = np.pad(noise, 10, constant_values=255)
+    reading = read_outline(save(tmp_path, Image.fromarray(framed)))
+    assert iou(reading.outline, reading.outline) == 1
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: Image.new("L", (1, 1)), "1 x 1 pixels cannot hold"),
+        (lambda: Image.new("L", (50, 50), 77), r"blank, every pixel has luminance 0\.30"),
+        (lambda: Image.new("RGBA", (50, 50)), "wholly transparent"),
+        (lambda: draw("L", 250, 255), "all but blank"),
+        (lambda: draw().resize((8, 8)), "covers only .* pixels"),
+        (lambda: Image.new("L", (6400, 6400)), r"6400 x 6400 pixels \(41 megapixels\)"),
+    ],
+)
+def test_images_without_a_shape(
+    tmp_path: Path, make: Callable[[], Image.Image], message: str
+) -> None:
+    path = save(tmp_path, make())
+    with pytest.raises(InputFileError, match=message) as caught:
+        read_outline(path)
+    assert str(caught.value).startswith(f"{path}: ")
+
+
+def test_a_bomb_is_refused_by_its_header(tmp_path: Path) -> None:
+    def chunk(kind: bytes, body: bytes) -> bytes:
+        return (
+            struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
+        )
+
+    for side, said in ((10_000, "10000 x 10000 pixels"), (60_000, "3600 megapixels")):
+        path = tmp_path / "bomb.png"
+        header = chunk(b"IHDR", struct.pack(">IIBBBBB", side, side, 8, 0, 0, 0, 0))
+        path.write_bytes(b"\x89PNG\r\n\x1a\n" + header + chunk(b"IDAT", b"") + chunk(b"IEND", b""))
+        with pytest.raises(InputFileError, match=f"{said}.*40 megapixels are read"):
+            read_outline(path)
+
+
+@pytest.mark.parametrize("name", ["a.png", "a.jpg", "a.webp", "a.gif", "a.bmp", "a.tiff"])
+@pytest.mark.parametrize("share", [0.05, 0.5, 0.9])
+def test_truncated_files(tmp_path: Path, name: str, share: float) -> None:
+    rng = np.random.default_rng(0)
+    whole = io.BytesIO()
+    noise = Image.fromarray(rng.integers(0, 256, (64, 64), dtype=np.uint8))
+    noise.save(whole, {"jpg": "JPEG"}.get(name[2:], name[2:].upper()))
+    path = tmp_path / name
+    path.write_bytes(whole.getvalue()[: int(share * whole.tell())])
+    with pytest.raises(InputFileError, match=r"damaged or cut short|covers only|fills the whole"):
+        read_outline(path)
+
+
+@pytest.mark.parametrize("name", ["a.png", "a.jpg", "a.webp", "a.gif", "a.bmp", "a.tiff"])
+def test_damaged_files_never_raise_anything_else(tmp_path: Path, name: str) -> None:
+    whole = io.BytesIO()
+    draw("RGB", "black", "white").save(whole, {"jpg": "JPEG"}.get(name[2:], name[2:].upper()))
+    rng = np.random.default_rng(1)
+    path = tmp_path / name
+    for _ in range(40):
+        data = bytearray(whole.getvalue())
+        for at in rng.integers(0, min(len(data), 400), size=4):
+            data[at] = rng.integers(256)
+        path.write_bytes(data)
+        try:
+            reading = read_outline(path)
+        except InputFileError:
+            continue
+        assert iou(reading.outline, reading.outline) == pytest.approx(1)
+
+
+def test_a_file_over_the_limit_is_not_opened(tmp_path: Path) -> None:
+    path = save(tmp_path, draw())
+    os.truncate(path, 64 * 2**20 + 1)
+    with pytest.raises(InputFileError, match="64 MB, images over 64 MB are not read"):
+        read_outline(path)

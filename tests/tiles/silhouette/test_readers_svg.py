@@ -1,0 +1,234 @@
+"""SVG drawings: geometry in user units, fill rules, and drawings that cannot be read."""
+
+import math
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from shapely.geometry import Point, Polygon, box
+
+from orbiflow.errors import InputFileError
+from orbiflow.tiles import Reading, hausdorff, iou, read_outline
+from orbiflow.tiles.silhouette.readers import svg
+
+SQUARE = "M10 20 h30 v30 h-30 z"
+
+
+def read(tmp_path: Path, body: str, attributes: str = 'viewBox="0 0 100 100"') -> Reading:
+    path = tmp_path / "drawing.svg"
+    path.write_text(f'<svg xmlns="http://www.w3.org/2000/svg" {attributes}>{body}</svg>')
+    return read_outline(path)
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        f'<path d="{SQUARE}"/>',
+        '<path d="M10 20L40 20 40 50 10 50Z" fill="none" stroke="red"/>',
+        '<path d="M10 20L40 20 40 50 10 50 10 20"/>',
+        '<rect x="10" y="20" width="30" height="30"/>',
+        '<rect x="10%" y="20%" width="30%" height="30%"/>',
+        '<polygon points="10,20 40,20 40,50 10,50"/>',
+        '<polyline points="10,20 40,20 40,50 10,50 10,20"/>',
+        '<g transform="translate(10,20) scale(3)"><rect width="10" height="10"/></g>',
+        '<g transform="translate(0,50) scale(.1,-.1)"><path d="M100 0h300v300h-300z"/></g>',
+        '<rect x="-50" y="10" width="30" height="30" transform="rotate(-90)"/>',
+        '<defs><path id="a" d="M0 0h30v30h-30z"/></defs><use href="#a" x="10" y="20"/>',
+        '<symbol id="s" viewBox="0 0 3 3"><rect width="3" height="3"/></symbol>'
+        '<use href="#s" x="10" y="20" width="30" height="30"/>',
+        '<svg x="10" y="20" width="30" height="30" viewBox="1 1 2 2"><path d="M1 1h2v2h-2z"/></svg>',
+        "<style>.m{transform:translate(10px,20px)} .h{display:none}</style>"
+        '<rect class="m" width="30" height="30"/><rect class="h" width="90" height="90"/>',
+        '<clipPath id="c"><rect width="99" height="99"/></clipPath>'
+        f'<mask id="k"><rect width="99" height="99"/></mask><path d="{SQUARE}"/>',
+        '<rect width="90" height="90" style="display:none"/><path d="' + SQUARE + '"/>',
+    ],
+)
+def test_a_square_however_it_is_drawn(tmp_path: Path, body: str) -> None:
+    reading = read(tmp_path, body)
+    assert reading.y_down
+    assert reading.size == (100, 100)
+    assert hausdorff(reading.outline, box(10, 20, 40, 50)) < 1e-3
+
+
+@pytest.mark.parametrize(
+    "attributes",
+    [
+        'width="1536pt" height="703pt" viewBox="0 0 1536 703"',
+        'width="50%" height="10mm" viewBox="0 0 1536 703"',
+        'viewBox="0 0 1536 703" preserveAspectRatio="none" width="3" height="900"',
+        'viewBox="-99 -50 1536 703"',
+        'width="1536" height="703"',
+        "",
+    ],
+)
+def test_user_units_whatever_the_size_on_paper(tmp_path: Path, attributes: str) -> None:
+    reading = read(tmp_path, f'<path d="{SQUARE}"/>', attributes)
+    assert hausdorff(reading.outline, box(10, 20, 40, 50)) < 1e-3
+    assert reading.size == ((1536, 703) if attributes else None)
+
+
+def test_curves_are_flattened_within_the_bound(tmp_path: Path) -> None:
+    disc = Point(50, 50).buffer(30, quad_segs=2000)
+    bodies = [
+        '<circle cx="50" cy="50" r="30"/>',
+        '<ellipse cx="50" cy="25" rx="30" ry="15" transform="scale(1 2)"/>',
+        '<path d="M20 50A30 30 0 0 1 80 50 30 30 0 0 1 20 50z"/>',
+        '<path d="M20 50A30 30 0 0180 50A30 30 0 0120 50z"/>',
+    ]
+    for body in bodies:
+        outline = read(tmp_path, body).outline
+        assert hausdorff(outline, disc) < 60 / 2000
+        assert len(outline) < 200
+
+
+def test_lone_loop(tmp_path: Path) -> None:
+    outline = read(tmp_path, '<path d="M50 50C90 10 90 90 50 50z"/>').outline
+    t = np.linspace(0, 1, 500)[:-1, None]
+    start, a, b = np.array([50, 50]), np.array([90, 10]), np.array([90, 90])
+    exact = start * ((1 - t) ** 3 + t**3) + 3 * t * (1 - t) ** 2 * a + 3 * t**2 * (1 - t) * b
+    assert iou(outline, exact) > 0.995
+    quadratic = read(tmp_path, '<path d="M10 90Q50 10 90 90z"/>').outline
+    assert Polygon(quadratic).area == pytest.approx(2 / 3 * 80 * 40, rel=1e-3)
+
+
+def test_holes_and_components(tmp_path: Path) -> None:
+    body = '<path d="M10 10h60v60h-60z M20 20v10h10v-10z M80 80h10v10h-10z"/>'
+    reading = read(tmp_path, body)
+    assert reading.notes == (
+        "kept the largest of 2 components (97.3% of the filled area)",
+        "filled 1 hole (2.8% of the area)",
+    )
+    assert hausdorff(reading.outline, box(10, 10, 70, 70)) < 1e-3
+
+
+def test_fill_rules(tmp_path: Path) -> None:
+    # Two overlapping squares in one path: united by nonzero, cut apart by even-odd.
+    path = '<path d="M10 10h40v40h-40z M30 30h40v40h-40z" {}/>'
+    both = read(tmp_path, path.format("")).outline
+    assert Polygon(both).area == pytest.approx(2800)
+    for rule in ('fill-rule="evenodd"', 'style="fill-rule:evenodd"'):
+        apart = read(tmp_path, path.format(rule))
+        assert Polygon(apart.outline).area == pytest.approx(1200)
+    star = [
+        (50 + 40 * math.sin(i * 4 * math.pi / 5), 50 - 40 * math.cos(i * 4 * math.pi / 5))
+        for i in range(5)
+    ]
+    points = " ".join(f"{x:.4f},{y:.4f}" for x, y in star)
+    assert len(read(tmp_path, f'<polygon points="{points}"/>').outline) == 10
+
+
+def test_overlapping_elements_are_united(tmp_path: Path) -> None:
+    body = '<rect x="10" y="10" width="40" height="40"/><circle cx="50" cy="30" r="10"/>'
+    outline = read(tmp_path, body).outline
+    assert Polygon(outline).area == pytest.approx(1600 + 50 * math.pi, rel=1e-3)
+
+
+def test_neighbours_that_all_but_share_an_edge_leave_no_crack(tmp_path: Path) -> None:
+    body = '<path d="M10 10H50V50H10z"/><path d="M50.00000000001 5H90V60H50.00000000001z"/>'
+    outline = read(tmp_path, body).outline
+    assert Polygon(outline).area == pytest.approx(1600 + 2200)
+
+
+def test_extreme_scales_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputFileError, match="encloses no area"):
+        read(tmp_path, f'<g transform="scale(1e-300,1)"><path d="{SQUARE}"/></g>')
+    with pytest.raises(InputFileError, match="encloses no area"):
+        read(tmp_path, '<polygon points="0,0 1e-3,0 0,1e11"/>')
+
+
+def test_background_is_left_out(tmp_path: Path) -> None:
+    background = '<rect width="100" height="100" fill="white"/>'
+    reading = read(tmp_path, background + f'<path d="{SQUARE}"/>')
+    assert reading.notes == ("left out a background rectangle that covers the whole drawing",)
+    assert hausdorff(reading.outline, box(10, 20, 40, 50)) < 1e-3
+    alone = read(tmp_path, background)
+    assert hausdorff(alone.outline, box(0, 0, 100, 100)) < 1e-3
+
+
+def test_open_paths_are_left_out_and_said(tmp_path: Path) -> None:
+    reading = read(tmp_path, f'<path d="M0 0L99 0 99 99"/><path d="{SQUARE}"/>')
+    assert reading.notes == ("left out 1 open path",)
+
+
+def test_prefixed_and_encoded_documents(tmp_path: Path) -> None:
+    path = tmp_path / "a.svg"
+    text = (
+        '<?xml version="1.0" encoding="{}"?><!-- é --><s:svg xmlns:s="http://www.w3.org/2000/svg">'
+    )
+    text += f'<s:path d="{SQUARE}"/></s:svg>'
+    for encoding in ("utf-8", "utf-16", "iso-8859-1", "utf-8-sig"):
+        path.write_bytes(text.format(encoding.removesuffix("-sig")).encode(encoding))
+        assert hausdorff(read_outline(path).outline, box(10, 20, 40, 50)) < 1e-3
+
+
+@pytest.mark.parametrize(
+    ("body", "message"),
+    [
+        ("", "no closed path: the drawing has no shape"),
+        ('<path d="M0 0L10 0 10 10"/>', "no closed path: its only path is open"),
+        ('<path d="M0 0L1 0M5 5L6 6 8 9"/>', "all 2 paths are open"),
+        ('<image href="a.png" width="9" height="9"/>', r"only 1 embedded image\(s\); trace"),
+        ("<text>hi</text><text>ho</text>", r"only 2 text\(s\); convert the text to paths"),
+        ('<path d="M0 0L10 0 0 0z"/>', "no shape that encloses an area"),
+        ('<circle r="0"/><rect width="0" height="4"/>', "no closed path"),
+        ('<path id="p7" d="M0 0L10 q"/>', "<path id='p7'>: its geometry cannot be read"),
+        ('<g transform="matrix(1 2 3)"/>', r"<g>: transform 'matrix\(1 2 3\)' cannot be read"),
+        ('<path d="M0 0H1e13V1e13z"/>', "beyond 1e\\+12 user units"),
+        ('<path d="M0 0H1e400V1e13z"/>', "beyond 1e\\+12 user units"),
+        ('<g transform="scale(1e200)"><path d="M0 0H1e200V9z"/></g>', "beyond 1e\\+12"),
+        ('<g id="a"><use href="#a"/></g>', "refer to each other in a circle"),
+        ('<use id="a" href="#b"/><use id="b" href="#a"/>', "refer to each other in a circle"),
+        ("<g>" * 200 + "</g>" * 200, "line 1: elements nested more than 100 deep"),
+        ("<g/>" * 20_001, "more than 20000 elements"),
+        ("<path", "line 1: not well-formed XML"),
+    ],
+)
+def test_drawings_that_cannot_be_read(tmp_path: Path, body: str, message: str) -> None:
+    with pytest.raises(InputFileError, match=message) as caught:
+        read(tmp_path, body)
+    assert str(caught.value).startswith(str(tmp_path))
+
+
+@pytest.mark.parametrize("value", ["0 0 0 9", "1 2 3", "a b c d", "0 0 nan 4", "0 0 -3 4"])
+def test_bad_view_box(tmp_path: Path, value: str) -> None:
+    with pytest.raises(InputFileError, match=r"<svg>: viewBox .* (is not four|has no area)"):
+        read(tmp_path, f'<path d="{SQUARE}"/>', f'viewBox="{value}"')
+
+
+def test_bad_size(tmp_path: Path) -> None:
+    with pytest.raises(InputFileError, match="<svg>: width 'wide' is not a length"):
+        read(tmp_path, f'<path d="{SQUARE}"/>', 'width="wide" height="3"')
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-16"])
+def test_entities_are_refused(tmp_path: Path, encoding: str) -> None:
+    path = tmp_path / "bomb.svg"
+    text = '<!DOCTYPE svg [<!ENTITY a "aaaa"><!ENTITY b "&a;&a;">]><svg>&b;</svg>'
+    path.write_bytes(text.encode(encoding))
+    with pytest.raises(InputFileError, match="declares the XML entity 'a'"):
+        read_outline(path)
+
+
+def test_uses_that_multiply_are_refused(tmp_path: Path) -> None:
+    levels = "".join(f'<g id="l{i + 1}">' + f'<use href="#l{i}"/>' * 10 + "</g>" for i in range(12))
+    start = time.perf_counter()
+    with pytest.raises(InputFileError, match="draws more than 10000 elements"):
+        read(tmp_path, f'<defs><path id="l0" d="{SQUARE}"/>{levels}</defs><use href="#l12"/>')
+    assert time.perf_counter() - start < 15
+
+
+def test_too_many_points(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(InputFileError, match="hold too much data"):
+        read(tmp_path, f'<path d="M0 0{"l1 1" * 300_000}z"/>')
+    monkeypatch.setattr(svg, "MAX_POINTS", 1000)
+    with pytest.raises(InputFileError, match="more than 1000 points"):
+        read(tmp_path, f'<path d="M0 0{"h1v1" * 600}z"/>')
+
+
+def test_scribbles_are_refused_before_they_are_resolved(tmp_path: Path) -> None:
+    points = np.random.default_rng(0).uniform(0, 100, (20_000, 2)).round(2)
+    path = " ".join(f"{x},{y}" for x, y in points)
+    with pytest.raises(InputFileError, match="crosses itself too often"):
+        read(tmp_path, f'<polygon points="{path}"/>')

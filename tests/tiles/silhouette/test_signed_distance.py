@@ -1,0 +1,106 @@
+"""The signed distance against shapely, and its gradients."""
+
+import numpy as np
+import pytest
+import shapely
+import torch
+from hypothesis import given
+from hypothesis import strategies as st
+
+from orbiflow.tiles import signed_distance
+from strategies import random_tensor, seeds
+
+
+def star_polygon(seed: int, corners: int = 5, *, low: float = 0.25) -> torch.Tensor:
+    """A simple polygon (corners, 2), concave more often than not, somewhere near the origin."""
+    rng = np.random.default_rng(seed)
+    angle = 2 * np.pi * (np.arange(corners) + rng.uniform(-0.35, 0.35, corners)) / corners
+    radius = rng.uniform(low, 1.0, corners)
+    points = radius[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    return torch.tensor(points + rng.uniform(-0.5, 0.5, 2))
+
+
+def nearest(points: np.ndarray, ring: shapely.LinearRing) -> np.ndarray:
+    """The points of the ring that are nearest to `points` (N, 2)."""
+    return shapely.get_coordinates(
+        shapely.line_interpolate_point(
+            ring, shapely.line_locate_point(ring, shapely.points(points))
+        )
+    )
+
+
+def smooth_points(seed: int, polygon: shapely.Polygon) -> torch.Tensor:
+    """Points (N, 2) off the boundary and off the medial axis, where the distance has a gradient."""
+    points = random_tensor(seed, 60, 2, size=1.5).numpy()
+    ring = polygon.exterior
+    closest = nearest(points, ring)
+    keep = np.hypot(*(points - closest).T) > 0.02
+    for shift in ([1e-3, 0.0], [-1e-3, 0.0], [0.0, 1e-3], [0.0, -1e-3]):
+        keep &= np.hypot(*(nearest(points + shift, ring) - closest).T) < 0.05
+    assert keep.sum() > 20
+    return torch.tensor(points[keep])
+
+
+@given(seeds, st.integers(3, 9), st.booleans())
+def test_agrees_with_shapely(seed: int, corners: int, clockwise: bool) -> None:
+    vertices = star_polygon(seed, corners)
+    polygon = shapely.Polygon(vertices.numpy())
+    points = random_tensor(seed, 80, 2, size=1.5)
+    inside = shapely.contains_xy(polygon, *points.numpy().T)
+    distance = shapely.distance(shapely.points(points.numpy()), polygon.exterior)
+    phi = signed_distance(points, vertices.flip(0) if clockwise else vertices)
+    assert np.abs(phi.numpy() - np.where(inside, distance, -distance)).max() < 1e-12
+
+
+def test_the_polygons_are_of_both_kinds() -> None:
+    polygons = [shapely.Polygon(star_polygon(seed).numpy()) for seed in range(100)]
+    assert all(p.is_valid for p in polygons)
+    convex = sum(p.convex_hull.area - p.area < 1e-12 for p in polygons)
+    assert 5 <= convex <= 95
+
+
+@given(seeds)
+def test_stacks_broadcast(seed: int) -> None:
+    vertices = torch.stack([star_polygon(seed + i) for i in range(3)])
+    points = random_tensor(seed, 3, 7, 2)
+    each = [signed_distance(p, v) for p, v in zip(points, vertices, strict=True)]
+    assert torch.equal(signed_distance(points, vertices), torch.stack(each))
+    shared = [signed_distance(points[0], v) for v in vertices]
+    assert torch.equal(signed_distance(points[0], vertices), torch.stack(shared))
+    one = [signed_distance(p, vertices[0]) for p in points]
+    assert torch.equal(signed_distance(points, vertices[0]), torch.stack(one))
+
+
+@given(seeds)
+def test_gradient_points_away_from_the_nearest_boundary_point(seed: int) -> None:
+    vertices = star_polygon(seed)
+    polygon = shapely.Polygon(vertices.numpy())
+    points = smooth_points(seed, polygon).requires_grad_()
+    phi = signed_distance(points, vertices)
+    (gradient,) = torch.autograd.grad(phi.sum(), points)
+    assert (gradient.norm(dim=-1) - 1).abs().max().item() < 1e-12
+    offset = points.detach() - torch.tensor(nearest(points.detach().numpy(), polygon.exterior))
+    outward = offset / offset.norm(dim=-1, keepdim=True) * phi.detach().sign()[:, None]
+    assert (gradient - outward).abs().max().item() < 1e-10
+
+
+@given(seeds)
+def test_derivatives_match_differences(seed: int) -> None:
+    vertices = star_polygon(seed)
+    points = smooth_points(seed, shapely.Polygon(vertices.numpy()))[:12]
+    assert torch.autograd.gradcheck(
+        signed_distance, (points.requires_grad_(), vertices.requires_grad_()), atol=1e-6, rtol=1e-5
+    )
+
+
+@pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
+@given(seeds)
+def test_gradient_is_finite_on_the_boundary(dtype: torch.dtype, seed: int) -> None:
+    vertices = star_polygon(seed).to(dtype).requires_grad_()
+    corners = vertices.detach()
+    middles = (corners + corners.roll(-1, 0)) / 2
+    points = torch.cat([corners, middles]).requires_grad_()
+    phi = signed_distance(points, vertices)
+    assert phi.detach().abs().max().item() <= 4 * torch.finfo(dtype).eps
+    for gradient in torch.autograd.grad(phi.sum(), (points, vertices)):
+        assert torch.isfinite(gradient).all()

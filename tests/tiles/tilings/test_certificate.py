@@ -1,0 +1,233 @@
+"""What is a tile is certified, what is not is refused and says why."""
+
+from __future__ import annotations
+
+import cProfile
+import json
+import tracemalloc
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from orbiflow.errors import CertificationError
+from orbiflow.symmetry import (
+    CrystallographicGroup,
+    rotation,
+    rotation_matrix,
+)
+from orbiflow.tiles import (
+    IsohedralClass,
+    Tile,
+    certify,
+    isohedral_class,
+    signed_area,
+)
+
+
+def square(side: float = 1.0) -> Tile:
+    group = CrystallographicGroup.generate(np.eye(2))
+    return Tile(side * np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]), group)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_stretched_templates_of_any_shape(kind: IsohedralClass, make_tile: Any, seed: int) -> None:
+    tile = make_tile(kind, seed, bend=0.0, stretch=0.8, shape=0.25)
+    certificate = certify(tile)
+    assert certificate.valid, certificate
+    assert certificate.edge_matching == "segments"
+    assert certificate.edge_mismatch < 1e-13
+    assert certificate.total_overlap < 1e-13
+    assert certificate.uncovered < 1e-13
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_equivariant_perturbation_tiles(kind: IsohedralClass, make_tile: Any, seed: int) -> None:
+    tile = make_tile(kind, seed, stretch=0.3, shape=0.1)
+    certificate = certify(tile)
+    assert certificate.valid, certificate
+    assert certificate.neighbours == len(kind.template())
+
+
+def test_other_perturbations_do_not(kind: IsohedralClass, make_tile: Any) -> None:
+    tile = make_tile(kind, 1)
+    for vertex in (7, 55):
+        polygon = tile.polygon.copy()
+        polygon[vertex] += (1e-5, 2e-5)
+        certificate = certify(Tile(polygon, tile.group))
+        assert not certificate.valid
+        assert certificate.edge_mismatch > 1e-6
+        assert any("edges miss" in reason for reason in certificate.reasons)
+
+
+@pytest.mark.parametrize("name", ["IH2", "IH4", "IH5", "IH7", "IH21", "IH28"])
+def test_a_field_without_the_symmetry_is_refused(
+    name: str, make_tile: Any, random_field: Any
+) -> None:
+    tile = make_tile(isohedral_class(name), bend=0.0)
+    field = random_field(tile.group, 3)
+    certificate = certify(Tile(tile.polygon + 0.02 * field(tile.polygon), tile.group))
+    assert not certificate.valid
+    assert certificate.simple
+    assert certificate.total_overlap > 1e-4
+
+
+def test_scaled_tiles_overlap_or_leave_gaps(kind: IsohedralClass, make_tile: Any) -> None:
+    tile = make_tile(kind)
+    large = certify(Tile(tile.polygon * 1.01, tile.group))
+    small = certify(Tile(tile.polygon * 0.99, tile.group))
+    assert not large.valid
+    assert large.total_overlap > 1e-2
+    assert any("overlaps" in reason for reason in large.reasons)
+    assert not small.valid
+    assert small.uncovered > 1e-2
+    assert any("uncovered" in reason for reason in small.reasons)
+
+
+def test_clockwise_and_y_down(kind: IsohedralClass, make_tile: Any) -> None:
+    tile = make_tile(kind, 2, stretch=0.3)
+    backwards = certify(Tile(tile.polygon[::-1], tile.group))
+    assert backwards.valid
+    assert backwards.signed_area < 0
+    flip = np.diag([1.0, -1.0])
+    assert certify(tile.transformed(flip, np.array([3.0, 40.0]))).valid
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    exponent=st.floats(-3, 5),
+    angle=st.floats(-3.2, 3.2),
+    offset=st.tuples(st.floats(-1e3, 1e3), st.floats(-1e3, 1e3)),
+    name=st.sampled_from(["IH2", "IH5", "IH21"]),
+)
+def test_any_scale_turn_and_position(
+    exponent: float, angle: float, offset: tuple[float, float], name: str
+) -> None:
+    kind = isohedral_class(name)
+    tile = Tile(kind.template(), kind.group())
+    scale = 10.0**exponent
+    moved = tile.transformed(scale * rotation_matrix(angle), scale * np.array(offset))
+    certificate = certify(moved)
+    assert certificate.valid, certificate
+    assert certificate.expected_area == pytest.approx(scale**2 * 1.5 * np.sqrt(3.0))
+
+
+def test_crossing_polygons_are_refused_with_the_place(make_tile: Any) -> None:
+    tile = make_tile(isohedral_class("IH5"))
+    polygon = tile.polygon + np.array([500.0, 0.0])
+    polygon[[10, 60]] = polygon[[60, 10]]
+    group = tile.group.conjugate(np.eye(2), np.array([500.0, 0.0]))
+    certificate = certify(Tile(polygon, group))
+    assert not certificate.valid
+    assert not certificate.simple
+    assert "self-intersection near (500." in certificate.reasons[0]
+    assert json.loads(json.dumps(certificate.as_dict()))["overlap"] is None
+
+
+@pytest.mark.parametrize(
+    "polygon",
+    [
+        [[0, 0], [1, 1], [2, 2]],
+        [[0, 0], [0, 0], [0, 0]],
+        [[0, 0], [1, 0], [1, 0], [0, 0]],
+        [[0, 0], [1, 1], [1, 0], [0, 1]],
+        [[0, 0], [1, 0], [1, 1], [0.5, 0.0], [0, 1]],
+        [[0, 0], [1e6, 0], [1e6, 1e6]],
+        [[0, 0], [1e-9, 0], [0, 1e-9]],
+        [[0, 0], [5, 0], [5, 5], [0, 5]],
+    ],
+)
+def test_awkward_polygons_never_crash(polygon: list[list[float]]) -> None:
+    for order in (2, 4):
+        group = CrystallographicGroup.generate(np.eye(2), [rotation((0.5, 0.5), order)])
+        certificate = certify(Tile(np.array(polygon, dtype=float), group))
+        assert not certificate.valid
+        assert certificate.reasons
+        json.dumps(certificate.as_dict(), allow_nan=False)
+
+
+def test_repeated_vertices_do_no_harm() -> None:
+    tile = square()
+    assert certify(Tile(np.repeat(tile.polygon, 2, axis=0), tile.group)).valid
+
+
+def test_right_area_is_not_enough() -> None:
+    """A rectangle of area one on the square lattice: half overlapped, half uncovered."""
+    certificate = certify(Tile(square().polygon * (2.0, 0.5), square().group))
+    assert certificate.area_error == 0.0
+    assert certificate.overlap == pytest.approx(0.5)
+    assert certificate.total_overlap == pytest.approx(1.0)
+    assert certificate.uncovered > 0.05
+    assert not certificate.valid
+
+
+def test_doubly_covering_tile_is_refused() -> None:
+    """Every edge of the square finds a partner under p2, but the plane is covered twice."""
+    group = CrystallographicGroup.generate(np.eye(2), [rotation((0.5, 0.2), 2)])
+    certificate = certify(Tile(square().polygon, group))
+    assert certificate.edge_mismatch < 1e-12
+    assert certificate.total_overlap == pytest.approx(2.0)  # of the expected area, one half
+    assert not certificate.valid
+
+
+def test_bricks_match_as_curves() -> None:
+    group = CrystallographicGroup.generate(np.array([[1.0, 0.3], [0.0, 1.0]]))
+    certificate = certify(Tile(square().polygon, group))
+    assert certificate.valid, certificate
+    assert certificate.edge_matching == "curves"
+    assert certificate.neighbours == 6
+
+
+def test_different_vertices_on_the_same_curve() -> None:
+    tile = square()
+    polygon = np.insert(tile.polygon, 1, [0.37, 0.0], axis=0)
+    certificate = certify(Tile(polygon, tile.group))
+    assert certificate.valid, certificate
+    assert certificate.edge_matching == "curves"
+
+
+def test_tolerance_is_the_callers() -> None:
+    tile = isohedral_class("IH4")
+    rounded = Tile(tile.template().round(6), tile.group())
+    assert not certify(rounded).valid
+    assert certify(rounded, tolerance=1e-5).valid
+
+
+def test_require() -> None:
+    certify(square()).require()
+    with pytest.raises(CertificationError, match="does not tile the plane: its area"):
+        certify(square(1.2)).require()
+
+
+def test_area_far_from_the_origin() -> None:
+    ring = square().polygon + np.array([1e6, -1e6])
+    assert signed_area(ring) == pytest.approx(1.0, abs=1e-12)
+
+
+def test_work_does_not_grow_with_the_square_of_the_vertices(make_tile: Any) -> None:
+    """Calls and memory, not seconds: those depend on who else is at work."""
+    calls, memory = zip(*(cost(make_tile, per_edge) for per_edge in (33, 330)), strict=True)
+    assert calls[1] < 1.5 * calls[0]
+    assert memory[1] < 20 * memory[0]
+
+
+def cost(make_tile: Any, per_edge: int) -> tuple[int, int]:
+    """Calls of functions, and bytes at most, of a certificate."""
+    tile = make_tile(isohedral_class("IH6"), per_edge=per_edge)
+    certify(tile)  # caches are full now
+    profile = cProfile.Profile()
+    assert profile.runcall(certify, tile).valid
+    tracemalloc.start()
+    certify(tile)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    return sum(entry.callcount for entry in profile.getstats()), peak
+
+
+@pytest.mark.parametrize("angle", np.linspace(-3.0, 3.0, 61))
+def test_edges_that_agree_but_for_rounding_do_not_fool_the_overlay(angle: float) -> None:
+    kind = isohedral_class("IH2")
+    tile = Tile(kind.template(), kind.group()).transformed(rotation_matrix(angle), np.zeros(2))
+    assert certify(tile).valid

@@ -1,0 +1,190 @@
+"""The table of nine classes against the geometry it describes."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+import pytest
+import torch
+
+from orbiflow.arrays import Array
+from orbiflow.errors import OrbiflowError
+from orbiflow.symmetry import identity
+from orbiflow.tiles import (
+    CLASSES,
+    EdgeIdentification,
+    IsohedralClass,
+    isohedral_class,
+    signed_area,
+)
+from orbiflow.tiles.tilings.tiling import coset_and_cell
+
+GROUP_ORDERS = {"p1": 1, "p2": 2, "pg": 2, "pgg": 4, "p3": 3, "p4": 4, "p6": 6}
+
+
+IDENTIFIED = {
+    "IH1": "0=3 1=4 2=5",
+    "IH2": "0~5 1=4 2~3",
+    "IH3": "0~2 1=4 3~5",
+    "IH4": "0o 1=4 2o 3o 5o",
+    "IH5": "0~5 1=4 2o 3o",
+    "IH6": "0~2 1~4 3o 5o",
+    "IH7": "0>5 1>2 3>4",
+    "IH21": "0>4 1>2 3o",
+    "IH28": "0>4 1>2 3o",
+}
+"""As the paper prints them: = translation, ~ glide, > rotation, o half-turn."""
+
+
+def edges_from_group(kind: IsohedralClass, vertices: Array) -> set[str]:
+    """Pairs of edges that an element other than 1 maps onto each other, tiles on both sides."""
+    count, found = len(vertices), set[str]()
+    for element in kind.group().elements_near(np.zeros(2), 8.0):
+        if element.is_close(identity(2), 1e-9):
+            continue
+        image = element(vertices)
+        for i in range(count):
+            ends = image[[i, (i + 1) % count]]
+            ends = ends if element.determinant < 0 else ends[::-1]
+            for j in range(i, count):
+                if np.allclose(ends, vertices[[j, (j + 1) % count]], atol=1e-9):
+                    found.add(EdgeIdentification(i, j, element).brief)
+    return found
+
+
+def test_nine_classes() -> None:
+    names = {"IH1": "p1", "IH2": "pg", "IH3": "pg", "IH4": "p2", "IH5": "pgg", "IH6": "pgg"}
+    names |= {"IH7": "p3", "IH21": "p6", "IH28": "p4"}
+    assert {name: kind.group_name for name, kind in CLASSES.items()} == names
+
+
+def test_group_closes_and_has_the_right_area(kind: IsohedralClass) -> None:
+    group, area = kind.group(), signed_area(kind.template())
+    assert group.order == GROUP_ORDERS[kind.group_name]
+    assert all(group.contains(generator) for generator in kind.generators())
+    assert group.order * area == pytest.approx(group.cell_volume, rel=1e-14)
+    assert area == pytest.approx(1.5 * np.sqrt(3.0))  # all templates are of one size
+
+
+def test_identified_edges_agree_with_the_group(kind: IsohedralClass) -> None:
+    shape = np.full(kind.shape_dim, 0.13)  # a generic pentagon: no accidental coincidences
+    assert edges_from_group(kind, kind.template(shape)) == set(IDENTIFIED[kind.name].split())
+    covered = [edge for pair in kind.identified_edges for edge in {pair.first, pair.second}]
+    assert sorted(covered) == list(range(len(kind.template())))
+
+
+def test_edge_isometry_maps_edge_onto_partner(kind: IsohedralClass) -> None:
+    vertices = kind.template()
+    for pair in kind.identified_edges:
+        element = pair.isometry
+        start = pair.second + 1 if pair.reversed else pair.second
+        image = element(vertices[pair.first])
+        np.testing.assert_allclose(image, vertices[start % len(vertices)], atol=1e-12)
+    assert " ".join(pair.brief for pair in kind.identified_edges) == IDENTIFIED[kind.name]
+
+
+def test_paper_operators_in_nested_order_are_a_multiple_of_the_mean(kind: IsohedralClass) -> None:
+    """O_1(O_2(F)) sums over g_2^k g_1^j: every coset has to occur equally often."""
+    products = [identity(2)]
+    for operator in kind.paper_operators():
+        powers = [identity(2)]
+        for _ in range(operator.terms - 1):
+            powers.append(operator.isometry @ powers[-1])
+        products = [power @ product for product in products for power in powers]
+    cosets = Counter(coset_and_cell(kind.group(), product)[0] for product in products)
+    assert set(cosets) == set(range(kind.group().order))
+    assert len(set(cosets.values())) == 1
+
+
+@pytest.mark.parametrize("name", ["IH21", "IH28"])
+def test_pentagons_keep_the_lattice_for_every_shape(name: str) -> None:
+    kind = isohedral_class(name)
+    for shape in np.random.default_rng(1).uniform(-0.3, 0.3, (5, 2)):
+        vertices = kind.template(shape)
+        pairs = set(IDENTIFIED[name].split())
+        assert pairs <= edges_from_group(kind, vertices)
+        assert signed_area(vertices) * kind.group().order == pytest.approx(kind.group().cell_volume)
+
+
+@pytest.mark.parametrize(
+    ("name", "sides", "angles"),
+    [
+        ("IH21", [2, 1, 1, 1, 2], [60, 120, 120, 120, 120]),
+        ("IH28", [1, 1, 1, np.sqrt(3.0) - 1, 1], [90, 120, 90, 120, 120]),
+    ],
+)
+def test_default_pentagons(name: str, sides: list[float], angles: list[float]) -> None:
+    vertices = isohedral_class(name).template()
+    steps = np.roll(vertices, -1, axis=0) - vertices
+    lengths = np.linalg.norm(steps, axis=1)
+    np.testing.assert_allclose(lengths / lengths[1], sides)
+    directions = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
+    turns = (directions - np.roll(directions, 1)) % (2 * np.pi)
+    np.testing.assert_allclose(180 - np.degrees(turns), angles)
+
+
+def test_stretch_commutes_with_the_point_group(kind: IsohedralClass) -> None:
+    rng = np.random.default_rng(2)
+    for parameters in rng.uniform(-1.5, 1.5, (10, kind.stretch_dim)):
+        linear = kind.stretch(parameters)
+        assert np.linalg.det(linear) == pytest.approx(1.0)
+        np.testing.assert_allclose(linear, linear.T)
+        for g in kind.group().cosets:
+            np.testing.assert_allclose(linear @ g.linear, g.linear @ linear, atol=1e-12)
+        group = kind.group().conjugate(linear)
+        for g in group.cosets:
+            for h in group.cosets:
+                assert group.contains(g @ h)
+
+
+def test_stretch_is_the_exponential() -> None:
+    for a, b in [(0.0, 0.0), (1e-3, 2e-3), (0.06, 0.08), (0.7, -0.4)]:
+        generator = torch.tensor([[a, b], [b, -a]], dtype=torch.float64)
+        expected = torch.linalg.matrix_exp(generator).numpy()
+        found = isohedral_class("IH4").stretch(np.array([a, b]))
+        np.testing.assert_allclose(found, expected, atol=1e-14)
+
+
+@pytest.mark.parametrize("name", ["IH1", "IH2", "IH7", "IH21"])
+def test_batched_and_differentiable(name: str) -> None:
+    kind = isohedral_class(name)
+    shape = torch.zeros(3, 4, kind.shape_dim, dtype=torch.float64, requires_grad=True)
+    corners = len(kind.template())
+    vertices = kind.template(shape)
+    assert vertices.shape == (3, 4, corners, 2)
+    np.testing.assert_allclose(vertices[1, 2].detach().numpy(), kind.template())
+    parameters = torch.zeros(5, kind.stretch_dim, dtype=torch.float64, requires_grad=True)
+    stretch = kind.stretch(parameters)
+    assert stretch.shape == (5, 2, 2)
+    np.testing.assert_allclose(stretch[0].detach().numpy(), np.eye(2))
+    if shape.numel():
+        assert torch.autograd.gradcheck(lambda s: kind.template(s), (shape,))
+    if parameters.numel():
+        assert torch.autograd.gradcheck(lambda s: kind.stretch(s), (parameters,))
+
+
+@pytest.mark.parametrize("size", [0.09, 0.11, 1.0])
+def test_gradients_of_the_stretch_across_the_series_boundary(size: float) -> None:
+    point = torch.tensor([size, 0.01], dtype=torch.float64, requires_grad=True)
+    assert torch.autograd.gradcheck(lambda s: isohedral_class("IH1").stretch(s), (point,))
+
+
+def test_names() -> None:
+    for spelling in ("IH4", "ih4", "4", "IH04", " ih-4 ", 4):
+        assert isohedral_class(spelling) is CLASSES["IH4"]
+    for wrong in ("IH8", "four", "", "IH", -4):
+        with pytest.raises(OrbiflowError, match="IH1, IH2, IH3, IH4, IH5, IH6, IH7, IH21, IH28"):
+            isohedral_class(wrong)
+
+
+def test_wrong_number_of_parameters() -> None:
+    with pytest.raises(OrbiflowError, match=r"IH21 has 2 shape parameters.*got \(3,\)"):
+        isohedral_class("IH21").template(np.zeros(3))
+    with pytest.raises(OrbiflowError, match=r"IH7 has 0 stretch parameters"):
+        isohedral_class("IH7").stretch(torch.zeros(2))
+
+
+def test_template_is_a_copy() -> None:
+    isohedral_class("IH1").template()[0] = 99.0
+    assert isohedral_class("IH1").template()[0, 0] == 1.0

@@ -1,0 +1,241 @@
+"""Tilings by several prototiles and by tiles with a symmetry: certified, or refused."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from orbiflow.errors import OrbiflowError
+from orbiflow.symmetry import (
+    WALLPAPER_GROUPS,
+    identity,
+    wallpaper_group,
+)
+from orbiflow.tiles import (
+    Placed,
+    Prototile,
+    Tile,
+    Tiling,
+    aspects,
+    certify,
+    colouring,
+    copies_inside,
+    copies_meeting,
+    dirichlet_tile,
+    dirichlet_tiling,
+    neighbours,
+    patch,
+)
+from some_tilings import NAMED, SQUARE, dirichlet_tilings, fixing, mirror_tiles, sites, tilings
+from strategies import seeds, wallpaper_groups
+
+
+def window_of(tiling: Tiling, half: float = 2.5) -> tuple[float, float, float, float]:
+    low, high = tiling.box
+    reach = half * np.sqrt(tiling.tile_area)
+    return (*(low - reach).tolist(), *(high + reach).tolist())
+
+
+@pytest.mark.parametrize("name", NAMED)
+def test_named_tilings_and_their_stabilisers(name: str) -> None:
+    tiling, orders = NAMED[name]
+    certificate = certify(tiling)
+    assert certificate.valid, certificate
+    assert certificate.edge_matching == "segments"
+    assert tuple(own.order for own in tiling.stabilisers) == orders
+
+
+@settings(max_examples=80, deadline=None)
+@given(tilings)
+def test_certified(tiling: Tiling) -> None:
+    certificate = certify(tiling)
+    assert certificate.valid, certificate
+    assert certificate.edge_matching == "segments"
+    assert certificate.area_error < 1e-12
+    assert certificate.total_overlap < 1e-11
+    assert certificate.uncovered < 1e-11
+
+
+@settings(max_examples=80, deadline=None)
+@given(tilings, seeds)
+def test_a_vertex_moved_by_a_millionth_is_refused(tiling: Tiling, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    k = int(rng.integers(len(tiling.prototiles)))
+    ring = tiling.prototiles[k].polygon.copy()
+    vertex, angle = int(rng.integers(len(ring))), rng.uniform(0, 2 * np.pi)
+    step = 1e-6 * np.sqrt(tiling.tile_area) * np.array([np.cos(angle), np.sin(angle)])
+    before, after = ring[vertex - 1], ring[(vertex + 1) % len(ring)]
+    # along a straight boundary it would move nothing
+    for other in (before, after):
+        along = (other - ring[vertex]) / np.linalg.norm(other - ring[vertex])
+        assume(abs(along[0] * step[1] - along[1] * step[0]) > 0.1 * np.linalg.norm(step))
+    ring[vertex] += step
+    own = [ring if n == k else p for n, p in enumerate(tiling.prototiles)]
+    certificate = certify(Tiling(tiling.group, own))
+    assert not certificate.valid
+    found = certificate
+    assert max(found.area_error, found.edge_mismatch, found.total_overlap, found.uncovered) > 2e-8
+
+
+@settings(max_examples=40, deadline=None)
+@given(tilings, st.sampled_from([0.97, 1.02]))
+def test_a_prototile_of_another_size_is_refused(tiling: Tiling, scale: float) -> None:
+    first, *others = tiling.prototiles
+    scaled = (first.polygon - first.center) * scale + first.center
+    certificate = certify(Tiling(tiling.group, [scaled, *others]))
+    assert not certificate.valid
+    assert any("area" in reason for reason in certificate.reasons)
+    gap, overlap = certificate.uncovered > 1e-4, certificate.total_overlap > 1e-4
+    assert gap if scale < 1 else overlap
+
+
+@settings(max_examples=40, deadline=None)
+@given(tilings)
+def test_a_patch_covers_its_window_once(tiling: Tiling) -> None:
+    """By shapely alone: areas of the pieces in a window add up to its own, as that of their union."""
+    window = window_of(tiling)
+    box = shapely.box(*window)
+    elements = patch(tiling, window)
+    shapes = [shapely.Polygon(g(tiling.prototiles[g.prototile].polygon)) for g in elements]
+    pieces = shapely.intersection(shapes, box)
+    assert np.isclose(shapely.area(pieces).sum(), box.area, rtol=1e-9)
+    assert np.isclose(
+        shapely.union_all(pieces, grid_size=1e-9 * box.length).area, box.area, rtol=1e-6
+    )
+    # the same tiles as integers, each once
+    copies = copies_meeting(tiling, window)
+    keys = set(zip(copies.aspects.tolist(), map(tuple, copies.cells.tolist()), strict=True))
+    assert len(keys) == len(copies) == len(elements)
+    assert sorted(aspects(tiling, elements)) == sorted(copies.aspects.tolist())
+    for index, ring in enumerate(copies.rings()):
+        found = copies.isometry(index)
+        own = tiling.prototiles[found.prototile].polygon
+        np.testing.assert_allclose(ring, found(own), atol=1e-9 * tiling.radius)
+    inside = copies_inside(tiling, window)
+    assert len(inside) == sum(bool(box.contains(shape)) for shape in shapes)
+
+
+@settings(max_examples=40, deadline=None)
+@given(tilings)
+def test_neighbours_and_colours_are_those_that_shapely_measures(tiling: Tiling) -> None:
+    size = np.sqrt(tiling.tile_area)
+    chosen = colouring(tiling)
+    elements = patch(tiling, window_of(tiling, 1.0))
+    shapes = [shapely.Polygon(g(tiling.prototiles[g.prototile].polygon)) for g in elements]
+    colours = [chosen.colour(g) for g in elements]
+    shared = {
+        (i, j): shapes[i].buffer(1e-6 * size).intersection(shapes[j].exterior).length
+        for i, j in itertools.permutations(range(len(shapes)), 2)
+        if shapes[i].distance(shapes[j]) < 1e-7 * size
+    }
+    for (i, j), length in shared.items():
+        if length > 1e-4 * size:
+            assert colours[i] != colours[j]
+    assert colouring(tiling).colours(copies_meeting(tiling, window_of(tiling))).max() < chosen.count
+    for k in range(len(tiling.prototiles)):
+        itself = next(i for i, g in enumerate(elements) if _is(g, k))
+        near = neighbours(tiling, k)
+        edge = sum(length > 1e-4 * size for (i, _), length in shared.items() if i == itself)
+        assert len(near.edge) == edge
+        assert len(near.edge) + len(near.point) == sum(i == itself for i, _ in shared)
+
+
+def _is(element: Placed, prototile: int) -> bool:
+    return element.prototile == prototile and element.is_close(identity(2), 1e-6)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.data())
+def test_dirichlet_cells_have_the_stabiliser_of_their_point(data: st.DataObject) -> None:
+    group = data.draw(wallpaper_groups())
+    point = data.draw(sites(group))
+    near = group.elements_near(point, 0.02 * np.sqrt(group.cell_volume), source=point)
+    assume(len(near) == len(fixing(group, point)))
+    tile = dirichlet_tile(group, point)
+    certificate = certify(tile)
+    assert certificate.valid, certificate
+    assert tile.tiling.stabilisers[0].order == len(near)
+    assert np.isclose(tile.signed_area * group.order, len(near) * group.cell_volume)
+
+
+@pytest.mark.parametrize("name", WALLPAPER_GROUPS)
+@settings(max_examples=5, deadline=None)
+@given(data=st.data())
+def test_every_group_has_several_prototiles(name: str, data: st.DataObject) -> None:
+    tiling = data.draw(dirichlet_tilings(names=(name,)))
+    assert certify(tiling).valid
+    shares = [own.order for own in tiling.stabilisers]
+    areas = [abs(prototile.signed_area) for prototile in tiling.prototiles]
+    total = sum(a * tiling.group.order / s for a, s in zip(areas, shares, strict=True))
+    assert np.isclose(total, tiling.group.cell_volume, rtol=1e-12)
+
+
+@settings(max_examples=20, deadline=None)
+@given(mirror_tiles())
+def test_mirror_tiles_have_their_mirror(tiling: Tiling) -> None:
+    (own,) = tiling.stabilisers
+    assert own.order == 2
+    assert own.elements[1].determinant < 0
+    ring = tiling.prototiles[0].ring
+    (order,) = own.orders[1:]
+    assert order is not None
+    np.testing.assert_allclose(own.elements[1](ring), ring[order], atol=1e-9 * tiling.radius)
+
+
+def test_a_symmetry_of_the_curve_but_not_of_the_vertices() -> None:
+    """The square cell under p4m with a vertex too many: as good a tile, matched as curves."""
+    ring = np.insert(SQUARE, 1, (0.13, -0.5), axis=0)
+    tiling = Tiling(wallpaper_group("p4m"), [ring])
+    certificate = certify(tiling)
+    assert certificate.valid, certificate
+    assert certificate.edge_matching == "curves"
+    assert tiling.stabilisers[0].order == 8
+
+
+def test_two_prototiles_that_are_one() -> None:
+    kept = dirichlet_tile(wallpaper_group("p2"), (0.2, 0.3))
+    twin = kept.group.cosets[1](kept.polygon)
+    certificate = certify(Tiling(kept.group, [kept.polygon, twin]))
+    assert not certificate.valid
+    assert any("overlaps" in reason for reason in certificate.reasons)
+    with pytest.raises(OrbiflowError, match="points 0 and 1 of a Dirichlet tiling have the same"):
+        dirichlet_tiling(kept.group, [(0.2, 0.3), kept.group.cosets[1](np.array([0.2, 0.3]))])
+
+
+def test_half_of_a_pair_is_refused_and_says_which() -> None:
+    tiling = NAMED["hexagons and triangles"][0]
+    certificate = certify(Tiling(tiling.group, tiling.prototiles[:1]))
+    assert any("uncovered" in reason for reason in certificate.reasons)
+    larger = Tiling(tiling.group, [tiling.prototiles[0], 1.1 * tiling.prototiles[1].polygon])
+    assert any("prototile" in reason for reason in certify(larger).reasons)
+
+
+@pytest.mark.parametrize(
+    ("prototiles", "message"),
+    [
+        ([], "one at least"),
+        (3, "one at least"),
+        (SQUARE, r"Tiling\(group, \[polygon\]\)"),
+        ([SQUARE, SQUARE[::-1]], "prototile 1 runs the other way around"),
+        ([SQUARE[:2]], "3 vertices at least"),
+        ([Prototile(SQUARE), "x"], "real numbers"),
+    ],
+)
+def test_what_is_no_tiling(prototiles: list, message: str) -> None:
+    with pytest.raises(OrbiflowError, match=message):
+        Tiling(wallpaper_group("p4m"), prototiles)
+
+
+def test_a_tile_is_the_tiling_by_it_alone() -> None:
+    tile = Tile(SQUARE, wallpaper_group("p4m"))
+    assert certify(tile) == certify(tile.tiling)
+    assert colouring(tile).count == colouring(tile.tiling).count == 2
+    with pytest.raises(OrbiflowError, match="must be a Tile or a Tiling, got 'p4m'"):
+        certify("p4m")  # pyright: ignore[reportArgumentType]
+    with pytest.raises(OrbiflowError, match="from 0 to 0, got 1"):
+        neighbours(tile, 1)
