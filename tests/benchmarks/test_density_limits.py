@@ -114,7 +114,7 @@ def test_the_published_evaluation_is_off_and_less_so_with_steps(module) -> None:
 def test_the_integral_is_seen_from_values(module, dim: int, monkeypatch) -> None:
     integral = module("density_integral").integral
     rng = np.random.default_rng(4)
-    rows = rng.vonmises(rng.uniform(-3, 3, (3, dim))[rng.integers(3, size=200)], 20.0)
+    rows = rng.vonmises(rng.uniform(-3, 3, (3, dim))[rng.integers(3, size=400)], 20.0)
     rows[:40] = rows[40:80]  # so that there are narrow kernels
     density = DensityEstimator("torus", parts="kernels,mixture,chains", seed=0).fit(rows).density_
     assert isinstance(density, Mixture)

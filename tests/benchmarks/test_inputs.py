@@ -92,6 +92,7 @@ def test_the_page_names_every_benchmark() -> None:
         "density_momentum",
         "density_unoriented_data",
     }
-    helpers |= {"density_unoriented_kde", "likeness_methods"}
+    helpers |= {"density_unoriented_kde", "likeness_methods", "same_cases", "same_compare"}
+    helpers |= {"same_files", "same_inputs"}
     for path in BENCHMARKS.glob("*.py"):
         assert path.stem in helpers or f"`{path.name}" in page

@@ -86,7 +86,7 @@ def test_the_same_seed_gives_the_same_density() -> None:
     settings = [AutomaticSettings(flow=QUICK, seed=seed) for seed in (1, 1, 2)]
     with torch.no_grad():
         one, same, other = (
-            fit_automatic(space, smooth("sphere"), s)[0].log_prob(at) for s in settings
+            fit_automatic(space, smooth("sphere", 150), s)[0].log_prob(at) for s in settings
         )
     assert torch.equal(one, same)
     assert not torch.equal(one, other)
@@ -134,9 +134,14 @@ def test_a_flow_alone_is_a_flow() -> None:
     assert type(found) is FlowDensity
 
 
+@pytest.fixture(scope="module", name="of_the_torus")
+def of_the_torus_fixture() -> SymmetricDensity:
+    return fit_automatic(Torus(2), smooth("torus", 120))[0]
+
+
 @pytest.mark.parametrize("count", [0, 1, 3, 100])
-def test_any_number_of_samples(count: int) -> None:
-    density, _ = fit_automatic(Torus(2), smooth("torus", 120))
+def test_any_number_of_samples(count: int, of_the_torus: SymmetricDensity) -> None:
+    density = of_the_torus
     generator = torch.Generator().manual_seed(0)
     drawn = density.sample((count,), generator)
     assert drawn.shape == (count, 2)
@@ -145,7 +150,7 @@ def test_any_number_of_samples(count: int) -> None:
 
 def test_many_angles_have_chains_beside_kernels(tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
-    angles = rng.vonmises(0, 4, (300, 5))
+    angles = rng.vonmises(0, 4, (150, 5))
     estimator = DensityEstimator("torus").fit(angles)
     assert isinstance(estimator.density_, Mixture)
     assert estimator.report_.mass is None

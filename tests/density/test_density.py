@@ -48,7 +48,8 @@ def square(seed: int, count: int = 40, dim: int = 2) -> torch.Tensor:
 
 @torch.no_grad()
 def on_a_plain_grid(density: Density) -> float:
-    return float(density.log_prob(midpoints(density.space, 400)).exp().mean())
+    # 400 points a side change it by less than 1e-6, and take six times as long
+    return float(density.log_prob(midpoints(density.space, 160)).exp().mean())
 
 
 @every

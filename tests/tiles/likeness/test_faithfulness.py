@@ -14,7 +14,7 @@ from outlines import animal, bent_squirrel, limb
 SQUIRREL = np.asarray(animal("squirrel.dat").normal)
 
 
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=4, deadline=None)  # two seconds each: both hands, every turn
 @given(st.floats(0.1, 10), st.floats(-3.2, 3.2), st.booleans(), st.integers(0, len(SQUIRREL) - 1))
 def test_motions_mirrors_and_scale_cost_nothing(
     scale: float, turn: float, mirrored: bool, first: int

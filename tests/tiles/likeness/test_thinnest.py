@@ -133,10 +133,10 @@ def blob(count: int) -> Array:
     "ring", [disc(1000), blob(1000), resampled(animal(ANIMALS[1]).normal, 1000)]
 )
 def test_quick_enough_for_a_list_of_tiles(ring: Array) -> None:
-    start = time.perf_counter()
+    start = time.process_time()  # what else runs on the machine does not count
     narrowest_neck(ring)
     hair_share(ring, 0.01 * float(np.sqrt(abs(signed_area(ring)))))
-    assert time.perf_counter() - start < 1.0  # about 0.05 s where nothing else runs
+    assert time.process_time() - start < 1.0  # about 0.05 s
 
 
 @pytest.mark.parametrize("case", [*USELESS, *NOT_SIMPLE])
