@@ -135,12 +135,12 @@ def test_a_flow_alone_is_a_flow() -> None:
 
 
 @pytest.fixture(scope="module", name="of_the_torus")
-def of_the_torus_fixture() -> SymmetricDensity:
+def of_the_torus_fixture() -> Density:
     return fit_automatic(Torus(2), smooth("torus", 120))[0]
 
 
 @pytest.mark.parametrize("count", [0, 1, 3, 100])
-def test_any_number_of_samples(count: int, of_the_torus: SymmetricDensity) -> None:
+def test_any_number_of_samples(count: int, of_the_torus: Density) -> None:
     density = of_the_torus
     generator = torch.Generator().manual_seed(0)
     drawn = density.sample((count,), generator)
