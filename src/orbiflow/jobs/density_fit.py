@@ -25,10 +25,10 @@ from orbiflow.density import (
     density_to_bytes,
     read_labels,
 )
+from orbiflow.density.tables import angle_unit
 from orbiflow.errors import OrbiflowError
-from orbiflow.jobs.density_data import unit_of
+from orbiflow.jobs.density_data import read_beside_groups
 from orbiflow.jobs.density_folder import written_files
-from orbiflow.jobs.density_groups import read_beside_groups
 from orbiflow.jobs.density_requests import DensityFitRequest
 from orbiflow.jobs.place import check_folder
 from orbiflow.jobs.run import Sink
@@ -74,7 +74,7 @@ def density_fit(request: DensityFitRequest, tell: Sink, cancel: Cancel) -> Finis
     groups = None
     if request.group is not None:
         groups = read_labels(request.data, request.group, table, has_header=request.header)
-    estimator = estimator_of(request, unit_of(request.space, request.unit, table, tell))
+    estimator = estimator_of(request, angle_unit(request.space, request.unit, table, tell))
     folder = ResultFolder(request.out, written_files)
     check_folder(request.out, request.data)
     estimator.fit(
