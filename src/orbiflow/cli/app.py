@@ -64,7 +64,13 @@ def _option(field: str) -> str:
     }.get(field, "--" + field.replace("_", "-"))
 
 
-DERIVED = ("density score", "density sample", "density marginal", "density conditional")
+DERIVED = (
+    "density fit",
+    "density score",
+    "density sample",
+    "density marginal",
+    "density conditional",
+)
 """Commands that are derived from their operations already."""
 
 

@@ -25,7 +25,6 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.jobs.density_cv_requests import DensityFoldRequest
 from orbiflow.jobs.density_fit import (
     estimator_of,
-    plain_report,
     told_of,
 )
 from orbiflow.jobs.run import Sink
@@ -159,6 +158,6 @@ def _document(
         "fitted": int((~held).sum()),
         "log_likelihood": mean,
         "uniform": -math.log(estimator.space_.volume),
-        "report": plain_report(estimator.report_),
+        "report": estimator.report_.to_json(),
         "seconds": time.perf_counter() - begin,
     }

@@ -175,10 +175,10 @@ def marginal(
     if not columns:
         raise SettingError("{columns} names no column; give names or numbers, as in phi,psi")
 
-    from orbiflow.density import written_files
     from orbiflow.density.inference import marginal as marginal_of
     from orbiflow.density.operations.derived import axes_of, write_derived
     from orbiflow.density.operations.saved import model_at, names_of
+    from orbiflow.density.run_folder import written_files
     from orbiflow.runtime import ResultFolder, check_output_folder, one_thread
 
     check_output_folder(out, model, what="model")
@@ -219,10 +219,10 @@ def conditional(
         raise SettingError("{given} says nothing; give what is known, as in psi=-45")
     pairs = [_angle(text) for text in given]
 
-    from orbiflow.density import written_files
     from orbiflow.density.inference import conditional as conditional_of
     from orbiflow.density.operations.derived import condition_of, write_derived
     from orbiflow.density.operations.saved import model_at, names_of
+    from orbiflow.density.run_folder import written_files
     from orbiflow.runtime import ResultFolder, check_output_folder, one_thread
 
     check_output_folder(out, model, what="model")

@@ -7,19 +7,17 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from orbiflow.arrays import Array
 from orbiflow.density.tables.files import column_names, is_identifier, read_labels, read_table
-from orbiflow.density.tables.settings import RowSettings, TableSettings
+from orbiflow.density.tables.settings import RowSettings, TableSettings, Unit, check_unit
 from orbiflow.density.tables.table import MissingCellsError, Table, TableError, find, quote
 from orbiflow.errors import SettingError, literal
 from orbiflow.runtime import Note, Sink
-
-Unit = Literal["radians", "degrees", "turns"]
 
 NORTH = frozenset({"lat", "latitude", "plunge", "inclination"})
 EAST = frozenset({"lon", "long", "lng", "longitude", "trend", "azimuth"})
@@ -192,11 +190,7 @@ def angle_unit(space: str, unit: Unit | None, table: Table, tell: Sink) -> Unit:
     """
     if space not in ("torus", "klein-bottle"):
         check_order(table.columns, space)
-        if unit in ("radians", "turns"):
-            raise SettingError(
-                f"{{unit}} {unit} applies only to angles on the torus and the Klein bottle: latitude "
-                "and longitude are degrees; convert them, or give unit vectors x,y,z"
-            )
+        check_unit(space, unit)
         return "radians"
     if unit is not None:
         return unit

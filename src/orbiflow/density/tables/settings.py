@@ -21,6 +21,36 @@ OTHER_FORMATS = frozenset((
 ))
 # fmt: on
 
+Space = Literal["torus", "sphere", "klein-bottle", "projective-plane"]
+Unit = Literal["radians", "degrees", "turns"]
+
+
+class SpaceSettings(Settings, group="Density"):
+    """Where the data live."""
+
+    space: Space
+    """Where the data live."""
+
+    unit: Annotated[Unit | None, DefaultText("radians, if no value is beyond 2 pi")] = None
+    """Unit of angles on the torus and the Klein bottle."""
+
+    def check(self) -> None:
+        """Check that only angles have a unit."""
+        check_unit(self.space, self.unit)
+
+
+def check_unit(space: str, unit: Unit | None) -> None:
+    """Refuse a unit of data that are not angles.
+
+    Raises:
+        SettingError: If it is another than degrees, by the name of the setting `unit`.
+    """
+    if space in ("sphere", "projective-plane") and unit in ("radians", "turns"):
+        raise SettingError(
+            f"{{unit}} {unit} applies only to angles on the torus and the Klein bottle: latitude and "
+            "longitude are degrees; convert them, or give unit vectors x,y,z"
+        )
+
 
 class TableSettings(Settings, group="Reading the table"):
     """Which columns and rows of a table are read."""
