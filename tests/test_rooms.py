@@ -17,7 +17,7 @@ TILES = ["geometry", "tilings", "silhouette", "likeness", "tile_map", "tile", "r
 TILES += ["search", "pictures", "exporting"]
 TILES += ["art", "motion", "pages"]
 DENSITY = ["arguments", "spaces", "models", "inference", "gradients", "fitting"]
-DENSITY += ["estimator", "comparing", "regions", "tables", "pictures"]
+DENSITY += ["estimator", "comparing", "regions", "tables", "pictures", "run_folder", "operations"]
 ROOMS = [
     *("runtime", "symmetry", "fields", "flows", "drawing"),
     *(f"tiles.{room}" for room in TILES),

@@ -3,7 +3,11 @@
 OPERATIONS = {
     "escherize": "orbiflow.derived.tiles:escherize",
     "export": "orbiflow.derived.tiles:export",
-    "density fit": "orbiflow.derived.density:fit",
+    "density fit": "orbiflow.density.operations.fitting:fit",
+    "density score": "orbiflow.density.operations.using:score",
+    "density sample": "orbiflow.density.operations.using:sample",
+    "density marginal": "orbiflow.density.operations.using:marginal",
+    "density conditional": "orbiflow.density.operations.using:conditional",
 }
 
 RUN_FOLDERS = {

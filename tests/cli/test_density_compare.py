@@ -272,7 +272,7 @@ MISTAKES: dict[str, tuple[tuple[object, ...], str]] = {
         ("compare", "-d", "good.csv", "-d", "held.csv", "--space", "torus", "--unit", "degrees"),
         "say with --columns which to compare",
     ),
-    "no unit": (("compare", "-d", "good.csv", "-d", "poor.csv", "--space", "torus"), "say --unit"),
+    "no unit": (("compare", "-d", "good.csv", "-d", "poor.csv", "--space", "torus"), "give --unit"),
     "mass": (("region", "-m", "good", "--mass", "95"), "--mass must be between 0 and 1"),
     "mass of words": (("region", "-m", "good", "--mass", "half"), "--mass must be numbers"),
     "no mass": (("region", "-m", "good", "--mass", ","), "need a number each"),

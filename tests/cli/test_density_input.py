@@ -34,7 +34,7 @@ def test_units_are_said_or_asked_for(tmp_path: Path, orbiflow) -> None:
     table(tmp_path, 50.0)
     refused = orbiflow(*fit)
     assert refused.status == 2
-    assert "beyond 2 pi: say --unit degrees, radians or turns" in refused.err
+    assert "beyond 2 pi; give --unit degrees, radians or turns" in refused.err
     assert orbiflow(*fit, "--unit", "degrees").status == 0
     report = json.loads((out / "report.json").read_text())
     assert report["space"]["unit"] == "degrees"

@@ -48,7 +48,7 @@ def table(path: Path, header: str, values: np.ndarray) -> None:
         ("fit two.csv --space torus --seconds -1", "--seconds must be at least 0, got -1.0"),
         (
             "fit places.csv --space sphere --unit radians",
-            "--unit radians is of angles on the torus",
+            "--unit radians applies only to angles on the torus",
         ),
         (
             "fit places.csv --space sphere --parts chains",

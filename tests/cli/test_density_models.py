@@ -121,7 +121,7 @@ def test_angles_that_seem_to_be_in_another_unit(folder: Path, tmp_path: Path, or
 def test_where_a_table_goes_is_looked_at_first(
     command: str, out: str, message: str, folder: Path, orbiflow, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("orbiflow.jobs.density_use.model_at", None)
+    monkeypatch.setattr("orbiflow.density.operations.saved.model_at", None)
     monkeypatch.setattr("orbiflow.jobs.density_use.read_data", None)
     options = {
         "score": (folder / "torus.csv", "-m", folder / "torus"),

@@ -24,8 +24,6 @@ from orbiflow.jobs import (
     DensityFitRequest,
     DensityPlotRequest,
     DensityRegionRequest,
-    DensitySampleRequest,
-    DensityScoreRequest,
     EscherizeRequest,
     ExportRequest,
     PatchesRequest,
@@ -117,10 +115,6 @@ REQUESTS = st.one_of(
         seconds=st.none() | numbers,
         seed=seeds,
     ),
-    st.builds(
-        DensityScoreRequest, data=paths, model=paths, out=paths, columns=columns, measure=measures
-    ),
-    st.builds(DensitySampleRequest, model=paths, out=paths, count=st.integers(1, 10**8)),
     st.builds(
         DensityPlotRequest,
         model=paths,

@@ -14,7 +14,7 @@ from jobs.searches import ENDLESS, boot_request, check_order
 from orbiflow.errors import OrbiflowError
 from orbiflow.jobs import (
     DensityFitRequest,
-    DensitySampleRequest,
+    DensityRegionRequest,
     Event,
     Finished,
     Preview,
@@ -185,7 +185,7 @@ def test_what_the_sink_raises_comes_out(tmp_path: Path) -> None:
 def test_a_mistake_is_told_and_raised(tmp_path: Path) -> None:
     events: list[Event] = []
     with pytest.raises(OrbiflowError, match="cannot read"):
-        run(DensitySampleRequest(model=tmp_path / "none"), events.append)
+        run(DensityRegionRequest(model=tmp_path / "none", out=tmp_path / "r.json"), events.append)
     check_order(events)
     assert isinstance(events[-1], Failed)
     assert events[-1].failure == "mistake"

@@ -9,6 +9,7 @@ import typer
 from rich.markup import escape
 
 from orbiflow import __version__
+from orbiflow.cli import commands
 from orbiflow.cli.animate import animate
 from orbiflow.cli.art import art
 from orbiflow.cli.batch import batch
@@ -17,7 +18,7 @@ from orbiflow.cli.console import errors
 from orbiflow.cli.density import density
 from orbiflow.cli.escherize import escherize
 from orbiflow.cli.export import export
-from orbiflow.errors import OrbiflowError
+from orbiflow.errors import OrbiflowError, SettingError
 from orbiflow.jobs import RecordError
 
 app = typer.Typer(
@@ -63,12 +64,25 @@ def _option(field: str) -> str:
     }.get(field, "--" + field.replace("_", "-"))
 
 
+DERIVED = (
+    "density fit",
+    "density score",
+    "density sample",
+    "density marginal",
+    "density conditional",
+)
+"""Commands that are derived from their operations already."""
+
+
 def main() -> None:
     """Run the command line: exit status 0, 1 (no tile found), 2 (a user's mistake) or 130 (Ctrl-C)."""
+    if " ".join(sys.argv[1:3]) in DERIVED:
+        commands.main()
     try:
         app()
     except OrbiflowError as error:
-        text = error.named(_option) if isinstance(error, RecordError) else str(error)
+        named = isinstance(error, RecordError | SettingError)
+        text = error.named(_option) if named else str(error)
         errors.print(f"[bold red]error:[/] {escape(text)}", soft_wrap=True, highlight=False)
         sys.exit(2)
     except KeyboardInterrupt:

@@ -15,7 +15,6 @@ from .comparing.resampling import cross_validation_folds as cross_validation_fol
 from .comparing.two_samples import TestResult as TestResult
 from .comparing.two_samples import mmd_test as mmd_test
 from .estimator import DensityEstimator as DensityEstimator
-from .fitting.automatic import AutomaticSettings as AutomaticSettings
 from .fitting.automatic import fit_automatic as fit_automatic
 from .fitting.flow import fit_density as fit_density
 from .fitting.folds import LEAST_PLACES as LEAST_PLACES
@@ -27,7 +26,9 @@ from .fitting.report import Progress as Progress
 from .fitting.report import report_from_json as report_from_json
 from .fitting.rows import mean_of as mean_of
 from .fitting.rows import weighed as weighed
-from .fitting.settings import FitSettings as FitSettings
+from .fitting.settings import ComponentSettings as ComponentSettings
+from .fitting.settings import DensitySettings as DensitySettings
+from .fitting.settings import FlowSettings as FlowSettings
 from .gradients import log_density_gradient as log_density_gradient
 from .inference.axes import axes_named as axes_named
 from .inference.axes import chart_of_observed as chart_of_observed

@@ -3,29 +3,24 @@
 from __future__ import annotations
 
 import inspect
-import math
 import numbers
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
 from typing import Any, Self, TypeAlias
 
 import numpy as np
 import torch
 from numpy.typing import ArrayLike
 
-from orbiflow.arguments import is_a
 from orbiflow.arrays import Array
 from orbiflow.density.arguments import check_kind
 from orbiflow.density.fitting import (
-    PARTS,
-    AutomaticSettings,
+    ComponentSettings,
+    DensitySettings,
     FitReport,
-    FitSettings,
     Progress,
     check_missing,
     fit_automatic,
     fit_density,
-    flow_settings,
     mean_of,
     weighed,
 )
@@ -40,7 +35,8 @@ from orbiflow.density.inference import (
 )
 from orbiflow.density.models import MOST_DIM, Density
 from orbiflow.density.spaces import Space, space_class
-from orbiflow.errors import OrbiflowError
+from orbiflow.errors import OrbiflowError, SettingError
+from orbiflow.settings import check_names, fields_of
 
 
 class Parameters:
@@ -114,13 +110,15 @@ def seed_of(random_state: RandomState) -> int:
     )
 
 
-OF_FLOWS = (
-    "detail", "segments", "smoothness", "ridge", "roughness", "kinetic", "iterations", "base",
-    "evaluations", "validation",
-)  # fmt: skip
-"""Parameters of a flow, alone or beside other components."""
-
-AUTO = "auto"
+def _signature() -> inspect.Signature:
+    """The constructor's parameters, which include all settings by name."""
+    own = {"unit": "radians", "missing": "refuse"}
+    others = own | {entry.name: entry.default for entry in fields_of(DensitySettings)}
+    kinds = inspect.Parameter
+    return inspect.Signature(
+        [kinds("space", kinds.POSITIONAL_OR_KEYWORD, default="torus")]
+        + [kinds(name, kinds.KEYWORD_ONLY, default=value) for name, value in others.items()]
+    )
 
 
 class DensityEstimator(Parameters):
@@ -130,75 +128,41 @@ class DensityEstimator(Parameters):
 
     Args:
         space: "torus", "sphere", "klein-bottle", "projective-plane", or a `Space`.
-        unit: of angles on torus and Klein bottle: "radians", "degrees" or "turns".
-        parts: "auto": of flow, kernels, mixture, chains and network what rows held out speak for
-            (`fit_automatic`). Or those that may be used, such as "kernels" or "flow,chains"; "flow" is
-            a flow alone (`fit_density`).
+        unit: The unit of angles on torus and Klein bottle: "radians", "degrees" or "turns".
         missing: "refuse" rows that lack an angle (NaN), or, on tori, "marginalise": fit kernels and
             mixtures to them, and score them, by the density of the angles that they have.
-        repeats: "places": rows that repeat another are real mass; "rounding": they are an accident.
-        detail: largest wave number of the flow, in waves along a side of the square.
-        segments: stationary pieces of the flow.
-        smoothness, ridge, roughness, kinetic, iterations, evaluations, validation, base: of the flow,
-            see `FitSettings`; None for what suits the number of rows.
-        kernels: a flow blended with adaptive kernels, and nothing else; see `blend_kernels`.
-        seconds: of training at most; then the fit depends on the machine.
-        seed: of all that is drawn.
+        settings: Those of `DensitySettings`, by name: `components`, `repeats`, `max_frequency`,
+            `kernels`, `seconds`, `seed` and others. They are checked by `fit`.
 
-    On tori of four or more angles there is no flow, and its parameters must be left at their defaults.
+    On tori of four or more angles there is no flow, and its settings must be left at their defaults.
 
     After `fit`: `space_`, `density_` (a `Density`), `report_` (a `FitReport`),
     `n_features_in_`, and `feature_names_in_` where the data, a data frame, name their columns.
 
     >>> rng = np.random.default_rng(0)
     >>> angles = rng.vonmises([0.0, 1.0], 4.0, (200, 2))
-    >>> estimator = DensityEstimator("torus", detail=2, segments=2, iterations=5).fit(angles)
+    >>> estimator = DensityEstimator("torus", max_frequency=2, segments=2, iterations=5).fit(angles)
     >>> estimator.score_samples([[0.0, 1.0]]).shape
     (1,)
     """
 
     feature_names_in_: np.ndarray
+    __signature__ = _signature()
 
     def __init__(
         self,
         space: str | Space = "torus",
         *,
         unit: str = "radians",
-        parts: str = AUTO,
-        repeats: str = "places",
         missing: str = "refuse",
-        detail: int | None = None,
-        segments: int | None = None,
-        smoothness: float = 2.0,
-        ridge: float = 1e-4,
-        roughness: tuple[float, ...] | None = None,
-        kinetic: float = 0.0,
-        iterations: int | None = None,
-        evaluations: int = 1000,
-        validation: float = 0.1,
-        base: str = "uniform",
-        kernels: bool = False,
-        seconds: float = float("inf"),
-        seed: int = 0,
+        **settings: Any,
     ) -> None:
         self.space = space
         self.unit = unit
-        self.parts = parts
-        self.repeats = repeats
         self.missing = missing
-        self.detail = detail
-        self.segments = segments
-        self.smoothness = smoothness
-        self.ridge = ridge
-        self.roughness = roughness
-        self.kinetic = kinetic
-        self.iterations = iterations
-        self.evaluations = evaluations
-        self.validation = validation
-        self.base = base
-        self.kernels = kernels
-        self.seconds = seconds
-        self.seed = seed
+        check_names(settings, fields_of(DensitySettings), "DensityEstimator")
+        defaults = {entry.name: entry.default for entry in fields_of(DensitySettings)}
+        vars(self).update({**defaults, **settings})
 
     def fit(
         self,
@@ -222,41 +186,37 @@ class DensityEstimator(Parameters):
                 setting out of range, or one that has no meaning on a torus of so many angles.
         """
         del y
-        chosen, alone = self._parts(), self._flow_settings()
+        settings = self.settings()
         data = np.asarray(X)
         self.space_ = self._space_for(data)
         points = self._chart(data)
         self.density_: Density
         self.report_: FitReport
         if self.space_.dim > MOST_DIM:
-            self._refuse_settings_of_flows()
-        whole = self.kernels or chosen == ("flow",)
-        if whole and self.missing != "refuse":
-            raise OrbiflowError(
-                "flows cannot be fitted to rows that lack angles: leave out missing, or parts and "
-                "kernels"
+            _refuse_flows(settings, self.space_)
+        if settings.flow_alone and self.missing != "refuse":
+            raise SettingError(
+                "{missing} marginalise needs kernels or mixtures, as flows cannot be fitted to rows "
+                "that lack angles; give other {components}, or leave {missing} out"
             )
-        if whole and groups is not None:
-            raise OrbiflowError(
-                "groups are held out where parts are chosen: leave out groups, or parts 'flow' and "
-                "kernels"
+        if settings.flow_alone and groups is not None:
+            raise SettingError(
+                "{groups} are held out where components are chosen, and a flow alone has no choice; "
+                "leave {groups} out, or give other {components}"
             )
-        if not whole:
-            settings = AutomaticSettings(
-                parts=chosen,
-                repeats=self.repeats,
-                missing=self.missing,
-                flow=self._flow_beside(len(points)),
-                seconds=self.seconds,
-                seed=self.seed,
-            )
-            found = fit_automatic(
-                self.space_, points, settings, weights=sample_weight, groups=groups,
-                progress=progress,
-            )  # fmt: skip
-        else:
+        if settings.flow_alone:
             found = fit_density(
-                self.space_, points, alone, weights=sample_weight, progress=progress
+                self.space_, points, settings.flow, weights=sample_weight, progress=progress
+            )
+        else:
+            found = fit_automatic(
+                self.space_,
+                points,
+                settings,
+                missing=self.missing,
+                weights=sample_weight,
+                groups=groups,
+                progress=progress,
             )
         self.density_, self.report_ = found
         self.n_features_in_ = int(data.shape[1])
@@ -267,6 +227,23 @@ class DensityEstimator(Parameters):
             del self.feature_names_in_  # of an earlier fit
         return self
 
+    @classmethod
+    def with_settings(
+        cls, space: str | Space, settings: ComponentSettings, **others: Any
+    ) -> DensityEstimator:
+        """Return an estimator with the settings that were given; `others` are more parameters."""
+        given = {name: getattr(settings, name) for name in settings.fields_given}
+        return cls(space, **given, **others)
+
+    def settings(self) -> DensitySettings:
+        """Return the settings of a fit.
+
+        Raises:
+            SettingError: If one is not allowed.
+        """
+        names = [entry.name for entry in fields_of(DensitySettings)]
+        return DensitySettings(**self._changed(names))
+
     def marginal(self, *columns: str | int) -> DensityEstimator:
         """An estimator of some of the angles alone, by their columns' names or numbers from 0.
 
@@ -275,7 +252,7 @@ class DensityEstimator(Parameters):
                 `orbiflow.density.marginal`.
 
         >>> angles = np.random.default_rng(0).vonmises([0.0, 1.0], 4.0, (60, 2))
-        >>> fit = DensityEstimator("torus", parts="kernels").fit(angles)
+        >>> fit = DensityEstimator("torus", components="kernels").fit(angles)
         >>> fit.marginal("angle2").score_samples([[1.0]]).shape
         (1,)
         """
@@ -382,37 +359,7 @@ class DensityEstimator(Parameters):
             return self.space
         if data.ndim != 2:
             raise OrbiflowError(f"expected data of shape (N, k), got {data.shape}")
-        return space_class(self.space).for_data(data, unit=self.unit, seed=self.seed)
-
-    def _parts(self) -> tuple[str, ...]:
-        if self.parts == AUTO:
-            return PARTS
-        if not is_a(self.parts, str):
-            raise OrbiflowError(
-                f'parts must be "{AUTO}" or names such as "kernels,mixture", got {self.parts!r}'
-            )
-        return tuple(name.strip() for name in self.parts.split(","))
-
-    def _flow_settings(self) -> FitSettings:
-        """Of a flow alone, or with kernels."""
-        return FitSettings(
-            kernels=self.kernels, seconds=self.seconds, seed=self.seed, **self._changed(OF_FLOWS)
-        )
-
-    def _flow_beside(self, rows: int) -> FitSettings | None:
-        """Of a flow beside other parts."""
-        given = self._changed(OF_FLOWS)
-        if not given or self.space_.dim > MOST_DIM:
-            return None
-        return replace(flow_settings(self.space_, rows, self.seed), seconds=math.inf, **given)
-
-    def _refuse_settings_of_flows(self) -> None:
-        given = list(self._changed((*OF_FLOWS, "kernels")))
-        if given:
-            raise OrbiflowError(
-                f"{', '.join(given)} would have no effect on a torus of {self.space_.dim} angles, "
-                f"where there is no flow: leave {'it' if len(given) == 1 else 'them'} out"
-            )
+        return space_class(self.space).for_data(data, unit=self.unit, seed=self.settings().seed)
 
     def _chart(self, data: np.ndarray) -> torch.Tensor:
         """Points of data (N, k); with missing angles where they may be."""
@@ -432,3 +379,13 @@ class DensityEstimator(Parameters):
         if not hasattr(self, "density_"):
             raise OrbiflowError("this estimator is not fitted yet: call fit first")
         return self.density_
+
+
+def _refuse_flows(settings: DensitySettings, space: Space) -> None:
+    given = [*settings.of_flow, *(["kernels"] if settings.kernels else [])]
+    if given:
+        names = ", ".join(f"{{{name}}}" for name in given)
+        raise SettingError(
+            f"{names} would have no effect on a torus of {space.dim} angles, where there is no flow; "
+            f"leave {'it' if len(given) == 1 else 'them'} out"
+        )

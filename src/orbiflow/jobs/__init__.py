@@ -12,12 +12,8 @@ from orbiflow.jobs.batch_requests import BatchRequest, DensityBatchRequest
 from orbiflow.jobs.density_compare_requests import DensityCompareRequest, DensityRegionRequest
 from orbiflow.jobs.density_cv_requests import DensityCvRequest, DensityFoldRequest
 from orbiflow.jobs.density_requests import (
-    DensityConditionalRequest,
     DensityFitRequest,
-    DensityMarginalRequest,
     DensityPlotRequest,
-    DensitySampleRequest,
-    DensityScoreRequest,
     PatchesRequest,
 )
 from orbiflow.jobs.process import Job, start
@@ -55,15 +51,11 @@ __all__ = [
     "ClassFailed",
     "DensityBatchRequest",
     "DensityCompareRequest",
-    "DensityConditionalRequest",
     "DensityCvRequest",
     "DensityFitRequest",
     "DensityFoldRequest",
-    "DensityMarginalRequest",
     "DensityPlotRequest",
     "DensityRegionRequest",
-    "DensitySampleRequest",
-    "DensityScoreRequest",
     "EscherizeRequest",
     "Event",
     "ExportRequest",

@@ -25,14 +25,14 @@ from orbiflow.density import (
     require_one_space,
     scores_of,
 )
+from orbiflow.density.operations import check_fits, model_at
+from orbiflow.density.tables import angle_unit
 from orbiflow.errors import OrbiflowError
 from orbiflow.jobs.density_compare_requests import DensityCompareRequest
 from orbiflow.jobs.density_data import (
     read_data,
     same_columns,
-    unit_of,
 )
-from orbiflow.jobs.density_models import check_fits, model_at
 from orbiflow.jobs.place import check_place
 from orbiflow.jobs.run import Sink
 from orbiflow.runtime import (
@@ -130,7 +130,7 @@ def _compare_data(request: DensityCompareRequest, tell: Sink, cancel: Cancel) ->
         if len({table.values.shape[1] for table in tables}) == 1
         else tables[0]
     )
-    unit = unit_of(request.space, request.unit, both, tell)
+    unit = angle_unit(request.space, request.unit, both, tell)
 
     def told(share: float, what: str) -> None:
         cancel.check()
@@ -153,8 +153,7 @@ def _table(
     request: DensityCompareRequest, data: Path, columns: tuple[str, ...] | None, tell: Sink
 ) -> Table:
     """Numbers, less the column of groups where columns are not named."""
-    how: dict[str, Any] = {"has_header": request.header, "drop_missing": request.drop_missing}
-    table = read_data(data, columns, None, tell, **how)
+    table = read_data(data, columns, tell, header=request.header, drop_missing=request.drop_missing)
     if columns is not None or request.group is None:
         return table
     wanted = request.group.strip().casefold()

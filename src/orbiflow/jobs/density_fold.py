@@ -20,12 +20,11 @@ from orbiflow.density import (
     read_table,
     weighed,
 )
+from orbiflow.density.tables import RowSettings, angle_unit, read_rows
 from orbiflow.errors import OrbiflowError
 from orbiflow.jobs.density_cv_requests import DensityFoldRequest
-from orbiflow.jobs.density_data import read_weighed, unit_of
 from orbiflow.jobs.density_fit import (
     estimator_of,
-    plain_report,
     told_of,
 )
 from orbiflow.jobs.run import Sink
@@ -57,18 +56,16 @@ def density_fold(request: DensityFoldRequest, tell: Sink, cancel: Cancel) -> Fin
         Cancelled: if it was told to stop; nothing is written.
     """
     begin = time.perf_counter()
-    table, weights = read_weighed(
-        request.data,
-        request.columns,
-        len(request.columns),
-        request.weights,
-        tell,
-        has_header=request.header,
-        drop_missing=request.missing == "drop",
-        keep_missing=request.missing == "marginalise",
+    reading = RowSettings(
+        columns=request.columns,
+        header=request.header,
+        missing=request.missing,
+        weights=request.weights,
     )
+    rows = read_rows(request.data, reading, tell, width=len(request.columns), group=request.group)
+    table, weights = rows.table, rows.weights
     held = _held(request, table)
-    estimator = estimator_of(request.fit(), unit_of(request.space, request.unit, table, tell))
+    estimator = estimator_of(request.fit(), angle_unit(request.space, request.unit, table, tell))
     groups = None
     if request.group is not None:
         groups = read_labels(request.data, request.group, table, has_header=request.header)[~held]
@@ -161,6 +158,6 @@ def _document(
         "fitted": int((~held).sum()),
         "log_likelihood": mean,
         "uniform": -math.log(estimator.space_.volume),
-        "report": plain_report(estimator.report_),
+        "report": estimator.report_.to_json(),
         "seconds": time.perf_counter() - begin,
     }

@@ -16,6 +16,7 @@ from orbiflow.density import (
     plot_density,
     read_coastlines,
 )
+from orbiflow.density.operations import check_fits, model_at
 from orbiflow.drawing import column_width
 from orbiflow.jobs.asked import (
     given,
@@ -23,7 +24,6 @@ from orbiflow.jobs.asked import (
     samples_asked,
 )
 from orbiflow.jobs.density_data import read_data, same_columns
-from orbiflow.jobs.density_models import check_fits, model_at
 from orbiflow.jobs.density_requests import DensityPlotRequest
 from orbiflow.jobs.place import check_place, keep_apart
 from orbiflow.jobs.run import Sink
@@ -65,7 +65,7 @@ def density_plot(request: DensityPlotRequest, tell: Sink, cancel: Cancel) -> Fin
         own = request.header
         columns = request.columns or same_columns(request.data, extra, tell, has_header=own)
         table = read_data(
-            request.data, columns, None, tell, has_header=own, drop_missing=request.drop_missing
+            request.data, columns, tell, header=own, drop_missing=request.drop_missing
         )
         check_fits(request.data, table, density.space, extra, tell)
         points = table.values

@@ -14,10 +14,10 @@ from orbiflow.density import (
     outlines,
     to_geojson,
 )
+from orbiflow.density.operations import model_at
 from orbiflow.errors import OrbiflowError
 from orbiflow.jobs.asked import samples_asked
 from orbiflow.jobs.density_compare_requests import DensityRegionRequest
-from orbiflow.jobs.density_models import model_at
 from orbiflow.jobs.place import check_place
 from orbiflow.jobs.run import Sink
 from orbiflow.jobs.wording import (

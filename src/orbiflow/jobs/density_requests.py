@@ -104,68 +104,6 @@ class DensityFitRequest(Request):
 
 
 @dataclass(frozen=True)
-class DensityScoreRequest(Request):
-    """Add log densities to a table; see `orbiflow density score --help`.
-
-    - `columns`, `header`, `drop_missing`, `missing`, `weights`: as for a fit; rows left out get an
-      empty cell, weights are of the mean.
-    - `region`: add the mass of the smallest highest-density region that holds each row, too, by so many
-      `samples` of the density; None for 20,000.
-    - `gradient`: whether the gradient in the data's own coordinates is added, a column each.
-    - `table`: whether log densities are read off a table, whose error is told.
-    """
-
-    KIND = "density-score"
-
-    data: Path
-    model: Path
-    out: Path = Path("scores.csv")
-    columns: tuple[str, ...] | None = None
-    header: bool | None = None
-    drop_missing: bool = False
-    missing: Missing = "refuse"
-    weights: str | None = None
-    measure: Measure = "natural"
-    region: bool = False
-    samples: int | None = None
-    gradient: bool = False
-    table: bool = False
-
-    def check(self) -> None:
-        ends_as_table(self.out)
-        columns_named(self.columns)
-        _check_missing(self.drop_missing, self.missing)
-        region_samples_in_range(self, "samples")
-        if self.samples is not None and not self.region:
-            raise RecordError("{samples} are those of {region}: give both, or neither")
-        if self.region and self.missing == "marginalise":
-            raise RecordError("{region} is of whole rows: leave it out, or {missing} marginalise")
-        if self.gradient and self.table:
-            raise RecordError("{gradient} is exact and {table} is not: give one of them")
-        if (self.gradient or self.table) and self.missing == "marginalise":
-            raise RecordError(
-                "{gradient} and {table} are of whole rows: leave them out, or {missing} marginalise"
-            )
-
-
-@dataclass(frozen=True)
-class DensitySampleRequest(Request):
-    """Draw samples in the units of the data; see `orbiflow density sample --help`."""
-
-    KIND = "density-sample"
-
-    model: Path
-    out: Path = Path("samples.csv")
-    count: int = 1000
-    seed: int = 0
-
-    def check(self) -> None:
-        ends_as_table(self.out)
-        if not 1 <= self.count <= MOST_SAMPLES:
-            raise RecordError(f"{{count}} must be from 1 to {MOST_SAMPLES}, got {self.count}")
-
-
-@dataclass(frozen=True)
 class DensityPlotRequest(Request):
     """Draw a density; see `orbiflow density plot --help`.
 
@@ -244,46 +182,6 @@ class PatchesRequest(Request):
         columns_named(self.columns)
         if self.farthest is not None and not self.farthest >= 0:
             raise RecordError(f"{{farthest}} must be at least 0, got {self.farthest:g}")
-
-
-@dataclass(frozen=True)
-class DensityMarginalRequest(Request):
-    """The density of some angles of a torus; see `orbiflow density marginal --help`.
-
-    - `columns`: names or numbers, from 1, of the fit's columns, in the order that is wanted.
-    - `out`: folder of the new model, its table and its picture.
-    """
-
-    KIND = "density-marginal"
-
-    model: Path
-    columns: tuple[str, ...]
-    out: Path = Path("marginal")
-
-    def check(self) -> None:
-        columns_named(self.columns)
-
-
-@dataclass(frozen=True)
-class DensityConditionalRequest(Request):
-    """The density of a torus' other angles where some are known; see `density conditional --help`.
-
-    - `given`: such as "psi=-45", in the model's unit.
-    - `columns`: of those that are left, the ones to keep; None for all.
-    - `out`: as of a marginal.
-    """
-
-    KIND = "density-conditional"
-
-    model: Path
-    given: tuple[str, ...]
-    columns: tuple[str, ...] | None = None
-    out: Path = Path("conditional")
-
-    def check(self) -> None:
-        columns_named(self.columns)
-        if not self.given:
-            raise RecordError("{given} says nothing; give what is known, as in psi=-45")
 
 
 def _check_missing(drop: bool, missing: str) -> None:

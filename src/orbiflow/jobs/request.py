@@ -30,8 +30,8 @@ class Request(Record):
     def to_json(self) -> dict[str, Any]:
         """An object for `json.dumps`, with the version of its layout.
 
-        >>> from orbiflow.jobs import DensitySampleRequest
-        >>> DensitySampleRequest(model="quakes", out="drawn.csv").to_json()["schema_version"]
+        >>> from orbiflow.jobs import PatchesRequest
+        >>> PatchesRequest(data="patches.csv").to_json()["schema_version"]
         1
         """
         return {"schema_version": SCHEMA_VERSION, **super().to_json()}

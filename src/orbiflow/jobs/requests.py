@@ -9,12 +9,8 @@ from orbiflow.jobs.batch_requests import BatchRequest, DensityBatchRequest
 from orbiflow.jobs.density_compare_requests import DensityCompareRequest, DensityRegionRequest
 from orbiflow.jobs.density_cv_requests import DensityCvRequest, DensityFoldRequest
 from orbiflow.jobs.density_requests import (
-    DensityConditionalRequest,
     DensityFitRequest,
-    DensityMarginalRequest,
     DensityPlotRequest,
-    DensitySampleRequest,
-    DensityScoreRequest,
     PatchesRequest,
 )
 from orbiflow.jobs.request import SCHEMA_VERSION, Request
@@ -34,11 +30,7 @@ REQUESTS: dict[str, type[Request]] = {
         ArtRequest,
         AnimateRequest,
         DensityFitRequest,
-        DensityScoreRequest,
-        DensitySampleRequest,
         DensityPlotRequest,
-        DensityMarginalRequest,
-        DensityConditionalRequest,
         DensityCompareRequest,
         DensityRegionRequest,
         PatchesRequest,

@@ -31,6 +31,7 @@ from .operations import call_from_json as call_from_json
 from .operations import find as find
 from .operations import ignore as ignore
 from .operations import operation as operation
+from .operations import progress_events as progress_events
 from .places import check_inputs_kept as check_inputs_kept
 from .places import check_output_file as check_output_file
 from .places import check_output_folder as check_output_folder

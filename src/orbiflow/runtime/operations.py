@@ -43,7 +43,7 @@ from typing import Any, Literal, ParamSpec, TypeVar, cast
 from orbiflow.arguments import as_instance, described, meant
 from orbiflow.errors import OrbiflowError, SettingError, literal
 from orbiflow.runtime.cancel import Cancel, Cancelled
-from orbiflow.runtime.events import Event, Failed, Finished, Started
+from orbiflow.runtime.events import Event, Failed, Finished, Progress, Started
 from orbiflow.settings import Field, Settings, check_names, check_rules, fields_of, make_field
 
 SCHEMA_VERSION = 2
@@ -287,6 +287,22 @@ def operation(
         return checked
 
     return decorate
+
+
+def progress_events(tell: Sink, cancel: Cancel) -> Callable[[float, str], None]:
+    """Return a function that tells the share of the work done and what is being done.
+
+    The share that is told never falls. The function raises `Cancelled` if the work is to stop.
+    """
+    reached = 0.0
+
+    def progress(share: float, what: str) -> None:
+        nonlocal reached
+        cancel.check()
+        reached = max(reached, share)
+        tell(Progress(min(1.0, reached), what))
+
+    return progress
 
 
 @cache

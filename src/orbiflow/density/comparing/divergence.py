@@ -15,7 +15,7 @@ from orbiflow.arrays import Array
 from orbiflow.density.arguments import silent
 from orbiflow.density.comparing.resampling import Groups, resampled_sums
 from orbiflow.density.fitting import (
-    AutomaticSettings,
+    DensitySettings,
     Progress,
     fit_automatic,
 )
@@ -151,6 +151,6 @@ def _trust(own: Array, weights: Array) -> float:
 
 def _fit(space: Space, train: Tensor, seed: int) -> Mixture:
     try:
-        return fit_automatic(space, train, AutomaticSettings(parts=PARTS, seed=seed))[0]
+        return fit_automatic(space, train, DensitySettings(components=PARTS, seed=seed))[0]
     except OrbiflowError as error:
         raise OrbiflowError(f"half of a data set is too small to fit: {error}") from error

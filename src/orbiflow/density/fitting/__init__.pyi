@@ -1,5 +1,3 @@
-from .automatic import PARTS as PARTS
-from .automatic import AutomaticSettings as AutomaticSettings
 from .automatic import fit_automatic as fit_automatic
 from .flow import fit_density as fit_density
 from .flow_trial import flow_settings as flow_settings
@@ -12,4 +10,7 @@ from .rows import check_missing as check_missing
 from .rows import group_numbers as group_numbers
 from .rows import mean_of as mean_of
 from .rows import weighed as weighed
-from .settings import FitSettings as FitSettings
+from .settings import COMPONENTS as COMPONENTS
+from .settings import ComponentSettings as ComponentSettings
+from .settings import DensitySettings as DensitySettings
+from .settings import FlowSettings as FlowSettings

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import torch
@@ -12,7 +12,6 @@ from torch import Tensor
 
 from orbiflow.density.arguments import (
     check_kind,
-    check_range,
     silent,
 )
 from orbiflow.density.fitting.assembly import assembled
@@ -66,7 +65,7 @@ from orbiflow.density.fitting.rows import (
     weights_note,
     weights_of,
 )
-from orbiflow.density.fitting.settings import FitSettings
+from orbiflow.density.fitting.settings import COMPONENTS, DensitySettings
 from orbiflow.density.fitting.weights import stacked, supported_weights
 from orbiflow.density.inference import at_observed
 from orbiflow.density.models import MOST_DIM, Mixture
@@ -76,12 +75,6 @@ from orbiflow.density.spaces import (
     whole_turn,
 )
 from orbiflow.errors import OrbiflowError
-
-PARTS = ("flow", "kernels", "mixture", "chains", "network")
-"""What a density may be made of, beside its uniform floor."""
-
-REPEATS = ("places", "rounding")
-"""What rows that repeat another are taken for."""
 
 LEAST_FLOW_ROWS = 300
 """With fewer, a flow is not tried: none has gained anything."""
@@ -96,47 +89,13 @@ BEFORE_FLOW, BEFORE_END = 0.7, 0.95
 """Of the work told: before a flow, if one is tried, and before all is put together."""
 
 
-@dataclass(frozen=True)
-class AutomaticSettings:
-    """What there is to choose of a fit that chooses by itself.
-
-    - `parts`: of `PARTS`, those that may be used; chains are for tori of two or more angles, a flow for
-      spaces of three dimensions at most, a network for tori of more.
-    - `repeats`: "places": new rows repeat the old ones as often as these repeat each other; "rounding":
-      repeated values are an accident, and the density is to have no peaks at them.
-    - `missing`: "refuse" points that lack angles (NaN), or "marginalise": on tori a row counts by the
-      density of the angles that it has, and the parts are kernels and mixtures.
-    - `flow`: its settings; None for what suits the number of rows.
-    - `seconds`: after which nothing further is tried; a fit that it ends depends on the machine.
-    - `seed`: of the folds and the starts.
-    """
-
-    parts: tuple[str, ...] = PARTS
-    repeats: str = "places"
-    missing: str = "refuse"
-    flow: FitSettings | None = None
-    seconds: float = math.inf
-    seed: int = 0
-
-    def __post_init__(self) -> None:
-        unknown = [part for part in self.parts if part not in PARTS]
-        if unknown or not self.parts:
-            raise OrbiflowError(f"parts must be of {', '.join(PARTS)}, got {self.parts!r}")
-        if self.repeats not in REPEATS:
-            raise OrbiflowError(
-                f"repeats must be one of {', '.join(REPEATS)}, got {self.repeats!r}"
-            )
-        check_missing(self.missing)
-        check_range("seconds", self.seconds, 0, math.inf)
-        check_range("seed", self.seed, -(2**63), 2**64 - 1, integer=True)
-
-
 @training()
 def fit_automatic(
     space: Space,
     points: Tensor,
-    settings: AutomaticSettings | None = None,
+    settings: DensitySettings | None = None,
     *,
+    missing: str = "refuse",
     weights: Any = None,
     groups: ArrayLike | None = None,
     progress: Progress | None = None,
@@ -152,7 +111,9 @@ def fit_automatic(
     Args:
         space: any.
         points: (N, d) in the chart, N >= 10 different ones.
-        settings: default `AutomaticSettings()`.
+        settings: Default: `DensitySettings()`.
+        missing: "refuse" points that lack angles (NaN), or "marginalise": on tori a row counts by the
+            density of the angles that it has, and the components are kernels and mixtures.
         weights: of the points (N,), at least 0; only their ratios count; default equal.
         groups: a label (N,) a point: those of one are held out together, so that parts are chosen for
             rows of new groups. Default: each point is by itself.
@@ -164,11 +125,11 @@ def fit_automatic(
     Raises:
         OrbiflowError: for points of another shape or too few, or parts that the space does not have.
     """
-    settings = AutomaticSettings() if settings is None else settings
-    check_kind(settings, AutomaticSettings, "settings")
+    settings = DensitySettings() if settings is None else settings
+    check_kind(settings, DensitySettings, "settings")
     say = progress or silent
     budget = Budget(seconds=settings.seconds)
-    rows, settings, notes = _rows(space, points, weights, groups, settings)
+    rows, settings, notes = _rows(space, points, weights, groups, settings, check_missing(missing))
     found = repeats_of(space, rows[is_whole(rows)].points)
     whole = " that lack no angle" if found.places + found.rows < len(rows) else ""
     if found.places < LEAST_PLACES:
@@ -199,10 +160,15 @@ def fit_automatic(
 
 
 def _rows(
-    space: Space, points: Any, weights: Any, groups: ArrayLike | None, settings: AutomaticSettings
-) -> tuple[Rows, AutomaticSettings, list[str]]:
+    space: Space,
+    points: Any,
+    weights: Any,
+    groups: ArrayLike | None,
+    settings: DensitySettings,
+    missing: str,
+) -> tuple[Rows, DensitySettings, list[str]]:
     """Rows that say anything, the parts that can be fitted to them, and what to say of it."""
-    if settings.missing == "refuse":
+    if missing == "refuse":
         own = own_points(space, points)
         labels = None if groups is None else torch.as_tensor(group_numbers(groups, len(own)))
         return weighed(own, weights, labels), settings, []
@@ -211,17 +177,22 @@ def _rows(
     rows = weighed(own, None if weights is None else weights_of(weights, known), labels)
     if not bool(rows.points.isnan().any()):
         return rows, settings, missing_notes(rows, int((~known).sum()))
-    chosen = tuple(part for part in settings.parts if part in MARGINAL_PARTS)
-    if not chosen or (settings.parts != PARTS and chosen != settings.parts):
+    chosen = tuple(part for part in settings.allowed if part in MARGINAL_PARTS)
+    if not chosen or (settings.allowed != COMPONENTS and chosen != settings.allowed):
         raise OrbiflowError(
-            f"{' and '.join(part for part in settings.parts if part not in MARGINAL_PARTS)} cannot be "
-            "fitted to rows that lack angles: choose of kernels and mixture, or leave those rows out"
+            f"{' and '.join(name for name in settings.allowed if name not in MARGINAL_PARTS)} cannot "
+            "be fitted to rows that lack angles: choose among kernels and mixture, or leave out those "
+            "rows"
         )
-    return rows, replace(settings, parts=chosen), missing_notes(rows, int((~known).sum()))
+    return (
+        rows,
+        settings.replace(components=chosen, max_frequency=None, segments=None),
+        missing_notes(rows, int((~known).sum())),
+    )
 
 
 def _families(
-    space: Space, folds: Folds, settings: AutomaticSettings, found: Repeats
+    space: Space, folds: Folds, settings: DensitySettings, found: Repeats
 ) -> list[Family[Any]]:
     rounding = settings.repeats == "rounding"
     narrowest = _narrowest(space, found.step) if rounding else NARROWEST
@@ -234,17 +205,17 @@ def _families(
         families.append(ChainFamily(space, settings.seed, starts))
     if isinstance(space, Torus) and space.dim > MOST_DIM:
         families.append(NetworkFamily(space, settings.seed))
-    chosen = [family for family in families if family.name in settings.parts]
-    beside = "flow" in settings.parts and settings.parts not in (PARTS, ("flow",))
+    chosen = [family for family in families if family.name in settings.allowed]
+    beside = "flow" in settings.allowed and settings.allowed not in (COMPONENTS, ("flow",))
     if beside and space.dim > MOST_DIM:
         raise OrbiflowError(
             f"a flow has {MOST_DIM} dimensions at most, this {space.name} has {space.dim}: leave it "
             "out of the parts"
         )
-    if not chosen and (space.dim > MOST_DIM or settings.parts != ("flow",)):
+    if not chosen and (space.dim > MOST_DIM or settings.allowed != ("flow",)):
         raise OrbiflowError(
             f"a density on this {type(space).__name__} of {space.dim} dimensions cannot be made of "
-            f"{' and '.join(settings.parts)} alone: chains are for tori of two angles or more, a "
+            f"{' and '.join(settings.allowed)} alone: chains are for tori of two angles or more, a "
             f"network for more than {MOST_DIM}, a flow for {MOST_DIM} at most"
         )
     return chosen
@@ -261,14 +232,14 @@ def _narrowest(space: Space, step: float | None) -> float:
     return min(NARROWEST, 1 / angle**2)
 
 
-def _wants_flow(space: Space, folds: Folds, settings: AutomaticSettings) -> bool:
-    enough = len(folds.rows) >= LEAST_FLOW_ROWS or settings.parts == ("flow",)
-    return "flow" in settings.parts and space.dim <= MOST_DIM and enough
+def _wants_flow(space: Space, folds: Folds, settings: DensitySettings) -> bool:
+    enough = len(folds.rows) >= LEAST_FLOW_ROWS or settings.allowed == ("flow",)
+    return "flow" in settings.allowed and space.dim <= MOST_DIM and enough
 
 
-def _untried_note(space: Space, folds: Folds, settings: AutomaticSettings) -> list[str]:
+def _untried_note(space: Space, folds: Folds, settings: DensitySettings) -> list[str]:
     """What to say where a flow was meant, and not only one of all parts, and none was tried."""
-    meant = "flow" in settings.parts and (settings.flow is not None or settings.parts != PARTS)
+    meant = "flow" in settings.allowed and (settings.of_flow or settings.allowed != COMPONENTS)
     if not meant or _wants_flow(space, folds, settings):
         return []
     return [
@@ -282,11 +253,11 @@ def _try_flow(
     folds: Folds,
     candidates: Candidates,
     weights: Tensor,
-    settings: AutomaticSettings,
+    settings: DensitySettings,
     budget: Budget,
     say: Progress,
 ) -> TriedFlow:
-    chosen = settings.flow or flow_settings(space, len(folds.rows), settings.seed)
+    chosen = flow_settings(space, len(folds.rows), settings.seed).replace(**settings.of_flow)
     return try_flow(
         space, folds, candidates, weights, chosen, budget,
         lambda done, what: say(BEFORE_FLOW + (BEFORE_END - BEFORE_FLOW) * done, what),
@@ -314,7 +285,7 @@ def _report(
     tried: TriedFlow,
     parts: tuple[PartEvidence, ...],
     found: Repeats,
-    settings: AutomaticSettings,
+    settings: DensitySettings,
     budget: Budget,
     notes: list[str],
 ) -> FitReport:

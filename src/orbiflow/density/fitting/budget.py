@@ -30,8 +30,8 @@ class Budget:
     it has to say so: `notes`.
 
     Args:
-        evaluations: at most.
-        seconds: from now, at most.
+        evaluations: The largest number of them.
+        seconds: The time from now. Default: no limit.
 
     >>> budget = Budget(evaluations=1)
     >>> budget.spend()
@@ -39,8 +39,9 @@ class Budget:
     True
     """
 
-    def __init__(self, evaluations: float = math.inf, seconds: float = math.inf) -> None:
-        self.evaluations, self.seconds = evaluations, seconds
+    def __init__(self, evaluations: float = math.inf, seconds: float | None = None) -> None:
+        self.evaluations = evaluations
+        self.seconds = math.inf if seconds is None else seconds
         self.used = 0
         self._began = clock()
         self._reason: str | None = None
@@ -61,10 +62,10 @@ class Budget:
         return self._reason == "time"
 
     @property
-    def seconds_left(self) -> float:
-        """Of the limit on time, at least 0."""
+    def seconds_left(self) -> float | None:
+        """What is left of the limit on time, at least 0; None if there is no limit."""
         if self.seconds == math.inf:
-            return math.inf
+            return None
         return max(0.0, self.seconds - (clock() - self._began))
 
     def spend(self) -> None:

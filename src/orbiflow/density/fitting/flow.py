@@ -38,7 +38,7 @@ from orbiflow.density.fitting.rows import (
     weighed,
     weights_note,
 )
-from orbiflow.density.fitting.settings import FitSettings
+from orbiflow.density.fitting.settings import FlowSettings
 from orbiflow.density.models import (
     MOST_DIM,
     Density,
@@ -68,7 +68,7 @@ def refine_in_stages(
     density: FlowDensity,
     train: Rows,
     validation: Rows,
-    settings: FitSettings,
+    settings: FlowSettings,
     say: Progress,
     budget: Budget,
 ) -> list[Refinement]:
@@ -85,7 +85,7 @@ def refine_in_stages(
         part.to(dtype)
         for part in merged(
             train.points,
-            max(LEAST_CELLS, CELLS * settings.detail),
+            max(LEAST_CELLS, CELLS * settings.max_frequency),
             crowd=math.ceil(CROWD * len(train) / MERGED),
             row_weights=train.weights,
         )
@@ -158,7 +158,7 @@ MOST_MATCHED = 6_000
 def fit_density(
     space: Space,
     points: Tensor,
-    settings: FitSettings | None = None,
+    settings: FlowSettings | None = None,
     *,
     weights: Any = None,
     progress: Progress | None = None,
@@ -170,7 +170,7 @@ def fit_density(
     Args:
         space: of three dimensions at most.
         points: (N, d) in the chart, anything that NumPy takes, N >= 10 different ones.
-        settings: default `FitSettings()`.
+        settings: default `FlowSettings()`.
         weights: of the points (N,), at least 0; only their ratios count; default equal.
         progress: told how far it is.
 
@@ -181,8 +181,8 @@ def fit_density(
         OrbiflowError: for a space of four and more dimensions, points of another shape or too few, or
             weights that are none.
     """
-    settings = FitSettings() if settings is None else settings
-    check_kind(settings, FitSettings, "settings")
+    settings = FlowSettings() if settings is None else settings
+    check_kind(settings, FlowSettings, "settings")
     if check_kind(space, Space, "space", "see `make_space`").dim > MOST_DIM:
         raise OrbiflowError(
             f"a flow has {MOST_DIM} dimensions at most, this {space.name} has {space.dim}: fit other "
@@ -248,12 +248,12 @@ def _nll(density: Density, rows: Rows) -> float:
 
 
 def _start(
-    space: Space, train: Rows, settings: FitSettings, generator: torch.Generator
+    space: Space, train: Rows, settings: FlowSettings, generator: torch.Generator
 ) -> FlowDensity:
     """The closed-form start, by flow matching."""
     base = UniformDensity(space) if settings.base == "uniform" else VonMisesDensity(space)
     dtype = torch.float32 if settings.single else torch.float64
-    frequency = max_frequency(space, settings.detail)
+    frequency = max_frequency(space, settings.max_frequency)
     segments = [
         SplineField(space.group, frequency, smoothness=settings.smoothness, dtype=dtype)
         for _ in range(settings.segments)

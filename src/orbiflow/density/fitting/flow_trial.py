@@ -15,7 +15,7 @@ from orbiflow.density.fitting.flow import fit_density
 from orbiflow.density.fitting.folds import Folds
 from orbiflow.density.fitting.report import FitReport, PartEvidence
 from orbiflow.density.fitting.rows import Rows, mean_of
-from orbiflow.density.fitting.settings import FitSettings
+from orbiflow.density.fitting.settings import FlowSettings
 from orbiflow.density.fitting.weights import (
     Gain,
     gain_of,
@@ -50,7 +50,7 @@ def try_flow(
     folds: Folds,
     candidates: Candidates,
     weights: Tensor,
-    chosen: FitSettings,
+    chosen: FlowSettings,
     budget: Budget,
     told: Callable[[float, str], None],
 ) -> TriedFlow:
@@ -69,7 +69,7 @@ def try_flow(
         return fit_density(
             space,
             train.points,
-            replace(chosen, seconds=min(chosen.seconds, budget.seconds_left)),
+            chosen.replace(seconds=budget.seconds_left),
             weights=train.weights,
             progress=lambda done, what: told(begin + (end - begin) * done, f"flow: {what}"),
         )
@@ -121,12 +121,16 @@ def _is_worth_it(worth: PartEvidence) -> bool:
     return worth.gain * worth.rows >= 1
 
 
-def flow_settings(space: Space, rows: int, seed: int) -> FitSettings:
+def flow_settings(space: Space, rows: int, seed: int) -> FlowSettings:
     """Of a flow beside other parts: those have the clusters, it has what is smooth."""
     if space.dim == MOST_DIM:
-        return FitSettings(detail=5, segments=3, roughness=(1e-3,), iterations=60, seed=seed)
+        return FlowSettings(
+            max_frequency=5, segments=3, roughness=(1e-3,), iterations=60, seed=seed
+        )
     if rows >= MANY_ROWS:
-        return FitSettings(roughness=(1e-3, 1e-4), seed=seed)
+        return FlowSettings(roughness=(1e-3, 1e-4), seed=seed)
     if rows >= FEW_ROWS:
-        return FitSettings(detail=6, segments=4, roughness=(1e-3, 1e-4), iterations=60, seed=seed)
-    return FitSettings(detail=6, segments=4, roughness=(1e-3,), iterations=40, seed=seed)
+        return FlowSettings(
+            max_frequency=6, segments=4, roughness=(1e-3, 1e-4), iterations=60, seed=seed
+        )
+    return FlowSettings(max_frequency=6, segments=4, roughness=(1e-3,), iterations=40, seed=seed)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import torch
@@ -102,6 +102,14 @@ class FitReport:
     repeats: Repeats | None = None
     effective: float | None = None
     notes: tuple[str, ...] = field(default=())
+
+    def to_json(self) -> dict[str, Any]:
+        """Return an object for `json.dumps`; infinite figures are None."""
+        document = asdict(self)
+        for stage in document["stages"]:
+            for name in ("train", "validation"):
+                stage[name] = [round(v, 6) if math.isfinite(v) else None for v in stage[name]]
+        return document
 
 
 def report_from_json(document: Mapping[str, Any]) -> FitReport:

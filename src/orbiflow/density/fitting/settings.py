@@ -1,81 +1,166 @@
-"""Knobs of a fit by splines."""
+"""Settings of a fit: which components a density may have, and how its flow is trained."""
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
+from typing import Annotated, Any, Literal
 
-from orbiflow.arguments import is_a
-from orbiflow.density.arguments import (
-    check_range,
-    check_ranges,
-    check_share,
+from orbiflow.kinds import Parsed
+from orbiflow.settings import (
+    DefaultText,
+    Group,
+    Hidden,
+    NotWith,
+    Range,
+    SettingError,
+    Settings,
+    Unit,
+    fields_of,
 )
-from orbiflow.errors import OrbiflowError
+
+Component = Literal["flow", "kernels", "mixture", "chains", "network"]
+Seed = Annotated[int, Range(-(2**63), 2**64 - 1)]
+
+COMPONENTS = ("flow", "kernels", "mixture", "chains", "network")
+"""What a density may be made of, beside its uniform floor."""
+
+FLOW = Group("Flow")
 
 
-@dataclass(frozen=True)
-class FitSettings:
-    """Knobs of a fit; the defaults are measured on the benchmarks.
+def component_names(text: str) -> tuple[str, ...] | None:
+    """Return the components that a text names, such as "kernels,mixture"; None for "auto"."""
+    if text.strip() == "auto":
+        return None
+    return tuple(name.strip() for name in text.split(",") if name.strip())
 
-    - `detail`: largest wave number of the fields, in waves along a side of the square.
-    - `segments`: stationary pieces of the flow.
-    - `steps`: RK4 steps in each, at first; doubled where the integrator has not converged.
-    - `smoothness`: exponent s of the parameters' scaling (1 + |kappa|^2)^(-s/2).
-    - `ridge`: of the closed-form start.
-    - `roughness`: weights of the roughness penalty, each a stage of refinement from where the one
-      before was best on the validation points; largest first.
-    - `kinetic`: weight of the kinetic energy.
-    - `iterations`: of L-BFGS in each stage, at most; 0 keeps the closed-form start.
-    - `evaluations`: of the likelihood and its gradient in all stages together, at most. A stage of
-      100 iterations takes about 105, so the default leaves those of `iterations` alone.
-    - `validation`: share of the points held out for early stopping.
-    - `base`: "uniform" or "von-mises", the paper's.
-    - `kernels`: blend the flow with adaptive kernels about the training points, for data sharper than
-      the flow's waves; see `blend_kernels`.
-    - `single`: train in float32, about twice as fast; the result is float64 in any case.
-    - `seconds`: of refinement at most, looked at between evaluations. A fit that it ends depends on
-      the machine's speed, and its report says so; `evaluations` ends alike everywhere.
-    - `seed`: of the split, the base points and the times.
-    """
 
-    detail: int = 8
-    segments: int = 6
-    steps: int = 1
-    smoothness: float = 2.0
-    ridge: float = 1e-4
-    roughness: tuple[float, ...] = (1e-3, 1e-3, 1e-4)
-    kinetic: float = 0.0
-    iterations: int = 100
-    evaluations: int = 1000
-    validation: float = 0.1
-    base: str = "uniform"
+class ComponentSettings(Settings, group="Density"):
+    """Which components a density may have; data that were held out choose among them."""
+
+    components: Annotated[
+        tuple[Component, ...] | None,
+        Parsed(component_names, "names such as kernels,mixture"),
+        DefaultText("all"),
+    ] = None
+    """Components that may be used, such as kernels,mixture; held-out data choose among them. Chains are
+    for tori of two or more angles, a flow for three dimensions at most, a network for more."""
+
+    repeats: Literal["places", "rounding"] = "places"
+    """What rows that repeat another are. Places: new rows repeat them as often. Rounding: an accident,
+    and the density has no peaks there."""
+
+    seed: Seed = 0
+    """Seed of the random numbers: the same seed on the same machine gives the same density."""
+
+    @property
+    def allowed(self) -> tuple[str, ...]:
+        """The components that may be used."""
+        return COMPONENTS if self.components is None else self.components
+
+
+class FlowOptions(Settings, group="Flow"):
+    """How a flow is trained, where None is what suits the data."""
+
+    max_frequency: Annotated[int | None, Range(1, 64), FLOW, DefaultText("what suits the rows")] = (
+        None
+    )
+    """Largest wave number of the flow, in waves along a side of the square."""
+
+    segments: Annotated[int | None, Range(1, 256), FLOW, DefaultText("what suits the rows")] = None
+    """Number of stationary pieces of the flow."""
+
+    roughness: Annotated[
+        tuple[Annotated[float, Range(0)], ...] | None, Hidden(), DefaultText("what suits the rows")
+    ] = None
+    """Weights of the roughness penalty, largest first: each is a stage of refinement, which starts
+    where the one before was best on held-out points."""
+
+    iterations: Annotated[
+        int | None, Range(0, 100_000), Hidden(), DefaultText("what suits the rows")
+    ] = None
+    """Maximum number of iterations of L-BFGS in each stage; 0 keeps the closed-form start."""
+
+    smoothness: Annotated[float, Range(0, 8), Hidden()] = 2.0
+    """Exponent s of the scaling (1 + |kappa|^2)^(-s/2) of the flow's parameters."""
+
+    ridge: Annotated[float, Range(0), Hidden()] = 1e-4
+    """Weight of the ridge penalty of the closed-form start."""
+
+    kinetic: Annotated[float, Range(0), Hidden()] = 0.0
+    """Weight of the kinetic energy."""
+
+    evaluations: Annotated[int, Range(0, 1_000_000_000), Hidden()] = 1000
+    """Maximum number of evaluations of the likelihood and its gradient in all stages together. A stage
+    of 100 iterations takes about 105."""
+
+    validation: Annotated[float, Range(above=0, below=1), Hidden()] = 0.1
+    """Share of the points held out for early stopping."""
+
+    base: Annotated[Literal["uniform", "von-mises"], Hidden()] = "uniform"
+    """Density that the flow moves; "von-mises" is the paper's."""
+
+    seconds: Annotated[float | None, Range(0), Unit("s"), DefaultText("no limit")] = None
+    """Maximum training time. A fit that it ends depends on the machine's speed, and its report says so;
+    `evaluations` end alike everywhere."""
+
+
+class FlowSettings(FlowOptions, group="Flow"):
+    """How a flow is trained; the defaults are measured on the benchmarks."""
+
+    max_frequency: Annotated[int, Range(1, 64)] = 8
+    segments: Annotated[int, Range(1, 256)] = 6
+    roughness: tuple[Annotated[float, Range(0)], ...] = (1e-3, 1e-3, 1e-4)
+    iterations: Annotated[int, Range(0, 100_000)] = 100
+
+    steps: Annotated[int, Range(1, 256)] = 1
+    """RK4 steps in each segment, at first; doubled where the integrator has not converged."""
+
     kernels: bool = False
-    single: bool = True
-    seconds: float = math.inf
-    seed: int = 0
+    """Blend the flow with adaptive kernels about the training points, for data sharper than the flow's
+    waves; see `blend_kernels`."""
 
-    def __post_init__(self) -> None:
-        whole = (
-            ("detail", 1, 64),
-            ("segments", 1, 256),
-            ("steps", 1, 256),
-            ("iterations", 0, 100_000),
-            ("evaluations", 0, 1_000_000_000),
-            ("seed", -(2**63), 2**64 - 1),
+    single: bool = True
+    """Train in float32, about twice as fast; the result is float64 in any case."""
+
+    seed: Seed = 0
+    """Seed of the split, the base points and the times."""
+
+    def check(self) -> None:
+        """Check that there is a stage of refinement."""
+        if not self.roughness:
+            raise SettingError("{roughness} must be one weight or more, such as 1e-3")
+
+
+class DensitySettings(FlowOptions, ComponentSettings, group="Density"):
+    """How a density is fitted."""
+
+    kernels: Annotated[
+        bool, FLOW, NotWith("components", because="{kernels} is a flow with kernels")
+    ] = False
+    """A flow with adaptive kernels, and nothing else."""
+
+    def check(self) -> None:
+        """Check that what is set of a flow has one."""
+        for name in ("max_frequency", "segments"):
+            if getattr(self, name) is not None and "flow" not in self.allowed:
+                raise SettingError(
+                    f"{{{name}}} needs a flow: add flow to {{components}}, or leave {{{name}}} out"
+                )
+
+    @property
+    def flow_alone(self) -> bool:
+        """Whether there is nothing to choose: a flow, with adaptive kernels or without."""
+        return self.kernels or self.components == ("flow",)
+
+    @property
+    def flow(self) -> FlowSettings:
+        """Settings of a flow that is fitted alone."""
+        return FlowSettings(
+            kernels=self.kernels, seconds=self.seconds, seed=self.seed, **self.of_flow
         )
-        real = (
-            ("smoothness", 0, 8),
-            ("ridge", 0, math.inf),
-            ("kinetic", 0, math.inf),
-            ("seconds", 0, math.inf),
-        )
-        check_ranges(self, whole, integer=True)
-        check_ranges(self, real)
-        check_share(self.validation)
-        if not is_a(self.roughness, tuple | list) or not self.roughness:
-            raise OrbiflowError(f"roughness needs weights of at least 0, got {self.roughness!r}")
-        for weight in self.roughness:
-            check_range("each weight of roughness", weight, 0, math.inf)
-        if self.base not in ("uniform", "von-mises"):
-            raise OrbiflowError(f'base must be "uniform" or "von-mises", got {self.base!r}')
+
+    @property
+    def of_flow(self) -> dict[str, Any]:
+        """What was given of a flow, the time apart, by name."""
+        names = {entry.name for entry in fields_of(FlowOptions)} - {"seconds"}
+        given = {name: getattr(self, name) for name in self.fields_given & names}
+        return {name: value for name, value in given.items() if value is not None}

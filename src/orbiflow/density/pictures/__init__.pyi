@@ -13,3 +13,4 @@ from .plots import Plotted as Plotted
 from .plots import plot_density as plot_density
 from .samples import samples_picture as samples_picture
 from .square import density_picture as density_picture
+from .thumbnail import density_thumbnail as density_thumbnail

@@ -5,5 +5,15 @@ from .files import is_identifier as is_identifier
 from .files import read_labels as read_labels
 from .files import read_table as read_table
 from .files import to_csv as to_csv
+from .rows import TableRows as TableRows
+from .rows import angle_unit as angle_unit
+from .rows import check_order as check_order
+from .rows import read_rows as read_rows
+from .settings import RowSettings as RowSettings
+from .settings import SpaceSettings as SpaceSettings
+from .settings import TableSettings as TableSettings
+from .settings import check_table_name as check_table_name
 from .table import MissingCellsError as MissingCellsError
 from .table import Table as Table
+from .table import TableError as TableError
+from .table import listing as listing

@@ -15,6 +15,7 @@ from orbiflow.density.tables.table import (
     BLOCK,
     MAX_COLUMNS,
     Table,
+    TableError,
     check_count,
     check_finite,
     choose,
@@ -22,7 +23,7 @@ from orbiflow.density.tables.table import (
     quote,
     without_missing,
 )
-from orbiflow.errors import InputFileError, OrbiflowError
+from orbiflow.errors import InputFileError, OrbiflowError, literal
 
 MAX_NPY_HEADER = 10_000  # characters; numpy parses the header with `ast.literal_eval`
 
@@ -177,9 +178,9 @@ def _check_numeric(
 ) -> None:
     for i in picked:
         if not numeric[i]:
-            raise InputFileError(
-                f"{path}: column {quote(names[i])} holds {quote(str(types[i]))}, not numbers; "
-                "choose another with --columns"
+            raise TableError(
+                literal(f"{path}: column {quote(names[i])} holds {quote(str(types[i]))}")
+                + ", not numbers; choose another with {columns}"
             )
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from orbiflow.errors import InputFileError
+from orbiflow.errors import InputFileError, SettingError, literal
 
 MAX_COLUMNS = 10_000
 BLOCK = 65_536  # rows
@@ -44,7 +44,11 @@ class Table:
         return replace(self, values=np.delete(self.values, column, axis=1), columns=names)
 
 
-class MissingCellsError(InputFileError):
+class TableError(SettingError, InputFileError):
+    """A table that cannot be read as the settings say; the message names those in braces."""
+
+
+class MissingCellsError(TableError):
     """Cells that are empty, NaN or infinite in rows that must not lack any."""
 
 
@@ -59,15 +63,20 @@ def choose(
     if columns is not None:
         picked = [find(path, names, wanted) for wanted in columns]
         if len(set(picked)) < len(picked):
-            raise InputFileError(f"{path}: --columns names a column twice; name each once")
+            raise TableError(
+                literal(f"{path}: ") + "{columns} names a column twice; name each once"
+            )
     else:
         # Of just `width` columns all are meant, so that a bad cell is named rather than passed by.
         picked = [i for i, ok in enumerate(numeric) if ok or len(names) == width]
     if not picked or (width is not None and len(picked) != width):
-        got = f"--columns names {len(picked)}" if columns is not None else f"it has {len(picked)}"
-        raise InputFileError(
-            f"{path}: {'' if width is None else f'{width} '}column{'s' * (width != 1)} of numbers "
-            f"must be taken and {got} (its columns: {listing(names)}); choose with --columns"
+        got = f"{{columns}} names {len(picked)}" if columns is not None else f"it has {len(picked)}"
+        count = "" if width is None else f"{width} "
+        raise TableError(
+            literal(f"{path}: ")
+            + f"{count}column{'s' * (width != 1)} of numbers must be taken and {got} (its columns: "
+            + literal(f"{listing(names)})")
+            + "; choose with {columns}"
         )
     if columns is not None:
         return picked, []
@@ -86,9 +95,9 @@ def find(path: Path, names: Sequence[str], wanted: str) -> int:
         return hits[0]
     if hits:
         numbers = " and ".join(str(i + 1) for i in hits[:8])
-        raise InputFileError(
-            f"{path}: columns {numbers} are all called {quote(key)}; rename them, or choose by "
-            f"number with --columns {hits[0] + 1}"
+        raise TableError(
+            literal(f"{path}: columns {numbers} are all called {quote(key)}")
+            + f"; rename them, or choose by number with {{columns}} {hits[0] + 1}"
         )
     number = column_number(key, len(names))
     if number is None:
@@ -131,9 +140,11 @@ def check_finite(
     rows, at = np.nonzero(np.isinf(values) if missing else ~np.isfinite(values))
     if len(rows):
         raise MissingCellsError(
-            f"{path}: {len(rows)} cell{'s' * (len(rows) > 1)} empty, NaN or infinite, the first in "
-            f"{unit} {lines[rows[0]]}, column {quote(columns[int(at[0])])}; fill them in "
-            "or leave their rows out with --drop-missing"
+            literal(
+                f"{path}: {len(rows)} cell{'s' * (len(rows) > 1)} empty, NaN or infinite, the first "
+                f"in {unit} {lines[rows[0]]}, column {quote(columns[int(at[0])])}"
+            )
+            + "; fill them in or leave their rows out with {drop_missing}"
         )
 
 
@@ -143,7 +154,9 @@ def without_missing(
     """Rows and lines without a missing value, the lines left out, and a note of them."""
     whole = ~np.isnan(values).any(axis=1)
     if not whole.any():
-        raise InputFileError(f"{path}: every row lacks a value; choose others with --columns")
+        raise TableError(
+            literal(f"{path}: ") + "every row lacks a value; choose others with {columns}"
+        )
     left = lines[~whole].tolist()
     first = f", the first in {unit} {left[0]}" if left else ""
     rows = f"{len(left)} row{'s' * (len(left) > 1)}"

@@ -23,6 +23,7 @@ from orbiflow.density.tables.table import (
     BLOCK,
     MAX_COLUMNS,
     Table,
+    TableError,
     check_count,
     check_finite,
     choose,
@@ -31,7 +32,7 @@ from orbiflow.density.tables.table import (
     quote,
     without_missing,
 )
-from orbiflow.errors import InputFileError
+from orbiflow.errors import InputFileError, literal
 
 MAX_LINE = 2**20  # characters
 SAMPLE = 100  # rows looked at to find the layout
@@ -258,10 +259,12 @@ def _has_header(
     by_number = all(column_number(name, len(row)) is not None for name in wanted)
     if not by_number and all(name.casefold() in names for name in wanted):
         return True
-    raise InputFileError(
-        f"{path}: line {first} may be a header or a row, as its numbers stand above numbers and "
-        "its words above words; say --no-header, put a header line of names above it, or choose "
-        "columns by the names in it with --columns"
+    raise TableError(
+        literal(
+            f"{path}: line {first} may be a header or a row, as its numbers stand above numbers "
+        )
+        + "and its words above words; say with {header} which it is, put a header line of names above "
+        "it, or choose columns by the names in it with {columns}"
     )
 
 

@@ -20,11 +20,11 @@ from orbiflow.density import (
     space_class,
     weighed,
 )
+from orbiflow.density.tables import angle_unit
 from orbiflow.errors import OrbiflowError
 from orbiflow.jobs.density_cv_requests import DensityCvRequest
-from orbiflow.jobs.density_data import unit_of
+from orbiflow.jobs.density_data import read_beside_groups
 from orbiflow.jobs.density_fit import WIDTH
-from orbiflow.jobs.density_groups import read_beside_groups
 from orbiflow.jobs.density_requests import Unit
 from orbiflow.jobs.run import Sink
 from orbiflow.runtime import Note
@@ -60,7 +60,7 @@ def read_rows(request: DensityCvRequest, tell: Sink) -> CvRows:
         OrbiflowError: for a table, columns, weights or groups that cannot be used.
     """
     table, weights = _counting(*read_beside_groups(request, WIDTH[request.space], tell))
-    unit = unit_of(request.space, request.unit, table, tell)
+    unit = angle_unit(request.space, request.unit, table, tell)
     space = space_class(request.space).for_data(table.values, unit=unit, seed=request.seed)
     points = (
         chart_of_observed(space, table.values)

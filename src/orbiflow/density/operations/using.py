@@ -1,0 +1,264 @@
+"""Using a saved density: the commands score, sample, marginal and conditional."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Annotated, Literal
+
+from orbiflow.density.tables import RowSettings, check_table_name
+from orbiflow.errors import literal
+from orbiflow.runtime import Cancel, Note, Outcome, Progress, Sink, Written, ignore, operation
+from orbiflow.settings import (
+    DefaultText,
+    Needs,
+    NotWith,
+    Option,
+    Range,
+    SettingError,
+    Settings,
+)
+
+Model = Annotated[Path, Option("--model", "-m")]
+Out = Annotated[Path, Option("--out", "-o")]
+RegionSamples = Annotated[int | None, Range(1000, 10_000_000)]
+
+
+class ScoreSettings(Settings, group="Scores"):
+    """What is found of each row of a table."""
+
+    measure: Literal["natural", "square", "uniform"] = "natural"
+    """What the density is per. Natural: the data's own units, or steradians. Uniform: relative to
+    chance."""
+
+    region: bool = False
+    """Add a column hdr: the mass of the smallest region of highest density that holds the row."""
+
+    samples: Annotated[RegionSamples, Needs("region"), DefaultText("20000")] = None
+    """Samples of the density from which hdr is known; 20000 tell masses up to 0.9995."""
+
+    gradient: bool = False
+    """Add the gradient of log_prob, a column for each of the data's: per unit of each angle, per degree
+    of lat and lon, tangent vectors of x,y,z."""
+
+    table: Annotated[bool, NotWith("gradient", because="{gradient} is exact, {table} is not")] = (
+        False
+    )
+    """Read log densities off a table, in two dimensions: faster where kernels are wide or a flow has a
+    weight. Its error is told."""
+
+    def check_whole_rows(self) -> None:
+        """Refuse what cannot be found of rows that lack angles."""
+        for name in ("region", "gradient", "table"):
+            if getattr(self, name):
+                raise SettingError(
+                    f"{{{name}}} requires complete rows; leave it out, or {{missing}} marginalise"
+                )
+
+
+@operation("density score")
+def score(
+    data: Path,
+    settings: ScoreSettings = ScoreSettings(),
+    reading: RowSettings = RowSettings(),
+    *,
+    model: Model,
+    out: Out = Path("scores.csv"),
+    on_event: Sink = ignore,
+    cancel: Cancel = Cancel(),
+) -> Outcome:
+    """Add a column log_prob, in nats, to a table.
+
+    Args:
+        data: CSV, TSV, NPY or Parquet.
+        model: Folder that `orbiflow density fit` wrote.
+        out: The table with the new columns.
+    """
+    check_table_name(out)
+    may_lack = reading.missing == "marginalise"
+    if may_lack:
+        settings.check_whole_rows()
+
+    from orbiflow.density.operations.saved import (
+        check_fits,
+        model_at,
+        with_columns_of,
+    )
+    from orbiflow.density.operations.scores import score_rows
+    from orbiflow.density.tables import append_columns, read_rows
+    from orbiflow.runtime import check_output_file, one_thread, write_atomic
+
+    check_output_file(out, data, model)
+    with one_thread():
+        density, extra = model_at(model)
+        rows = read_rows(data, with_columns_of(reading, data, extra, on_event), on_event)
+        check_fits(data, rows.table, density.space, extra, on_event)
+        found = score_rows(density, rows, settings, on_event, cancel, may_lack=may_lack)
+    write_atomic(out, append_columns(rows.table, data, found.columns))
+    on_event(Written(out))
+    for note in found.notes:
+        on_event(Note(note))
+    weighted = "" if reading.weights is None else f", weighted by {reading.weights}"
+    on_event(
+        Note(
+            f"mean log density {found.mean:.4f} nats over {found.over}{weighted}; written to {out}"
+        )
+    )
+    return Outcome({"file": str(out), "rows": len(rows.table.values), "mean": found.mean})
+
+
+class SampleSettings(Settings, group="Samples"):
+    """How samples are drawn."""
+
+    count: Annotated[int, Range(1, 100_000_000), Option("-n")] = 1000
+    """Number of samples."""
+
+    seed: Annotated[int, Range(-(2**63), 2**64 - 1)] = 0
+    """Seed of the random numbers: the same seed on the same machine gives the same samples."""
+
+
+@operation("density sample")
+def sample(
+    settings: SampleSettings = SampleSettings(),
+    *,
+    model: Model,
+    out: Out = Path("samples.csv"),
+    on_event: Sink = ignore,
+    cancel: Cancel = Cancel(),
+) -> Outcome:
+    """Draw samples in the units of the data.
+
+    Args:
+        model: Folder that `orbiflow density fit` wrote.
+        out: CSV of the samples.
+    """
+    check_table_name(out)
+
+    import torch
+
+    from orbiflow.density.operations.saved import model_at, names_of
+    from orbiflow.density.tables import to_csv
+    from orbiflow.runtime import check_output_file, one_thread, write_atomic
+
+    check_output_file(out, model)
+    with one_thread():
+        density, extra = model_at(model)
+        generator = torch.Generator().manual_seed(settings.seed)
+        data = density.space.from_chart(density.sample((settings.count,), generator))
+    names = names_of(density, extra)
+    cancel.check()
+    write_atomic(out, to_csv(names, data))
+    on_event(Written(out))
+    on_event(Note(f"{settings.count} samples written to {out}"))
+    return Outcome({"file": str(out), "rows": settings.count})
+
+
+@operation("density marginal")
+def marginal(
+    *,
+    model: Model,
+    columns: tuple[str, ...],
+    out: Out = Path("marginal"),
+    on_event: Sink = ignore,
+    cancel: Cancel = Cancel(),
+) -> Outcome:
+    """Find the density of some of a torus' angles, whatever the others are.
+
+    Writes a model that score, sample and plot read; of one or two angles density.csv and density.png,
+    too.
+
+    Args:
+        model: Folder that `orbiflow density fit` wrote.
+        columns: Angles to keep, by name or number, such as phi.
+        out: Folder of the new model, made if need be.
+    """
+    if not columns:
+        raise SettingError("{columns} names no column; give names or numbers, as in phi,psi")
+
+    from orbiflow.density.inference import marginal as marginal_of
+    from orbiflow.density.operations.derived import axes_of, write_derived
+    from orbiflow.density.operations.saved import model_at, names_of
+    from orbiflow.density.run_folder import written_files
+    from orbiflow.runtime import ResultFolder, check_output_folder, one_thread
+
+    check_output_folder(out, model, what="model")
+    with one_thread():
+        density, extra = model_at(model)
+        names = names_of(density, extra)
+        axes = axes_of(columns, names)
+        folder = ResultFolder(out, written_files)
+        on_event(Progress(0.0, "integrating"))
+        found = marginal_of(density, axes)
+        kept = [names[axis] for axis in axes]
+        origin = {"marginal": kept, "model": str(model)}
+        return write_derived(found, kept, origin, folder, on_event, cancel)
+
+
+@operation("density conditional")
+def conditional(
+    *,
+    model: Model,
+    given: tuple[str, ...],
+    columns: Annotated[tuple[str, ...] | None, DefaultText("all")] = None,
+    out: Out = Path("conditional"),
+    on_event: Sink = ignore,
+    cancel: Cancel = Cancel(),
+) -> Outcome:
+    """Find the density of a torus' other angles where some are known.
+
+    Writes a model that score, sample and plot read; of one or two angles density.csv and density.png,
+    too.
+
+    Args:
+        model: Folder that `orbiflow density fit` wrote.
+        given: What is known, in the model's unit, such as psi=-45 or psi=-45,chi1=60.
+        columns: Of the other angles, those to keep.
+        out: Folder of the new model, made if need be.
+    """
+    if not given:
+        raise SettingError("{given} says nothing; give what is known, as in psi=-45")
+    pairs = [_angle(text) for text in given]
+
+    from orbiflow.density.inference import conditional as conditional_of
+    from orbiflow.density.operations.derived import condition_of, write_derived
+    from orbiflow.density.operations.saved import model_at, names_of
+    from orbiflow.density.run_folder import written_files
+    from orbiflow.runtime import ResultFolder, check_output_folder, one_thread
+
+    check_output_folder(out, model, what="model")
+    with one_thread():
+        density, extra = model_at(model)
+        names = names_of(density, extra)
+        condition = condition_of(density.space, names, pairs, columns)
+        for note in condition.notes:
+            on_event(Note(note))
+        folder = ResultFolder(out, written_files)
+        on_event(Progress(0.0, "integrating"))
+        found = conditional_of(density, condition.given, condition.kept)
+        evidence = condition.evidence(density)
+        rare = "; few data lie there, or none" if evidence < -3 else ""
+        on_event(
+            Note(
+                f"the density at {condition.words} is {math.exp(evidence):.3g} times that of even "
+                f"angles{rare}"
+            )
+        )
+        origin = {
+            "given": condition.values,
+            "log_density_of_given_over_uniform": evidence,
+            "model": str(model),
+        }
+        return write_derived(found, condition.columns, origin, folder, on_event, cancel)
+
+
+def _angle(text: str) -> tuple[str, float]:
+    """The name and the value of an angle that is known."""
+    name, sign, value = text.rpartition("=")
+    try:
+        if not sign or not name.strip():
+            raise ValueError
+        return name.strip(), float(value)
+    except ValueError:
+        raise SettingError(
+            f"{{given}} must be angles such as psi=-45, got {literal(repr(text))}"
+        ) from None

@@ -1,0 +1,231 @@
+"""The rows of a table that a density is fitted to or compared with, read as the settings say."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orbiflow.arrays import Array
+from orbiflow.density.tables.files import column_names, is_identifier, read_labels, read_table
+from orbiflow.density.tables.settings import RowSettings, TableSettings, Unit, check_unit
+from orbiflow.density.tables.table import MissingCellsError, Table, TableError, find, quote
+from orbiflow.errors import SettingError, literal
+from orbiflow.runtime import Note, Sink
+
+NORTH = frozenset({"lat", "latitude", "plunge", "inclination"})
+EAST = frozenset({"lon", "long", "lng", "longitude", "trend", "azimuth"})
+"""First words of names of the angle towards the pole, and of that around it."""
+
+
+@dataclass(frozen=True, eq=False)
+class TableRows:
+    """The rows of a table, what each weighs and what it belongs to.
+
+    - `path`: The file.
+    - `table`: The columns of data, N rows.
+    - `weights`: How much each row counts, (N,). None: all the same.
+    - `group`: The column that names what rows belong to, or None.
+    - `header`: Whether the first line names the columns, None to look.
+    """
+
+    path: Path
+    table: Table
+    weights: Array | None = None
+    group: str | None = None
+    header: bool | None = None
+
+    def labels(self) -> NDArray[np.str_] | None:
+        """Return what each row belongs to, (N,), or None if no column says so.
+
+        Raises:
+            InputFileError: If the column is unknown, or a row has no label.
+        """
+        if self.group is None:
+            return None
+        return read_labels(self.path, self.group, self.table, has_header=self.header)
+
+
+def read_rows(
+    path: Path,
+    settings: TableSettings,
+    tell: Sink,
+    *,
+    width: int | None = None,
+    group: str | None = None,
+) -> TableRows:
+    """Return the rows of a table, and tell what was decided for the user.
+
+    Without `columns`, all columns of numbers are taken but those that count the rows, and those of
+    weights and groups.
+
+    Args:
+        path: The file.
+        settings: Which columns and rows.
+        tell: Gets a note of each decision.
+        width: How many columns there must be. Default: any number.
+        group: The column that names what rows belong to.
+
+    Raises:
+        InputFileError: If the table cannot be read, lacks values that it must have, or its columns
+            are not those that are needed.
+    """
+    rows = settings if isinstance(settings, RowSettings) else RowSettings(**settings.to_json())
+    how: dict[str, Any] = {
+        "has_header": rows.header,
+        "drop_missing": rows.drop_missing or rows.missing == "drop",
+    }
+    name = None if group is None or rows.columns is not None else _name(path, group, rows.header)
+    weighing = None
+    if rows.weights is not None:
+        weighing = read_table(path, columns=[rows.weights], width=1, **how)
+    others = [*(weighing.columns if weighing else ()), *([name] if name else [])]
+    try:
+        keep = rows.missing == "marginalise"
+        table = _read(path, rows.columns, None if others else width, tell, how, keep)
+    except MissingCellsError as error:
+        if rows is not settings:  # the command has no way to keep them
+            raise
+        raise TableError(
+            f"{error.template} (on tori {{missing}} marginalise keeps them)"
+        ) from error
+    for note in table.notes:
+        tell(Note(note))
+    for other in others if rows.columns is None else ():
+        if other in table.columns and len(table.columns) > 1:
+            table = table.without(table.columns.index(other))
+    weights = None
+    if weighing is not None:
+        table, weights = _weighed(path, table, weighing)
+    if others and width is not None and len(table.columns) != width:
+        raise TableError(
+            literal(
+                f"{path}: {width} columns must be taken beside {' and '.join(map(quote, others))}, "
+                f"there are {', '.join(table.columns)}"
+            )
+            + "; choose with {columns}"
+        )
+    return TableRows(path, table, weights, group, rows.header)
+
+
+def _read(
+    path: Path,
+    columns: Sequence[str] | None,
+    width: int | None,
+    tell: Sink,
+    how: dict[str, Any],
+    keep_missing: bool,
+) -> Table:
+    how = {**how, "keep_missing": keep_missing}
+    if columns is not None:
+        return read_table(path, columns=list(columns), width=None, **how)
+    try:
+        table = read_table(path, columns=None, width=width, **how)
+    except TableError:
+        # one more than wanted may be an identifier
+        if width is None:
+            raise
+        table = _without_identifiers(read_table(path, columns=None, width=None, **how), tell)
+        if len(table.columns) != width:
+            raise
+        return table
+    return table if width is not None else _without_identifiers(table, tell)
+
+
+def _without_identifiers(table: Table, tell: Sink) -> Table:
+    for column in reversed(range(len(table.columns))):
+        name = table.columns[column]
+        if len(table.columns) > 1 and is_identifier(name, table.values[:, column]):
+            table = table.without(column)
+            tell(Note(f"left out the column {name!r}, which numbers the rows; name all to keep it"))
+    return table
+
+
+def _weighed(path: Path, table: Table, weighing: Table) -> tuple[Table, Array]:
+    """The rows that have a weight, and their weights."""
+    name = weighing.columns[0]
+    if name in table.columns:
+        raise TableError(
+            literal(f"{path}: {name!r} holds the rows' weights and cannot be a column of the data")
+            + " as well; leave it out of {columns}"
+        )
+    kept = np.isin(table.lines, weighing.lines)
+    table = replace(
+        table,
+        values=table.values[kept],
+        lines=table.lines[kept],
+        dropped=table.dropped | weighing.dropped,
+    )
+    return table, weighing.values[np.isin(weighing.lines, table.lines), 0]
+
+
+def _name(path: Path, column: str, header: bool | None) -> str:
+    """What a table calls a column that is given by its name or number."""
+    names = column_names(path, wanted=[column], has_header=header)
+    if names is None:
+        number = column.strip()
+        return f"column{int(number)}" if number.isdecimal() else number
+    return names[find(path, names, column)]
+
+
+def angle_unit(space: str, unit: Unit | None, table: Table, tell: Sink) -> Unit:
+    """Return the unit of angles: the given one, or else radians if all values are within 2 pi.
+
+    Args:
+        space: The name of the space.
+        unit: The unit that was asked for, if any.
+        table: The data.
+        tell: Gets a note if radians were assumed.
+
+    Raises:
+        SettingError: If no unit was given and the values cannot be radians; and on the sphere or the
+            projective plane, if another unit than degrees was given, or the columns are a longitude
+            before its latitude.
+    """
+    if space not in ("torus", "klein-bottle"):
+        check_order(table.columns, space)
+        check_unit(space, unit)
+        return "radians"
+    if unit is not None:
+        return unit
+    beyond = np.nanmax(abs(table.values), axis=0, initial=0) > 2 * math.pi + 1e-9
+    if beyond.any():
+        column = int(beyond.argmax())
+        most = table.values[np.nanargmax(abs(table.values[:, column])), column]
+        raise SettingError(
+            literal(f"column {table.columns[column]!r} has {most:g}, beyond 2 pi")
+            + "; give {unit} degrees, radians or turns"
+        )
+    tell(Note("no unit was given and all values are within 2 pi: they were read as radians"))
+    return "radians"
+
+
+def check_order(columns: Sequence[str], space: str) -> None:
+    """Refuse a longitude before its latitude: it would be taken for another place.
+
+    >>> check_order(["lat", "lon"], "sphere")
+    >>> check_order(["Longitude (deg)", "Latitude (deg)"], "sphere")
+    Traceback (most recent call last):
+    ...
+    orbiflow.errors.SettingError: the columns are 'Longitude (deg)', 'Latitude (deg)', and the sphere \
+takes latitude before longitude; give columns 'Latitude (deg),Longitude (deg)'
+    """
+    if len(columns) != 2 or _word(columns[0]) not in EAST or _word(columns[1]) not in NORTH:
+        return
+    first, second = columns
+    raise SettingError(
+        literal(f"the columns are {first!r}, {second!r}, and the {space} takes latitude before ")
+        + "longitude; give {columns} "
+        + literal(f"'{second},{first}'")
+    )
+
+
+def _word(name: str) -> str:
+    found = re.search(r"[^\W\d_]+", name)
+    return found[0].casefold() if found else ""

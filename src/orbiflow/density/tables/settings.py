@@ -1,0 +1,95 @@
+"""Which columns and rows of a table are read: settings that the density commands share."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from orbiflow.errors import literal
+from orbiflow.settings import DefaultText, SettingError, Settings
+
+Missing = Literal["refuse", "drop", "marginalise"]
+
+TABLES = (".csv", ".tsv", ".txt", ".dat")
+"""What names of tables end in. Others may end in anything that is not among these:"""
+
+# fmt: off
+OTHER_FORMATS = frozenset((
+    ".npy", ".npz", ".parquet", ".feather", ".arrow", ".h5", ".hdf5", ".mat", ".pkl", ".safetensors",
+    ".xls", ".xlsx", ".ods", ".json", ".geojson", ".html", ".xml", ".gz", ".bz2", ".xz", ".zst", ".zip",
+    ".tar", ".png", ".jpg", ".jpeg", ".gif", ".tif", ".tiff", ".webp", ".svg", ".pdf",
+))
+# fmt: on
+
+Space = Literal["torus", "sphere", "klein-bottle", "projective-plane"]
+Unit = Literal["radians", "degrees", "turns"]
+
+
+class SpaceSettings(Settings, group="Density"):
+    """Where the data live."""
+
+    space: Space
+    """Where the data live."""
+
+    unit: Annotated[Unit | None, DefaultText("radians, if no value is beyond 2 pi")] = None
+    """Unit of angles on the torus and the Klein bottle."""
+
+    def check(self) -> None:
+        """Check that only angles have a unit."""
+        check_unit(self.space, self.unit)
+
+
+def check_unit(space: str, unit: Unit | None) -> None:
+    """Refuse a unit of data that are not angles.
+
+    Raises:
+        SettingError: If it is another than degrees, by the name of the setting `unit`.
+    """
+    if space in ("sphere", "projective-plane") and unit in ("radians", "turns"):
+        raise SettingError(
+            f"{{unit}} {unit} applies only to angles on the torus and the Klein bottle: latitude and "
+            "longitude are degrees; convert them, or give unit vectors x,y,z"
+        )
+
+
+class TableSettings(Settings, group="Reading the table"):
+    """Which columns and rows of a table are read."""
+
+    columns: Annotated[tuple[str, ...] | None, DefaultText("what the space takes")] = None
+    """Names or numbers of the columns, such as lat,lon."""
+
+    header: Annotated[bool | None, DefaultText("found automatically")] = None
+    """Whether the table's first line names the columns."""
+
+    drop_missing: bool = False
+    """Leave out rows that lack a value."""
+
+
+class RowSettings(TableSettings, group="Reading the table"):
+    """Which columns and rows of a table are read, and how much each row counts."""
+
+    missing: Missing = "refuse"
+    """What is done with rows that lack a value. With marginalise, on tori, they count by the angles
+    that they have."""
+
+    weights: str | None = None
+    """Column, by name or number, that says how much each row counts; only ratios matter."""
+
+    def check(self) -> None:
+        """Check that rows that lack a value are treated in one way."""
+        if self.drop_missing and self.missing == "marginalise":
+            raise SettingError(
+                "{drop_missing} leaves out the rows that {missing} marginalise would use; give one"
+            )
+
+
+def check_table_name(out: Path) -> None:
+    """Refuse a name for a table whose ending is that of another format.
+
+    Raises:
+        SettingError: If it is, by the name of the setting `out`.
+    """
+    if out.suffix.lower() in OTHER_FORMATS:
+        raise SettingError(
+            f"{{out}} must end in {', '.join(TABLES)}, got {literal(repr(out.name))}"
+        )
