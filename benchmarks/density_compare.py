@@ -20,11 +20,11 @@ Data = NDArray[np.float64]
 
 PARTS: dict[str, dict[str, Any]] = {
     "default": {},
-    "flow": {"parts": "flow"},
-    "kernels": {"parts": "kernels"},
-    "mixture": {"parts": "mixture"},
-    "chains": {"parts": "chains"},
-    "network": {"parts": "network"},
+    "flow": {"components": "flow"},
+    "kernels": {"components": "kernels"},
+    "mixture": {"components": "mixture"},
+    "chains": {"components": "chains"},
+    "network": {"components": "network"},
 }
 
 COLUMNS = ("kernel", "flow", "kernels", "mixture", "chains", "network", "default")

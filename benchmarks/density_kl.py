@@ -23,9 +23,9 @@ import torch
 
 from orbiflow.density import (
     SPACES,
-    AutomaticSettings,
     Density,
-    FitSettings,
+    DensitySettings,
+    FlowSettings,
     fit_automatic,
     fit_density,
     kl_by_quadrature,
@@ -57,11 +57,11 @@ def run(
     points = drawn(label, space, measure, count, seed)
     begin = time.perf_counter()
     if flow:
-        settings = FitSettings(seed=seed, seconds=seconds, **FIT_SETTINGS[label])  # type: ignore[arg-type]
+        settings = FlowSettings(seed=seed, seconds=seconds, **FIT_SETTINGS[label])  # type: ignore[arg-type]
         found, report = fit_density(space, points, settings)
         density = finer(found)
     else:
-        density, report = fit_automatic(space, points, AutomaticSettings(seed=seed))
+        density, report = fit_automatic(space, points, DensitySettings(seed=seed))
     spent = time.perf_counter() - begin
     grid = midpoints(space, 200)
     with torch.no_grad():

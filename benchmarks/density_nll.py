@@ -59,7 +59,7 @@ def run(job: tuple[str, int, bool, float, int, bool]) -> Outcome:
     kde = KernelDensity.tuned(train, held, round_=round_)
     begin = time.perf_counter()
     share = len(held) / (len(train) + len(held))
-    options = {"detail": detail, "kernels": True, "validation": share, "seconds": seconds}
+    options = {"max_frequency": detail, "kernels": True, "validation": share, "seconds": seconds}
     if not kernels:
         options = {"repeats": "rounding" if grouped else "places"}
     estimator = DensityEstimator("sphere" if round_ else "torus", seed=seed, **options)  # type: ignore[arg-type]
@@ -114,7 +114,7 @@ def main() -> None:
     parser.add_argument("--grouped", action="store_true")
     parser.add_argument("--kernels", action="store_true", help="a flow with adaptive kernels")
     parser.add_argument("--seconds", type=float, default=20.0, help="of refinement")
-    parser.add_argument("--detail", type=int, default=8)
+    parser.add_argument("--max-frequency", type=int, default=8)
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--quick", action="store_true", help="proline, one split, 10 s")
     options = parser.parse_args()
@@ -132,7 +132,7 @@ def main() -> None:
     )
     with ProcessPoolExecutor(options.workers) as pool:
         jobs = [
-            (n, k, options.grouped, seconds, options.detail, options.kernels)
+            (n, k, options.grouped, seconds, options.max_frequency, options.kernels)
             for n in names
             for k in range(count)
         ]

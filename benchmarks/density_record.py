@@ -160,7 +160,7 @@ def entropy(_count: int, _pool: ProcessPoolExecutor, names: tuple[str, ...]) -> 
             continue
         torch.set_num_threads(1)
         parts = "mixture,chains"  # smooth: draws from kernels lie beside each other
-        estimator = DensityEstimator("torus", seed=0, parts=parts).fit(drawn.data)
+        estimator = DensityEstimator("torus", seed=0, components=parts).fit(drawn.data)
         draws = estimator.sample(len(drawn.data), random_state=1)
         truth = -estimator.score(draws)
         for neighbour in (1, 2, 4):

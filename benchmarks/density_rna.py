@@ -21,7 +21,7 @@ from common import published
 from density_data import rna, splits
 from density_kde import KernelDensity
 
-from orbiflow.density import AutomaticSettings, Mixture, Torus, fit_automatic
+from orbiflow.density import DensitySettings, Mixture, Torus, fit_automatic
 
 QUERIES = 10_000
 
@@ -44,7 +44,7 @@ def run(seed: int, seconds: float) -> Outcome:
     space = Torus(train.shape[1])
     rows = space.to_chart(np.concatenate([train, held]))
     begin = time.perf_counter()
-    density, _ = fit_automatic(space, rows, AutomaticSettings(seconds=seconds, seed=seed))
+    density, _ = fit_automatic(space, rows, DensitySettings(seconds=seconds, seed=seed))
     fit = time.perf_counter() - begin
     queries = np.random.default_rng(seed).uniform(-np.pi, np.pi, (QUERIES, train.shape[1]))
     points = space.to_chart(test)

@@ -6,7 +6,7 @@ Points in forty clusters of 0.01 to 0.3 radians. Fit: seconds of processor time.
 second of processor time, side by side in one run: of `log_prob`; of its gradient in the points; of all
 kernels for all points; and off a `TabulatedDensity`, once made. Off: largest differences in nats, of
 the exact one to that of all kernels (which knows the narrowest ones to 1e-9), and of the table to
-the exact one at the density's own points. --parts: of the density, such as kernels. --search:
+the exact one at the density's own points. --components: of the density, such as kernels. --search:
 `GridSearchCV` over five settings of 2,000 points in five folds.
 """
 
@@ -96,7 +96,7 @@ def line(space: str, rows: int, points: int, parts: str) -> str:
     data = clustered(space, rows)
     begin = time.process_time()
     name = "torus" if space == "three angles" else space
-    estimator = DensityEstimator(name, parts=parts).fit(data)
+    estimator = DensityEstimator(name, components=parts).fit(data)
     fit = time.process_time() - begin
     density = estimator.density_
     assert isinstance(density, Mixture)
@@ -133,7 +133,7 @@ def search() -> str:
 
     begin, wall = time.process_time(), time.perf_counter()
     settings = ["auto", "kernels", "mixture", "kernels,mixture", "flow,kernels"]
-    found = GridSearchCV(DensityEstimator("torus"), {"parts": settings}, cv=5)
+    found = GridSearchCV(DensityEstimator("torus"), {"components": settings}, cv=5)
     found.fit(clustered("torus", 2_000))
     return (
         f"GridSearchCV, 5 settings of 2,000 points, 26 fits on one core: "
@@ -147,7 +147,7 @@ def main() -> None:
     parser.add_argument("spaces", nargs="*", metavar="SPACE", help=f"{', '.join(SPACES)} (all)")
     parser.add_argument("--rows", type=int, nargs="+", default=[1_000, 10_000])
     parser.add_argument("--points", type=int, default=1_000_000, help="evaluated")
-    parser.add_argument("--parts", default="auto")
+    parser.add_argument("--components", default="auto")
     parser.add_argument("--search", action="store_true", help="a grid search, too")
     parser.add_argument("--quick", action="store_true", help="one small fit")
     options = parser.parse_args()
@@ -161,7 +161,7 @@ def main() -> None:
     )
     for count in rows:
         for space in spaces:
-            print(line(space, count, points, options.parts), flush=True)
+            print(line(space, count, points, options.components), flush=True)
     if options.search:
         print(search())
 

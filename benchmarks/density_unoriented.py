@@ -59,7 +59,7 @@ def run(name: str, data: Data, seed: int, seconds: float, detail: int) -> Outcom
     begin = time.perf_counter()
     estimator = DensityEstimator(
         "projective-plane" if axes else "klein-bottle",
-        detail=detail,
+        max_frequency=detail,
         kernels=True,
         validation=len(held) / (len(train) + len(held)),
         seconds=seconds,
@@ -110,7 +110,7 @@ def main() -> None:
     parser.add_argument("data", nargs="*", choices=(*KLEIN, *AXES, []))
     parser.add_argument("--splits", type=int, default=5)
     parser.add_argument("--seconds", type=float, default=20.0, help="of refinement")
-    parser.add_argument("--detail", type=int, default=8)
+    parser.add_argument("--max-frequency", type=int, default=8)
     parser.add_argument("--quick", action="store_true", help="three-axes, one split, 5 s")
     options = parser.parse_args()
     names = options.data or [*KLEIN, *AXES]
@@ -118,14 +118,16 @@ def main() -> None:
     if options.quick:
         names, count, seconds = ["three-axes"], 1, 5.0
     torch.set_num_threads(1)
-    print(f"{count} splits, {seconds:g} s of refinement, detail {options.detail}, one thread")
+    print(
+        f"{count} splits, {seconds:g} s of refinement, detail {options.max_frequency}, one thread"
+    )
     print(
         "data              N  uniform      kde               flow          flow - kde"
         "       mixture     mixture - kde     true  kde fit  flow fit   100k: kde s  flow s     mass"
     )
     for name in names:
         data = load(name)
-        rows = [run(name, data, seed, seconds, options.detail) for seed in range(count)]
+        rows = [run(name, data, seed, seconds, options.max_frequency) for seed in range(count)]
         print_row(name, len(data), rows)
         truth = known(name)
         if truth is not None:

@@ -10,7 +10,7 @@ import torch
 
 from orbiflow.density import (
     Density,
-    FitSettings,
+    FlowSettings,
     density_to_bytes,
     fit_density,
     kl_by_quadrature,
@@ -58,7 +58,7 @@ def fitted(
     """Draw samples of a target, fit a density to them, and measure how near it comes."""
     there = make_space(space)
     samples = drawn(target, there, measure, points, seed=0)
-    settings = FitSettings(evaluations=evaluations, **FIT_SETTINGS[target])  # type: ignore[arg-type]
+    settings = FlowSettings(evaluations=evaluations, **FIT_SETTINGS[target])  # type: ignore[arg-type]
     density, report = fit_density(there, samples, settings)
     places = midpoints(there, grid)
     with torch.no_grad():

@@ -65,10 +65,10 @@ def test_a_density(folders: Path) -> None:
     data = np.loadtxt(folders / "a.csv", delimiter=",", skiprows=1)
     assert found.score(data) == pytest.approx(report["log_likelihood"]["natural"], abs=1e-9)
     assert found.report_.validation_nll == report["report"]["validation_nll"]
-    assert found.report_.parts[0].name == "kernels"
+    assert found.report_.components[0].name == "kernels"
     assert found.report_.repeats is not None
     assert found.feature_names_in_.tolist() == ["phi", "psi"]
-    assert (found.parts, found.seed, found.n_features_in_) == ("kernels", 3, 2)
+    assert (found.components, found.seed, found.n_features_in_) == (["kernels"], 3, 2)
     assert found.sample(3, random_state=1).shape == (3, 2)
     again = DensityEstimator(**found.get_params()).fit(data)
     assert again.score(data) == pytest.approx(found.score(data), abs=1e-9)

@@ -148,11 +148,12 @@ def _estimator(path: Path) -> DensityEstimator:
 
 
 def _settings(settings: dict[str, Any]) -> dict[str, Any]:
-    """Of a request, as the estimator has them."""
-    parts = settings.get("parts")
-    own = ("repeats", "missing", "detail", "segments", "kernels", "seed")
-    known = {name: settings[name] for name in own if name in settings}
-    return known | {"parts": "auto" if parts is None else ",".join(parts)}
+    """The settings of a fit as the estimator has them; version 0.1 had other names for two."""
+    settings = {
+        {"parts": "components", "detail": "max_frequency"}.get(k, k): v for k, v in settings.items()
+    }
+    own = ("components", "repeats", "missing", "max_frequency", "segments", "kernels", "seed")
+    return {name: settings[name] for name in own if name in settings}
 
 
 def _json(file: Path) -> dict[str, Any]:

@@ -116,7 +116,9 @@ def test_the_integral_is_seen_from_values(module, dim: int, monkeypatch) -> None
     rng = np.random.default_rng(4)
     rows = rng.vonmises(rng.uniform(-3, 3, (3, dim))[rng.integers(3, size=400)], 20.0)
     rows[:40] = rows[40:80]  # so that there are narrow kernels
-    density = DensityEstimator("torus", parts="kernels,mixture,chains", seed=0).fit(rows).density_
+    density = (
+        DensityEstimator("torus", components="kernels,mixture,chains", seed=0).fit(rows).density_
+    )
     assert isinstance(density, Mixture)
     found = integral(density)
     assert found.value == pytest.approx(1, abs=1e-4)

@@ -9,7 +9,7 @@ import pytest
 
 from orbiflow.density import read_density
 
-FIT = ["--detail", 2, "--segments", 2]
+FIT = ["--max-frequency", 2, "--segments", 2]
 SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")
 
 
@@ -138,7 +138,7 @@ def test_plot_of_three_angles_is_of_their_pairs(tmp_path: Path, orbiflow) -> Non
     data, model, out = tmp_path / "data.csv", tmp_path / "model", tmp_path / "plots"
     rows = rng.normal(0, 0.5, (80, 3))
     data.write_text("a,b,c\n" + "\n".join(",".join(f"{v:.4f}" for v in row) for row in rows) + "\n")
-    fit = ("density", "fit", data, "--space", "torus", "--detail", 1, "--segments", 1)
+    fit = ("density", "fit", data, "--space", "torus", "--max-frequency", 1, "--segments", 1)
     assert orbiflow(*fit, "--out", model).status == 0
     plot = ("density", "plot", "--model", model, "--out", out)
     for options in ((), ("--data", data, "--center", "pi,0,-pi")):
@@ -200,12 +200,12 @@ def test_mistakes_in_the_options(tmp_path: Path, orbiflow) -> None:
     for arguments, message in (
         ((*fit, "--columns", "lat,height"), "height"),
         ((*fit, "--columns", " , "), "--columns names no column"),
-        ((*fit, "--detail", 0), "detail must be from 1 to 64"),
+        ((*fit, "--max-frequency", 0), "max_frequency must be from 1 to 64"),
         (("density", "fit", data, "--space", "moebius"), "moebius"),
         ((*score, "--model", tmp_path), "cannot read"),
         ((*score, "--model", data), "not a density saved by orbiflow"),
         ((*score, "--model", model, "--measure", "round"), "round"),
-        (("density", "sample", "--model", model, "-n", 0), "-n must be from 1"),
+        (("density", "sample", "--model", model, "-n", 0), "--count must be from 1"),
         (("density", "plot", "--model", model, "--coastlines", data), "belongs to the sphere"),
         (("density", "plot", "--model", model, "--center", "0,north"), "--center needs angles"),
         (("density", "plot", "--model", model, "--center", "0,nan"), "--center needs 2 angles"),

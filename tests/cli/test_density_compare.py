@@ -16,7 +16,7 @@ import shapely
 from cli.conftest import call_main
 from orbiflow.density import DensityEstimator, density_to_bytes
 
-KERNELS = ("--parts", "mixture")
+KERNELS = ("--components", "mixture")
 
 
 def write(path: Path, header: str, rows: np.ndarray, labels: list[str] | None = None) -> Path:
@@ -99,7 +99,7 @@ def test_rows_that_a_model_was_fitted_to_are_known(folder: Path, orbiflow: Any) 
     mixed = write(folder / "mixed.csv", "phi,psi", np.concatenate([angles(0)[:20], angles(3)]))
     done = orbiflow("density", "compare", *models, "--data", mixed)
     assert "20 of 140 rows that were looked up equal one that good was fitted to" in done.out
-    extra = DensityEstimator(unit="degrees", parts="mixture").fit(angles(0))
+    extra = DensityEstimator(unit="degrees", components="mixture").fit(angles(0))
     (folder / "old.safetensors").write_bytes(density_to_bytes(extra.density_))
     done = orbiflow(
         "density", "compare", "-m", folder / "good", "-m", folder / "old.safetensors",

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from orbiflow.density import DensityEstimator, read_density
-from orbiflow.jobs import density_fit
 
-SMALL = ["--parts", "kernels"]
+SMALL = ["--components", "kernels"]
 
 
 def table(folder: Path, scale: float, *, first: str = "", count: int = 40) -> Path:
@@ -28,7 +27,7 @@ def test_units_are_said_or_asked_for(tmp_path: Path, orbiflow) -> None:
     fitted = orbiflow(*fit)
     assert fitted.status == 0, fitted.err
     assert "they were read as radians" in fitted.out
-    assert "--parts" not in fitted.err
+    assert "--components" not in fitted.err
     said = orbiflow(*fit, "--unit", "radians")
     assert "read as radians" not in said.out
     table(tmp_path, 50.0)
@@ -39,7 +38,7 @@ def test_units_are_said_or_asked_for(tmp_path: Path, orbiflow) -> None:
     report = json.loads((out / "report.json").read_text())
     assert report["space"]["unit"] == "degrees"
     assert report["columns"] == ["phi angle", "psi angle"]
-    assert report["report"]["parts"][0]["name"] == "kernels"
+    assert report["report"]["components"][0]["name"] == "kernels"
 
 
 @pytest.mark.parametrize("space", ["torus", "klein-bottle"])
@@ -68,15 +67,18 @@ def test_missing_values_and_no_header(tmp_path: Path, orbiflow) -> None:
     assert orbiflow(*score).status == 0
     assert scores.read_text().splitlines()[-1] == "0.5,,"
     data.write_text("\n".join(["a,0.1,0.2", *(f"b,{row}" for row in rows)]) + "\n")
-    assert "--no-header" in orbiflow(*fit).err
+    assert "--header" in orbiflow(*fit).err
     assert orbiflow(*fit, "--no-header").status == 0
 
 
 def test_parts_that_are_none(tmp_path: Path, orbiflow) -> None:
     fit = ("density", "fit", table(tmp_path, 1.0), "--space", "torus", "--out", tmp_path / "m")
     for options, message in (
-        (("--parts", "trees"), "--parts must be of flow, kernels, mixture, chains"),
-        (("--parts", "kernels", "--kernels"), "--kernels means a flow with kernels"),
+        (
+            ("--components", "trees"),
+            "--components: entry 1: must be flow, kernels, mixture, chains",
+        ),
+        (("--components", "kernels", "--kernels"), "--kernels and --components exclude each other"),
         (("--repeats", "noise"), "noise"),
     ):
         outcome = orbiflow(*fit, *options)
@@ -102,7 +104,7 @@ def test_the_mean_says_of_how_many_rows_it_is(
     scores = fitted.score_samples(values)
     assert (count, mean) == (60, pytest.approx(scores.mean()))
     # few of many are drawn by the seed: the same at every run, and not every so many-th
-    monkeypatch.setattr(density_fit, "MOST_SCORED", 25)
+    monkeypatch.setattr("orbiflow.density.operations.fitted.MOST_SCORED", 25)
     count, mean = mean_of(orbiflow(*fit), "25 of them")
     assert (count, mean_of(orbiflow(*fit), "25 of them")) == (25, (25, mean))
     assert mean != pytest.approx(scores.mean(), abs=1e-9)

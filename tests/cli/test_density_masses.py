@@ -21,7 +21,7 @@ def folder_fixture(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("masses")
     angles = np.random.default_rng(0).vonmises([0.0, 1.0], 4.0, (60, 2))
     np.savetxt(folder / "data.csv", angles, delimiter=",", header="phi,psi", comments="")
-    fitted = DensityEstimator("torus", parts="mixture").fit(angles)
+    fitted = DensityEstimator("torus", components="mixture").fit(angles)
     (folder / "density.safetensors").write_bytes(
         density_to_bytes(fitted.density_, columns=["phi", "psi"])
     )
@@ -81,9 +81,12 @@ def test_lines_far_out(folder: Path, orbiflow) -> None:
         ("region --samples 10", "--samples must be from 1000 to 1e+07, got 10"),
         (
             "score data.csv --samples 20000",
-            "--samples are those of --region: give both, or neither",
+            "--samples needs --region; give both or neither",
         ),
-        ("score data.csv --region --samples 20", "--samples must be from 1000 to 1e+07, got 20"),
+        (
+            "score data.csv --region --samples 20",
+            "--samples must be from 1000 to 10000000, got '20'",
+        ),
         (
             "plot --regions 0.99999 --region-samples 20000",
             "--region-samples must be at least 1000000",

@@ -24,7 +24,7 @@ def folder_fixture(tmp_path_factory: pytest.TempPathFactory) -> Path:
     table(folder / "gaps.csv", "phi,psi", gaps)
     table(folder / "nothing.csv", "phi,psi", np.full((12, 2), np.nan))
     for dim in (2, 3):
-        fitted = DensityEstimator("torus", parts="mixture").fit(angles[:, :dim])
+        fitted = DensityEstimator("torus", components="mixture").fit(angles[:, :dim])
         model = folder / f"model{dim}"
         model.mkdir()
         (model / "density.safetensors").write_bytes(
@@ -41,24 +41,24 @@ def table(path: Path, header: str, values: np.ndarray) -> None:
     ("words", "message"),
     [
         (
-            "fit two.csv --space torus --parts kernels --detail 5",
-            "--detail is the flow's, and --parts",
+            "fit two.csv --space torus --components kernels --max-frequency 5",
+            "--max-frequency needs a flow: add flow to --components",
         ),
         ("fit two.csv --space torus --segments 0", "--segments must be from 1 to 256, got 0"),
-        ("fit two.csv --space torus --seconds -1", "--seconds must be at least 0, got -1.0"),
+        ("fit two.csv --space torus --seconds -1", "--seconds must be at least 0, got '-1'"),
         (
             "fit places.csv --space sphere --unit radians",
             "--unit radians applies only to angles on the torus",
         ),
         (
-            "fit places.csv --space sphere --parts chains",
+            "fit places.csv --space sphere --components chains",
             "Sphere of 2 dimensions cannot be made of chains alone",
         ),
         (
             "fit gaps.csv --space klein-bottle --missing marginalise",
-            "--missing marginalise is of angles",
+            "--missing marginalise is for angles",
         ),
-        ("fit gaps.csv --space torus --missing marginalise --kernels", "give other --parts"),
+        ("fit gaps.csv --space torus --missing marginalise --kernels", "give other --components"),
         ("fit gaps.csv --space torus", "(on tori --missing marginalise keeps them)"),
         (
             "fit nothing.csv --space torus",
@@ -132,9 +132,9 @@ def test_a_flow_that_was_meant_and_not_tried_is_said(
     fit = ("density", "fit", folder / "two.csv", "--space", "torus", "--out", tmp_path / "m")
     said = "no flow was tried: of fewer than 300 rows, here 40, none has gained anything"
     for options, told in (
-        (("--parts", "kernels,flow"), True),
-        (("--detail", 2), True),
-        (("--parts", "kernels"), False),
+        (("--components", "kernels,flow"), True),
+        (("--max-frequency", 2), True),
+        (("--components", "kernels"), False),
         ((), False),
     ):
         done = orbiflow(*fit, *options)

@@ -19,7 +19,7 @@ def folder_fixture(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ("sphere", "sphere", "radians", np.degrees(angles).clip(-80, 80), ["lat", "lon"]),
     ):
         write(folder / f"{name}.csv", columns, data)
-        fitted = DensityEstimator(space, unit=unit, parts="mixture").fit(data)
+        fitted = DensityEstimator(space, unit=unit, components="mixture").fit(data)
         (folder / name).mkdir()
         (folder / name / "density.safetensors").write_bytes(
             density_to_bytes(fitted.density_, columns=columns)

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-FIT = ("density", "fit", "--parts", "kernels")
+FIT = ("density", "fit", "--components", "kernels")
 
 
 def places(path: Path, header: str) -> Path:

@@ -11,7 +11,7 @@ import pytest
 from cli.conftest import Run
 from orbiflow.density import DensityEstimator, density_to_bytes
 
-KERNELS = ("--parts", "kernels", "--space", "torus", "--unit", "degrees")
+KERNELS = ("--components", "kernels", "--space", "torus", "--unit", "degrees")
 
 
 def table(path: Path, *, gaps: bool = False) -> Path:
@@ -30,7 +30,7 @@ def table(path: Path, *, gaps: bool = False) -> Path:
 def model(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("model")
     values = np.loadtxt(table(folder / "data.csv"), delimiter=",", skiprows=1)[:, :3]
-    fit = DensityEstimator("torus", unit="degrees", parts="kernels").fit(values)
+    fit = DensityEstimator("torus", unit="degrees", components="kernels").fit(values)
     saved = density_to_bytes(fit.density_, columns=["phi", "psi", "chi"])
     (folder / "density.safetensors").write_bytes(saved)
     return folder
@@ -123,7 +123,7 @@ def test_weights_and_missing_angles(tmp_path: Path, orbiflow: Run) -> None:
         ("--weights weight", "no column 'weight'"),
         ("--weights phi --columns phi,psi", "cannot be a column of the data as well"),
         ("--weights chi", "at least 0; row 1 has -"),
-        ("--missing marginalise --drop-missing", "is for: give one"),
+        ("--missing marginalise --drop-missing", "would use; give one"),
         ("--missing marginalise --space sphere --columns phi,psi", "missing"),
     ],
 )

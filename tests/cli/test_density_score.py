@@ -15,7 +15,7 @@ def fitted_fixture(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path
     values = np.random.default_rng(0).normal([20.0, 60.0], 25.0, (100, 2)).clip(-89, 89)
     data = folder / "data.csv"
     np.savetxt(data, values, delimiter=",", fmt="%.4f", header="lat,lon", comments="")
-    estimator = DensityEstimator("sphere", parts="kernels,mixture").fit(values)
+    estimator = DensityEstimator("sphere", components="kernels,mixture").fit(values)
     model = folder / "density.safetensors"
     model.write_bytes(density_to_bytes(estimator.density_))
     return data, model

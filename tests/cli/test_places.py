@@ -16,7 +16,7 @@ from cli.conftest import Run, call_main
 from jobs.searches import boot_request
 from orbiflow.jobs import run
 
-KERNELS = ("--parts", "kernels", "--space", "torus", "--unit", "degrees")
+KERNELS = ("--components", "kernels", "--space", "torus", "--unit", "degrees")
 KEPT = "would replace what is read: choose another --out"
 OWN = "is a file of the run in"
 ALONE = "holds the files of one run alone, and the next run there would refuse others"

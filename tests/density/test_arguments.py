@@ -9,10 +9,10 @@ import torch
 
 from orbiflow.density import (
     AdaptiveKernels,
-    AutomaticSettings,
     DensityEstimator,
-    FitSettings,
+    DensitySettings,
     FlowDensity,
+    FlowSettings,
     Mixture,
     Sphere,
     TabulatedDensity,
@@ -46,7 +46,7 @@ def a_density(space: Any = torus, dtype: torch.dtype = torch.float64) -> FlowDen
 
 POINTS = torch.rand(30, 2, dtype=torch.float64)
 HALVES = torch.full((4,), 0.25)
-QUICK: Any = {"detail": 1, "segments": 1, "iterations": 1}
+QUICK: Any = {"max_frequency": 1, "segments": 1, "iterations": 1}
 
 WRONG: dict[str, tuple[Callable[[], Any], str]] = {
     "a name for a space": (
@@ -110,21 +110,27 @@ WRONG: dict[str, tuple[Callable[[], Any], str]] = {
     "fit: one row": (lambda: fit_density(sphere, torch.rand(2)), r"\(N, 2\), got .*\(2,\)"),
     "fit: nan": (lambda: fit_density(sphere, POINTS / 0 * 0), "points must be finite"),
     "fit: settings": (
-        lambda: fit_density(sphere, POINTS, {"detail": 2}),  # type: ignore[arg-type]
-        "settings must be an? FitSettings",
+        lambda: fit_density(sphere, POINTS, {"max_frequency": 2}),  # type: ignore[arg-type]
+        "settings must be an? FlowSettings",
     ),
     "fit: other settings": (
-        lambda: fit_density(sphere, POINTS, AutomaticSettings()),  # type: ignore[arg-type]
-        "settings must be an? FitSettings",
+        lambda: fit_density(sphere, POINTS, DensitySettings()),  # type: ignore[arg-type]
+        "settings must be an? FlowSettings",
     ),
     "fit: four angles": (lambda: fit_density(Torus(4), torch.rand(30, 4)), "3 dimensions at most"),
-    "detail": (lambda: FitSettings(detail=2.5), "detail must be a whole number from 1 to 64"),  # type: ignore[arg-type]
-    "detail text": (lambda: FitSettings(detail="8"), "detail must be a whole number"),  # type: ignore[arg-type]
-    "seed": (lambda: FitSettings(seed=None), "seed must be a whole number"),  # type: ignore[arg-type]
-    "roughness": (lambda: FitSettings(roughness=1e-3), "roughness needs weights"),  # type: ignore[arg-type]
-    "weights": (lambda: FitSettings(roughness=("a",)), "each weight of roughness"),  # type: ignore[arg-type]
-    "validation": (lambda: FitSettings(validation="a"), "validation must be .*below 1"),  # type: ignore[arg-type]
-    "base": (lambda: FitSettings(base=["uniform"]), "base must be"),  # type: ignore[arg-type]
+    "max_frequency": (
+        lambda: FlowSettings(max_frequency=2.5),
+        "max_frequency must be a whole number from 1 to 64",
+    ),  # type: ignore[arg-type]
+    "frequency text": (
+        lambda: FlowSettings(max_frequency="8"),
+        "max_frequency must be a whole number",
+    ),  # type: ignore[arg-type]
+    "seed": (lambda: FlowSettings(seed=None), "seed must be a whole number"),  # type: ignore[arg-type]
+    "roughness": (lambda: FlowSettings(roughness=1e-3), "roughness must be a list"),  # type: ignore[arg-type]
+    "weights": (lambda: FlowSettings(roughness=("a",)), "roughness: entry 1: must be a number"),  # type: ignore[arg-type]
+    "validation": (lambda: FlowSettings(validation="a"), "validation must be .*below 1"),  # type: ignore[arg-type]
+    "base": (lambda: FlowSettings(base=["uniform"]), "base must be"),  # type: ignore[arg-type]
     "dim": (lambda: Torus("2"), "dim must be a whole number from 1 to 64"),  # type: ignore[arg-type]
     "unit": (lambda: Torus(2, unit=None), "unit must be one of"),  # type: ignore[arg-type]
     "form": (lambda: Sphere(form=["latlon"]), "form must be one of"),  # type: ignore[arg-type]
@@ -168,7 +174,7 @@ def test_dtypes_mix(name: str, flow_dtype: torch.dtype) -> None:
 
 def test_arrays_of_every_kind_are_fitted() -> None:
     for points in (POINTS.numpy(), POINTS.tolist(), POINTS.float()):
-        density, _ = fit_density(torus, points, FitSettings(**QUICK))  # type: ignore[arg-type]
+        density, _ = fit_density(torus, points, FlowSettings(**QUICK))  # type: ignore[arg-type]
         assert density.sample(3).shape == (3, 2)
     whole = np.random.default_rng(0).integers(-90, 90, (30, 2))
     assert DensityEstimator("sphere", **QUICK).fit(whole).sample(2).shape == (2, 2)

@@ -2,6 +2,7 @@
 
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -9,9 +10,8 @@ import torch
 
 from density.blends import kernels_of
 from orbiflow.density import (
-    AutomaticSettings,
     DensityEstimator,
-    FitSettings,
+    DensitySettings,
     FlowDensity,
     Mixture,
     Torus,
@@ -21,12 +21,14 @@ from orbiflow.density import (
     midpoints,
     read_density,
 )
-from orbiflow.density.fitting import PARTS
+from orbiflow.density.fitting import COMPONENTS
 from orbiflow.errors import OrbiflowError
 from orbiflow.jobs import density_requests
 
 SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")
-QUICK = FitSettings(detail=2, segments=2, iterations=10, roughness=(1e-3,))
+QUICK: dict[str, Any] = {
+    "max_frequency": 2, "segments": 2, "iterations": 10, "roughness": (1e-3,)
+}  # fmt: skip
 
 
 def smooth(name: str, count: int = 400, seed: int = 0) -> torch.Tensor:
@@ -39,7 +41,7 @@ def smooth(name: str, count: int = 400, seed: int = 0) -> torch.Tensor:
 @pytest.mark.parametrize("name", SPACES)
 def test_a_fit_by_evidence(name: str, tmp_path: Path) -> None:
     space, said = make_space(name), []
-    settings = AutomaticSettings(flow=QUICK)
+    settings = DensitySettings(**QUICK)
     density, report = fit_automatic(
         space, smooth(name), settings, progress=lambda done, what: said.append((done, what))
     )
@@ -54,8 +56,8 @@ def test_a_fit_by_evidence(name: str, tmp_path: Path) -> None:
     assert held == pytest.approx(-report.validation_nll, abs=0.15)
     assert held > -report.start_nll + 0.5
     wanted = {"flow", "kernels", "mixture"} | ({"chains"} if name == "torus" else set())
-    assert {part.name for part in report.parts} == wanted
-    assert sum(part.share for part in report.parts) == pytest.approx(1, abs=0.05)
+    assert {part.name for part in report.components} == wanted
+    assert sum(part.share for part in report.components) == pytest.approx(1, abs=0.05)
     assert report.repeats is not None
     assert report.repeats.rows == 0
     assert report.notes[0].startswith("chosen by 400 rows held out, in 10 parts")
@@ -73,7 +75,7 @@ def test_a_fit_by_evidence(name: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["torus", "projective-plane"])
 def test_it_is_invariant_and_has_gradients(name: str) -> None:
     space = make_space(name)
-    density, _ = fit_automatic(space, smooth(name, 150), AutomaticSettings(seed=3))
+    density, _ = fit_automatic(space, smooth(name, 150), DensitySettings(seed=3))
     points = torch.rand(20, 2, dtype=torch.float64, generator=torch.Generator().manual_seed(0))
     for element in space.group.cosets:
         one, other = (density.log_prob(space.project(p)) for p in (element(points), points))
@@ -83,7 +85,7 @@ def test_it_is_invariant_and_has_gradients(name: str) -> None:
 
 def test_the_same_seed_gives_the_same_density() -> None:
     space, at = make_space("sphere"), smooth("sphere", 50, 9)
-    settings = [AutomaticSettings(flow=QUICK, seed=seed) for seed in (1, 1, 2)]
+    settings = [DensitySettings(**QUICK, seed=seed) for seed in (1, 1, 2)]
     with torch.no_grad():
         one, same, other = (
             fit_automatic(space, smooth("sphere", 150), s)[0].log_prob(at) for s in settings
@@ -99,7 +101,7 @@ def test_repeated_places_are_mass_unless_said_otherwise() -> None:
     at = points[300:]
     values = {}
     for repeats in ("places", "rounding"):
-        settings = AutomaticSettings(parts=("kernels",), repeats=repeats)
+        settings = DensitySettings(components=("kernels",), repeats=repeats)
         density, report = fit_automatic(space, points, settings)
         with torch.no_grad():
             values[repeats] = float(density.log_prob(at).mean())
@@ -117,20 +119,20 @@ def test_spikes_are_of_places_and_not_of_accidents(close: int, spiky: bool) -> N
     assert (int(narrow.sum()) > 20) == spiky  # some follow the distance to the nearest row
 
 
-@pytest.mark.parametrize("part", PARTS[1:])
+@pytest.mark.parametrize("part", COMPONENTS[1:])
 def test_each_part_alone(part: str) -> None:
-    estimator = DensityEstimator("torus", parts=part)
+    estimator = DensityEstimator("torus", components=part)
     dim = 4 if part == "network" else 3
     angles = np.random.default_rng(0).vonmises([0.0, 1.0, 2.0, 3.0][:dim], 3.0, (200, dim))
     estimator.fit(angles)
-    assert [p.name for p in estimator.report_.parts] == [part]
+    assert [p.name for p in estimator.report_.components] == [part]
     assert estimator.score(angles) > -dim * math.log(2 * math.pi) + 0.5
 
 
 def test_a_flow_alone_is_a_flow() -> None:
-    small = {"detail": 2, "segments": 2, "iterations": 3}
+    small = {"max_frequency": 2, "segments": 2, "iterations": 3}
     angles = np.random.default_rng(0).vonmises([0.0, 1.0], 3.0, (200, 2))
-    found = DensityEstimator("torus", parts="flow", **small).fit(angles).density_  # type: ignore[arg-type]
+    found = DensityEstimator("torus", components="flow", **small).fit(angles).density_  # type: ignore[arg-type]
     assert type(found) is FlowDensity
 
 
@@ -172,14 +174,16 @@ def test_few_points(count: int) -> None:
 
 
 def test_what_cannot_be_chosen_is_refused() -> None:
-    with pytest.raises(OrbiflowError, match="parts must be of flow, kernels"):
-        AutomaticSettings(parts=("trees",))
+    with pytest.raises(OrbiflowError, match=r"components.* must be flow, kernels"):
+        DensitySettings(components=("trees",))
     with pytest.raises(OrbiflowError, match="repeats must be"):
-        AutomaticSettings(repeats="noise")
+        DensitySettings(repeats="noise")
     with pytest.raises(OrbiflowError, match=r"Sphere.* cannot be made of chains alone"):
-        fit_automatic(make_space("sphere"), smooth("sphere"), AutomaticSettings(parts=("chains",)))
+        fit_automatic(
+            make_space("sphere"), smooth("sphere"), DensitySettings(components=("chains",))
+        )
     with pytest.raises(OrbiflowError, match="a flow has 3 dimensions at most"):
-        DensityEstimator("torus", parts="flow,chains").fit(
+        DensityEstimator("torus", components="flow,chains").fit(
             np.zeros((50, 5)) + np.arange(50)[:, None]
         )
     with pytest.raises(OrbiflowError, match="at least 10 different points, got 3 among 30"):
@@ -187,7 +191,7 @@ def test_what_cannot_be_chosen_is_refused() -> None:
 
 
 def test_the_request_knows_the_same_parts() -> None:
-    assert density_requests.PARTS == PARTS
+    assert density_requests.PARTS == COMPONENTS == get_args(Component)
 
 
 def test_parts_for_new_groups() -> None:
@@ -197,7 +201,7 @@ def test_parts_for_new_groups() -> None:
     label = np.repeat(np.arange(60), 8)
     points = space.to_chart(middles[label] + 0.01 * rng.normal(size=(480, 2)))
     new = space.to_chart(rng.vonmises(0.0, 2.0, (2000, 2)))
-    chosen = AutomaticSettings(parts=("kernels", "mixture"))
+    chosen = DensitySettings(components=("kernels", "mixture"))
     alone, _ = fit_automatic(space, points, chosen)
     grouped, report = fit_automatic(space, points, chosen, groups=label)
     assert "of whole groups, of which there are 60" in " ".join(report.notes)

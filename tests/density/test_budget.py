@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from orbiflow.density import (
-    FitSettings,
     FlowDensity,
+    FlowSettings,
     fit_density,
     make_space,
 )
@@ -21,7 +21,7 @@ from orbiflow.fields import SplineField
 from orbiflow.flows import Flow
 
 SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")
-SMALL: dict[str, Any] = {"detail": 2, "segments": 2}
+SMALL: dict[str, Any] = {"max_frequency": 2, "segments": 2}
 
 
 class Clock:
@@ -71,7 +71,7 @@ def test_a_budget_counts(limit: int, wanted: int) -> None:
 
 def test_without_a_limit_no_clock_is_asked(striking_after) -> None:
     clock = striking_after(math.inf)
-    fit_density(make_space("torus"), cluster("torus"), FitSettings(**SMALL, iterations=3))
+    fit_density(make_space("torus"), cluster("torus"), FlowSettings(**SMALL, iterations=3))
     assert clock.asked <= 5  # when budgets begin
 
 
@@ -79,7 +79,7 @@ def test_without_a_limit_no_clock_is_asked(striking_after) -> None:
 @pytest.mark.parametrize("name", SPACES)
 def test_the_integral_does_not_depend_on_the_clock(name: str, looks: int, striking_after) -> None:
     clock = striking_after(looks)
-    settings = FitSettings(**SMALL, seconds=1.0)
+    settings = FlowSettings(**SMALL, seconds=1.0)
     density, report = fit_density(make_space(name), cluster(name), settings)
     assert report.mass == pytest.approx(1.0, abs=5e-4)
     assert density.mass(96) == pytest.approx(1.0, abs=1e-3)
@@ -93,7 +93,7 @@ def test_the_same_evaluations_give_the_same_density(name: str, striking_after) -
     space, points, values = make_space(name), cluster(name), []
     for _ in range(2):
         clock = striking_after(10**6)  # never, however many looks
-        settings = FitSettings(**SMALL, evaluations=25, seconds=1e6)
+        settings = FlowSettings(**SMALL, evaluations=25, seconds=1e6)
         density, report = fit_density(space, points, settings)
         assert clock.asked > 20
         assert report.notes == ("stopped by the budget of 25 evaluations",)
@@ -103,9 +103,9 @@ def test_the_same_evaluations_give_the_same_density(name: str, striking_after) -
 
 
 def test_the_default_budget_leaves_the_defaults_alone() -> None:
-    settings, points = FitSettings(**SMALL), cluster("sphere")
+    settings, points = FlowSettings(**SMALL), cluster("sphere")
     few, many = (
-        fit_density(make_space("sphere"), points, FitSettings(**SMALL, evaluations=count))
+        fit_density(make_space("sphere"), points, FlowSettings(**SMALL, evaluations=count))
         for count in (settings.evaluations, 10**9)
     )
     assert few[1].validation_nll == many[1].validation_nll

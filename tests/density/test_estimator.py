@@ -37,7 +37,7 @@ DATA = {
 
 @pytest.mark.parametrize("space", DATA)
 def test_the_estimator(space: str) -> None:
-    estimator = DensityEstimator(space, detail=2, segments=2, iterations=8)
+    estimator = DensityEstimator(space, max_frequency=2, segments=2, iterations=8)
     with pytest.raises(OrbiflowError, match="not fitted yet"):
         estimator.sample()
     assert estimator.fit(DATA[space]) is estimator
@@ -55,7 +55,7 @@ def test_the_estimator(space: str) -> None:
 
 
 def test_units_change_the_density_by_their_ratio() -> None:
-    small: dict[str, Any] = {"detail": 2, "segments": 2, "iterations": 5}
+    small: dict[str, Any] = {"max_frequency": 2, "segments": 2, "iterations": 5}
     radians = DensityEstimator("torus", **small).fit(DATA["torus"])
     degrees = DensityEstimator("torus", unit="degrees", **small).fit(np.degrees(DATA["torus"]))
     shift = radians.score_samples(DATA["torus"]) - degrees.score_samples(np.degrees(DATA["torus"]))
@@ -63,10 +63,10 @@ def test_units_change_the_density_by_their_ratio() -> None:
 
 
 def test_parameters_of_the_estimator() -> None:
-    estimator = DensityEstimator("sphere", detail=3)
-    assert estimator.get_params()["detail"] == 3
-    assert estimator.set_params(detail=5).detail == 5
-    assert repr(estimator) == "DensityEstimator(space='sphere', detail=5)"
+    estimator = DensityEstimator("sphere", max_frequency=3)
+    assert estimator.get_params()["max_frequency"] == 3
+    assert estimator.set_params(max_frequency=5).max_frequency == 5
+    assert repr(estimator) == "DensityEstimator(space='sphere', max_frequency=5)"
     with pytest.raises(OrbiflowError, match="no parameter 'depth'"):
         estimator.set_params(depth=1)
     with pytest.raises(OrbiflowError, match="unknown space 'moebius'"):
@@ -75,15 +75,15 @@ def test_parameters_of_the_estimator() -> None:
 
 def test_a_grid_search() -> None:
     search = GridSearchCV(
-        DensityEstimator("torus", segments=2, iterations=3), {"detail": [1, 2]}, cv=2
+        DensityEstimator("torus", segments=2, iterations=3), {"max_frequency": [1, 2]}, cv=2
     ).fit(DATA["torus"][:120])
-    assert search.best_params_["detail"] in (1, 2)
+    assert search.best_params_["max_frequency"] in (1, 2)
     assert math.isfinite(search.best_score_)
 
 
 @pytest.fixture(name="fitted", scope="module")
 def fitted_fixture() -> DensityEstimator:
-    return DensityEstimator("torus", detail=1, segments=1, iterations=0).fit(DATA["torus"])
+    return DensityEstimator("torus", max_frequency=1, segments=1, iterations=0).fit(DATA["torus"])
 
 
 def test_samples_are_new_at_every_call(fitted: DensityEstimator) -> None:

@@ -24,7 +24,7 @@ def fitted() -> DensityEstimator:
     rng = np.random.default_rng(0)
     first = rng.vonmises(0.5, 3.0, 150)
     angles = np.degrees(np.stack([first, first + rng.vonmises(0, 9.0, 150)], axis=1))
-    return DensityEstimator("torus", unit="degrees", parts="kernels,chains").fit(
+    return DensityEstimator("torus", unit="degrees", components="kernels,chains").fit(
         Frame(angles, ["phi", "psi"])
     )
 
@@ -60,7 +60,7 @@ def test_mistakes_are_named(fitted: DensityEstimator) -> None:
         fitted.conditional(psi="left")  # type: ignore[arg-type]
     with pytest.raises(OrbiflowError, match="not fitted"):
         DensityEstimator("torus").marginal("phi")
-    sphere = DensityEstimator("sphere", parts="kernels").fit(
+    sphere = DensityEstimator("sphere", components="kernels").fit(
         np.random.default_rng(0).uniform(-60, 60, (40, 2))
     )
     with pytest.raises(OrbiflowError, match="on a torus; on the sphere"):

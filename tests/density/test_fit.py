@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from orbiflow.density import (
-    FitSettings,
     FlowDensity,
+    FlowSettings,
     KleinBottle,
     ProjectivePlane,
     Sphere,
@@ -33,7 +33,7 @@ from orbiflow.flows import Flow
 SPACES = (Torus(2), Sphere(), KleinBottle(), ProjectivePlane())
 every = pytest.mark.parametrize("space", SPACES, ids=lambda s: s.name)
 seeds = st.integers(0, 2**31 - 1)
-QUICK = FitSettings(detail=3, segments=2, iterations=15)
+QUICK = FlowSettings(max_frequency=3, segments=2, iterations=15)
 
 
 def blob(space, count: int = 600, seed: int = 0) -> torch.Tensor:
@@ -113,7 +113,7 @@ def test_what_only_the_integrators_error_gained_is_undone(name: str) -> None:
     rng = np.random.default_rng(0)
     space = make_space(name, unit="degrees")
     points = space.to_chart(rng.normal([20.0, 60.0], 15.0, (200, 2)).clip(-89, 89))
-    _, report = fit_density(space, points, FitSettings(detail=2, segments=2))
+    _, report = fit_density(space, points, FlowSettings(max_frequency=2, segments=2))
     # with one step a segment, refinement tore the Klein bottle's flow: 3.7 nats worse than its start
     assert report.validation_nll < report.start_nll + 0.01
     assert report.train_nll < -2.5
@@ -124,7 +124,9 @@ def test_what_only_the_integrators_error_gained_is_undone(name: str) -> None:
 def test_the_same_seed_gives_the_same_density() -> None:
     points = blob(Torus(2), 200)
     one, other, another = (
-        fit_density(Torus(2), points, FitSettings(detail=2, segments=2, iterations=5, seed=seed))[0]
+        fit_density(
+            Torus(2), points, FlowSettings(max_frequency=2, segments=2, iterations=5, seed=seed)
+        )[0]
         for seed in (1, 1, 2)
     )
     with torch.no_grad():
@@ -176,8 +178,8 @@ def test_held_out_scores_are_of_the_points_themselves() -> None:
 @pytest.mark.parametrize(
     "changes",
     [
-        {"detail": 0},
-        {"detail": 65},
+        {"max_frequency": 0},
+        {"max_frequency": 65},
         {"segments": 0},
         {"steps": 0},
         {"ridge": -1.0},
@@ -192,4 +194,4 @@ def test_held_out_scores_are_of_the_points_themselves() -> None:
 )
 def test_settings_out_of_range(changes) -> None:
     with pytest.raises(OrbiflowError, match=next(iter(changes))):
-        FitSettings(**changes)
+        FlowSettings(**changes)

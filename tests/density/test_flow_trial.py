@@ -1,13 +1,14 @@
 """Whether a flow belongs beside other parts: what it is compared with, how far it is."""
 
 from dataclasses import asdict
+from typing import Any
 
 import numpy as np
 import pytest
 import torch
 
-from orbiflow.density import AutomaticSettings, FitSettings, Torus, fit_automatic, weighed
-from orbiflow.density.fitting import PARTS, flow_trial
+from orbiflow.density import DensitySettings, Torus, fit_automatic, weighed
+from orbiflow.density.fitting import COMPONENTS, flow_trial
 from orbiflow.density.fitting.automatic import BEFORE_END
 from orbiflow.density.fitting.budget import Budget
 from orbiflow.density.fitting.evidence import (
@@ -22,14 +23,16 @@ from orbiflow.density.fitting.flow_trial import (
     try_flow,
 )
 from orbiflow.density.fitting.folds import Folds, folds_of
-from orbiflow.density.fitting.report import PartEvidence
+from orbiflow.density.fitting.report import ComponentEvidence
 from orbiflow.density.fitting.weights import (
     Gain,
     stacked,
     supported_weights,
 )
 
-QUICK = FitSettings(detail=2, segments=2, iterations=10, roughness=(1e-3,))
+QUICK: dict[str, Any] = {
+    "max_frequency": 2, "segments": 2, "iterations": 10, "roughness": (1e-3,)
+}  # fmt: skip
 SPACE = Torus(2)
 
 
@@ -52,7 +55,7 @@ def evidence(weights: np.ndarray | None = None) -> tuple[Folds, Candidates, torc
 def tried(
     folds: Folds, candidates: Candidates, weights: torch.Tensor, told=lambda *_: None
 ) -> TriedFlow:
-    return try_flow(SPACE, folds, candidates, weights, QUICK, Budget(), told)
+    return try_flow(SPACE, folds, candidates, weights, FlowSettings(**QUICK), Budget(), told)
 
 
 @pytest.mark.parametrize("tenths", [1, 2])
@@ -69,11 +72,11 @@ def test_progress_goes_on_from_one_tenth_to_the_next(
     assert max(shares) <= (FIRST, 1)[tenths - 1]
 
 
-@pytest.mark.parametrize("parts", [PARTS, PARTS[1:], ("kernels",)])
+@pytest.mark.parametrize("parts", [COMPONENTS, COMPONENTS[1:], ("kernels",)])
 def test_no_step_of_a_fit_is_half_of_it(parts: tuple[str, ...]) -> None:
     rng, shares = np.random.default_rng(0), [0.0]
     points = SPACE.project(torch.tensor(0.1 * rng.normal(size=(700, 2))))
-    settings = AutomaticSettings(parts=parts, flow=QUICK if "flow" in parts else None)
+    settings = DensitySettings(components=parts, **(QUICK if "flow" in parts else {}))
     fit_automatic(SPACE, points, settings, progress=lambda done, _: shares.append(done))
     assert shares == sorted(shares)
     assert shares[-1] == BEFORE_END
@@ -97,17 +100,17 @@ def test_a_flow_is_compared_at_the_rows_that_it_was_tried_on(
     expected = np.average(above, weights=None if row_weights is None else row_weights[: flow.rows])
     assert flow.others == pytest.approx(expected, abs=1e-12)
     assert flow.alone < expected + 0.1
-    assert PartEvidence(**asdict(flow)) == flow
+    assert ComponentEvidence(**asdict(flow)) == flow
     (kernels,) = judged(candidates, weights)
     assert kernels.others is None
     assert kernels.rows == 350
 
 
 def test_it_is_said_of_which_rows_a_figure_is() -> None:
-    flow = PartEvidence("flow", 0.0, 1.5264, 0.0, 0.0, 233, 1.529)
+    flow = ComponentEvidence("flow", 0.0, 1.5264, 0.0, 0.0, 233, 1.529)
     assert str(flow) == (
         "flow: 0.0%, would add nothing; alone 1.5264 over uniform at 233 of these rows, where the "
         "others have 1.5290"
     )
-    kernels = PartEvidence("kernels", 0.5, 1.5, 0.01, 0.002, 699)
+    kernels = ComponentEvidence("kernels", 0.5, 1.5, 0.01, 0.002, 699)
     assert str(kernels) == "kernels: 50.0%, worth 0.0100 ± 0.0020 nats; alone 1.5000 over uniform"

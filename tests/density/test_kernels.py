@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from density.blends import kernels_of
 from orbiflow.density import (
     AdaptiveKernels,
-    FitSettings,
     FlowDensity,
+    FlowSettings,
     Mixture,
     UniformDensity,
     blend_kernels,
@@ -107,7 +107,7 @@ def test_a_mixture_beats_both_parts_on_clusters(name: str, tmp_path) -> None:
 
 
 def test_a_fit_with_kernels_says_its_shares() -> None:
-    settings_ = FitSettings(detail=2, segments=2, iterations=5, kernels=True)
+    settings_ = FlowSettings(max_frequency=2, segments=2, iterations=5, kernels=True)
     density, report = fit_density(make_space("torus"), clustered("torus"), settings_)
     assert isinstance(density, Mixture)
     assert report.weights is not None

@@ -26,7 +26,7 @@ def data(count: int = 400) -> np.ndarray:
 
 def test_five_angles(tmp_path: Path) -> None:
     points = data()
-    estimator = DensityEstimator("torus", unit="degrees", evaluations=20).fit(points[:300])
+    estimator = DensityEstimator("torus", unit="degrees").fit(points[:300])
     assert isinstance(estimator.density_, Mixture)
     assert "chains" in estimator.density_.weight_of_kind
     assert estimator.score(points[300:]) > -5 * np.log(360) + 3
@@ -49,7 +49,7 @@ def test_five_angles(tmp_path: Path) -> None:
     ("settings", "named"),
     [
         ({"kernels": True}, "kernels would"),
-        ({"base": "von-mises", "detail": 16}, "detail, base would"),
+        ({"base": "von-mises", "max_frequency": 16}, "max_frequency, base would"),
         ({"iterations": 3}, "iterations would"),
     ],
 )

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from density.blends import random_kernels
 from orbiflow.arrays import Array
 from orbiflow.density import (
-    AutomaticSettings,
     DensityEstimator,
+    DensitySettings,
     Torus,
     at_observed,
     density_to_bytes,
@@ -26,7 +26,7 @@ from orbiflow.density.fitting.rows import Rows, with_incomplete
 from orbiflow.errors import OrbiflowError
 
 seeds = st.integers(0, 2**31)
-MARGINALISE = AutomaticSettings(parts=("kernels", "mixture"), missing="marginalise")
+BOTH = DensitySettings(components=("kernels", "mixture"))
 
 
 def two_clusters(seed: int, count: int, share: float = 0.5) -> Array:
@@ -71,7 +71,7 @@ def test_rows_that_lack_angles_tell_how_common_places_are() -> None:
     """Whole rows have one cluster too rarely; rows that know the first angle alone make up for it."""
     whole, rest = two_clusters(0, 200, 0.1), two_clusters(1, 600, 0.6)
     rest[:, 1] = np.nan
-    density = DensityEstimator("torus", missing="marginalise", parts="kernels,mixture").fit(
+    density = DensityEstimator("torus", missing="marginalise", components="kernels,mixture").fit(
         np.concatenate([whole, rest])
     )
     drawn = density.sample(4000, random_state=0)
@@ -85,7 +85,7 @@ def test_rows_that_lack_angles_tell_how_common_places_are() -> None:
 def test_whole_rows_are_fitted_as_ever() -> None:
     angles = two_clusters(2, 120)
     one, other = (
-        DensityEstimator("torus", parts="kernels,mixture", missing=missing).fit(angles)
+        DensityEstimator("torus", components="kernels,mixture", missing=missing).fit(angles)
         for missing in ("refuse", "marginalise")
     )
     assert density_to_bytes(one.density_) == density_to_bytes(other.density_)
@@ -98,9 +98,13 @@ def test_weights_and_rows_without_any_angle() -> None:
     weights = np.linspace(1, 2, 90)
     space = Torus(2)
     points = torch.tensor(angles / (2 * np.pi))
-    found, report = fit_automatic(space, points, MARGINALISE, weights=weights)
+    found, report = fit_automatic(space, points, BOTH, missing="marginalise", weights=weights)
     again, _ = fit_automatic(
-        space, points[np.arange(90) != 5], MARGINALISE, weights=weights[np.arange(90) != 5]
+        space,
+        points[np.arange(90) != 5],
+        BOTH,
+        missing="marginalise",
+        weights=weights[np.arange(90) != 5],
     )
     assert density_to_bytes(found) == density_to_bytes(again)
     assert report.points == 89
@@ -108,7 +112,9 @@ def test_weights_and_rows_without_any_angle() -> None:
 
 
 def test_scores_are_of_the_angles_that_are_there() -> None:
-    fit = DensityEstimator("torus", parts="kernels", missing="marginalise").fit(two_clusters(4, 60))
+    fit = DensityEstimator("torus", components="kernels", missing="marginalise").fit(
+        two_clusters(4, 60)
+    )
     rows = np.array([[0.1, np.nan], [np.nan, 1.1], [0.1, 1.1], [np.nan, np.nan]])
     found = fit.score_samples(rows)
     first, second = fit.marginal("angle1"), fit.marginal(1)
@@ -125,8 +131,8 @@ def test_mistakes_are_named() -> None:
     angles[0, 1] = np.nan
     for options, message in (
         ({}, "missing"),
-        ({"missing": "marginalise", "parts": "chains"}, "chains cannot be fitted"),
-        ({"missing": "marginalise", "parts": "flow"}, "flows cannot"),
+        ({"missing": "marginalise", "components": "chains"}, "chains cannot be fitted"),
+        ({"missing": "marginalise", "components": "flow"}, "missing marginalise needs kernels"),
         ({"missing": "guess"}, "missing must be one of"),
         ({"missing": "marginalise", "space": "klein-bottle"}, "missing or infinite"),
     ):

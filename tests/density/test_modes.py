@@ -11,8 +11,8 @@ import torch
 from density.blends import flow_of
 from orbiflow.density import (
     DensityEstimator,
-    FitSettings,
     FlowDensity,
+    FlowSettings,
     TabulatedDensity,
     UniformDensity,
     density_to_bytes,
@@ -25,7 +25,7 @@ from orbiflow.flows import Flow
 
 SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")
 DATA = np.random.default_rng(0).normal([20.0, 40.0], 10.0, (60, 2))
-QUICK: dict[str, Any] = {"detail": 1, "segments": 1, "iterations": 3}
+QUICK: dict[str, Any] = {"max_frequency": 1, "segments": 1, "iterations": 3}
 
 
 @pytest.fixture(name="three_threads")
@@ -118,7 +118,7 @@ def test_no_cache_is_poisoned_when_it_is_first_filled_under_inference(name: str,
             space.displacement(at, at.flip(0))
     fresh = make_space(name)
     points = fresh.uniform(60, torch.Generator().manual_seed(0))
-    found, _ = fit_density(fresh, points, FitSettings(detail=3, segments=1, iterations=2))
+    found, _ = fit_density(fresh, points, FlowSettings(max_frequency=3, segments=1, iterations=2))
     found.log_prob(points.requires_grad_()).sum().backward()
     assert points.grad is not None
     points.grad = None

@@ -278,14 +278,16 @@ def test_arrows_are_along_the_chain() -> None:
 def test_the_default_takes_a_network_where_states_multiply() -> None:
     angles = states(5, 500, 8)
     scores = {
-        parts: DensityEstimator("torus", parts=parts, seed=1).fit(angles[:360]).score(angles[360:])
+        parts: DensityEstimator("torus", components=parts, seed=1)
+        .fit(angles[:360])
+        .score(angles[360:])
         for parts in ("kernels,mixture", "network", "auto")
     }
     assert scores["network"] > scores["kernels,mixture"] + 0.5
     assert scores["auto"] > scores["network"] - 0.05
     small = np.random.default_rng(0).vonmises(0, 2, (50, 2))
     with pytest.raises(OrbiflowError, match="cannot be made of network alone"):
-        DensityEstimator("torus", parts="network").fit(small)
+        DensityEstimator("torus", components="network").fit(small)
 
 
 @given(seeds)

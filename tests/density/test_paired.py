@@ -165,16 +165,16 @@ def test_mistakes(call: Any, message: str) -> None:
 def test_models_are_compared_in_one_measure() -> None:
     rng = np.random.default_rng(6)
     angles = rng.vonmises([0.0, 1.0], 4.0, (160, 2))
-    good = DensityEstimator(parts="mixture").fit(angles[:80])
-    poor = DensityEstimator(parts="mixture").fit(rng.uniform(-3, 3, (80, 2)))
+    good = DensityEstimator(components="mixture").fit(angles[:80])
+    poor = DensityEstimator(components="mixture").fit(rng.uniform(-3, 3, (80, 2)))
     found = compare_models({"good": good, "poor": poor.density_}, angles[80:])
     assert isinstance(found, ModelComparison)
     assert found.best == "good"
     assert found.scores[0].mean == pytest.approx(good.score(angles[80:]))
-    degrees = DensityEstimator(unit="degrees", parts="mixture").fit(np.degrees(angles[:80]))
+    degrees = DensityEstimator(unit="degrees", components="mixture").fit(np.degrees(angles[:80]))
     with pytest.raises(OrbiflowError, match="radians, deg in degrees"):
         compare_models({"rad": good, "deg": degrees}, angles)
-    globe = DensityEstimator("sphere", parts="mixture").fit(angles[:80])
+    globe = DensityEstimator("sphere", components="mixture").fit(angles[:80])
     with pytest.raises(OrbiflowError, match="torus of 2 angles, globe on the sphere"):
         compare_models({"flat": good, "globe": globe}, angles)
     assert make_space("torus").dim == 2

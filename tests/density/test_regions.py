@@ -197,7 +197,7 @@ def test_islands_between_the_nodes_are_found() -> None:
 def test_thresholds_in_any_dimension(dim: int) -> None:
     rng = np.random.default_rng(dim)
     data = rng.vonmises(np.zeros(dim), 3.0, (300, dim))
-    estimator = DensityEstimator(parts="mixture").fit(data)
+    estimator = DensityEstimator(components="mixture").fit(data)
     levels = DensityLevels(estimator, samples=4000)
     fresh = estimator.sample(2000, random_state=1)
     assert kstest(levels.hdr(fresh), "uniform").pvalue > 1e-4

@@ -136,7 +136,9 @@ def test_merged_points_carry_their_weights(seed: int, cells: int) -> None:
 
 def test_a_flow_descends_on_the_weighted_likelihood() -> None:
     points, weights, rows = repeated(0, 200)
-    estimator = DensityEstimator("torus", parts="flow", detail=2, segments=2, iterations=3)
+    estimator = DensityEstimator(
+        "torus", components="flow", max_frequency=2, segments=2, iterations=3
+    )
     density = estimator.fit(points.numpy() * 2 * math.pi, sample_weight=weights.numpy()).density_
     both = [
         Objective(flow_of(density), part, own, kinetic=0.0, roughness=1e-3)
@@ -147,10 +149,10 @@ def test_a_flow_descends_on_the_weighted_likelihood() -> None:
     assert slope == pytest.approx(also, abs=1e-9)
 
 
-@pytest.mark.parametrize("options", [{}, {"parts": "flow"}, {"kernels": True}])
+@pytest.mark.parametrize("options", [{}, {"components": "flow"}, {"kernels": True}])
 def test_equal_weights_are_none(options: dict[str, object]) -> None:
     angles = np.random.default_rng(0).vonmises([0.0, 1.0], 4.0, (310, 2))
-    few_waves = {"detail": 2, "segments": 1, "iterations": 3}
+    few_waves = {"max_frequency": 2, "segments": 1, "iterations": 3}
     first, second = (
         DensityEstimator("torus", **few_waves, **options).fit(angles, sample_weight=weight)  # type: ignore[arg-type]
         for weight in (None, np.full(310, 0.3))
@@ -167,20 +169,20 @@ def test_a_fit_follows_its_weights(space: str) -> None:
     made = make_space(space)
     data = made.from_chart(torch.tensor(chart))
     weights = np.repeat([0.9, 0.1], 50)
-    some = DensityEstimator(made, parts="kernels").fit(data, sample_weight=weights)
+    some = DensityEstimator(made, components="kernels").fit(data, sample_weight=weights)
     drawn = some.density_.sample((3000,), torch.Generator().manual_seed(0))
     near, far = (made.distance(torch.tensor(at).expand(3000, 2), drawn) for at in PLACES)
     assert float((near < far).double().mean()) == pytest.approx(0.9, abs=0.05)
     assert some.report_.effective == pytest.approx(effective_rows(torch.tensor(weights)))
     assert any("100 rows say as much as" in note for note in some.report_.notes)
     ghosts = np.concatenate([data, data[::-1]]), np.concatenate([weights, np.zeros(100)])
-    again = DensityEstimator(made, parts="kernels").fit(ghosts[0], sample_weight=ghosts[1])
+    again = DensityEstimator(made, components="kernels").fit(ghosts[0], sample_weight=ghosts[1])
     assert density_to_bytes(again.density_) == density_to_bytes(some.density_)
 
 
 def test_the_score_is_the_weighted_mean() -> None:
     angles = np.random.default_rng(0).vonmises([0.0, 1.0], 4.0, (60, 2))
-    fit = DensityEstimator("torus", parts="kernels").fit(angles)
+    fit = DensityEstimator("torus", components="kernels").fit(angles)
     weights = np.arange(60.0)
     own = fit.score_samples(angles)
     assert fit.score(angles, sample_weight=weights) == pytest.approx(

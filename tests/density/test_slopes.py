@@ -131,7 +131,7 @@ def test_both_ends_of_an_axis_point_uphill_alike() -> None:
 
 def test_the_estimator_has_it() -> None:
     angles = np.random.default_rng(0).vonmises(1.0, 4.0, (80, 1))
-    estimator = DensityEstimator("torus", parts="mixture").fit(angles)
+    estimator = DensityEstimator("torus", components="mixture").fit(angles)
     slope = estimator.score_gradient([[0.5], [1.5]])
     assert slope[0, 0] > 0 > slope[1, 0]
     assert estimator.score_gradient(np.zeros((0, 1))).shape == (0, 1)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from orbiflow.density import (
     AdaptiveKernels,
-    AutomaticSettings,
+    DensitySettings,
     UniformDensity,
     VonMisesChains,
     fit_automatic,
@@ -226,7 +226,7 @@ def test_groups_are_held_out_whole(seed: int, count: int, rows: int) -> None:
 )
 def test_groups_that_cannot_be_held_out(labels: list[object], said: str) -> None:
     space, points = make_space("torus"), torch.rand(40, 2, dtype=torch.float64)
-    chosen = AutomaticSettings(parts=("kernels", "mixture", "chains"))
+    chosen = DensitySettings(components=("kernels", "mixture", "chains"))
     with pytest.raises(OrbiflowError, match=said):
         fit_automatic(space, points, chosen, groups=labels)  # type: ignore[arg-type]
     weights = torch.arange(40) < 20

@@ -153,7 +153,7 @@ def _document(
     return {
         "space": {"name": estimator.space_.name, **estimator.space_.settings()},
         "fold": request.fold,
-        "parts": request.parts,
+        "components": request.parts,
         "rows": int(held.sum()),
         "fitted": int((~held).sum()),
         "log_likelihood": mean,

@@ -110,7 +110,7 @@ def test_densities_from_wherever_they_are(tmp_path: Path) -> None:
 
 
 def test_a_fitted_estimator_is_drawn_and_another_refused(tmp_path: Path) -> None:
-    estimator = DensityEstimator("torus", detail=1, segments=1, iterations=2)
+    estimator = DensityEstimator("torus", max_frequency=1, segments=1, iterations=2)
     with pytest.raises(OrbiflowError, match=r"call fit\(data\) first"):
         plot_density(estimator, tmp_path / "a.pdf")
     plot_density(estimator.fit(DATA), tmp_path / "a.pdf")

@@ -36,7 +36,7 @@ def pixels(png: bytes) -> np.ndarray:
 def test_every_space_has_one_that_is_the_same_every_time(name: str) -> None:
     space, count = SPACES[name]
     data = data_of(count)
-    density = DensityEstimator(space, parts="kernels").fit(data).density_
+    density = DensityEstimator(space, components="kernels").fit(data).density_
     png = density_thumbnail(density, data)
     assert png == density_thumbnail(density, data)
     assert len(png) < 80_000
@@ -46,7 +46,7 @@ def test_every_space_has_one_that_is_the_same_every_time(name: str) -> None:
 
 def test_the_brightest_place_of_the_square_is_the_peak() -> None:
     data = np.degrees(np.random.default_rng(0).vonmises([1.2, -0.8], 40.0, (80, 2)))
-    density = DensityEstimator(unit="degrees", parts="kernels").fit(data).density_
+    density = DensityEstimator(unit="degrees", components="kernels").fit(data).density_
     found = pixels(density_thumbnail(density, data))
     # viridis ends in yellow; beside the square, from 60 to 300, there is paper
     yellow = (found[..., 0] + found[..., 1] - found[..., 2])[:, 60:300]
@@ -57,6 +57,6 @@ def test_the_brightest_place_of_the_square_is_the_peak() -> None:
 
 def test_rows_that_lack_angles_are_left_out() -> None:
     data = data_of(1)
-    density = DensityEstimator(parts="kernels").fit(data).density_
+    density = DensityEstimator(components="kernels").fit(data).density_
     with_missing = np.concatenate([data, [[np.nan]]])
     assert density_thumbnail(density, data) == density_thumbnail(density, with_missing)

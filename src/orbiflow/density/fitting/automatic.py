@@ -43,8 +43,8 @@ from orbiflow.density.fitting.folds import (
 )
 from orbiflow.density.fitting.kernels import NARROWEST
 from orbiflow.density.fitting.report import (
+    ComponentEvidence,
     FitReport,
-    PartEvidence,
     Progress,
     mass_with,
     mean_nll,
@@ -272,7 +272,7 @@ def _shares_of(folds: Folds) -> str:
     return f"of whole groups, of which there are {count}"
 
 
-def _shrunk(parts: list[PartEvidence], flow: float) -> list[PartEvidence]:
+def _shrunk(parts: list[ComponentEvidence], flow: float) -> list[ComponentEvidence]:
     """Beside a flow of this share."""
     return [replace(part, share=part.share * (1 - flow)) for part in parts]
 
@@ -283,7 +283,7 @@ def _report(
     candidates: Candidates,
     weights: Tensor,
     tried: TriedFlow,
-    parts: tuple[PartEvidence, ...],
+    parts: tuple[ComponentEvidence, ...],
     found: Repeats,
     settings: DensitySettings,
     budget: Budget,
@@ -319,7 +319,7 @@ def _report(
         mass=mass,
         integration_error=error,
         weights=density.weight_of_kind,
-        parts=parts,
+        components=parts,
         repeats=found,
         effective=None if folds.rows.weights is None else effective_rows(folds.rows.weights),
         notes=(

@@ -13,7 +13,7 @@ from torch import Tensor
 from orbiflow.density.fitting.budget import Budget
 from orbiflow.density.fitting.families import Family
 from orbiflow.density.fitting.folds import Folds
-from orbiflow.density.fitting.report import PartEvidence, Progress
+from orbiflow.density.fitting.report import ComponentEvidence, Progress
 from orbiflow.density.fitting.rows import (
     Rows,
     log_prob_of_rows,
@@ -143,11 +143,11 @@ def without_idle(candidates: Candidates, weights: Tensor) -> Tensor:
         )
 
 
-def judged(candidates: Candidates, weights: Tensor) -> list[PartEvidence]:
+def judged(candidates: Candidates, weights: Tensor) -> list[ComponentEvidence]:
     """What each family is worth in the mixture of these weights (P,)."""
     table, own_weights = candidates.table, candidates.row_weights
     whole, uniform = stacked(table, weights), table[-1]
-    found: list[PartEvidence] = []
+    found: list[ComponentEvidence] = []
     names = [name for name in dict.fromkeys(candidates.families) if name != FLOOR]
     for name in names:
         own = candidates.of(name)
@@ -160,5 +160,5 @@ def judged(candidates: Candidates, weights: Tensor) -> list[PartEvidence]:
             without = stacked(table[rest], others)
             gain = gain_of(whole, without, own_weights)
         above = mean_of(alone - uniform, own_weights)
-        found.append(PartEvidence(name, share, above, gain.nats, gain.error, table.shape[1]))
+        found.append(ComponentEvidence(name, share, above, gain.nats, gain.error, table.shape[1]))
     return found

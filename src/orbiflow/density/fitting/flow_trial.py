@@ -13,7 +13,7 @@ from orbiflow.density.fitting.budget import Budget
 from orbiflow.density.fitting.evidence import Candidates
 from orbiflow.density.fitting.flow import fit_density
 from orbiflow.density.fitting.folds import Folds
-from orbiflow.density.fitting.report import FitReport, PartEvidence
+from orbiflow.density.fitting.report import ComponentEvidence, FitReport
 from orbiflow.density.fitting.rows import Rows, mean_of
 from orbiflow.density.fitting.settings import FlowSettings
 from orbiflow.density.fitting.weights import (
@@ -41,7 +41,7 @@ class TriedFlow(NamedTuple):
 
     flow: Density | None = None
     share: float = 0.0
-    evidence: tuple[PartEvidence, ...] = ()
+    evidence: tuple[ComponentEvidence, ...] = ()
     report: FitReport | None = None
 
 
@@ -98,14 +98,14 @@ def _beside(density: Density, held: Rows, columns: Tensor, weights: Tensor) -> T
     return torch.stack([stacked(columns, weights), own, columns[-1]])
 
 
-def _worth(tables: list[Tensor], held: list[Rows]) -> PartEvidence:
+def _worth(tables: list[Tensor], held: list[Rows]) -> ComponentEvidence:
     others, own, uniform = torch.cat(tables, dim=1)
     known = [rows.weights for rows in held if rows.weights is not None]
     row_weights = torch.cat(known) if known else None
     table = torch.stack([others, own])
     both = stacking_weights(table, row_weights)
     gain = gain_of(stacked(table, both), others, row_weights)
-    return PartEvidence(
+    return ComponentEvidence(
         "flow",
         float(both[1]),
         mean_of(own - uniform, row_weights),
@@ -116,7 +116,7 @@ def _worth(tables: list[Tensor], held: list[Rows]) -> PartEvidence:
     )
 
 
-def _is_worth_it(worth: PartEvidence) -> bool:
+def _is_worth_it(worth: ComponentEvidence) -> bool:
     # a weight chosen on these rows gains one nat among all of them by chance
     return worth.gain * worth.rows >= 1
 

@@ -31,8 +31,8 @@ Progress = Callable[[float, str], None]
 
 
 @dataclass(frozen=True)
-class PartEvidence:
-    """What a part of a density is worth.
+class ComponentEvidence:
+    """What a component of a density is worth.
 
     - `name`: "flow", "kernels", "mixture", "chains" or "network".
     - `share`: of the density.
@@ -80,7 +80,7 @@ class FitReport:
     - `mass`: integral over the square, see `FlowDensity.mass`; None above two dimensions.
     - `integration_error`: change of the flow's mean validation log density at doubled steps.
     - `weights`: of each kind of component; None for a flow alone.
-    - `parts`: of a fit by evidence, what each part is worth.
+    - `components`: of a fit by evidence, what each component is worth.
     - `repeats`: of a fit by evidence, what was found of rows that repeat another.
     - `effective`: rows of equal weight that say as much (Kish); None where all weigh the same.
     - `notes`: what the user should know, in words.
@@ -98,7 +98,7 @@ class FitReport:
     mass: float | None
     integration_error: float
     weights: dict[str, float] | None = None
-    parts: tuple[PartEvidence, ...] = ()
+    components: tuple[ComponentEvidence, ...] = ()
     repeats: Repeats | None = None
     effective: float | None = None
     notes: tuple[str, ...] = field(default=())
@@ -124,12 +124,13 @@ def report_from_json(document: Mapping[str, Any]) -> FitReport:
             Refinement(**stage | {k: _figures(stage[k]) for k in ("train", "validation")})
             for stage in values.pop("stages")
         )
-        parts = tuple(PartEvidence(**part) for part in values.pop("parts"))
+        evidence = values.pop("components" if "components" in values else "parts")  # version 0.1
+        components = tuple(ComponentEvidence(**entry) for entry in evidence)
         repeats = values.pop("repeats")
         values.pop("shares", None)  # version 0.1 wrote them without names
         return FitReport(
             stages=stages,
-            parts=parts,
+            components=components,
             repeats=None if repeats is None else Repeats(**repeats),
             **values,
         )

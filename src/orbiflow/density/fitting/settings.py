@@ -161,6 +161,6 @@ class DensitySettings(FlowOptions, ComponentSettings, group="Density"):
     @property
     def of_flow(self) -> dict[str, Any]:
         """What was given of a flow, the time apart, by name."""
-        names = {entry.name for entry in fields_of(FlowOptions)} - {"seconds"}
-        given = {name: getattr(self, name) for name in self.fields_given & names}
+        names = [entry.name for entry in fields_of(FlowOptions) if entry.name != "seconds"]
+        given = {name: getattr(self, name) for name in names if name in self.fields_given}
         return {name: value for name, value in given.items() if value is not None}
