@@ -29,7 +29,6 @@ from orbiflow.density.fitting import (
     mean_of,
     weighed,
 )
-from orbiflow.density.gradients import log_density_gradient
 from orbiflow.density.inference import (
     axes_named,
     chart_of_observed,
@@ -38,7 +37,7 @@ from orbiflow.density.inference import (
     log_prob_observed,
     marginal,
 )
-from orbiflow.density.models import MOST_DIM, Density
+from orbiflow.density.models import MOST_DIM, Density, log_density_gradient
 from orbiflow.density.spaces import Space, space_class
 from orbiflow.errors import OrbiflowError
 
