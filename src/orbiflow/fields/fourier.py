@@ -18,11 +18,7 @@ from orbiflow.fields.invariants import (
     sobolev_weights,
 )
 from orbiflow.fields.lipschitz import coefficient_bound
-from orbiflow.fields.series import (
-    differentiate,
-    evaluate,
-    weight_cotangent,
-)
+from orbiflow.fields.series import differentiate, evaluate, weight_cotangent
 from orbiflow.symmetry import CrystallographicGroup, cached_as_written
 
 
@@ -66,12 +62,7 @@ class FourierField(InvariantField):
         device: torch.device | str | None = None,
     ) -> None:
         super().__init__(
-            group,
-            max_frequency,
-            batch=batch,
-            smoothness=smoothness,
-            dtype=dtype,
-            device=device,
+            group, max_frequency, batch=batch, smoothness=smoothness, dtype=dtype, device=device
         )
         self._orders = _orders(self.basis)
         self._fill_buffers()

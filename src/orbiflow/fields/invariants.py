@@ -14,11 +14,7 @@ from torch import Tensor, nn
 
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
-from orbiflow.symmetry import (
-    CrystallographicGroup,
-    cached_as_written,
-    checked_group,
-)
+from orbiflow.symmetry import CrystallographicGroup, cached_as_written, checked_group
 
 MAX_COEFFICIENTS = 2_000_000
 """Largest number of real coefficients before symmetrization: about a gigabyte of work."""

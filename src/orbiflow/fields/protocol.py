@@ -135,9 +135,7 @@ def prepared(field: Callable[..., Tensor]) -> Callable[..., Tensor]:
     return field.bound() if isinstance(field, Bindable) else field
 
 
-def prepared_with_divergence(
-    field: Callable[..., Tensor],
-) -> Callable[..., tuple[Tensor, Tensor]]:
+def prepared_with_divergence(field: Callable[..., Tensor]) -> Callable[..., tuple[Tensor, Tensor]]:
     """As `prepared`, giving V and its divergence together, sharing work where the field can."""
     if is_time_dependent(field):
         if isinstance(field, HasDivergenceInTime):

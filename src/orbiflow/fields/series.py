@@ -17,11 +17,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from orbiflow.fields.transforms import (
-    plain_gradients,
-    refuse_old_batches,
-    transformed,
-)
+from orbiflow.fields.transforms import plain_gradients, refuse_old_batches, transformed
 from orbiflow.typed_torch import applied
 
 BLOCK_BYTES = 2**21

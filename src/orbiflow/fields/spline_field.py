@@ -17,12 +17,7 @@ from orbiflow.fields.invariants import (
     invariant_basis,
     sobolev_weights,
 )
-from orbiflow.fields.splines import (
-    padded,
-    spline_sum,
-    spline_sum_with_divergence,
-    symbol,
-)
+from orbiflow.fields.splines import padded, spline_sum, spline_sum_with_divergence, symbol
 from orbiflow.symmetry import CrystallographicGroup, cached_as_written
 from orbiflow.typed_torch import fft, linalg
 
@@ -174,10 +169,7 @@ def _constants(
 ) -> dict[str, Tensor]:
     basis = invariant_basis(group, max_frequency)
     rows, columns, values = _spectrum_layout(basis, grid_sides(group, basis))
-    real = {
-        "values": values,
-        "scale": sobolev_weights(group, basis, smoothness),
-    }
+    real = {"values": values, "scale": sobolev_weights(group, basis, smoothness)}
     return {
         "rows": torch.tensor(rows, device=device),
         "columns": torch.tensor(columns, device=device),

@@ -16,11 +16,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from orbiflow.fields.transforms import (
-    plain_gradients,
-    refuse_old_batches,
-    transformed,
-)
+from orbiflow.fields.transforms import plain_gradients, refuse_old_batches, transformed
 from orbiflow.typed_torch import applied
 
 TAPS = 4

@@ -15,11 +15,7 @@ import torch
 from numpy.typing import ArrayLike
 from torch import Tensor, nn
 
-from orbiflow.fields.protocol import (
-    VectorField,
-    is_time_dependent,
-    prepared_with_divergence,
-)
+from orbiflow.fields.protocol import VectorField, is_time_dependent, prepared_with_divergence
 from orbiflow.symmetry import (
     CrystallographicGroup,
     Isometry,

@@ -19,13 +19,8 @@ from orbiflow.fields import (
     prepared,
     prepared_with_divergence,
 )
-from orbiflow.flows.integrators import (
-    RungeKutta,
-    Watch,
-)
-from orbiflow.flows.integrators import (
-    method as find_method,
-)
+from orbiflow.flows.integrators import RungeKutta, Watch
+from orbiflow.flows.integrators import method as find_method
 from orbiflow.runtime import one_thread
 from orbiflow.typed_torch import linalg
 

@@ -92,12 +92,7 @@ METHODS: dict[str, RungeKutta] = {
     for method in (
         RungeKutta("euler", 1, (), (1.0,)),
         RungeKutta("midpoint", 2, ((0.5,),), (0.0, 1.0)),
-        RungeKutta(
-            "rk4",
-            4,
-            ((0.5,), (0.0, 0.5), (0.0, 0.0, 1.0)),
-            (1 / 6, 1 / 3, 1 / 3, 1 / 6),
-        ),
+        RungeKutta("rk4", 4, ((0.5,), (0.0, 0.5), (0.0, 0.0, 1.0)), (1 / 6, 1 / 3, 1 / 3, 1 / 6)),
         # Kutta's third-order method
         RungeKutta("rk3", 3, ((0.5,), (-1.0, 2.0)), (1 / 6, 2 / 3, 1 / 6)),
         # Butcher's six-stage fifth-order method (Hairer, Norsett, Wanner, section II.5)

@@ -10,14 +10,8 @@ from typing import Any, cast
 import torch
 from torch import Tensor, nn
 
-from orbiflow.arguments import (
-    instance,
-    number,
-    whole,
-)
-from orbiflow.arguments import (
-    path as as_path,
-)
+from orbiflow.arguments import instance, number, whole
+from orbiflow.arguments import path as as_path
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.fields import (
     FourierField,
@@ -27,17 +21,8 @@ from orbiflow.fields import (
     Symmetrized,
 )
 from orbiflow.flows.flow import Flow
-from orbiflow.runtime import (
-    is_list,
-    read_tensors,
-    tensor_bytes,
-    write_atomic,
-)
-from orbiflow.symmetry import (
-    CrystallographicGroup,
-    group_from_header,
-    group_header,
-)
+from orbiflow.runtime import is_list, read_tensors, tensor_bytes, write_atomic
+from orbiflow.symmetry import CrystallographicGroup, group_from_header, group_header
 
 Makers = Mapping[str, Callable[[], Any]]
 """What makes a user's own fields, without their parameters, by the field's name or place."""

@@ -9,12 +9,7 @@ from numpy.typing import ArrayLike
 
 from orbiflow.errors import GroupError, NotAnIsometryError
 from orbiflow.symmetry.group import CrystallographicGroup, checked_lattice
-from orbiflow.symmetry.isometry import (
-    Isometry,
-    Line,
-    rotation,
-    transflection,
-)
+from orbiflow.symmetry.isometry import Isometry, Line, rotation, transflection
 
 LATTICES: dict[str, list[list[float]]] = {
     "oblique": [[1.0, 0.3], [0.0, 1.1]],

@@ -11,11 +11,7 @@ from numpy.typing import ArrayLike
 from orbiflow.arrays import Array
 from orbiflow.errors import GroupError
 from orbiflow.symmetry.group import CrystallographicGroup
-from orbiflow.symmetry.isometry import (
-    Isometry,
-    Points,
-    cast_like,
-)
+from orbiflow.symmetry.isometry import Isometry, Points, cast_like
 
 
 class DirichletDomain:

@@ -11,11 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from orbiflow.arrays import Array
-from orbiflow.errors import (
-    GroupError,
-    LatticeMismatchError,
-    NotDiscreteError,
-)
+from orbiflow.errors import GroupError, LatticeMismatchError, NotDiscreteError
 from orbiflow.symmetry.isometry import (
     TOLERANCE,
     Isometry,

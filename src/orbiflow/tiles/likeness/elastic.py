@@ -23,17 +23,8 @@ from numpy.typing import NDArray
 
 from orbiflow.arrays import Complex
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles.geometry import (
-    best_similarity,
-    complex_points,
-    plane_points,
-    signed_area,
-)
-from orbiflow.tiles.silhouette import (
-    Mesh,
-    local_thickness,
-    triangulate,
-)
+from orbiflow.tiles.geometry import best_similarity, complex_points, plane_points, signed_area
+from orbiflow.tiles.silhouette import Mesh, local_thickness, triangulate
 
 Array = NDArray[np.float64]
 
@@ -392,10 +383,7 @@ def _squares(z: Complex) -> Array:
 
 
 def _symmetric(
-    rows: list[NDArray[np.int64]],
-    columns: list[NDArray[np.int64]],
-    values: list[Array],
-    count: int,
+    rows: list[NDArray[np.int64]], columns: list[NDArray[np.int64]], values: list[Array], count: int
 ) -> scipy.sparse.csr_matrix:
     i, j, v = np.concatenate(rows), np.concatenate(columns), np.concatenate(values)
     both = (np.concatenate([v, v]), (np.concatenate([i, j]), np.concatenate([j, i])))

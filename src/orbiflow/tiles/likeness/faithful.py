@@ -29,13 +29,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from orbiflow.arguments import numbers
 from orbiflow.arrays import Complex
-from orbiflow.tiles.geometry import (
-    centroid,
-    complex_points,
-    orient,
-    plane_points,
-    signed_area,
-)
+from orbiflow.tiles.geometry import centroid, complex_points, orient, plane_points, signed_area
 from orbiflow.tiles.likeness.elastic import Elastic
 from orbiflow.tiles.likeness.laid import laid_on
 from orbiflow.tiles.likeness.metrics import as_region

@@ -12,13 +12,7 @@ import shapely
 from orbiflow.arguments import numbers
 from orbiflow.arrays import Array, Complex
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles.geometry import (
-    centroid,
-    complex_points,
-    orient,
-    plane_points,
-    signed_area,
-)
+from orbiflow.tiles.geometry import centroid, complex_points, orient, plane_points, signed_area
 from orbiflow.tiles.likeness.ranking import Similarity
 from orbiflow.typed_shapely import ufuncs
 

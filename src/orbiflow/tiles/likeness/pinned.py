@@ -24,12 +24,7 @@ from numpy.typing import NDArray
 
 from orbiflow.arrays import Complex, Integers
 from orbiflow.tiles.geometry import best_similarity
-from orbiflow.tiles.likeness.elastic import (
-    Array,
-    Condensed,
-    Elastic,
-    Stiffness,
-)
+from orbiflow.tiles.likeness.elastic import Array, Condensed, Elastic, Stiffness
 from orbiflow.tiles.silhouette import Mesh
 
 PINNED = 1e5

@@ -23,16 +23,8 @@ from scipy.optimize import linear_sum_assignment
 from scipy.spatial.distance import cdist
 from shapely.geometry.polygon import orient
 
-from orbiflow.tiles.geometry import (
-    points_along,
-    polygons_in,
-    ring_length,
-)
-from orbiflow.tiles.likeness.metrics import (
-    Region,
-    Shape,
-    as_region,
-)
+from orbiflow.tiles.geometry import points_along, polygons_in, ring_length
+from orbiflow.tiles.likeness.metrics import Region, Shape, as_region
 
 POINTS = 256  # on the target's outline, and as dense on the tile's
 MOST_POINTS = 4 * POINTS  # on a tile's outline, however long it is

@@ -21,12 +21,7 @@ from scipy.spatial import KDTree
 from orbiflow.arguments import number, numbers
 from orbiflow.arrays import Integers
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles.geometry import (
-    arc_lengths,
-    orient,
-    polygons_in,
-    ring_length,
-)
+from orbiflow.tiles.geometry import arc_lengths, orient, polygons_in, ring_length
 from orbiflow.typed_shapely import ufuncs
 
 Array = NDArray[np.float64]

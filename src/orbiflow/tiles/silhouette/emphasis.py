@@ -11,11 +11,7 @@ import shapely
 from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import gaussian_filter, map_coordinates
 
-from orbiflow.arguments import (
-    instance,
-    number,
-    numbers,
-)
+from orbiflow.arguments import instance, number, numbers
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.tiles.silhouette.outlines import clean_ring, percent
 from orbiflow.tiles.silhouette.readers import MaskReading, read_mask

@@ -9,11 +9,7 @@ import torch.nn.functional as F
 from scipy.ndimage import distance_transform_edt
 from torch import Tensor
 
-from orbiflow.arguments import (
-    instance,
-    number,
-    whole,
-)
+from orbiflow.arguments import instance, number, whole
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.silhouette.emphasis import Emphasis
 from orbiflow.tiles.silhouette.target import Target

@@ -11,11 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from orbiflow.arguments import described, is_a
 from orbiflow.errors import InputFileError, OrbiflowError
-from orbiflow.tiles.geometry import (
-    centroid,
-    orient,
-    signed_area,
-)
+from orbiflow.tiles.geometry import centroid, orient, signed_area
 from orbiflow.tiles.silhouette.frame import Frame
 from orbiflow.tiles.silhouette.outlines import clean_ring
 from orbiflow.tiles.silhouette.readers import (

@@ -23,11 +23,7 @@ from orbiflow.tiles.tilings.surroundings import (
     surroundings,
     touching,
 )
-from orbiflow.tiles.tilings.tiling import (
-    Tiles,
-    Tiling,
-    as_tiling,
-)
+from orbiflow.tiles.tilings.tiling import Tiles, Tiling, as_tiling
 from orbiflow.typed_shapely import ufuncs
 
 EdgeMatching: TypeAlias = Literal["segments", "curves", "none"]

@@ -12,12 +12,7 @@ from numpy.typing import NDArray
 from orbiflow.symmetry import Isometry
 from orbiflow.tiles.tilings.surroundings import neighbours
 from orbiflow.tiles.tilings.tile_copies import Copies, prototile_of
-from orbiflow.tiles.tilings.tiling import (
-    Cell,
-    Tiles,
-    Tiling,
-    as_tiling,
-)
+from orbiflow.tiles.tilings.tiling import Cell, Tiles, Tiling, as_tiling
 
 Graph: TypeAlias = list[set[int]]
 """Neighbours of each vertex; symmetric, without loops."""

@@ -14,11 +14,7 @@ from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from orbiflow.arguments import number, whole
-from orbiflow.arrays import (
-    Array,
-    Integers,
-    checked_window,
-)
+from orbiflow.arrays import Array, Integers, checked_window
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import Isometry
 from orbiflow.tiles.geometry import subdivided
@@ -29,11 +25,7 @@ from orbiflow.tiles.tilings.tile_copies import (
     copies_near,
     prototile_of,
 )
-from orbiflow.tiles.tilings.tiling import (
-    Tiles,
-    Tiling,
-    as_tiling,
-)
+from orbiflow.tiles.tilings.tiling import Tiles, Tiling, as_tiling
 
 MAX_SPAN = 12.0
 """Largest radius of a tile, in square roots of its group's area, whose images are listed."""

@@ -23,11 +23,7 @@ from orbiflow.tiles.tilings.surroundings import (
     surroundings,
 )
 from orbiflow.tiles.tilings.tile_copies import Placed
-from orbiflow.tiles.tilings.tiling import (
-    Tiles,
-    Tiling,
-    as_tiling,
-)
+from orbiflow.tiles.tilings.tiling import Tiles, Tiling, as_tiling
 from orbiflow.typed_shapely import ufuncs
 
 EdgeKind: TypeAlias = Literal["translation", "rotation", "glide", "mirror"]

@@ -10,19 +10,11 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from orbiflow.arguments import (
-    described,
-    instance,
-    is_a,
-)
+from orbiflow.arguments import described, instance, is_a
 from orbiflow.arrays import Array, Integers
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import CrystallographicGroup, Isometry
-from orbiflow.tiles.tilings.prototile import (
-    Prototile,
-    Stabiliser,
-    stabiliser,
-)
+from orbiflow.tiles.tilings.prototile import Prototile, Stabiliser, stabiliser
 
 Cell: TypeAlias = tuple[int, int]
 """Coordinates of a lattice vector over the basis of the group's lattice."""

@@ -9,13 +9,7 @@ from orbiflow.arguments import path as as_path
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.tiles.silhouette.readers.pictures import read_image
 from orbiflow.tiles.silhouette.readers.polygon_files import read_dat, read_json
-from orbiflow.tiles.silhouette.readers.reading import (
-    Held,
-    Reading,
-    Source,
-    check_file,
-    read_head,
-)
+from orbiflow.tiles.silhouette.readers.reading import Held, Reading, Source, check_file, read_head
 from orbiflow.tiles.silhouette.readers.svg import read_svg
 
 _HEAD_BYTES = 65536

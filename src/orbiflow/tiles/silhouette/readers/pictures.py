@@ -15,13 +15,7 @@ from skimage.filters import threshold_otsu
 
 from orbiflow.arguments import described
 from orbiflow.errors import InputFileError, OrbiflowError
-from orbiflow.tiles.silhouette.readers.reading import (
-    Held,
-    Reading,
-    Source,
-    check_file,
-    opened,
-)
+from orbiflow.tiles.silhouette.readers.reading import Held, Reading, Source, check_file, opened
 from orbiflow.tiles.silhouette.readers.tracing import Level, trace
 
 MAX_BYTES = 64 * 2**20
@@ -265,11 +259,7 @@ def _polarity(
 
 
 def read_mask_array(
-    values: Any,
-    name: str = "mask",
-    *,
-    threshold: float | None = None,
-    invert: bool | None = None,
+    values: Any, name: str = "mask", *, threshold: float | None = None, invert: bool | None = None
 ) -> Reading:
     """The outline of the shape in an array (H, W), in pixels with y down, the first row on top.
 

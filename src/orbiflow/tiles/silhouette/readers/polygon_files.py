@@ -8,11 +8,7 @@ import numpy as np
 from orbiflow.errors import InputFileError
 from orbiflow.runtime import is_list, is_object
 from orbiflow.tiles.silhouette.outlines import MAX_VERTICES, clean_ring
-from orbiflow.tiles.silhouette.readers.reading import (
-    Reading,
-    Source,
-    read_bytes,
-)
+from orbiflow.tiles.silhouette.readers.reading import Reading, Source, read_bytes
 
 MAX_BYTES = 16 * 2**20
 POLYGON_KEYS = ("polygon", "tile", "outline")

@@ -15,11 +15,7 @@ from orbiflow.tiles.silhouette.outlines import (
     outer_ring,
     simplified,
 )
-from orbiflow.tiles.silhouette.readers.reading import (
-    Reading,
-    Source,
-    read_bytes,
-)
+from orbiflow.tiles.silhouette.readers.reading import Reading, Source, read_bytes
 from orbiflow.tiles.silhouette.readers.svg_paths import (
     MAX_POINTS,
     SubPath,

@@ -156,15 +156,7 @@ _TOKEN = re.compile(r"[A-Za-z]|\.?\d+")
 _LENGTH = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)(e[-+]?\d+)?(px|pt|pc|mm|cm|in|%)?", re.IGNORECASE)
 
 
-PAINT = (
-    "fill",
-    "stroke",
-    "stroke-width",
-    "fill-opacity",
-    "stroke-opacity",
-    "color",
-    "visibility",
-)
+PAINT = ("fill", "stroke", "stroke-width", "fill-opacity", "stroke-opacity", "color", "visibility")
 """Properties of paint that elements have from those around them."""
 
 

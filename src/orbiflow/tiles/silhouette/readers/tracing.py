@@ -10,11 +10,7 @@ from skimage.measure import find_contours
 
 from orbiflow.errors import InputFileError
 from orbiflow.tiles.geometry import polygons_in
-from orbiflow.tiles.silhouette.outlines import (
-    outer_ring,
-    percent,
-    simplified,
-)
+from orbiflow.tiles.silhouette.outlines import outer_ring, percent, simplified
 from orbiflow.tiles.silhouette.readers.reading import Source
 
 MIN_AREA = 30.0  # square pixels
