@@ -4,6 +4,9 @@ Nothing here moves a shape: bring both into one frame first. A shape is a ring (
 polygon or multipolygon.
 """
 
+# pyright: reportUnknownMemberType=false
+# shapely's stubs leave the keyword arguments of its functions of arrays without types.
+
 from dataclasses import asdict, dataclass
 
 import numpy as np
@@ -13,7 +16,6 @@ from shapely.geometry import MultiPolygon, Polygon, box
 
 from orbiflow.arguments import numbers
 from orbiflow.errors import OrbiflowError
-from orbiflow.typed_shapely import ufuncs
 
 # Of the diagonal of the box around both curves.
 TOLERANCE = 1e-6
@@ -202,7 +204,7 @@ def _pixel_accuracy(a: Region, b: Region, window: Region) -> float:
 
 
 def _hausdorff(a: Region, b: Region) -> float:
-    xmin, ymin, xmax, ymax = ufuncs.total_bounds([a, b])
+    xmin, ymin, xmax, ymax = shapely.total_bounds([a, b])
     return hausdorff_distance(
         _edges(a), _edges(b), tolerance=TOLERANCE * float(np.hypot(xmax - xmin, ymax - ymin))
     )

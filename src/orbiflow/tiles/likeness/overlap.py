@@ -1,5 +1,8 @@
 """The exact overlap of polygons with a region, and its exact gradient in the vertices."""
 
+# pyright: reportUnknownMemberType=false
+# shapely's stubs leave the keyword arguments of its functions of arrays without types.
+
 from __future__ import annotations
 
 from collections.abc import Sequence
@@ -14,7 +17,6 @@ from orbiflow.arrays import Array, Complex
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.geometry import centroid, complex_points, orient, plane_points, signed_area
 from orbiflow.tiles.likeness.ranking import Similarity
-from orbiflow.typed_shapely import ufuncs
 
 MANY, COARSE = 1500, 2e-3
 """Vertices beyond which a region is simplified, and by how much of its size (area 1)."""
@@ -43,8 +45,8 @@ def boundary_iou(goal: shapely.Polygon, boundaries: Array) -> Array:
     polygons = np.asarray(shapely.polygons(boundaries))
     good = np.asarray(shapely.is_valid(polygons))
     scores = np.full(len(polygons), -1.0)
-    common = ufuncs.area(shapely.intersection(polygons[good], goal))
-    scores[good] = common / (ufuncs.area(polygons[good]) + goal.area - common)
+    common = shapely.area(shapely.intersection(polygons[good], goal))
+    scores[good] = common / (shapely.area(polygons[good]) + goal.area - common)
     return scores
 
 
@@ -90,10 +92,10 @@ class Overlap:
         pieces, owner = shapely.get_parts(
             shapely.intersection(lines, self.region), return_index=True
         )
-        lengths = ufuncs.length(pieces)
+        lengths = shapely.length(pieces)
         pieces, owner = pieces[lengths > 0], owner[lengths > 0]  # not where they only touch
         first, last = (
-            shapely.get_coordinates(ufuncs.get_point(pieces, index)) for index in (0, -1)
+            shapely.get_coordinates(shapely.get_point(pieces, index)) for index in (0, -1)
         )
         square = np.maximum((sides**2).sum(axis=1), 1e-300)[owner]
         start, stop = (

@@ -7,11 +7,14 @@ degrees, and then its width is taken where the outline beyond is `APART` long. A
 the segment outside.
 """
 
+# pyright: reportUnknownMemberType=false
+# shapely's stubs leave the keyword arguments of its functions of arrays without types.
+
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 import shapely
@@ -22,7 +25,6 @@ from orbiflow.arguments import number, numbers
 from orbiflow.arrays import Integers
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.geometry import arc_lengths, orient, polygons_in, ring_length
-from orbiflow.typed_shapely import ufuncs
 
 Array = NDArray[np.float64]
 
@@ -119,7 +121,7 @@ def narrowest_neck(ring: ArrayLike) -> Thinnest:
     points, polygon = _checked(ring)
     size = math.sqrt(polygon.area)
     shapely.prepare(polygon)
-    found = _facing(orient(points), size, lambda lines: ufuncs.contains_properly(polygon, lines))
+    found = _facing(orient(points), size, lambda lines: cast(Any, polygon.contains_properly(lines)))
     if found is not None:
         return found
     radius = shapely.maximum_inscribed_circle(polygon, tolerance=1e-4 * size)
@@ -137,7 +139,7 @@ def narrowest_slit(ring: ArrayLike) -> Thinnest | None:
     shapely.prepare(polygon)
     outside = orient(points, counter_clockwise=False)
     size = math.sqrt(polygon.area)
-    return _facing(outside, size, lambda lines: ~ufuncs.intersects(polygon, lines))
+    return _facing(outside, size, lambda lines: ~cast(Any, polygon.intersects(lines)))
 
 
 def hair_share(ring: ArrayLike, width: float) -> float:
@@ -275,10 +277,12 @@ def _thin_share(
     opened = eroded.buffer(width / 2 * (1 + SLACK), quad_segs=ROUND)
     parts = polygons_in(region.difference(opened))
     lines = shapely.get_parts(polygon.exterior.difference(opened))
-    lengths = ufuncs.length(lines)
+    lengths = shapely.length(lines)
     lines, lengths = lines[lengths > 0], lengths[lengths > 0]
     if not parts or not len(lines):
         return 0.0
-    own = shapely.STRtree(parts).nearest(ufuncs.line_interpolate_point(lines, 0.5, normalized=True))
+    own = shapely.STRtree(parts).nearest(
+        shapely.line_interpolate_point(lines, 0.5, normalized=True)
+    )
     totals = np.bincount(own, lengths)
     return float(totals[totals > FAR * width].sum() / polygon.exterior.length)

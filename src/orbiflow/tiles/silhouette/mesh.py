@@ -1,8 +1,11 @@
 """A triangulation of a silhouette: fine along its outline and in thin parts, coarser inside."""
 
+# pyright: reportUnknownMemberType=false
+# shapely's stubs leave the keyword arguments of its functions of arrays without types.
+
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 import shapely
@@ -12,7 +15,6 @@ from scipy.spatial import Delaunay, Voronoi
 from orbiflow.arrays import Integers
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.geometry import subdivided
-from orbiflow.typed_shapely import ufuncs
 
 Array = NDArray[np.float64]
 
@@ -78,7 +80,7 @@ def triangulate(ring: Array, spacing: float | None = None) -> Mesh:
         extra = np.concatenate([extra, at + middle[:, None] * (after - at)])
         own_side = np.concatenate([own_side, sides[missing]])
         own_share = np.concatenate([own_share, middle])
-        near = ufuncs.distance(ufuncs.points(inside), shapely.MultiPoint(extra))
+        near = shapely.distance(shapely.points(inside), shapely.MultiPoint(extra))
         inside = inside[near > spacing / 4]
         old = ends[missing]
         halves = np.concatenate([np.stack([old[:, 0], fresh], 1), np.stack([fresh, old[:, 1]], 1)])
@@ -104,8 +106,8 @@ def _inside(polygon: shapely.Polygon, spacing: float) -> Array:
         grid = np.stack(np.meshgrid(x, y), axis=-1)
         grid[1::2, :, 0] += step / 2
         points = grid.reshape(-1, 2)
-        points = points[ufuncs.contains_xy(polygon, points[:, 0], points[:, 1])]
-        depth = ufuncs.distance(ufuncs.points(points), polygon.exterior) / spacing
+        points = points[shapely.contains_xy(polygon, points[:, 0], points[:, 1])]
+        depth = shapely.distance(shapely.points(points), polygon.exterior) / spacing
         found.append(points[(depth >= least) & (depth < most)])
     return np.concatenate(found)
 
@@ -126,7 +128,7 @@ def _kept(mesh: Mesh, polygon: shapely.Polygon) -> Mesh:
     u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     area = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
     triangles = np.where((area < 0)[:, None], mesh.triangles[:, ::-1], mesh.triangles)
-    inside = ufuncs.contains_xy(polygon, *middle.T)
+    inside = cast(NDArray[np.bool_], shapely.contains_xy(polygon, *middle.T))
     flat = abs(area) < FLAT * polygon.area
     triangles = _without_flat(triangles[inside & ~flat], mesh.triangles[flat])
     used = np.zeros(len(mesh.points), dtype=bool)
@@ -222,7 +224,7 @@ class Locator:
         outside = np.flatnonzero(found < 0)
         if len(outside):
             found[outside] = self._tree.nearest(where[outside])
-            lines = ufuncs.shortest_line(self._tree.geometries[found[outside]], where[outside])
+            lines = shapely.shortest_line(self._tree.geometries[found[outside]], where[outside])
             nearest[outside] = shapely.get_coordinates(lines)[::2]
         return Located(found, nearest)
 
@@ -251,10 +253,10 @@ def local_thickness(mesh: Mesh) -> Array:
     middle = corners.mean(axis=1)
     outline = polygon.exterior
     shapely.prepare(outline)
-    own = ufuncs.distance(ufuncs.points(middle), outline)
+    own: Array = shapely.distance(cast(NDArray[np.object_], shapely.points(middle)), outline)
     if not len(centers):
         return own
-    radius = ufuncs.distance(ufuncs.points(centers), outline)
+    radius = shapely.distance(shapely.points(centers), outline)
     found = own.copy()
     for start in range(0, len(middle), 512):  # bounds the memory
         part = middle[start : start + 512]

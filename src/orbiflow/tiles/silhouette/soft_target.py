@@ -13,7 +13,6 @@ from orbiflow.arguments import instance, number, whole
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.silhouette.emphasis import Emphasis
 from orbiflow.tiles.silhouette.target import Target
-from orbiflow.typed_shapely import ufuncs
 
 PIECES = 8
 """Of each side of a ring, in integrals along it."""
@@ -48,7 +47,7 @@ class SoftTarget:
         x, y = np.meshgrid(float(center[0]) + axis, float(center[1]) + axis)
         region = shapely.Polygon(target.normal)
         shapely.prepare(region)
-        inside = ufuncs.contains_xy(region, x.ravel(), y.ravel()).reshape(x.shape)
+        inside = shapely.contains_xy(region, x.ravel(), y.ravel()).reshape(x.shape)
         # half a pixel: the boundary runs between pixel centres
         steps = np.where(
             inside,

@@ -1,14 +1,18 @@
 """Does a tile tile the plane? A certificate in figures (design point 9)."""
 
+# pyright: reportUnknownMemberType=false
+# shapely's stubs leave the keyword arguments of its functions of arrays without types.
+
 from __future__ import annotations
 
 import math
 import re
 from dataclasses import dataclass, fields
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal, TypeAlias, cast
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 
 from orbiflow.arguments import number
 from orbiflow.arrays import Array
@@ -24,7 +28,6 @@ from orbiflow.tiles.tilings.surroundings import (
     touching,
 )
 from orbiflow.tiles.tilings.tiling import Tiles, Tiling, as_tiling
-from orbiflow.typed_shapely import ufuncs
 
 EdgeMatching: TypeAlias = Literal["segments", "curves", "none"]
 
@@ -234,11 +237,11 @@ def _edge_mismatch(
 def _areas(around: Surroundings) -> tuple[float, float, float]:
     """Largest and total overlap with the other tiles, and uncovered area in a ring around."""
     polygon = shapely.Polygon(around.ring)
-    images = ufuncs.polygons(around.rings)
+    images = cast(NDArray[np.object_], shapely.polygons(around.rings))
     region = shapely.buffer(polygon, _MARGIN, quad_segs=2)
     shapely.prepare(region)
     images = images[shapely.intersects(region, images)]
-    common = ufuncs.area(shapely.intersection(polygon, images, grid_size=_GRID))
+    common = shapely.area(shapely.intersection(polygon, images, grid_size=_GRID))
     covered = shapely.union_all([polygon, *images], grid_size=_GRID)
-    uncovered = ufuncs.area(shapely.difference(region, covered, grid_size=_GRID))
+    uncovered = shapely.area(shapely.difference(region, covered, grid_size=_GRID))
     return float(common.max(initial=0.0)), float(common.sum()), float(uncovered)

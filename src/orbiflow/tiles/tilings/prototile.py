@@ -1,5 +1,8 @@
 """A prototile: a polygon whose images make up a tiling, alone or together with others."""
 
+# pyright: reportUnknownMemberType=false
+# shapely's stubs leave the keyword arguments of its functions of arrays without types.
+
 from __future__ import annotations
 
 import math
@@ -16,7 +19,6 @@ from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import CrystallographicGroup, Isometry
 from orbiflow.tiles.geometry import signed_area
-from orbiflow.typed_shapely import ufuncs
 
 _REPEATED = 1e-12
 """Vertices nearer than this to the next, in radii of the tile, are one with it."""
@@ -159,7 +161,9 @@ def _image_order(element: Isometry, ring: Array) -> tuple[NDArray[np.int64] | No
     order = (first + step * np.arange(count)) % count
     error = float(np.linalg.norm(image - ring[order], axis=1).max())
     curve = shapely.linearrings(ring)
-    there = ufuncs.distance(curve, shapely.points(np.concatenate([image, element.inverse()(ring)])))
+    there = shapely.distance(
+        curve, shapely.points(np.concatenate([image, element.inverse()(ring)]))
+    )
     as_curve = float(there.max())
     # where vertices are no nearer to vertices than to the curve, they correspond
     return (

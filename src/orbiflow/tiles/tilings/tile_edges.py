@@ -1,5 +1,8 @@
 """The edges of a tiling and the isometries that identify them, found from polygons and group alone."""
 
+# pyright: reportUnknownMemberType=false
+# shapely's stubs leave the keyword arguments of its functions of arrays without types.
+
 from __future__ import annotations
 
 from collections import deque
@@ -24,7 +27,6 @@ from orbiflow.tiles.tilings.surroundings import (
 )
 from orbiflow.tiles.tilings.tile_copies import Placed
 from orbiflow.tiles.tilings.tiling import Tiles, Tiling, as_tiling
-from orbiflow.typed_shapely import ufuncs
 
 EdgeKind: TypeAlias = Literal["translation", "rotation", "glide", "mirror"]
 
@@ -377,7 +379,7 @@ def _with_vertices(tiling: Tiling, k: int) -> Prototile:
     points = points[near > 2 * reach]
     if not len(points):
         return own
-    along = ufuncs.line_locate_point(line, ufuncs.points(points))
+    along: Array = np.asarray(shapely.line_locate_point(line, shapely.points(points)))
     order = np.argsort(along)
     fresh = np.diff(along[order], prepend=-np.inf) > 2 * reach
     points, along = points[order][fresh], along[order][fresh]

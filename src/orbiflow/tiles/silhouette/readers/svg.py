@@ -1,5 +1,8 @@
 """SVG drawings: the outline of the largest closed shape, in the drawing's own user units."""
 
+# pyright: reportUnknownMemberType=false
+# shapely's stubs leave the keyword arguments of its functions of arrays without types.
+
 import numpy as np
 import shapely
 from numpy.typing import NDArray
@@ -24,7 +27,6 @@ from orbiflow.tiles.silhouette.readers.svg_paths import (
     fill,
 )
 from orbiflow.tiles.silhouette.readers.svg_shapes import Drawing, parse_xml
-from orbiflow.typed_shapely import ufuncs
 
 MAX_BYTES = 16 * 2**20
 # Flattening error, of the size of each shape, and its floor, of the size of the drawing.
@@ -122,7 +124,7 @@ def _drop_backgrounds(
     regions: list[BaseGeometry], box: tuple[float, float, float, float] | None
 ) -> tuple[list[BaseGeometry], list[str]]:
     """`regions` without rectangles that cover the page, as long as something else is there."""
-    xmin, ymin, xmax, ymax = ufuncs.total_bounds(regions) if box is None else box
+    xmin, ymin, xmax, ymax = shapely.total_bounds(regions) if box is None else box
     page = shapely.box(xmin, ymin, xmax, ymax)
     rest = [region for region in regions if not _covers(region, page)]
     n = len(regions) - len(rest)
@@ -142,7 +144,7 @@ def _covers(region: BaseGeometry, page: BaseGeometry) -> bool:
 
 def _overlay(path: Source, regions: list[BaseGeometry]) -> BaseGeometry:
     # Snapped to a grid: neighbours that all but share an edge would leave cracks between them.
-    bounds = ufuncs.total_bounds(regions)
+    bounds = shapely.total_bounds(regions)
     size = max(bounds[2] - bounds[0], bounds[3] - bounds[1])
     grid = max(GRID * size, GRID_FLOOR * float(np.abs(bounds).max()))
     try:
