@@ -22,7 +22,7 @@ Window: TypeAlias = tuple[float, float, float, float]
 
 
 def checked_window(window: Sequence[float]) -> Window:
-    """`window` as four numbers.
+    """Return `window` as four numbers.
 
     Raises:
         OrbiflowError: unless xmin < xmax and ymin < ymax.

@@ -75,12 +75,15 @@ class FourierField(InvariantField):
         # not reshape(-1, P): P is 0 for Omega = 0 and a group without invariant vectors
         return parameters if parameters.dim() == 2 else parameters.unsqueeze(0)
 
-    def sobolev_weights(self, smoothness: float) -> np.ndarray:
-        """(P,) factors (1 + |kappa|^2 vol^(2/d))^(-smoothness / 2), free of the unit of length."""
+    def sobolev_weights(self, smoothness: float) -> Array:
+        """Return factors (P,) (1 + |kappa|^2 vol^(2/d))^(-smoothness / 2), which have no unit."""
         return sobolev_weights(self.group, self.basis, smoothness)
 
     def weights(self) -> Tensor:
-        """Fourier weights in the tensor basis of `series`: (S, d, A_1, ..., A_d), S = 1 if single."""
+        """Return the Fourier weights in the tensor basis of `series`.
+
+        Shape (S, d, A_1, ..., A_d), with S = 1 for a single field.
+        """
         flat = self._stacked(self.parameters_) * self.scale
         shape = (self.group.dim, *(2 * k + 1 for k in self._orders))
         weights = flat.new_zeros(flat.shape[0], math.prod(shape))
@@ -88,13 +91,15 @@ class FourierField(InvariantField):
         return weights.reshape(flat.shape[0], *shape)
 
     def bound(self) -> Callable[[Tensor], Tensor]:
-        """The field with its weights worked out once, for many evaluations (an integrator's)."""
+        """Return the field with its weights computed once, for many evaluations (an integrator's)."""
         weights = self.weights()
         return lambda points: self._values(weights, points)
 
     @torch.no_grad()
     def adjoint(self, points: Tensor, forces: Tensor) -> Tensor:
-        """Gradient of sum forces . V(points) in the parameters, without autograd: the force's work.
+        """Return the gradient of sum forces . V(points) in the parameters, without autograd.
+
+        This is the work of the force.
 
         The projection of a force on the invariant fields (design point 10). V is linear in the
         parameters, so their values do not matter.
@@ -116,15 +121,15 @@ class FourierField(InvariantField):
         return (gradient * self.scale).reshape(self.parameters_.shape)
 
     def forward(self, points: Tensor) -> Tensor:
-        """V at points (..., d): vectors of the same shape."""
+        """Return V at points (..., d): vectors of the same shape."""
         return self._values(self.weights(), points)
 
     def divergence(self, points: Tensor) -> Tensor:
-        """Trace of the Jacobian, (...,), in closed form: itself one Fourier sum."""
+        """Return the trace of the Jacobian, (...,), in closed form: itself one Fourier sum."""
         return self._values(self._divergence_weights(self.weights()), points)[..., 0]
 
     def bound_with_divergence(self) -> Callable[[Tensor], tuple[Tensor, Tensor]]:
-        """As `bound`, returning V and its divergence from the same matrix product."""
+        """Return, as `bound` does, a function for V and its divergence from one matrix product."""
         weights = self.weights()
         joint = torch.cat([weights, self._divergence_weights(weights)], dim=1)
 
@@ -135,7 +140,7 @@ class FourierField(InvariantField):
         return both
 
     def jacobian(self, points: Tensor) -> Tensor:
-        """dV_i / dp_j as (..., d, d), in closed form: d^2 Fourier sums from one matrix product."""
+        """Return dV_i / dp_j as (..., d, d): d^2 Fourier sums from one matrix product."""
         d = self.group.dim
         weights = self.weights()
         by_axis = torch.stack([differentiate(weights, j, d) for j in range(d)], dim=2)
@@ -144,7 +149,7 @@ class FourierField(InvariantField):
         return values.reshape(*values.shape[:-1], d, d)
 
     def lipschitz_bound(self) -> Tensor:
-        """An upper bound of the Jacobian's spectral norm anywhere, () or (S,): `coefficient_bound`.
+        """Return `coefficient_bound`: an upper bound of the Jacobian's spectral norm, () or (S,).
 
         Rigorous but pessimistic; a Runge-Kutta step h with h * bound below the method's
         `RungeKutta.injective_below` is injective (design point 5).
@@ -198,10 +203,8 @@ def _constants(
 
 
 @lru_cache(maxsize=64)  # bases hash by identity
-def tensor_layout(
-    basis: InvariantBasis, orders: tuple[int, ...]
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The invariant basis rewritten in the tensor basis of `series`, as sparse (row, column, value).
+def tensor_layout(basis: InvariantBasis, orders: tuple[int, ...]) -> tuple[Array, Array, Array]:
+    """Rewrite the invariant basis in the tensor basis of `series`, as sparse (row, column, value).
 
     exp(2 pi i k.u) is a product over the axes of cos(2 pi k u) + i sin(2 pi k u): each mode becomes
     2^d products of cosines and sines.

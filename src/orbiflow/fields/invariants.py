@@ -46,7 +46,7 @@ class InvariantBasis:
 
 
 def frequency_set(group: CrystallographicGroup, max_frequency: int) -> Array:
-    """(M, d) integer frequencies, one of each pair +-k, k = 0 first.
+    """Return (M, d) integer frequencies, one of each pair +-k, k = 0 first.
 
     The box |k_i| <= max_frequency and its images under the dual point group: a set that is not a
     union of orbits would lose symmetry (hexagonal groups).
@@ -71,13 +71,13 @@ def frequency_set(group: CrystallographicGroup, max_frequency: int) -> Array:
 
 
 def _integral_parts(group: CrystallographicGroup) -> Array:
-    """(|G|, d, d) integer matrices B^-1 R B; a frequency k (a row) goes to k @ M."""
+    """Return (|G|, d, d) integer matrices B^-1 R B; a frequency k (a row) goes to k @ M."""
     m = group.inverse_lattice @ group.linear_parts @ group.lattice
     return np.round(m).astype(np.int64)
 
 
 def _half(k: Array) -> tuple[Array, Array]:
-    """The lexicographically non-negative one of k and -k, and whether it was -k."""
+    """Return the lexicographically non-negative one of k and -k, and whether it was -k."""
     first = np.zeros(len(k), dtype=np.int64)
     for column in range(k.shape[1] - 1, -1, -1):
         first = np.where(k[:, column] != 0, k[:, column], first)
@@ -86,14 +86,14 @@ def _half(k: Array) -> tuple[Array, Array]:
 
 
 def _index(frequencies: Array, k: Array) -> Array:
-    """Rows of `frequencies` (sorted lexicographically) at which the rows of `k` stand."""
+    """Return rows of `frequencies` (sorted lexicographically) at which the rows of `k` stand."""
     base = int(np.abs(frequencies).max(initial=0)) * 2 + 3
     radix = base ** np.arange(frequencies.shape[1] - 1, -1, -1, dtype=np.int64)
     return np.searchsorted(frequencies @ radix, k @ radix)
 
 
 def _action(group: CrystallographicGroup, frequencies: Array) -> tuple[Array, Array]:
-    """Where each element sends each frequency, and the real (2d, 2d) block it applies on the way.
+    """Return where each element sends each frequency, and the (2d, 2d) block it applies.
 
     (g V)(p) = R^-1 V(R p + t) sends the coefficient at k to k M times R^-1 exp(2 pi i k . B^-1 t).
     """
@@ -118,7 +118,7 @@ def _action(group: CrystallographicGroup, frequencies: Array) -> tuple[Array, Ar
 
 
 def _orthonormal_columns(projector: Array) -> Array:
-    """Basis of the range of an orthogonal projector, by Gram-Schmidt in a fixed order.
+    """Return the basis of the range of an orthogonal projector, by Gram-Schmidt in a fixed order.
 
     Deterministic, unlike eigenvectors of a repeated eigenvalue: saved parameters depend on it.
     """
@@ -177,7 +177,7 @@ def invariant_basis(group: CrystallographicGroup, max_frequency: int) -> Invaria
 
 
 def _members(labels: Array) -> list[Array]:
-    """Positions that share a label, each list ascending, in the order of the labels."""
+    """Return positions that share a label, each list ascending, in the order of the labels."""
     order = np.argsort(labels, kind="stable")
     cuts = np.flatnonzero(np.diff(labels[order])) + 1
     return np.split(order, cuts)
@@ -221,11 +221,11 @@ class InvariantField(nn.Module, ABC):
 
     @abstractmethod
     def _constants(self, dtype: torch.dtype, device: torch.device) -> dict[str, Tensor]:
-        """Buffers by name; segments of a flow should share them."""
+        """Return buffers by name; segments of a flow should share them."""
 
     @abstractmethod
     def adjoint(self, points: Tensor, forces: Tensor) -> Tensor:
-        """Gradient (P,) of sum forces . V(points) in the parameters; points, forces (N, d)."""
+        """Return the gradient (P,) of sum forces . V(points) in the parameters; inputs (N, d)."""
 
     def _check_points(self, points: Tensor) -> None:
         """Raise OrbiflowError for points that the field cannot be evaluated at."""
@@ -259,7 +259,7 @@ class InvariantField(nn.Module, ABC):
 
 def sobolev_weights(
     group: CrystallographicGroup, basis: InvariantBasis, smoothness: float
-) -> np.ndarray:
-    """(P,) factors (1 + |kappa|^2 vol^(2/d))^(-smoothness / 2), free of the unit of length."""
+) -> Array:
+    """Return (P,) factors (1 + |kappa|^2 vol^(2/d))^(-smoothness / 2), free of the unit of length."""
     size = group.cell_volume ** (1 / group.dim)
     return (1.0 + (basis.magnitude * size) ** 2) ** (-smoothness / 2)

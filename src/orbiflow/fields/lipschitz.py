@@ -35,7 +35,7 @@ MOST_SIGNS = 6
 
 
 def steepness(parameters: Tensor, magnitude: Tensor) -> Tensor:
-    """sum_j |c_j| 2 pi sqrt 2 |kappa_j|: times `group_factor`, a bound of |DV| anywhere.
+    """Return sum_j |c_j| 2 pi sqrt 2 |kappa_j|: times `group_factor`, a bound of |DV| anywhere.
 
     Args:
         parameters: (..., P) coordinates c in the orthonormal basis.
@@ -49,7 +49,7 @@ def steepness(parameters: Tensor, magnitude: Tensor) -> Tensor:
 
 @lru_cache(maxsize=64)  # bases hash by identity
 def group_factor(group: CrystallographicGroup, basis: InvariantBasis) -> float:
-    """The least f known with |DV| <= f `steepness` for all parameters and at all points.
+    """Return the least f known with |DV| <= f `steepness` for all parameters and at all points.
 
     1 for p1 and p2, up to sqrt 2 for pg and pgg, sqrt 1/2 for p4, sqrt 3/4 for p3 and p6, sqrt 3/2 for
     p6m: it belongs to the group, its lattice and the frequencies at hand.
@@ -71,7 +71,7 @@ def group_factor(group: CrystallographicGroup, basis: InvariantBasis) -> float:
 
 
 def _terms(group: CrystallographicGroup, basis: InvariantBasis) -> tuple[Array, Array]:
-    """Parameters (T,), ascending, and the matrices A_i (T, d, d) of each for |kappa| = 1."""
+    """Return parameters (T,), ascending, and the matrices A_i (T, d, d) of each for |kappa| = 1."""
     d, modes = group.dim, len(basis.frequencies)
     pair = basis.columns * modes + basis.rows // (2 * d)
     pairs, place = np.unique(pair, return_inverse=True)
@@ -89,7 +89,7 @@ def _terms(group: CrystallographicGroup, basis: InvariantBasis) -> tuple[Array, 
 
 
 def _largest_sum(terms: Array) -> Array:
-    """Bound of the spectral norm of sum_i s_i A_i over signs s: (P, n, d, d) -> (P,)."""
+    """Return bound of the spectral norm of sum_i s_i A_i over signs s: (P, n, d, d) -> (P,)."""
     count = terms.shape[1]
     if count > MOST_SIGNS:
         return np.linalg.norm(terms, axis=(2, 3)).sum(axis=1)
@@ -101,7 +101,9 @@ def _largest_sum(terms: Array) -> Array:
 def coefficient_bound(
     group: CrystallographicGroup, basis: InvariantBasis, coefficients: Tensor
 ) -> Tensor:
-    """An upper bound of the Jacobian's spectral norm: sum over kappa of 2 pi sqrt 2 |kappa| |[a, b]|.
+    """Return an upper bound of the Jacobian's spectral norm for given coefficients.
+
+    The bound is the sum over kappa of 2 pi sqrt 2 |kappa| |[a, b]|.
 
     Sharper than `group_factor` for given coefficients, since parameters at one frequency are added
     before their size is taken.

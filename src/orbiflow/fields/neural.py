@@ -50,7 +50,7 @@ class PeriodicFeatures(nn.Module):
         return 2 * self.frequencies.shape[0]
 
     def forward(self, points: Tensor) -> Tensor:
-        """Features of shape (..., 2 M)."""
+        """Return features of shape (..., 2 M)."""
         phase = 2.0 * math.pi * points @ self.frequencies.to(points).mT
         return torch.cat([phase.cos(), phase.sin()], dim=-1)
 
@@ -64,7 +64,7 @@ def neural_field(
     seed: int = 0,
     dtype: torch.dtype = torch.float64,
 ) -> Symmetrized:
-    """A multilayer perceptron on periodic features, symmetrized over `group`.
+    """Return a multilayer perceptron on periodic features, symmetrized over `group`.
 
     The last layer starts at zero, so the flow starts at the identity. The same seed gives the same
     weights; the global random state is left alone.

@@ -112,31 +112,31 @@ def time_dependent(function: Callable[[Tensor, Tensor], Tensor]) -> TimeDependen
 
 
 def is_time_dependent(field: object) -> bool:
-    """Whether `field` is to be called as V(points, time)."""
+    """Return whether `field` is to be called as V(points, time)."""
     return bool(getattr(field, "time_dependent", False))
 
 
 def jacobian(field: VectorField, points: Tensor) -> Tensor:
-    """dV_i / dp_j at points (..., d), as (..., d, d): exact, d backward passes."""
+    """Return dV_i / dp_j at points (..., d), as (..., d, d): exact, d backward passes."""
     if isinstance(field, HasJacobian):
         return field.jacobian(points)
     return _by_autograd(field, points, field)[1]
 
 
 def divergence(field: VectorField, points: Tensor) -> Tensor:
-    """Trace of the Jacobian at points (..., d), as (...,): exact."""
+    """Return the trace of the Jacobian at points (..., d), as (...,): exact."""
     if isinstance(field, HasDivergence):
         return field.divergence(points)
     return _trace(jacobian(field, points))
 
 
 def prepared(field: Callable[..., Tensor]) -> Callable[..., Tensor]:
-    """The field for many evaluations at unchanged parameters; takes what the field takes."""
+    """Return the field for many evaluations at unchanged parameters; takes what the field takes."""
     return field.bound() if isinstance(field, Bindable) else field
 
 
 def prepared_with_divergence(field: Callable[..., Tensor]) -> Callable[..., tuple[Tensor, Tensor]]:
-    """As `prepared`, giving V and its divergence together, sharing work where the field can."""
+    """Return, as `prepared` does, a function for V and its divergence, sharing work if possible."""
     if is_time_dependent(field):
         if isinstance(field, HasDivergenceInTime):
             return field.with_divergence
@@ -158,7 +158,7 @@ def prepared_with_divergence(field: Callable[..., Tensor]) -> Callable[..., tupl
 
 
 def lipschitz_bound(field: object) -> float | None:
-    """The field's own bound of its Jacobian's spectral norm, None if it knows none."""
+    """Return the field's own bound of its Jacobian's spectral norm, None if it knows none."""
     if isinstance(field, HasLipschitzBound):
         return float(field.lipschitz_bound().max())
     return None
@@ -174,7 +174,7 @@ def _with_trace(function: VectorField, points: Tensor, owner: object) -> tuple[T
 
 
 def _by_autograd(function: VectorField, points: Tensor, owner: object) -> tuple[Tensor, Tensor]:
-    """V and its Jacobian, differentiable if V is: in the points or in anything the field holds."""
+    """Return V and its Jacobian, differentiable in the points and in what the field holds."""
     if transformed():
         return _functionally(function, points)
     keep = torch.is_grad_enabled() and _is_differentiable(function, points, owner)
@@ -199,7 +199,7 @@ def _by_autograd(function: VectorField, points: Tensor, owner: object) -> tuple[
 
 
 def _functionally(function: VectorField, points: Tensor) -> tuple[Tensor, Tensor]:
-    """The same under `torch.func`, where no tensor may be told to require a gradient."""
+    """Return the same under `torch.func`, where no tensor may be told to require a gradient."""
     values, pull, *_ = torch.func.vjp(function, points)
     units = torch.eye(points.shape[-1], dtype=points.dtype, device=points.device)
     rows = [pull(unit.expand(points.shape))[0] for unit in units]

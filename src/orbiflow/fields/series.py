@@ -25,7 +25,7 @@ BLOCK_BYTES = 2**21
 
 
 def trigonometric_table(u: Tensor, order: int, out: Tensor | None = None) -> Tensor:
-    """Rows 1, cos 2 pi u, ..., cos 2 pi K u, sin 2 pi u, ..., sin 2 pi K u.
+    """Return rows 1, cos 2 pi u, ..., cos 2 pi K u, sin 2 pi u, ..., sin 2 pi K u.
 
     Args:
         u: (..., N) fractional coordinates.
@@ -57,7 +57,7 @@ def _frequencies(order: int, like: Tensor) -> Tensor:
 
 
 def differentiate(weights: Tensor, axis: int, dim: int) -> Tensor:
-    """Weights of the derivative with respect to u_axis; the last `dim` axes are the variables."""
+    """Return the weights of the derivative in u_axis; the last `dim` axes are the variables."""
     moved = weights.movedim(axis - dim, -1)
     order = (moved.shape[-1] - 1) // 2
     factor = _frequencies(order, moved)
@@ -67,7 +67,7 @@ def differentiate(weights: Tensor, axis: int, dim: int) -> Tensor:
 
 
 def _derivative_dot(table: Tensor, dual: Tensor) -> Tensor:
-    """Sum over rows of (d table / du) times `dual`: (S, A, N), (S, A, N) -> (S, N)."""
+    """Return the sum over rows of (d table / du) times `dual`: (S, A, N), (S, A, N) -> (S, N)."""
     order = (table.shape[-2] - 1) // 2
     if order == 0:
         return torch.zeros_like(table[:, 0])
@@ -106,7 +106,7 @@ class _Room:
 
 
 def _blocks(weights: Tensor, points: int) -> list[slice]:
-    """Ranges of points whose tables and partial sums stay in a processor's cache."""
+    """Return ranges of points whose tables and partial sums stay in a processor's cache."""
     if weights.device.type != "cpu" or points == 0:
         return [slice(0, points)]
     rows = math.prod(weights.shape[:-1]) + weights.shape[0] * sum(weights.shape[2:])
@@ -140,7 +140,7 @@ def _forward(weights: Tensor, u: Tensor) -> Tensor:
 def _backward_block(
     weights: Tensor, u: Tensor, grad: Tensor, want_points: bool, room: _Room
 ) -> tuple[Tensor, Tensor | None]:
-    """Cotangents of the flattened weights and of u, the partial sums worked out anew."""
+    """Return cotangents of the flattened weights and of u, the partial sums worked out anew."""
     dim = u.shape[1]
     tables = room.fill(u)
     flat = weights.reshape(weights.shape[0], -1, weights.shape[-1])
@@ -191,7 +191,7 @@ class _Series(torch.autograd.Function):
 
 
 def evaluate_plainly(weights: Tensor, u: Tensor) -> Tensor:
-    """The same values by ordinary differentiable operations, for derivatives of any order."""
+    """Return the same values by ordinary differentiable operations, for derivatives of any order."""
     u = u - u.detach().round()
     *others, last = (_plain_table(weights, u, i) for i in range(u.shape[1]))
     flat = weights.flatten(1, -2)
@@ -209,7 +209,7 @@ def _plain_table(weights: Tensor, u: Tensor, i: int) -> Tensor:
 
 
 def evaluate(weights: Tensor, u: Tensor) -> Tensor:
-    """Values of the series at points.
+    """Return values of the series at points.
 
     Args:
         weights: (S, C, A_1, ..., A_d).
@@ -228,7 +228,7 @@ def evaluate(weights: Tensor, u: Tensor) -> Tensor:
 
 @torch.no_grad()
 def weight_cotangent(shape: tuple[int, ...], u: Tensor, grad: Tensor) -> Tensor:
-    """Gradient of sum grad . values in the weights; it depends on the points alone.
+    """Return the gradient of sum grad . values in the weights; it depends on the points alone.
 
     Args:
         shape: of the weights, (S, C, A_1, ..., A_d).

@@ -67,7 +67,7 @@ class SplineField(InvariantField):
         return _constants(self.group, self.max_frequency, self.smoothness, dtype, device)
 
     def table(self) -> Tensor:
-        """The spline's coefficients (d, M_1, ..., M_d)."""
+        """Return the spline's coefficients (d, M_1, ..., M_d)."""
         d, half = self.group.dim, self.sides[-1] // 2 + 1
         shape = (d, *self.sides[:-1], half, 2)
         spectrum = self.parameters_.new_zeros(math.prod(shape))
@@ -76,7 +76,7 @@ class SplineField(InvariantField):
         return fft.irfftn(spectrum, s=self.sides, dim=tuple(range(1, d + 1)), norm="forward")
 
     def bound(self) -> Callable[[Tensor], Tensor]:
-        """The field with its grid filled once, for many evaluations (an integrator's)."""
+        """Return the field with its grid filled once, for many evaluations (an integrator's)."""
         table = padded(self.table())
 
         def values(points: Tensor) -> Tensor:
@@ -85,7 +85,7 @@ class SplineField(InvariantField):
         return values
 
     def bound_with_divergence(self) -> Callable[[Tensor], tuple[Tensor, Tensor]]:
-        """As `bound`, returning V and its divergence from the same coefficients."""
+        """Return, as `bound` does, a function for V and its divergence from the same coefficients."""
         table = padded(self.table())
 
         def both(points: Tensor) -> tuple[Tensor, Tensor]:
@@ -96,16 +96,16 @@ class SplineField(InvariantField):
         return both
 
     def forward(self, points: Tensor) -> Tensor:
-        """V at points (..., d): vectors of the same shape."""
+        """Return V at points (..., d): vectors of the same shape."""
         return self.bound()(points)
 
     def divergence(self, points: Tensor) -> Tensor:
-        """Trace of the Jacobian, (...,), exact."""
+        """Return the trace of the Jacobian, (...,), exact."""
         return self.bound_with_divergence()(points)[1]
 
     @torch.no_grad()
     def lipschitz_bound(self) -> Tensor:
-        """An upper bound of the Jacobian's spectral norm anywhere, ().
+        """Return an upper bound of the Jacobian's spectral norm anywhere, ().
 
         The derivative of a spline along an axis is a convex combination of the differences of
         neighbouring coefficients, per cell; the norm of the Jacobian is at most that of its columns'
@@ -119,7 +119,7 @@ class SplineField(InvariantField):
         return linalg.vector_norm(torch.stack(steepest))
 
     def adjoint(self, points: Tensor, forces: Tensor) -> Tensor:
-        """Gradient (P,) of sum forces . V(points) in the parameters; points, forces (N, d)."""
+        """Return the gradient (P,) of sum forces . V(points) in the parameters; inputs (N, d)."""
         with torch.enable_grad():
             work = (self.forward(points.detach()) * forces.detach()).sum()
             return torch.autograd.grad(work, self.parameters_)[0]
@@ -132,7 +132,9 @@ class SplineField(InvariantField):
 
 
 def grid_sides(group: CrystallographicGroup, basis: InvariantBasis) -> tuple[int, ...]:
-    """Points of the grid along each lattice vector, equally spaced and mapped to itself by the group.
+    """Return the number of points along each lattice vector of a grid that the group preserves.
+
+    The points are equally spaced.
 
     Raises:
         OrbiflowError: if there is no such grid.
@@ -177,10 +179,8 @@ def _constants(
     }
 
 
-def _spectrum_layout(
-    basis: InvariantBasis, sides: tuple[int, ...]
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The invariant basis as sparse (row, column, value) of the half spectrum's real numbers.
+def _spectrum_layout(basis: InvariantBasis, sides: tuple[int, ...]) -> tuple[Array, Array, Array]:
+    """Return the invariant basis as sparse (row, column, value) of the half spectrum's real numbers.
 
     sqrt 2 (a cos + b sin) is (a - i b) / sqrt 2 at k and its conjugate at -k; divided by the
     B-splines' own transform, so that the spline goes through the field's values.

@@ -22,7 +22,7 @@ _forward_mode: Any = forward_ad
 
 
 def transformed() -> bool:
-    """Whether `torch.func` (vmap, grad, jvp and what is made of them) or forward mode is at work.
+    """Return whether `torch.func` (vmap, grad, jvp and what builds on them) or forward mode is active.
 
     Tensors may then stand for many, or carry tangents. torch has no public word for this; its own
     autograd functions ask the same.
@@ -33,7 +33,7 @@ def transformed() -> bool:
 def plain_gradients(
     function: Callable[..., Any], inputs: tuple[Tensor, ...], ctx: Any, cotangents: Any
 ) -> list[Tensor | None]:
-    """The backward pass of an autograd function that is `function` by ordinary operations.
+    """Return the backward pass of an autograd function that is `function` by ordinary operations.
 
     May itself be differentiated, in any mode, and batched; None for inputs that need no gradient.
     """

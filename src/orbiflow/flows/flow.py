@@ -127,11 +127,11 @@ class Flow(nn.Module):
         return self._watch is not None
 
     def fields(self) -> list[Any]:
-        """The vector fields, one a segment, as they were given."""
+        """Return the vector fields, one a segment, as they were given."""
         return [s.field if isinstance(s, _Plain) else s for s in self.segments]
 
     def with_steps(self, steps: int, *, method: str | None = None) -> Self:
-        """The same flow integrated otherwise: a view that shares fields and parameters.
+        """Return the same flow integrated otherwise: a view that shares fields and parameters.
 
         This flow stays as it is, so others that hold it notice nothing. A view has the same
         `state_dict`; training it trains this flow.
@@ -155,21 +155,21 @@ class Flow(nn.Module):
         return view
 
     def forward(self, points: Tensor) -> Tensor:
-        """Where points (..., d) are carried."""
+        """Return where points (..., d) are carried."""
         self._look(points)
         return self.carried(points)
 
     def inverse(self, points: Tensor) -> Tensor:
-        """Where points (..., d) come from: the same equation backwards, to the integrator's order."""
+        """Return where points (..., d) come from: the equation backwards, to the integrator's order."""
         self._look(points, inverse=True)
         return self.carried(points, inverse=True)
 
     def carried(self, points: Tensor, *, inverse: bool = False) -> Tensor:
-        """`forward` or `inverse`, without a look at whether the steps are fine enough."""
+        """Return `forward` or `inverse`, without a look at whether the steps are fine enough."""
         return self._last(points, (points,), inverse=inverse)[0]
 
     def forward_and_log_det(self, points: Tensor) -> tuple[Tensor, Tensor]:
-        """`forward` and the log-determinant of its Jacobian, from one integration.
+        """Return `forward` and the log-determinant of its Jacobian, from one integration.
 
         The second is the integral of the divergence along the path (instantaneous change of
         variables; paper, section 5.2), shape (...,).
@@ -178,16 +178,16 @@ class Flow(nn.Module):
         return self._with_log_det(points, inverse=False)
 
     def inverse_and_log_det(self, points: Tensor) -> tuple[Tensor, Tensor]:
-        """`inverse` and the log-determinant of the inverse's Jacobian."""
+        """Return `inverse` and the log-determinant of the inverse's Jacobian."""
         self._look(points, inverse=True)
         return self._with_log_det(points, inverse=True)
 
     def log_abs_det_jacobian(self, points: Tensor) -> Tensor:
-        """log |det D forward| at points (..., d), as (...,)."""
+        """Return log |det D forward| at points (..., d), as (...,)."""
         return self.forward_and_log_det(points)[1]
 
     def trajectories(self, points: Tensor) -> Tensor:
-        """The paths: (T + 1, ..., d) with T = segments x steps, the points themselves first."""
+        """Return the paths: (T + 1, ..., d) with T = segments x steps, the points themselves first."""
         self._look(points)
         with _calmly(points):
             states = self._walk((points,), inverse=False)
@@ -195,7 +195,7 @@ class Flow(nn.Module):
 
     @torch.no_grad()
     def error_estimate(self, points: Tensor, *, inverse: bool = False) -> float:
-        """Largest distance between the results with `steps` and with twice as many.
+        """Return the largest distance between the results with `steps` and with twice as many.
 
         For a method of order p the error at `steps` is about 2^p / (2^p - 1) times this.
         """
@@ -225,7 +225,7 @@ class Flow(nn.Module):
         return last
 
     def _walk(self, state: State, *, inverse: bool) -> Iterator[State]:
-        """The states after every step: points (..., d) and, if begun with one, the log-determinant."""
+        """Yield the state after every step: points (..., d), and the log-determinant if given one."""
         size = len(state)
         h = (-self.duration if inverse else self.duration) / self.steps
         fields = self.fields()

@@ -70,7 +70,7 @@ class RungeKutta:
         return low
 
     def step(self, slope: Callable[[State], State], state: State, h: float) -> State:
-        """One step of length h of d state / dt = slope(state)."""
+        """Return one step of length h of d state / dt = slope(state)."""
         slopes = [slope(state)]
         for row in self.stages:
             slopes.append(slope(_advance(state, slopes, row, h)))
@@ -196,7 +196,7 @@ def _complaint(flow: Flow, points: Tensor, inverse: bool) -> str:
 
 
 def _surely_fine(flow: Flow) -> bool:
-    """Whether the fields' own bounds say that each step errs little: (h L)^p / (p + 1)!."""
+    """Return whether the fields' own bounds say that each step errs little: (h L)^p / (p + 1)!."""
     bounds = [lipschitz_bound(field) for field in flow.fields()]
     known = [bound for bound in bounds if bound is not None]
     if len(known) < len(bounds):
@@ -207,7 +207,7 @@ def _surely_fine(flow: Flow) -> bool:
 
 
 def _some(points: Tensor) -> Tensor:
-    """Some of the points; the first axes may be those of a stack of fields."""
+    """Return some of the points; the first axes may be those of a stack of fields."""
     if points.dim() < 2 or points.shape[-2] <= SAMPLE:
         return points
     count = points.shape[-2]

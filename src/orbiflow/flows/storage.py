@@ -47,7 +47,7 @@ class Writer:
         self.groups: list[dict[str, Any]] = []
 
     def header(self, field: Any, place: str) -> dict[str, Any]:
-        """The field at `place` in the flow, ready for JSON.
+        """Return the field at `place` in the flow, ready for JSON.
 
         Raises:
             OrbiflowError: for a function without a name to ask for it by.
@@ -104,7 +104,7 @@ class Reader:
         self.shapes, self.makers = shapes, makers
 
     def field(self, header: Mapping[str, Any], place: str, nesting: int = 0) -> Any:
-        """The field whose tensors' names begin with `place`.
+        """Return the field whose tensors' names begin with `place`.
 
         Raises:
             OrbiflowError, KeyError, TypeError, ValueError: for what does not fit.
@@ -184,7 +184,7 @@ class Reader:
 
 
 def is_perceptron(field: Any) -> bool:
-    """Whether it is built as that of `neural_field` is."""
+    """Return whether it is built as that of `neural_field` is."""
     if type(field) is not nn.Sequential or len(field) < 2 or len(field) % 2:
         return False
     wanted = [PeriodicFeatures, *[nn.Linear, nn.Tanh] * (len(field) // 2)][: len(field)]
@@ -212,7 +212,7 @@ def _dtype(tensor: torch.Tensor) -> str:
 
 
 def finite(value: Any, name: str) -> float:
-    """`value` as a finite number."""
+    """Return `value` as a finite number."""
     return number(value, name, -math.inf)
 
 
@@ -266,7 +266,7 @@ def save_flow(flow: Flow, path: str | Path) -> Path:
 
 
 def load_flow(path: str | Path, *, modules: Makers | None = None) -> Flow:
-    """The flow that `save_flow` wrote, on the CPU.
+    """Return the flow that `save_flow` wrote, on the CPU.
 
     Args:
         path: of the file.

@@ -64,7 +64,7 @@ WALLPAPER_GROUPS: dict[str, WallpaperGroup] = {
 
 
 def wallpaper_group(name: str, lattice: ArrayLike | None = None) -> CrystallographicGroup:
-    """The wallpaper group `name` on `lattice` (2, 2, columns), by default one of its system.
+    """Return the wallpaper group `name` on `lattice` (2, 2, columns), by default one of its system.
 
     Raises:
         GroupError: for an unknown name, or a lattice that is not of the group's system.
@@ -118,7 +118,7 @@ IDENTIFICATION_SPACES: dict[str, IdentificationSpace] = {
 
 
 def identification_group(space: str) -> CrystallographicGroup:
-    """The group of an identification space, acting on the plane with canonical square [0, 1]^2.
+    """Return the group of an identification space, with canonical square [0, 1]^2.
 
     Raises:
         GroupError: for an unknown space.

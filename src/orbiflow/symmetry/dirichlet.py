@@ -49,7 +49,7 @@ class DirichletDomain:
         return np.stack([g(self.site) for g in self._candidates])
 
     def locate(self, points: Points) -> tuple[Points, Array]:
-        """Points wrapped to the lattice cell, and the index of the nearest image of the site."""
+        """Return points wrapped to the lattice cell, and the index of the nearest image of the site."""
         wrapped = self.group.wrap(points)
         plain = wrapped.detach().cpu().numpy() if isinstance(wrapped, torch.Tensor) else wrapped
         flat = np.asarray(plain, dtype=np.float64).reshape(-1, self.group.dim)
@@ -61,7 +61,7 @@ class DirichletDomain:
         return wrapped, nearest.reshape(plain.shape[:-1])
 
     def project(self, points: Points) -> Points:
-        """Representatives in the domain of the orbits of points, shape (..., d).
+        """Return representatives in the domain of the orbits of points, shape (..., d).
 
         Differentiable almost everywhere for torch tensors.
         """

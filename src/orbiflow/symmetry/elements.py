@@ -41,7 +41,7 @@ class SymmetryElements(NamedTuple):
 def symmetry_elements(
     group: CrystallographicGroup, center: Array | None = None, radius: float | None = None
 ) -> SymmetryElements:
-    """Rotation centres in a disc, and the mirror and glide lines that cross it.
+    """Return the rotation centres in a disc, and the mirror and glide lines that cross it.
 
     Args:
         group: of the plane.
@@ -98,7 +98,7 @@ def _lines(elements: list[Isometry], middle: Array, reach: float) -> list[GlideL
 
 
 def _axis(g: Isometry, middle: Array, reach: float) -> GlideLine:
-    """Line and glide of an orientation-reversing isometry, with the point next to `middle`."""
+    """Return line and glide of an orientation-reversing isometry, the point next to `middle`."""
     angle = np.arctan2(g.linear[1, 0], g.linear[0, 0]) / 2
     direction = np.array([np.cos(angle), np.sin(angle)])
     moved = g(middle) - middle

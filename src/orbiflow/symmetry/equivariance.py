@@ -114,7 +114,7 @@ def _failure(
 def _elements(
     group: CrystallographicGroup, cells: int, seed: int
 ) -> Iterator[tuple[int, Isometry]]:
-    """Each coset's number from 1 with: its representative, and some of it in other cells."""
+    """Return each coset's number from 1 with: its representative, and some of it in other cells."""
     d = group.dim
     steps: list[Array] = [
         np.array(s) for s in itertools.product((-cells, 0, cells), repeat=d) if any(s)

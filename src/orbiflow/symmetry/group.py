@@ -24,7 +24,7 @@ from orbiflow.symmetry.isometry import (
 
 
 def checked_lattice(lattice: ArrayLike) -> Array:
-    """A read-only float64 copy of a lattice basis, refused with GroupError if degenerate."""
+    """Return a read-only float64 copy of a lattice basis, refused with GroupError if degenerate."""
     basis = np.array(lattice, dtype=np.float64)
     if basis.ndim != 2 or basis.shape[0] != basis.shape[1] or basis.size == 0:
         raise GroupError(
@@ -118,7 +118,7 @@ class CrystallographicGroup:
         return np.stack([g.translation for g in self.cosets])
 
     def __eq__(self, other: object) -> bool:
-        """Whether both are the same set of isometries: each contains the other's generators."""
+        """Return whether both are the same set of isometries: each contains the other's generators."""
         if not isinstance(other, CrystallographicGroup):
             return NotImplemented
         if other is self:
@@ -153,7 +153,7 @@ class CrystallographicGroup:
         yield from self.cosets
 
     def contains(self, isometry: Isometry, tolerance: float = TOLERANCE) -> bool:
-        """Whether `isometry` is an element of the group, within `tolerance` of the cell's size."""
+        """Return whether `isometry` is in the group, within `tolerance` of the cell's size."""
         if isometry.dim != self.dim:
             return False
         offset = (isometry.translation - self.translations) @ self.inverse_lattice.T
@@ -176,7 +176,7 @@ class CrystallographicGroup:
         return points - floor @ cast_like(self.lattice, points).T
 
     def images(self, points: Points) -> Points:
-        """Images of points (..., d) under the coset representatives, shape (|G|, ..., d).
+        """Return images of points (..., d) under the coset representatives, shape (|G|, ..., d).
 
         Raises:
             GroupError: for points of another dimension.
@@ -190,7 +190,7 @@ class CrystallographicGroup:
     def elements_near(
         self, center: ArrayLike, radius: float, *, source: ArrayLike | None = None
     ) -> list[Isometry]:
-        """All elements that take the point `source` within `radius` of `center`, nearest first.
+        """Return all elements that take the point `source` within `radius` of `center`, nearest first.
 
         With the bounding disc of a tile as source, and radius = tile radius + region radius, these
         are the elements whose image of the tile can meet the region.
@@ -221,7 +221,7 @@ class CrystallographicGroup:
     def conjugate(
         self, linear: ArrayLike, offset: ArrayLike | None = None
     ) -> CrystallographicGroup:
-        """The group M G M^-1 for the affine map M: p -> linear p + offset.
+        """Return the group M G M^-1 for the affine map M: p -> linear p + offset.
 
         If a map D commutes with G then M o D carries tiles of G to tiles of M G M^-1. `linear` may
         be any similarity, or any map that commutes with the point group (lattice freedom).
@@ -254,7 +254,7 @@ class CrystallographicGroup:
 
 
 def checked_group(group: object) -> CrystallographicGroup:
-    """`group` itself.
+    """Return `group` itself.
 
     Raises:
         GroupError: if it is anything else, such as a group's name.
@@ -333,7 +333,7 @@ def _closure(basis: Array, generators: Sequence[Isometry], max_order: int) -> tu
 def _finite_closure(
     basis: Array, generators: Sequence[Isometry], max_order: int
 ) -> tuple[Isometry, ...] | None:
-    """All products modulo the lattice, breadth first, or None if there are over `max_order`."""
+    """Return all products modulo the lattice, breadth first, or None if there are over `max_order`."""
     elements = [identity(basis.shape[0])]
     seen = _Seen(basis)
     seen.add(elements[0])
@@ -349,7 +349,7 @@ def _finite_closure(
 
 
 def reduced_basis(lattice: Array) -> Array:
-    """Shortest basis (columns) of a plane lattice, with an angle of 60 to 120 degrees.
+    """Return the shortest basis (columns) of a plane lattice, with an angle of 60 to 120 degrees.
 
     Lagrange's and Gauss's reduction.
 

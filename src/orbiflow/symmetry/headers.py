@@ -16,7 +16,7 @@ MAX_ORDER, MAX_DIM, MAX_NAME = 2048, 64, 200
 
 
 def group_header(group: CrystallographicGroup) -> dict[str, Any]:
-    """Lattice (columns are basis vectors) and coset representatives, ready for JSON."""
+    """Return the lattice (columns are basis vectors) and coset representatives, ready for JSON."""
     return {
         "lattice": group.lattice.tolist(),
         "linear": group.linear_parts.tolist(),
@@ -25,7 +25,7 @@ def group_header(group: CrystallographicGroup) -> dict[str, Any]:
 
 
 def group_from_header(header: Mapping[str, Any], name: str = "") -> CrystallographicGroup:
-    """The group of `group_header`, with the same basis and representatives, bit for bit.
+    """Return the group of `group_header`, with the same basis and representatives, bit for bit.
 
     Raises:
         GroupError: for what is no group.
@@ -79,7 +79,7 @@ def cached_as_written(
     [Callable[Concatenate[CrystallographicGroup, Rest], Result]],
     Callable[Concatenate[CrystallographicGroup, Rest], Result],
 ]:
-    """As `lru_cache`, for functions of a group whose result depends on its basis and cosets.
+    """Cache a function of a group as `lru_cache` does, where bases and cosets matter.
 
     Groups are equal by value: Fourier coefficients of one are not those of an equal group in another
     basis, so that `lru_cache` would hand out wrong ones.

@@ -19,14 +19,11 @@ from typing import Any
 import numpy as np
 import scipy.linalg
 import scipy.sparse
-from numpy.typing import NDArray
 
-from orbiflow.arrays import Complex
+from orbiflow.arrays import Array, Complex, Integers
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.geometry import best_similarity, complex_points, plane_points, signed_area
 from orbiflow.tiles.silhouette import Mesh, local_thickness, triangulate
-
-Array = NDArray[np.float64]
 
 COTANGENTS = (0.05, 40.0)
 """Bounds of the areas' weights: obtuse triangles have negative ones."""
@@ -112,20 +109,20 @@ class Elastic:
         return len(self.rest)
 
     def rotations(self, z: Complex) -> Complex:
-        """The rotations (N, C), complex units, that suit shapes (N, C) best."""
+        """Return the rotations (N, C), complex units, that suit shapes (N, C) best."""
         n = self.size
         sums = self._own_conjugate[:, None] * z - self._conjugate @ z
         sums[:n] += (self._rod_cost * np.conj(self._curved))[:, None] * (self._rod @ z[:n])
         return sums / np.maximum(abs(sums), 1e-300)
 
     def energy(self, z: Complex) -> Array:
-        """Energies (C,) of shapes (N, C) without the pose's."""
+        """Return energies (C,) of shapes (N, C) without the pose's."""
         r = self.rotations(z)
         strain, bent = self._misfits(z, r)
         return self._w @ _squares(strain) + self._rod_cost @ _squares(bent)
 
     def forgiving_energy(self, z: Complex) -> Array:
-        """Energies (C,) that grow only in proportion to strains and kinks once these are large.
+        """Return energies (C,) that grow only in proportion to strains and kinks once these are large.
 
         2 f^2 (sqrt(1 + (s / f)^2) - 1) in place of s^2 (Charbonnier et al., 1994), with f the
         stiffness' `forgiven` strain and angle: a joint that bends, or a toe that is lost, costs
@@ -134,12 +131,12 @@ class Elastic:
         return self._forgiven(*self._forgiven_misfits(z))
 
     def cost(self, z: Complex) -> Array:
-        """(C,) what shapes (N, C) cost: `forgiving_energy` in their areas, and the displacement."""
+        """Return the cost (C,) of shapes (N, C): `forgiving_energy` over area, and displacement."""
         area = signed_area(plane_points(z[: self.size].T))
         return self.forgiving_energy(z) / area + POSE * self.displacement(z)
 
     def lenient_energy(self, z: Complex) -> Array:
-        """`forgiving_energy` (C,) at the rotations of least plain energy: never less, and quick."""
+        """Return `forgiving_energy` (C,) at the rotations of least plain energy: an upper bound."""
         return self._forgiven(*self._relative(z, self.rotations(z)))
 
     def _forgiven(self, strain: Array, kinks: Array) -> Array:
@@ -148,7 +145,7 @@ class Elastic:
         return (self._w * (f * abs(self._d)) ** 2) @ stretched + (self._rod_cost * g**2) @ bent
 
     def forgiving(self, z: Complex) -> Elastic:
-        """The body whose energy touches `forgiving_energy` at a shape (N,) or (N, 1) from above.
+        """Return the body whose energy touches `forgiving_energy` at a shape (N,) from above.
 
         Minimising with it, anew and anew, minimises that energy (iteratively reweighted least
         squares).
@@ -161,7 +158,7 @@ class Elastic:
         return body
 
     def _forgiven_misfits(self, z: Complex) -> tuple[Array, Array]:
-        """What is forgiven, see `_relative`, at the rotations of least forgiving energy."""
+        """Return what is forgiven, see `_relative`, at the rotations of least forgiving energy."""
         n = self.size
         turned = np.conj(self._d)[:, None] * (z[self._i] - z[self._j])
         curved = np.conj(self._curved)[:, None] * (self._rod @ z[:n])
@@ -178,7 +175,7 @@ class Elastic:
         return misfits
 
     def _relative(self, z: Complex, r: Complex) -> tuple[Array, Array]:
-        """Squared strains of pairs and squared kinks, in units of the stiffness' `forgiven`.
+        """Return the squared strains of pairs and squared kinks, in units of the stiffness' `forgiven`.
 
         Strains are the mean of both ends', so that weights stay symmetric.
         """
@@ -188,7 +185,7 @@ class Elastic:
         return (relative + relative[self._mates]) / 2, _squares(bent) / g**2
 
     @cached_property
-    def _mates(self) -> NDArray[np.int64]:
+    def _mates(self) -> Integers:
         """For each pair, the same pair from its other end."""
         own = self._i * len(self) + self._j
         order = np.argsort(own)
@@ -207,13 +204,13 @@ class Elastic:
         return strain, bent
 
     def displacement(self, z: Complex) -> Array:
-        """(C,) mean squared distance from the best similar copy, in areas of the copy."""
+        """Return (C,) mean squared distance from the best similar copy, in areas of the copy."""
         copy, factor = self.copies(z)
         size = np.maximum(abs(factor) ** 2, 1e-12)
         return (abs(z - copy) ** 2).mean(axis=0) / size
 
     def forces(self, z: Complex) -> Complex:
-        """What the rotations and the pose of shapes (N, C) pull towards: b of matrix z = b."""
+        """Return what the rotations and the pose of shapes (N, C) pull towards: b of matrix z = b."""
         r = self.rotations(z)
         copy, _ = self.copies(z)
         pull = r * self._own[:, None] + self._sums @ r
@@ -272,7 +269,7 @@ class Elastic:
         return solver
 
     def copies(self, z: Complex) -> tuple[Complex, Complex]:
-        """Best similar copies (N, C) of the body at rest, and the similarities' factors (C,)."""
+        """Return best similar copies (N, C) of the body at rest, and the similarities' factors (C,)."""
         center = z.mean(axis=0)
         factor = best_similarity(self.rest, z)
         return center + (self.rest - self.rest.mean())[:, None] * factor, factor
@@ -280,8 +277,8 @@ class Elastic:
     def _pairs(self, stiff: Array | None) -> Any:
         triangles, count, n = self.mesh.triangles, len(self), self.size
         factors = self._salience()
-        rows: list[NDArray[np.int64]] = []
-        columns: list[NDArray[np.int64]] = []
+        rows: list[Integers] = []
+        columns: list[Integers] = []
         values: list[Array] = []
         for k in range(3):
             i, j, apex = triangles[:, k], triangles[:, k - 2], triangles[:, k - 1]
@@ -309,7 +306,7 @@ class Elastic:
         return np.clip(thinness**self.stiffness.salience, *SALIENT)
 
     def _bending(self, stiff: Array | None) -> tuple[scipy.sparse.csr_matrix, Array]:
-        """The difference of unit steps at each of the outline's points (n, n), and its cost (n,)."""
+        """Return the differences of unit steps along the outline (n, n), and their costs (n,)."""
         n, rest = self.size, self.rest[: self.size]
         own, after = np.arange(n), (np.arange(n) + 1) % n
         length = np.maximum(abs(rest[after] - rest), 1e-6)
@@ -349,25 +346,25 @@ class Condensed:
         return None
 
     def forces(self, forces: Complex) -> Complex:
-        """Forces (N, C) as forces (n, C) on the outline."""
+        """Return forces (N, C) as forces (n, C) on the outline."""
         n = len(self.outline)
         return forces[:n] + _times(self.follow.T, forces[n:])
 
     def whole(self, outline: Complex, forces: Complex) -> Complex:
-        """All points (N, C), from the outline (n, C) and the forces (N, C)."""
+        """Return all points (N, C), from the outline (n, C) and the forces (N, C)."""
         n = len(self.outline)
         inner = _times(self.follow, outline) + _times(self.inverse, forces[n:])
         return np.concatenate([outline, inner])
 
 
 def _times(matrix: Array, z: Complex) -> Complex:
-    """A real matrix times complex columns, without making it complex."""
+    """Return a real matrix times complex columns, without making it complex."""
     z = np.ascontiguousarray(z)
     return (matrix @ z.view(np.float64)).view(np.complex128)
 
 
 def _inverse(matrix: Array) -> Array:
-    """Of a positive definite matrix, by Cholesky: a third of the work of a general one."""
+    """Return the inverse of a positive definite matrix by Cholesky, in a third of the usual work."""
     functions: Any = scipy.linalg.get_lapack_funcs(("potrf", "potri"), (matrix,))
     factorize, invert = functions
     factor, failed = factorize(matrix, lower=True)
@@ -383,7 +380,7 @@ def _squares(z: Complex) -> Array:
 
 
 def _symmetric(
-    rows: list[NDArray[np.int64]], columns: list[NDArray[np.int64]], values: list[Array], count: int
+    rows: list[Integers], columns: list[Integers], values: list[Array], count: int
 ) -> scipy.sparse.csr_matrix:
     i, j, v = np.concatenate(rows), np.concatenate(columns), np.concatenate(values)
     both = (np.concatenate([v, v]), (np.concatenate([i, j]), np.concatenate([j, i])))

@@ -25,18 +25,16 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from orbiflow.arguments import numbers
-from orbiflow.arrays import Complex
+from orbiflow.arrays import Array, Complex
 from orbiflow.tiles.geometry import centroid, complex_points, orient, plane_points, signed_area
 from orbiflow.tiles.likeness.elastic import Elastic
 from orbiflow.tiles.likeness.laid import laid_on
 from orbiflow.tiles.likeness.metrics import as_region
 from orbiflow.tiles.likeness.overlap import Overlap, overlaid
 from orbiflow.tiles.silhouette import sampled
-
-Array = NDArray[np.float64]
 
 PIECES = (0.04, 0.15, 0.4)
 """Lengths of the pieces, as shares of the outline."""
@@ -121,7 +119,7 @@ def fidelity(rest: Complex, bent: Complex, cost: float) -> Fidelity:
 
 
 def _misfits(rest: Complex, bent: Complex, length: float) -> Array:
-    """(n,) of the piece about each point: squared distance after the best motion, relative, 0 to 1."""
+    """Return, for the piece about each point, the misfit (n,) after the best motion, 0 to 1."""
     n = len(rest)
     half = min(max(3, round(length * n / 2)), (n - 1) // 2)
     index = (np.arange(n)[:, None] + np.arange(-half, half + 1)) % n
@@ -133,7 +131,7 @@ def _misfits(rest: Complex, bent: Complex, length: float) -> Array:
 
 
 def _clearance(z: Complex, *, inside: bool = False) -> Array:
-    """(n,) radius of the largest disc outside that touches the outline at each point, at most 1."""
+    """Return the radius (n,) of the largest disc outside that touches each point, at most 1."""
     z = z[::-1] if inside else z
     n = len(z)
     along = np.roll(z, -1) - np.roll(z, 1)
@@ -157,7 +155,7 @@ TRIED = 3
 
 
 def faithfulness(silhouette: ArrayLike, shape: ArrayLike, *, mirror: bool = True) -> Fidelity:
-    """What bending a silhouette into a shape would leave of it.
+    """Return what bending a silhouette into a shape would leave of it.
 
     Some tenths of a second; the silhouette's triangulation is kept for the next shape.
 
@@ -209,7 +207,7 @@ def _hands(ring: Array, *, mirror: bool) -> list[Complex]:
 
 
 def _ring(points: ArrayLike, what: str) -> Array:
-    """(n, 2) counter-clockwise about the origin, of area 1."""
+    """Return (n, 2) counter-clockwise about the origin, of area 1."""
     as_region(points, what)
     ring = orient(numbers(points, what, ("N", 2)), counter_clockwise=True)
     return np.ascontiguousarray((ring - centroid(ring)) / np.sqrt(signed_area(ring)))

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 import scipy.linalg
 
-from orbiflow.arrays import Complex
+from orbiflow.arrays import Array, Complex
 from orbiflow.tiles.geometry import (
     arc_lengths,
     complex_points,
@@ -22,7 +22,7 @@ from orbiflow.tiles.geometry import (
     points_along,
     resampled,
 )
-from orbiflow.tiles.likeness.elastic import Array, Elastic
+from orbiflow.tiles.likeness.elastic import Elastic
 
 FINER = 6
 """Places on the second outline for each point of the first."""
@@ -37,7 +37,7 @@ FIRST = 6
 def corresponding(
     own: Array, other: Array, near: float = 0.4, stretch: float = 1.0, count: int = 96
 ) -> Array:
-    """Where on another outline the points of one belong.
+    """Return where on another outline the points of one belong.
 
     Args:
         own: (n, 2) of area about 1, counter-clockwise.
@@ -70,7 +70,7 @@ def corresponding(
 
 
 def _differences(points: Array, places: Array, near: float) -> Array:
-    """(n, m) what it costs to take a point for a place."""
+    """Return (n, m) what it costs to take a point for a place."""
     x, y = complex_points(points), complex_points(places)
     own, other = (np.roll(z, -k) - np.roll(z, k) for z, k in ((x, 1), (y, FINER)))
     own, other = (step / np.maximum(abs(step), 1e-12) for step in (own, other))
@@ -79,7 +79,7 @@ def _differences(points: Array, places: Array, near: float) -> Array:
 
 
 def _begin(cost: Array) -> list[int]:
-    """Places for the first point, no two of them side by side."""
+    """Return places for the first point, no two of them side by side."""
     chosen: list[int] = []
     for place in np.argsort(cost, kind="stable").tolist():
         gaps = [abs(place - other) for other in chosen]
@@ -91,7 +91,7 @@ def _begin(cost: Array) -> list[int]:
 
 
 def _best_of(cost: Array, begin: list[int], stretch: float) -> Array:
-    """(n,) the best places, increasing, for points whose first is at one of the given places."""
+    """Return the best increasing places (n,), the first of them one of the places in `begin`."""
     n, m = cost.shape
     length = np.arange(1, LONGEST * FINER + 1)
     price = stretch * np.log(length / FINER) ** 2
@@ -132,7 +132,7 @@ CLOSE = 0.02
 
 
 def laid_on(body: Elastic, ring: Array) -> Complex:
-    """The body bent so that its outline's points lie on a ring, in order.
+    """Return the body bent so that its outline's points lie on a ring, in order.
 
     Args:
         body: the silhouette.
@@ -217,13 +217,13 @@ def _step(body: Elastic, slide: _Slide, z: Complex) -> tuple[_Slide, Complex]:
 
 
 def _objective(body: Elastic, z: Complex) -> float:
-    """What the steps lower: the energy and the pose's."""
+    """Return what the steps lower: the energy and the pose's."""
     copy, _ = body.copies(z)
     return float(body.energy(z)[0] + body.stiffness.pose * (abs(z - copy) ** 2).mean())
 
 
 def _parted(at: Array, size: float) -> Array:
-    """Places (n,) on a closed line, moved as little as it takes to be in order and some way apart."""
+    """Return places (n,) on a closed line, moved as little as order and a least distance require."""
     n = len(at)
     spaced = np.arange(n) * (CLOSE * size / n)
     turn = size - n * (CLOSE * size / n)  # what is left of a round

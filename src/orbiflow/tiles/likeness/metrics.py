@@ -11,20 +11,19 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 import shapely
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from shapely.geometry import MultiPolygon, Polygon, box
 
 from orbiflow.arguments import numbers
+from orbiflow.arrays import Array, Integers, Window
 from orbiflow.errors import OrbiflowError
 
 # Of the diagonal of the box around both curves.
 TOLERANCE = 1e-6
 
 
-def hausdorff_distance(
-    a: NDArray[np.float64], b: NDArray[np.float64], *, tolerance: float
-) -> float:
-    """Hausdorff distance between the unions of the segments `a` and `b`, each (M, 2, 2).
+def hausdorff_distance(a: Array, b: Array, *, tolerance: float) -> float:
+    """Return the Hausdorff distance between the unions of the segments `a` and `b`, each (M, 2, 2).
 
     Too small by at most `tolerance` (in the unit of the coordinates), never too large.
     """
@@ -32,10 +31,8 @@ def hausdorff_distance(
     return max(forth, _directed(b, a, tolerance, at_least=forth))
 
 
-def _directed(
-    a: NDArray[np.float64], b: NDArray[np.float64], tolerance: float, at_least: float = 0.0
-) -> float:
-    """Greatest distance from a point of `a` to the nearest point of `b`."""
+def _directed(a: Array, b: Array, tolerance: float, at_least: float = 0.0) -> float:
+    """Return the greatest distance from a point of `a` to the nearest point of `b`."""
     tree = shapely.STRtree(list(np.asarray(shapely.linestrings(b), dtype=object)))
     start, end = a[:, 0], a[:, 1]
     best = at_least
@@ -56,18 +53,16 @@ def _directed(
     return best
 
 
-def _nearest(
-    tree: shapely.STRtree, points: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
-    """Distance to, and index of, the edge of `tree` nearest to each of `points` (P, 2)."""
+def _nearest(tree: shapely.STRtree, points: Array) -> tuple[Array, Integers]:
+    """Return the distance to, and index of, the edge of `tree` nearest to each of `points` (P, 2)."""
     pairs, distance = tree.query_nearest(
         shapely.points(points), return_distance=True, all_matches=False
     )
     return distance, pairs[1]
 
 
-def _distance(points: NDArray[np.float64], edges: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Distance of each of `points` (P, 2) to the edge (P, 2, 2) of the same index."""
+def _distance(points: Array, edges: Array) -> Array:
+    """Return the distance of each of `points` (P, 2) to the edge (P, 2, 2) of the same index."""
     origin, along = edges[:, 0], edges[:, 1] - edges[:, 0]
     length2 = np.maximum((along**2).sum(axis=1), np.finfo(float).tiny)
     t = np.clip(((points - origin) * along).sum(axis=1) / length2, 0.0, 1.0)
@@ -95,16 +90,16 @@ class ShapeMetrics:
     iou: float
     dice: float
     pixel_accuracy: float
-    window: tuple[float, float, float, float]
+    window: Window
     hausdorff: float
 
     def as_dict(self) -> dict[str, float | list[float]]:
-        """The same values, ready for JSON."""
+        """Return the same values, ready for JSON."""
         return asdict(self) | {"window": list(self.window)}
 
 
 def iou(a: Shape, b: Shape) -> float:
-    """Intersection over union (the Jaccard index) of two shapes, 0 to 1.
+    """Return the intersection over union (the Jaccard index) of two shapes, 0 to 1.
 
     Raises `OrbiflowError` naming the argument that is not a valid polygon.
 
@@ -115,7 +110,7 @@ def iou(a: Shape, b: Shape) -> float:
 
 
 def dice(a: Shape, b: Shape) -> float:
-    """Dice coefficient of two shapes, 0 to 1: twice the shared area over the sum of the areas.
+    """Return the Dice coefficient of two shapes, 0 to 1: twice the shared over the total area.
 
     Raises `OrbiflowError` naming the argument that is not a valid polygon.
 
@@ -126,7 +121,7 @@ def dice(a: Shape, b: Shape) -> float:
 
 
 def pixel_accuracy(a: Shape, b: Shape, window: Shape | None = None) -> float:
-    """Share of `window` on which `a` and `b` agree: both there or both absent. 0 to 1.
+    """Return the share of `window` on which `a` and `b` agree: both there or both absent. 0 to 1.
 
     The limit, as pixels shrink, of the share of pixels classified alike. The value depends on the
     window: the more background it takes in, the nearer 1. `window` is a shape or four numbers
@@ -143,7 +138,7 @@ def pixel_accuracy(a: Shape, b: Shape, window: Shape | None = None) -> float:
 
 
 def default_window(target: Shape) -> Polygon:
-    """The bounding box of `target`, enlarged by 10% of its width and height on every side.
+    """Return the bounding box of `target`, enlarged by 10% of its width and height on every side.
 
     >>> default_window([[0, 0], [10, 0], [0, 20]]).bounds
     (-1.0, -2.0, 11.0, 22.0)
@@ -154,7 +149,7 @@ def default_window(target: Shape) -> Polygon:
 
 
 def hausdorff(a: Shape, b: Shape) -> float:
-    """Hausdorff distance between the boundaries of two shapes, in the shapes' own units.
+    """Return the Hausdorff distance between the boundaries of two shapes, in the shapes' own units.
 
     The distance between the curves, not between their vertices: the greatest distance from a point
     of one boundary to the nearest point of the other. It is too small by at most 1e-6 of the
@@ -169,7 +164,7 @@ def hausdorff(a: Shape, b: Shape) -> float:
 
 
 def compare(tile: Shape, target: Shape, window: Shape | None = None) -> ShapeMetrics:
-    """All metrics of `tile` against `target`, both in one frame.
+    """Return all metrics of `tile` against `target`, both in one frame.
 
     `window` is as in `pixel_accuracy`; `hausdorff` is in units of the square root of the target's
     area. Raises `OrbiflowError` naming the argument that is not a valid polygon.
@@ -215,8 +210,8 @@ def _share(value: float) -> float:
     return min(max(float(value), 0.0), 1.0)
 
 
-def _edges(region: Region) -> NDArray[np.float64]:
-    """Boundary segments of `region`, (M, 2 ends, 2 coordinates)."""
+def _edges(region: Region) -> Array:
+    """Return boundary segments of `region`, (M, 2 ends, 2 coordinates)."""
     polygons = region.geoms if isinstance(region, MultiPolygon) else [region]
     rings = [ring for part in polygons for ring in (part.exterior, *part.interiors)]
     coords = [np.asarray(ring.coords, dtype=np.float64)[:, :2] for ring in rings]
@@ -233,7 +228,7 @@ def _window(window: Shape) -> Region:
 
 
 def as_region(shape: Shape, name: str) -> Region:
-    """`shape` as a valid polygon of positive area, else an error naming the argument."""
+    """Return `shape` as a valid polygon of positive area, else an error naming the argument."""
     if not isinstance(shape, Polygon | MultiPolygon):
         shape = _ring_polygon(shape, name)
     if not np.isfinite(shapely.get_coordinates(shape)).all():

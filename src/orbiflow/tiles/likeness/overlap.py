@@ -23,7 +23,7 @@ MANY, COARSE = 1500, 2e-3
 
 
 def prepared_region(ring: Array) -> shapely.Polygon:
-    """The region of a ring (N, 2) of area about 1, prepared; simplified if its vertices are many.
+    """Return the prepared region of a ring (N, 2) of area about 1, simplified if it is complex.
 
     For choosing among candidates: intersections with thousands of vertices cost seconds. What is
     reported is measured with the ring itself.
@@ -41,7 +41,7 @@ def prepared_region(ring: Array) -> shapely.Polygon:
 
 
 def boundary_iou(goal: shapely.Polygon, boundaries: Array) -> Array:
-    """IoU (S,) of rings (S, N, 2) with a polygon; -1 for those that cross themselves."""
+    """Return the IoU (S,) of rings (S, N, 2) with a polygon; -1 for those that cross themselves."""
     polygons = np.asarray(shapely.polygons(boundaries))
     good = np.asarray(shapely.is_valid(polygons))
     scores = np.full(len(polygons), -1.0)
@@ -64,7 +64,7 @@ class Overlap:
         self.region = prepared_region(target)
 
     def iou(self, ring: Array) -> tuple[float, Array]:
-        """IoU of a simple ring (N, 2) with the region and its gradient (N, 2).
+        """Return the IoU of a simple ring (N, 2) with the region and its gradient (N, 2).
 
         >>> square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
         >>> value, gradient = Overlap(square).iou(0.5 * square + 0.25)
@@ -85,7 +85,7 @@ class Overlap:
         return common / union, ((union + common) * inside - common * whole) / union**2
 
     def area_gradient(self, ring: Array) -> Array:
-        """Gradient (N, 2) of the area of the ring's part inside the region."""
+        """Return the gradient (N, 2) of the area of the ring's part inside the region."""
         ends = np.roll(ring, -1, axis=0)
         sides = ends - ring
         lines = shapely.linestrings(np.stack([ring, ends], axis=1))
@@ -146,7 +146,7 @@ CLOSER = 0.15
 
 
 def mutual_iou(tiles: Sequence[Array], decisive: float = 0.9) -> Similarity:
-    """Mutual IoU of tiles by their indices, for `diverse`.
+    """Return the mutual IoU of tiles by their indices, for `diverse`.
 
     The better overlay is looked for only where it may decide: between pairs whose IoU, as they lie
     and with equal areas and centroids, is at most `CLOSER` below `decisive`.

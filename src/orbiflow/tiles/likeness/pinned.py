@@ -17,14 +17,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from orbiflow.arrays import Complex, Integers
+from orbiflow.arrays import Array, Complex, Integers
 from orbiflow.tiles.geometry import best_similarity
-from orbiflow.tiles.likeness.elastic import Array, Condensed, Elastic, Stiffness
+from orbiflow.tiles.likeness.elastic import Condensed, Elastic, Stiffness
 from orbiflow.tiles.silhouette import Mesh
 
 PINNED = 1e5
@@ -81,20 +79,20 @@ class Pinned(Elastic):
             self._low[part.index, 2 * k : 2 * k + 2] = part.columns
 
     def energy(self, z: Complex) -> Array:
-        """Energies (C,) of shapes (N, C) without the pose's, with the parts'."""
+        """Return energies (C,) of shapes (N, C) without the pose's, with the parts'."""
         return super().energy(z) + self._held(z)
 
     def lenient_energy(self, z: Complex) -> Array:
-        """As of `Elastic`, with the parts': placements that hold them are to be preferred."""
+        """Return `Elastic.lenient_energy` and the parts' cost: placements that hold them are better."""
         return super().lenient_energy(z) + self._held(z)
 
     def _held(self, z: Complex) -> Array:
-        """What the parts cost (C,)."""
+        """Return what the parts cost (C,)."""
         goals = zip(self.parts, self._goals(z), strict=True)
         return np.sum([part.cost(z, goal) for part, goal in goals], axis=0)
 
     def misfit(self, outline: Complex) -> float | None:
-        """How far the worst part of an outline (n,) is from similar to what it was, 0 to 1.
+        """Return how far the worst part of an outline (n,) is from similar to what it was, 0 to 1.
 
         The root of the mean squared distance after the best similarity over that from the part's
         middle (Procrustes); None if no part has three points of the outline.
@@ -110,14 +108,14 @@ class Pinned(Elastic):
         return float(max(found)) if found else None
 
     def forces(self, z: Complex) -> Complex:
-        """As of `Elastic`, the parts' pull to their sizes or angles included."""
+        """Return the forces of `Elastic` and the parts' pull to their sizes or angles."""
         pull = super().forces(z)
         for part, goal in zip(self.parts, self._goals(z), strict=True):
             pull[part.index] += part.pull[:, None] * goal
         return pull
 
     def _goals(self, z: Complex) -> list[Complex]:
-        """What each part's a is drawn to, (C,) each."""
+        """Return what each part's a is drawn to, (C,) each."""
         whole = best_similarity(self.rest, z)
         if self.keep_angle:
             return [whole] * len(self.parts)
@@ -148,7 +146,7 @@ class Pinned(Elastic):
         )
 
     def pulled(self, z: Complex, towards: Complex, strength: float, rounds: int) -> Complex:
-        """As of `Elastic`: let the outline be pulled towards other points."""
+        """Let the outline be pulled towards other points, as `Elastic.pulled` does."""
         mu = strength / self.size
         solve = self._pulled_solver(mu)
         spread = _complex(solve @ self._low)
@@ -182,12 +180,12 @@ class PinnedCondensed(Condensed):
         return self.coupling @ np.linalg.cholesky(self.solve)
 
     def forces(self, forces: Complex) -> Complex:
-        """Forces (N, C) as forces (n, C) on the outline."""
+        """Return forces (N, C) as forces (n, C) on the outline."""
         inner = self.spread.conj().T @ forces[len(self.outline) :]
         return super().forces(forces) + self.coupling @ (self.solve @ inner)
 
     def whole(self, outline: Complex, forces: Complex) -> Complex:
-        """All points (N, C), from the outline (n, C) and the forces (N, C)."""
+        """Return all points (N, C), from the outline (n, C) and the forces (N, C)."""
         n = len(self.outline)
         z = super().whole(outline, forces)
         pull = self.coupling.conj().T @ outline + self.spread.conj().T @ forces[n:]
@@ -217,22 +215,22 @@ class _Part:
         self.columns: Complex = np.stack([weight / np.sqrt(both) * self.rest, middle], axis=1)
 
     def factor(self, z: Complex) -> Complex:
-        """(C,) the a of the similar copies nearest to shapes (N, C)."""
+        """Return (C,) the a of the similar copies nearest to shapes (N, C)."""
         return np.conj(self.rest) @ z[self.index] / self.moment
 
     def cost(self, z: Complex, goal: Complex) -> Array:
-        """(C,) of shapes."""
+        """Return (C,) of shapes."""
         own = z[self.index] - z[self.index].mean(axis=0)
         a = self.factor(z)
         apart = (abs(own - self.rest[:, None] * a) ** 2).sum(axis=0)
         return self.weight * apart + self.stays * abs(a - goal) ** 2
 
 
-def _complex(array: NDArray[Any]) -> Complex:
+def _complex(array: Array) -> Complex:
     return np.asarray(array, dtype=np.complex128)
 
 
 def _one_less(low: Complex, spread: Complex) -> Complex:
-    """1 - W^H S W, made Hermitian."""
+    """Return 1 - W^H S W, made Hermitian."""
     product = low.conj().T @ spread
     return np.eye(low.shape[1]) - (product + product.conj().T) / 2

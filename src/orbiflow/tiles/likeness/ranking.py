@@ -4,9 +4,10 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 import shapely
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from orbiflow.arguments import number, whole
+from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.likeness.metrics import Shape, as_region
 
@@ -20,7 +21,7 @@ Similarity = Callable[[int, int], float]
 
 
 def rank_score(iou: float, recognisability: float) -> float:
-    """What tiles are ranked by, 0 to 1: the geometric mean of both, IoU with weight 1/4.
+    """Return what tiles are ranked by, 0 to 1: the geometric mean of both, IoU with weight 1/4.
 
     A geometric mean compares ratios, so it does not matter that IoU moves little from tile to tile
     (a blob without limbs has nine tenths of the best tile's) and recognisability much; and what has
@@ -45,7 +46,7 @@ def diverse(
     twin: float = TWIN,
     variety: float = VARIETY,
 ) -> list[int]:
-    """Up to `count` good candidates that differ from each other, the best first.
+    """Choose up to `count` good candidates that differ from each other, the best first.
 
     Maximal marginal relevance (Carbonell, Goldstein, 1998): first the candidate with the largest
     score, then again and again the one with the largest score minus `variety` times its similarity
@@ -84,7 +85,7 @@ def diverse(
 
 
 def tile_similarity(tiles: Sequence[Shape], classes: Sequence[str]) -> Similarity:
-    """How alike tiles are, for `diverse`: their mutual IoU, half of it if the classes differ.
+    """Return how alike tiles are, for `diverse`: their mutual IoU, half of it if the classes differ.
 
     So tiles are twins only within a class, and a class that is not yet in the list has the better
     of an equally good second tile of one that is.
@@ -114,7 +115,7 @@ def tile_similarity(tiles: Sequence[Shape], classes: Sequence[str]) -> Similarit
     return alike
 
 
-def _check(scores: ArrayLike, count: int, twin: float, variety: float) -> NDArray[np.float64]:
+def _check(scores: ArrayLike, count: int, twin: float, variety: float) -> Array:
     try:
         values = np.asarray(scores, dtype=np.float64)
     except (TypeError, ValueError) as exc:

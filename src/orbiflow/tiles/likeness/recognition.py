@@ -18,11 +18,11 @@ from typing import NamedTuple
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial.distance import cdist
 from shapely.geometry.polygon import orient
 
+from orbiflow.arrays import Array, Integers
 from orbiflow.tiles.geometry import points_along, polygons_in, ring_length
 from orbiflow.tiles.likeness.metrics import Region, Shape, as_region
 
@@ -58,7 +58,7 @@ class Recognisability:
     limbs: float
 
     def as_dict(self) -> dict[str, float]:
-        """The same values, ready for JSON."""
+        """Return the same values, ready for JSON."""
         return asdict(self)
 
 
@@ -105,15 +105,15 @@ class Recogniser:
             limbs=_share(float(self._limb_weights[goal_points] @ found)),
         )
 
-    def _rings(self, region: Region) -> list[NDArray[np.float64]]:
-        """Rings (M, 2) of `region` in units of the target, the inside on their left."""
+    def _rings(self, region: Region) -> list[Array]:
+        """Return rings (M, 2) of `region` in units of the target, the inside on their left."""
         polygons = [orient(polygon) for polygon in polygons_in(region)]
         rings = [ring for part in polygons for ring in (part.exterior, *part.interiors)]
         return [(shapely.get_coordinates(r)[:-1] - self._origin) / self._unit for r in rings]
 
 
 def recognisability(tile: Shape, target: Shape) -> Recognisability:
-    """How much of `target` is found again in `tile`, both in one frame; see `Recognisability`.
+    """Return how much of `target` is recognised in `tile`, both in one frame.
 
     Invariant under a similarity of both shapes. To compare many tiles with one target, make a
     `Recogniser`. Raises `OrbiflowError` naming the argument that is not a valid polygon.
@@ -133,14 +133,14 @@ class _Features(NamedTuple):
     - `before`, `after`: (P,), indices of each point's neighbours on its ring.
     """
 
-    lifted: NDArray[np.float64]
-    thickness: NDArray[np.float64]
-    before: NDArray[np.intp]
-    after: NDArray[np.intp]
+    lifted: Array
+    thickness: Array
+    before: Integers
+    after: Integers
 
 
-def _agreement(goal: _Features, own: _Features) -> NDArray[np.float64]:
-    """How far each point of the target (P,) agrees with each of the tile (Q,): (P, Q), 0 to 1.
+def _agreement(goal: _Features, own: _Features) -> Array:
+    """Return how far each point of the target (P,) agrees with each of the tile (Q,): (P, Q), 0 to 1.
 
     A point of the tile stands for its piece of the outline, a third of the way to its neighbours,
     so that it does not matter where on an outline the first point falls.
@@ -153,9 +153,7 @@ def _agreement(goal: _Features, own: _Features) -> NDArray[np.float64]:
     return np.exp(-squared * squared)
 
 
-def _features(
-    rings: list[NDArray[np.float64]], spacing: float, start: NDArray[np.float64]
-) -> _Features:
+def _features(rings: list[Array], spacing: float, start: Array) -> _Features:
     spacing = max(spacing, sum(ring_length(ring) for ring in rings) / MOST_POINTS)
     samples = [_sample(ring, spacing, start) for ring in rings]
     points = np.concatenate([xy for xy, _ in samples])
@@ -171,10 +169,8 @@ def _features(
     return _Features(lifted, thickness, before, after)
 
 
-def _sample(
-    ring: NDArray[np.float64], spacing: float, start: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Evenly spaced points (P, 2) of a closed ring, and the outward normal around each.
+def _sample(ring: Array, spacing: float, start: Array) -> tuple[Array, Array]:
+    """Return evenly spaced points (P, 2) of a closed ring, and the outward normal around each.
 
     The normal is the mean of the unit normals within `WINDOW`: shorter than 1 at a bend, so that a
     corner and its rounding are alike.
@@ -188,10 +184,8 @@ def _sample(
     return points_along(ring, at), np.column_stack([tangent[:, 1], -tangent[:, 0]])
 
 
-def _inscribed_radius(
-    points: NDArray[np.float64], normals: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Radius (P,) of the largest disk that touches the outline at each point from the inside.
+def _inscribed_radius(points: Array, normals: Array) -> Array:
+    """Return the radius (P,) of the largest disk inside that touches the outline at each point.
 
     The disk through p, tangent there, and through q has curvature 2 n . (p - q) / |q - p|^2; the
     largest disk that holds no other point of the outline has the largest of these curvatures.

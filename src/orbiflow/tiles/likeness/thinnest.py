@@ -22,11 +22,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import KDTree
 
 from orbiflow.arguments import number, numbers
-from orbiflow.arrays import Integers
+from orbiflow.arrays import Array, Integers
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.geometry import arc_lengths, orient, polygons_in, ring_length
-
-Array = NDArray[np.float64]
 
 FAR = 5.0
 """Length of the outline beyond a neck, in its widths: 1 / sin(11.5 degrees)."""
@@ -75,7 +73,7 @@ class Thinnest(NamedTuple):
 
 
 def neck_factor(share: float, min_neck: float) -> float:
-    """What a score is multiplied by where the narrowest neck, in square roots of the area, is `share`.
+    """Return the factor of a score for a narrowest neck of `share` square roots of the area.
 
     >>> neck_factor(0.02, 0.01), neck_factor(0.002, 0.01)
     (1.0, 0.2)
@@ -84,7 +82,7 @@ def neck_factor(share: float, min_neck: float) -> float:
 
 
 def least_neck(silhouette: ArrayLike, min_neck: float) -> float:
-    """How wide the necks of a silhouette's tiles should be, in square roots of the area.
+    """Return how wide the necks of a silhouette's tiles should be, in square roots of the area.
 
     `min_neck`, or `PINCHED` times the silhouette's own narrowest but at most `SOUND`, if that is more;
     0 if `min_neck` is 0.
@@ -103,7 +101,7 @@ def least_neck(silhouette: ArrayLike, min_neck: float) -> float:
 
 
 def narrowest_neck(ring: ArrayLike) -> Thinnest:
-    """The narrowest neck of a polygon; without a neck, the diameter of its largest disc.
+    """Return the narrowest neck of a polygon; without a neck, the diameter of its largest disc.
 
     Exact where the sides of the neck are parallel or a vertex is at its narrowest; where it tapers, the
     place is found to two `STEP`s along the outline, never too narrow.
@@ -131,7 +129,7 @@ def narrowest_neck(ring: ArrayLike) -> Thinnest:
 
 
 def narrowest_slit(ring: ArrayLike) -> Thinnest | None:
-    """The narrowest gap between parts of a polygon, outside of it; None if there is none.
+    """Return the narrowest gap between parts of a polygon, outside of it; None if there is none.
 
     As `narrowest_neck`.
     """
@@ -143,7 +141,7 @@ def narrowest_slit(ring: ArrayLike) -> Thinnest | None:
 
 
 def hair_share(ring: ArrayLike, width: float) -> float:
-    """Share of a polygon's outline that bounds parts thinner than `width`.
+    """Return the share of a polygon's outline that bounds parts thinner than `width`.
 
     Thin is what no disc of that diameter inside the polygon covers (the residue of a morphological
     opening); a part counts if it has more than `FAR` widths of the outline, so that corners do not
@@ -168,7 +166,7 @@ def hair_share(ring: ArrayLike, width: float) -> float:
 
 
 def slit_share(ring: ArrayLike, width: float) -> float:
-    """Share of a polygon's outline that bounds gaps thinner than `width`, as `hair_share`."""
+    """Return the share of a polygon's outline that bounds gaps thinner than `width`."""
     _, polygon = _checked(ring)
     width = number(width, "width", 0, above=True)
     around = shapely.box(*polygon.buffer(2 * width).bounds)
@@ -184,7 +182,7 @@ def _checked(ring: ArrayLike) -> tuple[Array, shapely.Polygon]:
 
 
 def _facing(ring: Array, size: float, runs_well: Callable[[Any], Any]) -> Thinnest | None:
-    """The nearest two points that face each other on the left of the ring, all of the segment well."""
+    """Return the nearest two points that face each other on the left of the ring."""
     points = _dense(ring, STEP * size)
     tree = KDTree(points)
     widest = min(ring_length(ring) / 2 / FAR, WIDE * size)
@@ -200,7 +198,7 @@ def _facing(ring: Array, size: float, runs_well: Callable[[Any], Any]) -> Thinne
 
 
 def _dense(ring: Array, step: float) -> Array:
-    """The ring's vertices, and points on its sides so that none are farther apart than `step`."""
+    """Return the ring's vertices, and points on its sides at most `step` apart."""
     after = np.roll(ring, -1, axis=0)
     pieces = np.maximum(np.ceil(np.linalg.norm(after - ring, axis=1) / step), 1).astype(int)
     start = np.repeat(np.cumsum(pieces) - pieces, pieces)
@@ -213,7 +211,7 @@ def _dense(ring: Array, step: float) -> Array:
 def _nearest_within(
     points: Array, tree: KDTree, reach: float, apart: float, runs_well: Callable[[Any], Any]
 ) -> Array | None:
-    """Ends (2, 2) of the shortest segment that counts, of those up to `reach` long."""
+    """Return ends (2, 2) of the shortest segment that counts, of those up to `reach` long."""
     knots = arc_lengths(points)
     steps = np.roll(points, -1, axis=0) - points
     lengths = np.diff(knots)
@@ -248,14 +246,14 @@ def _nearest_within(
 def _on_the_left(
     steps: Array, i: Integers, j: Integers, along: Array, segments: Array
 ) -> NDArray[np.bool_]:
-    """Which segments may leave point i, and reach side j, on the left: others need no closer look."""
+    """Return which segments may leave point i, and reach side j, on the left (a quick filter)."""
     leaves = np.maximum(_cross(steps[i], segments), _cross(steps[i - 1], segments)) > 0
     within = (along > 0) & (along < 1)
     return leaves & (~within | (_cross(steps[j], segments) < 0))
 
 
 def _local_minima(i: Integers, j: Integers, width: Array) -> Integers:
-    """Of segments from one point to sides in a row, those that are not longer than the next ones."""
+    """Return the segments from one point to successive sides that are shorter than the next ones."""
     order = np.lexsort((j, i))
     i, j, width = i[order], j[order], width[order]
     row = (i[1:] == i[:-1]) & (j[1:] == j[:-1] + 1)
@@ -272,7 +270,7 @@ def _cross(a: Array, b: Array) -> Array:
 def _thin_share(
     polygon: shapely.Polygon, region: shapely.geometry.base.BaseGeometry, width: float
 ) -> float:
-    """Share of the polygon's outline on parts of the region that no disc in it covers."""
+    """Return the share of the polygon's outline on parts of the region that no disc in it covers."""
     eroded = region.buffer(-width / 2, quad_segs=ROUND)
     opened = eroded.buffer(width / 2 * (1 + SLACK), quad_segs=ROUND)
     parts = polygons_in(region.difference(opened))

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import gaussian_filter, map_coordinates
 
 from orbiflow.arguments import instance, number, numbers
+from orbiflow.arrays import Array, Window
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.tiles.silhouette.outlines import clean_ring, percent
 from orbiflow.tiles.silhouette.readers import MaskReading, read_mask
@@ -28,8 +29,6 @@ TOUCH = 0.01  # of full emphasis: what is nowhere above this on the silhouette d
 GRID = 512  # pixels along a side of the grids that integrals are taken on
 
 _OUTLINE_BOX = "the outline's bounding box"
-
-Box = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +52,7 @@ class Emphasis:
     """
 
     mask: NDArray[np.floating]
-    box: Box
+    box: Window
     strength: float = 4.0
     source: str = "mask"
     share: float | None = None
@@ -101,16 +100,16 @@ class Emphasis:
         notes = (*picture.notes, *placed, *_warnings(levels, share, plain.strength))
         return cls(plain.mask, own, strength, str(path), share, notes)
 
-    def weight(self, points: ArrayLike) -> NDArray[np.float64]:
-        """Weights (...) at `points` (..., 2) of the normal form, from 1 to the strength.
+    def weight(self, points: ArrayLike) -> Array:
+        """Return weights (...) at `points` (..., 2) of the normal form, from 1 to the strength.
 
         Bilinear between the centres of the mask's pixels; beyond the box it fades to 1 within
         0.05. Raises `OrbiflowError` for points of another shape or that are not finite.
         """
         return 1 + (self.strength - 1) * self.level(points)
 
-    def image(self, center: ArrayLike, reach: float, resolution: int) -> NDArray[np.float64]:
-        """Weights at the pixel centres of a square, (resolution, resolution), row 0 at least y.
+    def image(self, center: ArrayLike, reach: float, resolution: int) -> Array:
+        """Return weights at the pixel centres of a square, (resolution, resolution), row 0 at least y.
 
         The grid of `SoftTarget`, and of `torch.nn.functional.grid_sample` without aligned corners:
         pixel (i, j) lies at `center` + `reach` * ((2 j + 1) / resolution - 1,
@@ -121,7 +120,7 @@ class Emphasis:
         return self.weight(np.stack(np.meshgrid(x0 + axis, y0 + axis), axis=-1))
 
     def report(self) -> dict[str, Any]:
-        """What was read and decided, ready for JSON."""
+        """Return what was read and decided, ready for JSON."""
         return {
             "source": self.source,
             "strength": float(self.strength),
@@ -129,7 +128,7 @@ class Emphasis:
             "notes": list(self.notes),
         }
 
-    def level(self, points: ArrayLike) -> NDArray[np.float64]:
+    def level(self, points: ArrayLike) -> Array:
         at = np.asarray(points, dtype=np.float64)
         if at.ndim == 0 or at.shape[-1] != 2 or not np.isfinite(at).all():
             raise OrbiflowError(
@@ -148,7 +147,7 @@ class Emphasis:
 
 
 def emphasised_iou(tile: ArrayLike, target: ArrayLike, emphasis: Emphasis) -> float:
-    """Weighted intersection over weighted union of two rings (N, 2) in the normal form, 0 to 1.
+    """Return the weighted intersection over union, 0 to 1, of two rings (N, 2) in the normal form.
 
     The areas are sums of weights over the pixel centres of a grid of 512 x 512 on the box around
     both shapes, the same ones every time. For outlines of animals the result is within 0.001 of
@@ -173,22 +172,22 @@ def emphasised_iou(tile: ArrayLike, target: ArrayLike, emphasis: Emphasis) -> fl
     return float(weight[(own & goal)[either]].sum()) / total if total else 0.0
 
 
-def _grid(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Centres (GRID^2, 2) of the pixels of the box around `points`."""
+def _grid(points: Array) -> Array:
+    """Return centres (GRID^2, 2) of the pixels of the box around `points`."""
     low, high = points.min(axis=0), points.max(axis=0)
     steps = (np.arange(GRID) + 0.5) / GRID
-    along: list[NDArray[np.float64]] = [low[i] + (high[i] - low[i]) * steps for i in range(2)]
+    along: list[Array] = [low[i] + (high[i] - low[i]) * steps for i in range(2)]
     return np.stack(np.meshgrid(*along), axis=-1).reshape(-1, 2)
 
 
-def _contains(ring: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.bool_]:
+def _contains(ring: Array, points: Array) -> NDArray[np.bool_]:
     region = shapely.Polygon(ring)
     shapely.prepare(region)
     return shapely.contains_xy(region, points[:, 0], points[:, 1])
 
 
-def _covered(target: Target) -> tuple[Box, str]:
-    """What a mask covers, (xmin, ymin, xmax, ymax) in input units, and its name."""
+def _covered(target: Target) -> tuple[Window, str]:
+    """Return what a mask covers, (xmin, ymin, xmax, ymax) in input units, and its name."""
     if target.size is None:
         xmin, ymin = target.outline.min(axis=0)
         xmax, ymax = target.outline.max(axis=0)
@@ -199,8 +198,8 @@ def _covered(target: Target) -> tuple[Box, str]:
     return (xmin, ymin, xmin + width, ymin + height), name
 
 
-def _check_aspect(path: Path, picture: MaskReading, box: Box, covered: str) -> list[str]:
-    """Notes of how the mask was laid over what it covers; an error where it does not fit."""
+def _check_aspect(path: Path, picture: MaskReading, box: Window, covered: str) -> list[str]:
+    """Return notes of how the mask was laid over what it covers; an error where it does not fit."""
     (width, height), wide, high = picture.size, box[2] - box[0], box[3] - box[1]
     mask, size = f"{width} x {height} pixels", f"{wide:.6g} x {high:.6g}"
     if abs(width * high / (height * wide) - 1) > MAX_ASPECT_ERROR:
@@ -213,8 +212,8 @@ def _check_aspect(path: Path, picture: MaskReading, box: Box, covered: str) -> l
     return [f"laid the mask ({mask}) over {covered} ({size})"]
 
 
-def _normal_box(target: Target, box: Box, overhang: NDArray[np.float64]) -> Box:
-    """`box` of the input in the normal form, drawn out to the right and downwards by `overhang`."""
+def _normal_box(target: Target, box: Window, overhang: Array) -> Window:
+    """Return `box` in the normal form, extended to the right and downwards by `overhang`."""
     corners = target.to_normal([box[:2], box[2:]])
     xmin, ymin = corners.min(axis=0)
     xmax, ymax = corners.max(axis=0)
@@ -227,7 +226,7 @@ def _normal_box(target: Target, box: Box, overhang: NDArray[np.float64]) -> Box:
     )
 
 
-def _smoothed(levels: NDArray[np.float64], box: Box) -> NDArray[np.float32]:
+def _smoothed(levels: Array, box: Window) -> NDArray[np.float32]:
     xmin, ymin, xmax, ymax = box
     pixel = np.array([ymax - ymin, xmax - xmin]) / levels.shape
     sigma = np.minimum(SMOOTHING / pixel, MAX_SMOOTHING)
@@ -236,7 +235,7 @@ def _smoothed(levels: NDArray[np.float64], box: Box) -> NDArray[np.float32]:
 
 
 def _share_of(emphasis: Emphasis, target: Target) -> float:
-    """Mean emphasis of the silhouette; an error where the mask does not touch it."""
+    """Return the mean emphasis of the silhouette; an error where the mask does not touch it."""
     ring = target.normal
     points = _grid(ring)
     levels = emphasis.level(points[_contains(ring, points)])
@@ -249,7 +248,7 @@ def _share_of(emphasis: Emphasis, target: Target) -> float:
     return float(levels.mean()) if levels.size else float(on_outline.mean())
 
 
-def _warnings(levels: NDArray[np.float64], share: float, strength: float) -> list[str]:
+def _warnings(levels: Array, share: float, strength: float) -> list[str]:
     notes: list[str] = []
     lightest = float(levels.max())
     if lightest < 0.9:

@@ -71,7 +71,7 @@ class Frame:
     @overload
     def to_input(self, points: ArrayLike) -> Array: ...
     def to_input(self, points: torch.Tensor | ArrayLike) -> torch.Tensor | Array:
-        """Points (..., 2) of the normal form in the input's units; arrays, lists or tensors."""
+        """Return points (..., 2) of the normal form in the input's units; arrays, lists or tensors."""
         if isinstance(points, torch.Tensor):
             points = _tensor(points)
             return points @ points.new_tensor(self.linear).T + points.new_tensor(self.offset)
@@ -82,7 +82,7 @@ class Frame:
     @overload
     def to_normal(self, points: ArrayLike) -> Array: ...
     def to_normal(self, points: torch.Tensor | ArrayLike) -> torch.Tensor | Array:
-        """Points (..., 2) in the input's units, in the normal form; arrays, lists or tensors."""
+        """Return points (..., 2) in the input's units, in the normal form; arrays, lists or tensors."""
         if isinstance(points, torch.Tensor):
             points = _tensor(points)
             return (points - points.new_tensor(self.offset)) @ points.new_tensor(self.inverse).T
@@ -93,7 +93,7 @@ class Frame:
         return local @ self.inverse.T
 
     def as_dict(self) -> dict[str, Any]:
-        """Everything, ready for JSON; `from_dict` undoes it bit for bit."""
+        """Return everything, ready for JSON; `from_dict` undoes it bit for bit."""
         return {
             "linear": self.linear.tolist(),
             "offset": self.offset.tolist(),
@@ -105,7 +105,7 @@ class Frame:
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Self:
-        """The frame that `as_dict` wrote.
+        """Return the frame that `as_dict` wrote.
 
         Raises `OrbiflowError` for values that are missing or do not make a frame.
         """

@@ -12,11 +12,9 @@ import shapely
 from numpy.typing import NDArray
 from scipy.spatial import Delaunay, Voronoi
 
-from orbiflow.arrays import Integers
+from orbiflow.arrays import Array, Integers
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.geometry import subdivided
-
-Array = NDArray[np.float64]
 
 ROUNDS = 24
 """Times that missing sides of the outline are halved."""
@@ -96,7 +94,7 @@ def triangulate(ring: Array, spacing: float | None = None) -> Mesh:
 
 
 def _inside(polygon: shapely.Polygon, spacing: float) -> Array:
-    """Points inside on triangular grids, the farther from the outline the wider."""
+    """Return points inside on triangular grids, the farther from the outline the wider."""
     xmin, ymin, xmax, ymax = polygon.bounds
     found: list[Array] = []
     for level, (least, most) in enumerate(((0.6, 1.7), (1.7, 4.5), (4.5, np.inf))):
@@ -122,7 +120,7 @@ def _are_sides(ends: Integers, triangles: Integers, count: int) -> NDArray[np.bo
 
 
 def _kept(mesh: Mesh, polygon: shapely.Polygon) -> Mesh:
-    """The triangles inside the polygon, counter-clockwise, and the points that they use."""
+    """Return the triangles inside the polygon, counter-clockwise, and the points that they use."""
     corners = mesh.points[mesh.triangles]
     middle = corners.mean(axis=1)
     u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
@@ -139,7 +137,7 @@ def _kept(mesh: Mesh, polygon: shapely.Polygon) -> Mesh:
 
 
 def _without_flat(triangles: Integers, flat: Integers) -> Integers:
-    """Vertices in line may be the corners of one flat triangle alone: its neighbour is divided."""
+    """Divide the neighbour of each flat triangle whose middle vertex is in no other triangle."""
     known = set(triangles.ravel().tolist())
     lost = [(row, k) for row in flat.tolist() for k in range(3) if row[k] not in known]
     for row, k in lost:
@@ -175,7 +173,7 @@ def _divided(mesh: Mesh) -> Mesh:
 
 
 def _pieces(corners: tuple[int, int, int], middles: list[int | None]) -> list[tuple[int, int, int]]:
-    """A triangle whose sides ab, bc, ca have these middles or none, in pieces without loose ends."""
+    """Return the pieces of a triangle whose sides ab, bc, ca have these middles or none."""
     a, b, c = corners
     count = sum(m is not None for m in middles)
     if count == 0:
@@ -215,7 +213,7 @@ class Locator:
         self._tree = shapely.STRtree(np.asarray(shapely.polygons(points[triangles])))
 
     def locate(self, points: Array) -> Located:
-        """The triangle of each point (P, 2); finite points alone."""
+        """Return the triangle of each point (P, 2); finite points alone."""
         found = np.full(len(points), -1)
         where = np.asarray(shapely.points(points))
         index, triangle = self._tree.query(where, predicate="intersects")
@@ -237,7 +235,7 @@ ROUNDING = 1.02
 
 
 def local_thickness(mesh: Mesh) -> Array:
-    """Radius (M,) of the largest disc in the polygon that covers the middle of each triangle.
+    """Return the radius (M,) of the largest disc inside that covers each triangle's middle.
 
     The local thickness of Hildebrand and Rüegsegger (1997), over discs about the Voronoi
     vertices of points on the outline, which lie near the medial axis.

@@ -7,11 +7,12 @@ from typing import NamedTuple
 
 import numpy as np
 import shapely
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from orbiflow.arguments import numbers
+from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.geometry import (
     arc_lengths,
@@ -37,7 +38,7 @@ _POSITION = re.compile(r"\[(\S+) (\S+)\]")
 
 def clean_ring(
     points: ArrayLike, where: str, error: type[OrbiflowError] = OrbiflowError
-) -> tuple[NDArray[np.float64], list[str]]:
+) -> tuple[Array, list[str]]:
     """Check that `points` (N, 2) bound a region, and drop repeated vertices.
 
     Returns the ring and a note, in plain words, of each thing that was dropped. `where` opens each
@@ -65,9 +66,9 @@ def clean_ring(
     return kept, notes
 
 
-def _as_points(points: ArrayLike, where: str, error: type[OrbiflowError]) -> NDArray[np.float64]:
+def _as_points(points: ArrayLike, where: str, error: type[OrbiflowError]) -> Array:
     try:
-        ring: NDArray[np.float64] = np.zeros(0)
+        ring: Array = np.zeros(0)
         if np.ndim(points):
             ring = numbers(points, where, (...,), finite=False)
     except (TypeError, ValueError) as exc:
@@ -83,7 +84,7 @@ def _as_points(points: ArrayLike, where: str, error: type[OrbiflowError]) -> NDA
     return ring
 
 
-def _check_coordinates(ring: NDArray[np.float64], where: str, error: type[OrbiflowError]) -> None:
+def _check_coordinates(ring: Array, where: str, error: type[OrbiflowError]) -> None:
     bad = np.flatnonzero(~np.isfinite(ring).all(axis=1))
     if bad.size:
         raise error(
@@ -98,7 +99,7 @@ def _check_coordinates(ring: NDArray[np.float64], where: str, error: type[Orbifl
         )
 
 
-def _check_region(ring: NDArray[np.float64], where: str, error: type[OrbiflowError]) -> None:
+def _check_region(ring: Array, where: str, error: type[OrbiflowError]) -> None:
     low, high = ring.min(axis=0), ring.max(axis=0)
     size = float((high - low).max())
     if size < max(MIN_RELATIVE_SIZE * float(np.abs(ring).max()), MIN_SIZE):
@@ -107,7 +108,7 @@ def _check_region(ring: NDArray[np.float64], where: str, error: type[OrbiflowErr
             f"of {_pair(low)}; move it nearer the origin or enlarge it"
         )
     # In units of the box, so that neither a huge nor a tiny shape strains the predicates.
-    local: NDArray[np.float64] = (ring - low) / size
+    local: Array = (ring - low) / size
     polygon = Polygon(np.round(local, CLEARANCE_DIGITS))
     if polygon.convex_hull.area < MIN_RELATIVE_AREA:
         raise error(f"{where}: the polygon encloses no area, its vertices all lie on one line")
@@ -122,12 +123,12 @@ def _check_region(ring: NDArray[np.float64], where: str, error: type[OrbiflowErr
         raise error(f"{where}: the polygon encloses no area; check its vertices")
 
 
-def _pair(point: NDArray[np.float64]) -> str:
+def _pair(point: Array) -> str:
     return f"({point[0]:.6g}, {point[1]:.6g})"
 
 
 def percent(share: float) -> str:
-    """`share` (0 to 1) in words, never rounded to none or all of it.
+    """Return `share` (0 to 1) in words, never rounded to none or all of it.
 
     >>> percent(0.9213), percent(0.0002), percent(0.9999)
     ('92.1%', 'under 0.1%', 'over 99.9%')
@@ -138,23 +139,23 @@ def percent(share: float) -> str:
 
 
 def filled(polygon: Polygon) -> Polygon:
-    """`polygon` without its holes."""
+    """Return `polygon` without its holes."""
     return Polygon(polygon.exterior)
 
 
 def simplified(polygon: Polygon, tolerance: float) -> Polygon:
-    """`polygon` with fewer vertices, its boundary moved by at most `tolerance`; may be invalid."""
+    """Return `polygon` with fewer vertices, moved by at most `tolerance`; may be invalid."""
     parts = polygons_in(polygon.simplify(tolerance))
     return max(parts, key=lambda part: part.area, default=Polygon())
 
 
-def outer_ring(polygon: Polygon) -> NDArray[np.float64]:
-    """The exterior of `polygon` as a ring (N, 2)."""
+def outer_ring(polygon: Polygon) -> Array:
+    """Return the exterior of `polygon` as a ring (N, 2)."""
     return np.asarray(polygon.exterior.coords, dtype=np.float64)[:-1, :2].copy()
 
 
 def outer_outline(geometry: BaseGeometry) -> tuple[Polygon, list[str]]:
-    """The largest component of `geometry`, its holes filled, with notes of what was left out.
+    """Return the largest component of `geometry`, its holes filled, with notes of what was left out.
 
     Components are compared by their area with holes filled; a component that lies in another's
     hole goes with that hole. `geometry` must be valid and hold at least one polygon.
@@ -180,8 +181,6 @@ def outer_outline(geometry: BaseGeometry) -> tuple[Polygon, list[str]]:
         notes.append(f"filled {n_holes} hole{'s' * (n_holes > 1)} ({percent(share)} of the area)")
     return shape, notes
 
-
-Array = NDArray[np.float64]
 
 PLAIN = 8.2
 """Length of an outline of area 1 up to which it is sampled with the fewest points; a disc has 3.5."""
@@ -213,7 +212,7 @@ class Samples(NamedTuple):
 
 
 def sampled(ring: Array, phase: float = 0.0, multiples: tuple[int, ...] = MULTIPLES) -> Samples:
-    """Sample an outline, more densely where it is long or rich in corners.
+    """Return sample an outline, more densely where it is long or rich in corners.
 
     Where twice the coarse points make no simple polygon, or do not divide the fine ones, `middle` is
     `fine`.
@@ -248,7 +247,7 @@ def sampled(ring: Array, phase: float = 0.0, multiples: tuple[int, ...] = MULTIP
 
 
 def _simple_coarse(ring: Array, count: int, phase: float) -> Array:
-    """As many points as it takes for a polygon that does not cross itself; hairs made thicker."""
+    """Resample with as many points as a simple polygon takes; hairs are thickened."""
     polygon = shapely.Polygon(ring)
     for width in (0.0, 0.01, 0.02, 0.04):
         thick = ring
@@ -266,7 +265,7 @@ def _simple_coarse(ring: Array, count: int, phase: float) -> Array:
 
 
 def important_vertices(ring: Array, tolerance: float) -> list[int]:
-    """Indices of the vertices that Douglas and Peucker's simplification keeps."""
+    """Return indices of the vertices that Douglas and Peucker's simplification keeps."""
     first = int(np.argmax(np.linalg.norm(ring - ring.mean(axis=0), axis=1)))
     turned = np.roll(ring, -first, axis=0)
     half = int(np.argmax(np.linalg.norm(turned - turned[0], axis=1)))
@@ -282,7 +281,7 @@ def important_vertices(ring: Array, tolerance: float) -> list[int]:
 
 
 def with_corners(ring: Array, corners: list[int], count: int, phase: float = 0.0) -> Array:
-    """`count` points (count, 2) nearly evenly spaced, the nearest point moved to each corner.
+    """Return `count` points (count, 2), nearly evenly spaced, with the nearest one at each corner.
 
     Point i stays within a spacing of where even spacing has it. Of corners that are nearest to the
     same point, the first is kept.

@@ -15,14 +15,12 @@ import shapely
 from numpy.typing import ArrayLike, NDArray
 
 from orbiflow.arguments import instance, numbers
-from orbiflow.arrays import Integers
+from orbiflow.arrays import Array, Integers
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.tiles.geometry import resampled
 from orbiflow.tiles.silhouette.emphasis import Emphasis
 from orbiflow.tiles.silhouette.outlines import percent
 from orbiflow.tiles.silhouette.target import Target
-
-Array = NDArray[np.float64]
 
 USUAL = 0.08
 """Radius of a spot that has none of its own, in the longer side of the silhouette's bounding box."""
@@ -63,7 +61,7 @@ class Pins:
 
     @classmethod
     def at(cls, target: Target, spots: Iterable[ArrayLike], *, keep_angle: bool = False) -> Self:
-        """Pins at spots (x, y) or (x, y, radius), all in the input's units.
+        """Return pins at spots (x, y) or (x, y, radius), all in the input's units.
 
         A spot without a radius has 8% of the longer side of the silhouette's bounding box, or 1.5
         times its distance from the outline if that is more: a part inside that touches no outline
@@ -78,7 +76,7 @@ class Pins:
 
     @classmethod
     def read(cls, given: Iterable[str | Path], target: Target, *, keep_angle: bool = False) -> Self:
-        """Pins from words: spots "x,y" or "x,y,radius", and paths of masks, white where pinned.
+        """Return pins from text: spots "x,y" or "x,y,radius", or paths of masks, white where pinned.
 
         A mask covers what one of `Emphasis.read` does: the picture, the drawing's page, or the
         outline's bounding box.
@@ -125,7 +123,7 @@ class Pins:
         return replace(pins, notes=(*notes, *_warnings(pins, target)))
 
     def holds(self, points: ArrayLike) -> NDArray[np.bool_]:
-        """Which of the points (..., 2) of the normal form are pinned."""
+        """Return which of the points (..., 2) of the normal form are pinned."""
         at = np.asarray(points, dtype=np.float64)
         held = np.zeros(at.shape[:-1], dtype=bool)
         for x, y, radius in self.spots:
@@ -135,7 +133,7 @@ class Pins:
         return held
 
     def parts(self, points: Array, triangles: Integers) -> list[Integers]:
-        """Indices of pinned points (N, 2) in the normal form, a list a connected part.
+        """Return indices of pinned points (N, 2) in the normal form, a list a connected part.
 
         Args:
             points: of a mesh.
@@ -151,7 +149,7 @@ class Pins:
         return [np.flatnonzero((label == k) & held) for k in np.unique(label[held])]
 
     def report(self) -> dict[str, Any]:
-        """What was asked for, ready for JSON."""
+        """Return what was asked for, ready for JSON."""
         return {
             "sources": list(self.sources),
             "keep_angle": self.keep_angle,
@@ -160,7 +158,7 @@ class Pins:
 
 
 def _warnings(pins: Pins, target: Target) -> list[str]:
-    """Notes of how much of the outline is held; an error where that is all of it."""
+    """Return notes of how much of the outline is held; an error where that is all of it."""
     share = float(pins.holds(resampled(target.normal, 720)).mean())
     if share >= ALL:
         raise OrbiflowError(
@@ -175,7 +173,7 @@ def _warnings(pins: Pins, target: Target) -> list[str]:
 
 
 def _disc(spot: ArrayLike, target: Target) -> tuple[float, float, float]:
-    """A spot as x, y and radius in input units."""
+    """Return a spot as x, y and radius in input units."""
     values = numbers(spot, "a pin", ("2 or 3",))
     if len(values) not in (2, 3):
         raise OrbiflowError(f"a pin is x,y or x,y,radius, got {len(values)} numbers")

@@ -64,18 +64,18 @@ class SoftTarget:
         self._integrals: tuple[Tensor, Tensor, float] | None = None
 
     def occupancy(self, points: Tensor, blur: float) -> Tensor:
-        """Soft occupancy in [0, 1] at points (..., 2): a sigmoid of the distance over `blur`."""
+        """Return the soft occupancy, 0 to 1, at points (..., 2): a sigmoid of distance over `blur`."""
         blur = number(blur, "blur", 0, above=True)
         return torch.sigmoid(self._sample(self.image, points) * (1.7 / blur))
 
     def weight(self, points: Tensor) -> Tensor:
-        """How much the plane matters at points (..., 2): 1 without emphasis."""
+        """Return how much the plane matters at points (..., 2): 1 without emphasis."""
         if self.weights is None:
             return torch.ones_like(points[..., 0])
         return self._sample(self.weights, points)
 
     def weighted_iou(self, rings: Tensor) -> Tensor:
-        """IoU (S,) of counter-clockwise rings (S, N, 2) with the target, areas weighted by emphasis.
+        """Return the IoU (S,) of counter-clockwise rings (S, N, 2) with the target, weighted.
 
         By Green's theorem, the integral of the weights along x sampled on the rings: as accurate as
         a pixel of the image is small.
@@ -110,7 +110,7 @@ class SoftTarget:
 
 
 def signed_distance(points: Tensor, vertices: Tensor) -> Tensor:
-    """True distance to the boundary, positive inside (paper, equation of phi).
+    """Return the true distance to the boundary, positive inside (paper, equation of phi).
 
     Args:
         points: (..., N, 2).
@@ -143,7 +143,7 @@ def signed_distance(points: Tensor, vertices: Tensor) -> Tensor:
 
 
 def _inside(offset: Tensor, edge: Tensor) -> Tensor:
-    """Even-odd rule: count the edges that a ray to the right crosses."""
+    """Return whether points are inside, by the crossings of a ray to the right (even-odd rule)."""
     y, height = offset[..., 1].detach(), edge[..., 1].detach()
     straddles = (y >= 0) != (y >= height)
     cross = edge[..., 0].detach() * y - height * offset[..., 0].detach()

@@ -7,9 +7,10 @@ from pathlib import Path
 from typing import IO, Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from orbiflow.arguments import described, is_a
+from orbiflow.arrays import Array
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.tiles.geometry import centroid, orient, signed_area
 from orbiflow.tiles.silhouette.frame import Frame
@@ -46,7 +47,7 @@ class Target:
     array([2., 2.])
     """
 
-    outline: NDArray[np.float64]
+    outline: Array
     y_down: bool
     notes: tuple[str, ...] = ()
     source: str = "polygon"
@@ -87,7 +88,7 @@ class Target:
         threshold: float | None = None,
         invert: bool | None = None,
     ) -> Self:
-        """As `read`, of the content of such a file; `name` stands in messages and for its ending.
+        """Read the content of such a file; `name` is used in messages and for its ending.
 
         >>> Target.from_bytes(b"[[0, 0], [2, 0], [2, 2], [0, 2]]").kind
         'json'
@@ -108,7 +109,7 @@ class Target:
         invert: bool | None = None,
         source: str = "mask",
     ) -> Self:
-        """The largest shape in an array (H, W), a row of pixels at a time, the first on top.
+        """Return the largest shape in an array (H, W), a row of pixels at a time, the first on top.
 
         Booleans, and integers that are 0 and 1 alone, are true in the shape (`invert`: outside of it).
         Other integers and floats are gray levels, of 0 to 255, 65535 or 1, and are read as those of
@@ -141,7 +142,7 @@ class Target:
     def from_polygon(
         cls, points: ArrayLike, *, y_down: bool = False, source: str = "polygon"
     ) -> Self:
-        """The silhouette bounded by the polygon `points` (N, 2), closed or not, in either sense.
+        """Return the silhouette bounded by the polygon `points` (N, 2), closed or not, in either sense.
 
         Raises `OrbiflowError` for coordinates that are not finite, fewer than 3 vertices, no area,
         or a polygon that crosses or touches itself.
@@ -162,20 +163,20 @@ class Target:
         return Frame(linear, centroid(self.outline), self.kind, self.size, self.corner)
 
     @cached_property
-    def normal(self) -> NDArray[np.float64]:
+    def normal(self) -> Array:
         """The outline (N, 2) with y up, area 1, centroid 0 and counter-clockwise, vertex by vertex."""
         return _read_only(self.to_normal(self.outline))
 
-    def to_input(self, points: ArrayLike) -> NDArray[np.float64]:
-        """`points` (..., 2) of the normal form in the input's units: `frame.to_input`."""
+    def to_input(self, points: ArrayLike) -> Array:
+        """Return `points` (..., 2) of the normal form in the input's units: `frame.to_input`."""
         return self.frame.to_input(points)
 
-    def to_normal(self, points: ArrayLike) -> NDArray[np.float64]:
-        """`points` (..., 2) in the input's units, in the normal form: `frame.to_normal`."""
+    def to_normal(self, points: ArrayLike) -> Array:
+        """Return `points` (..., 2) in the input's units, in the normal form: `frame.to_normal`."""
         return self.frame.to_normal(points)
 
     def report(self) -> dict[str, Any]:
-        """What was read and decided, ready for JSON."""
+        """Return what was read and decided, ready for JSON."""
         return {
             "source": self.source,
             "kind": self.kind,
@@ -188,7 +189,7 @@ class Target:
 
 
 def _held(stream: Any) -> Held:
-    """What a binary stream holds, up to what is read of any file."""
+    """Return what a binary stream holds, up to what is read of any file."""
     how = "a path or a binary stream; Target.from_bytes takes bytes, Target.from_mask arrays"
     if not callable(getattr(stream, "read", None)):
         raise OrbiflowError(f"the silhouette's file must be {how}, got {described(stream)}")
@@ -203,6 +204,6 @@ def _held(stream: Any) -> Held:
     return Held(data, name)
 
 
-def _read_only(array: NDArray[np.float64]) -> NDArray[np.float64]:
+def _read_only(array: Array) -> Array:
     array.setflags(write=False)
     return array

@@ -10,17 +10,16 @@ import scipy.sparse
 import scipy.sparse.linalg
 from numpy.typing import NDArray
 
+from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.silhouette.mesh import Mesh
-
-Array = NDArray[np.float64]
 
 STAGES = 30
 """Times that the penalty on folds is sharpened at most."""
 
 
 def folded(mesh: Mesh, points: Array) -> NDArray[np.bool_]:
-    """(M,) which triangles are turned over or flat where `points` (N, 2) are."""
+    """Return (M,) which triangles are turned over or flat where `points` (N, 2) are."""
     return _determinants(mesh, points) <= 0
 
 
@@ -68,7 +67,7 @@ def _untangled(work: _Distortion) -> Array | None:
 
 
 def _spread(mesh: Mesh, points: Array) -> Array:
-    """Inner points in the middle of their neighbours (Tutte, 1963)."""
+    """Return inner points in the middle of their neighbours (Tutte, 1963)."""
     fixed, count = mesh.size + len(mesh.sides), len(points)
     i, j = (np.concatenate([mesh.triangles[:, k] for k in turn]) for turn in ((0, 1, 2), (1, 2, 0)))
     ones = np.ones(2 * len(i))
@@ -107,7 +106,7 @@ class _Distortion:
         return float(np.linalg.det(self._jacobians(x)).min())
 
     def sharpen(self, smallest: float) -> None:
-        """Bound the determinants less far from 0, but so that the smallest is felt."""
+        """Return bound the determinants less far from 0, but so that the smallest is felt."""
         self.epsilon = min(0.5 * self.epsilon, 0.1 * abs(min(smallest, 0.0)) + 1e-6)
 
     def _jacobians(self, x: Array) -> Array:

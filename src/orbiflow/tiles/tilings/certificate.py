@@ -82,7 +82,7 @@ class Certificate:
         return not self.reasons
 
     def as_dict(self) -> dict[str, Any]:
-        """The figures as JSON can hold them: NaN and infinity as None, with "valid" added."""
+        """Return the figures as JSON can hold them: NaN and infinity as None, with "valid" added."""
         values: dict[str, Any] = {"valid": self.valid}
         for item in fields(self):
             value = getattr(self, item.name)
@@ -178,7 +178,7 @@ class _Figures:
     def certificate(
         self, mismatch: float, matching: EdgeMatching, areas: Array, count: int
     ) -> Certificate:
-        """Args: areas: (K, 3) overlap, total overlap and uncovered area of each prototile."""
+        """Return the certificate for `areas` (K, 3): overlap, total overlap and uncovered area."""
         overlap, total, uncovered = (float(x) for x in areas.max(axis=0))
         reasons: list[str] = []
         if not self.error <= self.tolerance:
@@ -206,7 +206,7 @@ class _Figures:
 
 
 def _self_crossing(tiling: Tiling, prototile: int, ring: Array) -> str:
-    """Why a ring is not a simple polygon, and where in the tile's coordinates; "" if it is."""
+    """Return why a ring is not a simple polygon, and where in the tile; "" if it is simple."""
     polygon = shapely.Polygon(ring)
     if shapely.is_valid(polygon) and polygon.area > 0:
         return ""
@@ -235,7 +235,7 @@ def _edge_mismatch(
 
 
 def _areas(around: Surroundings) -> tuple[float, float, float]:
-    """Largest and total overlap with the other tiles, and uncovered area in a ring around."""
+    """Return the largest and total overlap with other tiles, and the uncovered area around."""
     polygon = shapely.Polygon(around.ring)
     images = cast(NDArray[np.object_], shapely.polygons(around.rings))
     region = shapely.buffer(polygon, _MARGIN, quad_segs=2)

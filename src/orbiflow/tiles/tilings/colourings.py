@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from orbiflow.arrays import Integers
 from orbiflow.symmetry import Isometry
 from orbiflow.tiles.tilings.surroundings import neighbours
 from orbiflow.tiles.tilings.tile_copies import Copies, prototile_of
@@ -19,7 +19,7 @@ Graph: TypeAlias = list[set[int]]
 
 
 def colour_graph(graph: Graph, count: int, *, max_steps: int = 4000) -> list[int] | None:
-    """A proper colouring with colours 0 ... count - 1, or None.
+    """Return a proper colouring with colours 0 ... count - 1, or None.
 
     Backtracking in the order of saturation (Brélaz, "New methods to color the vertices of a graph",
     CACM 22, 1979). None means there is none, or that none was found in `max_steps` assignments;
@@ -45,7 +45,7 @@ def colour_graph(graph: Graph, count: int, *, max_steps: int = 4000) -> list[int
 
 
 def _most_constrained(graph: Graph, colours: list[int]) -> int | None:
-    """The uncoloured vertex with most colours around it, ties to the larger degree."""
+    """Return the uncoloured vertex with most colours around it, ties to the larger degree."""
     free = [v for v in range(len(graph)) if colours[v] < 0]
     if not free:
         return None
@@ -85,10 +85,10 @@ class Colouring:
     tiling: Tiling
     count: int
     sublattice: Sublattice
-    table: NDArray[np.int64]
+    table: Integers
 
     def colour(self, element: Isometry) -> int:
-        """Colour, 0 ... count - 1, of the tile that `element` makes of its prototile.
+        """Return the colour, 0 ... count - 1, of the tile that `element` makes of its prototile.
 
         Raises:
             OrbiflowError: for an isometry that is not in the tile's group.
@@ -98,8 +98,8 @@ class Colouring:
         first, second = reduce_cell(cell, self.sublattice)
         return int(self.table[aspect, first, second])
 
-    def colours(self, copies: Copies) -> NDArray[np.int64]:
-        """(M,) colour of each copy, all at once.
+    def colours(self, copies: Copies) -> Integers:
+        """Return (M,) colour of each copy, all at once.
 
         Args:
             copies: of `tiling`, or of one with the same group and aspects.
@@ -110,7 +110,7 @@ class Colouring:
 
 
 def colouring(tile: Tiles) -> Colouring:
-    """A proper colouring with the fewest colours that a small sublattice allows; deterministic.
+    """Return a proper colouring with the fewest colours that a small sublattice allows.
 
     Exact search on the quotient of the tiling by each sublattice of index up to 9, for 1, 2, 3 ...
     colours in turn; among equals the smallest index, so that colours follow the aspects where they
@@ -143,7 +143,7 @@ def colouring(tile: Tiles) -> Colouring:
 
 
 def reduce_cell(cell: Cell, sublattice: Sublattice) -> Cell:
-    """Representative (0 <= m < a, 0 <= n < c) of lattice coordinates modulo the sublattice."""
+    """Return the representative (0 <= m < a, 0 <= n < c) of a cell modulo the sublattice."""
     a, b, c = sublattice
     wraps, second = divmod(cell[1], c)
     return (cell[0] - wraps * b) % a, second
@@ -153,7 +153,7 @@ _Links: TypeAlias = list[list[tuple[int, Cell]]]
 
 
 def _links(tiling: Tiling) -> _Links:
-    """Per aspect: (aspect, offset) of the neighbours of its tile in cell (0, 0)."""
+    """Return, for each aspect, (aspect, offset) of the neighbours of its tile in cell (0, 0)."""
     table, group = tiling.aspects, tiling.group
     shared = [neighbours(tiling, k).edge for k in range(len(tiling.prototiles))]
     links: _Links = []
@@ -185,7 +185,7 @@ def _sublattices(index: int) -> Iterator[Sublattice]:
 
 
 def _quotient(links: _Links, sublattice: Sublattice) -> Graph:
-    """Adjacency of tiles modulo the sublattice; node (i, m, n) is number (i a + m) c + n."""
+    """Return adjacency of tiles modulo the sublattice; node (i, m, n) is number (i a + m) c + n."""
     a, _, c = sublattice
     graph: Graph = []
     for near in links:
@@ -196,7 +196,7 @@ def _quotient(links: _Links, sublattice: Sublattice) -> Graph:
     return graph
 
 
-def _most_frequent_first(colours: NDArray[np.int64]) -> NDArray[np.int64]:
+def _most_frequent_first(colours: Integers) -> Integers:
     order: Sequence[int] = np.argsort(-np.bincount(colours), kind="stable").tolist()
     rank = np.empty(len(order), dtype=np.int64)
     rank[order] = np.arange(len(order))

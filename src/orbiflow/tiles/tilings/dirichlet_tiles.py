@@ -19,7 +19,7 @@ _SAME = 1e-7
 
 
 def dirichlet_tile(group: CrystallographicGroup, point: ArrayLike) -> Tile:
-    """The points nearer to `point` than to any other of its images, as a tile.
+    """Return the points nearer to `point` than to any other of its images, as a tile.
 
     Convex, and it tiles edge to edge. Its stabiliser is that of the point: about a rotation centre or
     on a mirror the cell has that symmetry.
@@ -41,7 +41,7 @@ def dirichlet_tile(group: CrystallographicGroup, point: ArrayLike) -> Tile:
 
 
 def dirichlet_tiling(group: CrystallographicGroup, points: Sequence[ArrayLike]) -> Tiling:
-    """The Dirichlet cells of several points among all their images: a prototile for each.
+    """Return the Dirichlet cells of several points among all their images: a prototile for each.
 
     Args:
         group: of the plane.
@@ -67,7 +67,7 @@ def dirichlet_tiling(group: CrystallographicGroup, points: Sequence[ArrayLike]) 
 
 
 def _cell(group: CrystallographicGroup, points: Array, k: int, same: float) -> Array:
-    """(N, 2) the cell of point k, counter-clockwise."""
+    """Return (N, 2) the cell of point k, counter-clockwise."""
     site = points[k]
     # no point of the cell is further from the site than half the two shortest lattice vectors
     # together, and what bounds the cell no further than twice that

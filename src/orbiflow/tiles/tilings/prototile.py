@@ -12,10 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
 from orbiflow.arguments import numbers, whole
-from orbiflow.arrays import Array
+from orbiflow.arrays import Array, Integers
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import CrystallographicGroup, Isometry
 from orbiflow.tiles.geometry import signed_area
@@ -73,7 +72,7 @@ class Prototile:
         return float(np.linalg.norm(self.polygon - self.center, axis=1).max())
 
     @cached_property
-    def kept(self) -> NDArray[np.int64]:
+    def kept(self) -> Integers:
         """Indices of the vertices that are not the same as the next."""
         steps = np.linalg.norm(self.polygon - np.roll(self.polygon, -1, axis=0), axis=1)
         return np.flatnonzero(steps > _REPEATED * self.radius)
@@ -102,7 +101,7 @@ class Stabiliser(NamedTuple):
     """
 
     elements: tuple[Isometry, ...]
-    orders: tuple[NDArray[np.int64] | None, ...]
+    orders: tuple[Integers | None, ...]
     error: float
 
     @property
@@ -112,7 +111,7 @@ class Stabiliser(NamedTuple):
 
 
 def stabiliser(group: CrystallographicGroup, ring: Array) -> Stabiliser:
-    """All elements of `group` that take the polygon `ring` (N, 2) onto itself.
+    """Return all elements of `group` that take the polygon `ring` (N, 2) onto itself.
 
     >>> from orbiflow.symmetry import wallpaper_group
     >>> cell = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
@@ -122,7 +121,7 @@ def stabiliser(group: CrystallographicGroup, ring: Array) -> Stabiliser:
     size = math.sqrt(group.cell_volume / group.order)
     candidates = _near_center(group, ring, TOLERANCE * size) if len(ring) > 2 else []
     still = np.arange(len(ring))
-    found: list[tuple[Isometry, NDArray[np.int64] | None, float]] = []
+    found: list[tuple[Isometry, Integers | None, float]] = []
     for element in candidates:
         order, error = _image_order(element, ring)
         if error <= TOLERANCE * size:
@@ -137,7 +136,10 @@ def stabiliser(group: CrystallographicGroup, ring: Array) -> Stabiliser:
 
 
 def _near_center(group: CrystallographicGroup, ring: Array, reach: float) -> list[Isometry]:
-    """Elements, not the identity, that move the boundary's centre of mass by less than `reach`."""
+    """Return the elements that move the boundary's centre of mass by less than `reach`.
+
+    The identity is left out.
+    """
     if group.order == 1:
         return []
     ahead = np.roll(ring, -1, axis=0)
@@ -153,8 +155,8 @@ def _near_center(group: CrystallographicGroup, ring: Array, reach: float) -> lis
     ]
 
 
-def _image_order(element: Isometry, ring: Array) -> tuple[NDArray[np.int64] | None, float]:
-    """Which vertex each is taken to, and the largest distance from there."""
+def _image_order(element: Isometry, ring: Array) -> tuple[Integers | None, float]:
+    """Return which vertex each is taken to, and the largest distance from there."""
     image, count = element(ring), len(ring)
     step = 1 if element.determinant > 0 else -1
     first = int(np.linalg.norm(ring - image[0], axis=1).argmin())

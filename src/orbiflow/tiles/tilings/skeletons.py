@@ -36,7 +36,9 @@ class Skeleton:
 
 
 def skeleton(own: Edges, copies: Copies) -> Skeleton:
-    """Each edge of each copy, once: edge k of the copy g is edge partner(k) of g @ across(k).
+    """Return each edge of each copy once.
+
+    Edge k of the copy g is edge partner(k) of g @ across(k).
 
     That is arithmetic of aspects and cells; no places are compared, so that nothing is drawn twice or
     lost however close edges come to each other.
@@ -61,7 +63,7 @@ def skeleton(own: Edges, copies: Copies) -> Skeleton:
 
 
 def _vertices(own: Edges, beyond: Beyond) -> Integers:
-    """(M, E) number of the vertex in which edge k of each copy starts."""
+    """Return (M, E) number of the vertex in which edge k of each copy starts."""
     count, sides = beyond.copy.shape
     following = np.array(own.following)
     links: list[Integers] = []

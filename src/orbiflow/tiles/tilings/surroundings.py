@@ -32,12 +32,12 @@ MAX_SPAN = 12.0
 
 
 def expected_area(tile: Tiles) -> float:
-    """|det B| over the number of tiles in a lattice cell: the area of a tile of this group."""
+    """Return |det B| over the number of tiles in a lattice cell: the area of a tile of this group."""
     return as_tiling(tile).tile_area
 
 
 def span(tile: Tiles) -> float:
-    """Radius of the tile over the square root of the expected area: about 0.6 for a hexagon."""
+    """Return the tile's radius over the square root of the expected area: 0.6 for a hexagon."""
     tiling = as_tiling(tile)
     return tiling.radius / math.sqrt(tiling.tile_area)
 
@@ -89,11 +89,11 @@ class Surroundings:
         return np.asarray(shapely.linearrings(self.points, indices=self.owner))
 
     def elements(self) -> tuple[Placed, ...]:
-        """The tiles as elements of the group."""
+        """Return the tiles as elements of the group."""
         return tuple(self.copies.isometry(k) for k in range(len(self)))
 
     def select(self, keep: NDArray[np.bool_]) -> Surroundings:
-        """The tiles where `keep`, (M,), is true."""
+        """Return the tiles where `keep`, (M,), is true."""
         return Surroundings(
             self.prototile,
             self.ring,
@@ -105,7 +105,9 @@ class Surroundings:
 
 
 def surroundings(tiling: Tiling, prototile: int, margin: float) -> Surroundings:
-    """The tiles whose bounding box comes within `margin` (unit: a tile's area is 1) of a prototile's.
+    """Return the tiles whose bounding box comes within `margin` of a prototile's.
+
+    The unit is the side of a square of a tile's area.
 
     Nearest first.
 
@@ -167,7 +169,7 @@ class SegmentMatch(NamedTuple):
 
 
 def match_segments(around: Surroundings, tolerance: float) -> SegmentMatch:
-    """For each segment (a, b) of a prototile the nearest segment that runs from b to a.
+    """Return, for each segment (a, b) of a prototile, the nearest segment from b to a.
 
     All prototiles run the same way around, and so do their images: those of elements that reverse
     orientation are read backwards.
@@ -193,7 +195,7 @@ def match_segments(around: Surroundings, tolerance: float) -> SegmentMatch:
 def boundaries_cancel(
     tiling: Tiling, around: Sequence[Surroundings], matches: Sequence[SegmentMatch]
 ) -> bool:
-    """Whether the matched segments of all prototiles, with their signs, add up to nothing.
+    """Return whether the matched segments of all prototiles, with their signs, add up to nothing.
 
     Args:
         around, matches: of each prototile.
@@ -222,7 +224,7 @@ def boundaries_cancel(
 
 
 def _orbits(tiling: Tiling, first: Integers) -> Integers | None:
-    """The first segment that each is an image of under its prototile's stabiliser.
+    """Return the first segment that each is an image of under its prototile's stabiliser.
 
     None where vertices are not taken to vertices.
     """
@@ -239,7 +241,7 @@ def _orbits(tiling: Tiling, first: Integers) -> Integers | None:
 
 
 def curve_distance(around: Surroundings) -> float:
-    """Largest distance of a vertex of the prototile to the boundaries of the tiles around it.
+    """Return the largest distance of a prototile's vertex to the boundaries of the tiles around.
 
     With the tiles' vertices seen from the prototile being its vertices seen from them, over all
     prototiles this is the Hausdorff distance between a boundary and the union of the others near it.
@@ -254,7 +256,7 @@ def curve_distance(around: Surroundings) -> float:
 
 
 def segment_tree(around: Surroundings) -> shapely.STRtree:
-    """Tree of the segments of all tiles around; segment p begins at the p-th of their points."""
+    """Return a tree of the segments of all tiles around; segment p begins at their p-th point."""
     ends = np.stack([around.points, around.ahead], axis=1)
     return shapely.STRtree(np.asarray(shapely.linestrings(ends)))
 
@@ -275,7 +277,7 @@ class Neighbours(NamedTuple):
 
 
 def neighbours(tile: Tiles, prototile: int = 0, *, tolerance: float = 1e-7) -> Neighbours:
-    """The tiles that touch a prototile.
+    """Return the tiles that touch a prototile.
 
     Args:
         tile: a tile or a tiling, certified or not.
@@ -301,7 +303,7 @@ def neighbours(tile: Tiles, prototile: int = 0, *, tolerance: float = 1e-7) -> N
 
 
 def touching(around: Surroundings, tolerance: float) -> tuple[Surroundings, NDArray[np.bool_]]:
-    """Those of the tiles around that touch the prototile, and which of them share boundary."""
+    """Return the tiles that touch the prototile, and which of them share boundary with it."""
     if not len(around):
         return around, np.zeros(0, dtype=bool)
     outline = shapely.linearrings(around.ring)
@@ -316,13 +318,13 @@ def touching(around: Surroundings, tolerance: float) -> tuple[Surroundings, NDAr
 
 
 def _boundary_samples(ring: Array) -> Array:
-    """Interior points of the segments, midpoints among them: never the corners."""
+    """Return interior points of the segments, midpoints among them: never the corners."""
     per_segment = 2 * math.ceil(_SAMPLES / (2 * len(ring))) + 1 if len(ring) < _SAMPLES else 1
     return subdivided(ring, per_segment, phase=0.5)
 
 
 def patch(tile: Tiles, window: Sequence[float]) -> list[Placed]:
-    """The tiles that meet the rectangle, as elements of the group, nearest the middle first.
+    """Return the tiles that meet the rectangle, as elements of the group, nearest the middle first.
 
     Args:
         tile: a tile or a tiling, certified or not.
@@ -345,7 +347,7 @@ def patch(tile: Tiles, window: Sequence[float]) -> list[Placed]:
 
 
 def aspects(tile: Tiles, elements: Sequence[Isometry]) -> list[int]:
-    """For each element the aspect of its tile: tiles of one aspect are translates of each other.
+    """Return the aspect of each element's tile: tiles of one aspect are translates.
 
     Args:
         tile: a tile or a tiling.

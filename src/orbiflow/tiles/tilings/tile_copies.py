@@ -34,7 +34,7 @@ class Placed(Isometry):
     prototile: int = 0
 
     def __matmul__(self, other: Isometry) -> Isometry:
-        """As of isometries; of what `other` carries, if that carries anything."""
+        """Compose as isometries do; the product carries what `other` carries."""
         product = Isometry.__matmul__(self, other)
         if isinstance(other, Placed) and product is not NotImplemented:
             return Placed(product.linear, product.translation, other.prototile)
@@ -51,7 +51,7 @@ class Placed(Isometry):
 
 
 def prototile_of(element: Isometry) -> int:
-    """The number of the prototile that an isometry carries: 0 unless it says."""
+    """Return the number of the prototile that an isometry carries: 0 unless it says."""
     return element.prototile if isinstance(element, Placed) else 0
 
 
@@ -108,17 +108,17 @@ class Copies:
         return self.group.translations[self.cosets] + self.cells @ self.group.lattice.T
 
     def isometry(self, index: int) -> Placed:
-        """The group element of a copy."""
+        """Return the group element of a copy."""
         linear = self.group.linear_parts[self.cosets[index]]
         return Placed(linear, self.translations[index], int(self.prototiles[index]))
 
     def images(self, points: Array) -> Array:
-        """(M, N, 2) images of points (N, 2), one set a copy."""
+        """Return (M, N, 2) images of points (N, 2), one set a copy."""
         turned = np.einsum("gij,nj->gni", self.group.linear_parts, points)
         return turned[self.cosets] + self.translations[:, None, :]
 
     def rings(self) -> list[Array]:
-        """Each copy's polygon."""
+        """Return each copy's polygon."""
         found: list[Array] = [np.empty((0, 2))] * len(self)
         for k, prototile in enumerate(self.tiling.prototiles):
             own = np.flatnonzero(self.prototiles == k)
@@ -127,23 +127,25 @@ class Copies:
         return found
 
     def centers(self) -> Array:
-        """(M, 2) where the centre of each copy's prototile comes to lie."""
+        """Return (M, 2) where the centre of each copy's prototile comes to lie."""
         own = np.stack([p.center for p in self.tiling.prototiles])
         turned = np.einsum("mij,mj->mi", self.group.linear_parts[self.cosets], own[self.prototiles])
         return turned + self.translations
 
     def boxes(self) -> tuple[Array, Array]:
-        """(M, 2) lower left and upper right corners of the copies' bounding boxes."""
+        """Return (M, 2) lower left and upper right corners of the copies' bounding boxes."""
         low, high = aspect_boxes(self.tiling)
         shifts = self.cells @ self.group.lattice.T
         return low[self.aspects] + shifts, high[self.aspects] + shifts
 
     def select(self, keep: NDArray[np.bool_] | Integers) -> Copies:
-        """The copies where `keep` is true, or of these indices."""
+        """Return the copies where `keep` is true, or of these indices."""
         return Copies(self.tiling, self.aspects[keep], self.cells[keep])
 
     def neighbours(self, elements: Sequence[Isometry], of: Sequence[int] | None = None) -> Integers:
-        """(M, E) index of the copy beyond each copy g, g @ element; -1 if it is not among them.
+        """Return the index (M, E) of the copy across each element, -1 if it is not among them.
+
+        The copy across an element of the copy g is g @ element.
 
         Args:
             elements: a plain isometry carries prototile 0.
@@ -153,7 +155,7 @@ class Copies:
         return self.beyond(elements, of).copy
 
     def beyond(self, elements: Sequence[Isometry], of: Sequence[int] | None = None) -> Beyond:
-        """As `neighbours`, and how the copies found lie.
+        """Return the `neighbours` and how those copies lie.
 
         Integer arithmetic on aspects and cells: nothing is compared by its place.
         """
@@ -202,7 +204,7 @@ class _Codes:
 
 
 def copies_inside(tile: Tiles, window: Sequence[float]) -> Copies:
-    """The tiles that lie in a rectangle whole, row by row.
+    """Return the tiles that lie in a rectangle whole, row by row.
 
     Args:
         tile: a tile or a tiling, certified or not.
@@ -217,7 +219,7 @@ def copies_inside(tile: Tiles, window: Sequence[float]) -> Copies:
 
 
 def copies_meeting(tile: Tiles, window: Sequence[float]) -> Copies:
-    """The tiles that meet a rectangle, as `copies_inside`.
+    """Return the tiles that meet a rectangle, as `copies_inside`.
 
     >>> from orbiflow.symmetry import wallpaper_group
     >>> eighth = Tiling(wallpaper_group("p4m"), [[[0, 0], [0.5, 0], [0.5, 0.5]]])
@@ -242,7 +244,7 @@ def copies_meeting(tile: Tiles, window: Sequence[float]) -> Copies:
 
 
 def copies_near(tiling: Tiling, window: Window, *, whole: bool) -> Copies:
-    """The tiles whose bounding box lies in the window, or meets it, in no order that matters."""
+    """Return the tiles whose bounding box lies in the window, or meets it, in any order."""
     low, high = aspect_boxes(tiling)
     least, most = window[:2] - (low if whole else high), window[2:] - (high if whole else low)
     aspects, cells = _cells_within(tiling.group.lattice, least, most)
@@ -250,7 +252,7 @@ def copies_near(tiling: Tiling, window: Window, *, whole: bool) -> Copies:
 
 
 def aspect_boxes(tiling: Tiling) -> tuple[Array, Array]:
-    """(A, 2) lower left and upper right corners of the bounding boxes of the tiles of a cell."""
+    """Return the lower left and upper right corners (A, 2) of the boxes of the tiles of a cell."""
     table, group = tiling.aspects, tiling.group
     low, high = np.empty((len(table), 2)), np.empty((len(table), 2))
     for k, prototile in enumerate(tiling.prototiles):
@@ -261,7 +263,7 @@ def aspect_boxes(tiling: Tiling) -> tuple[Array, Array]:
 
 
 def _cells_within(lattice: Array, least: Array, most: Array) -> tuple[Integers, Integers]:
-    """All integer n with least <= lattice @ n <= most, for A boxes at once.
+    """Return all integer n with least <= lattice @ n <= most, for A boxes at once.
 
     Args:
         least, most: (A, 2).
@@ -292,7 +294,7 @@ def _cells_within(lattice: Array, least: Array, most: Array) -> tuple[Integers, 
 
 
 def _ranges(low: Array, high: Array) -> tuple[Integers, Array]:
-    """All whole numbers in some intervals, one more at either end than rounding may leave out.
+    """Return all whole numbers in some intervals, and one more at either end for rounding.
 
     Returns:
         (M,) the number of the interval, and (M,) the whole number.

@@ -119,7 +119,7 @@ class Edges:
         return tuple(e + 1 if e + 1 < last[k] else first[k] for e, k in enumerate(self.owners))
 
     def points(self, edge: int) -> Array:
-        """(M, 2) vertices of an edge, both ends included."""
+        """Return (M, 2) vertices of an edge, both ends included."""
         polygon = self.tiling.prototiles[self.owners[edge]].polygon
         first, last = self.starts[edge], self.starts[self.following[edge]]
         length = (last - first - 1) % len(polygon) + 2
@@ -136,7 +136,7 @@ class Edges:
 
 
 def edges(tile: Tiles) -> Edges:
-    """The edges of a tile or tiling: the longest runs of boundary along one neighbour.
+    """Return the edges of a tile or tiling: the longest runs of boundary along one neighbour.
 
     Args:
         tile: whose images match vertex by vertex, as those of every tile that orbiflow finds do;
@@ -192,7 +192,7 @@ def _require_match(tiling: Tiling, matches: Sequence[SegmentMatch]) -> None:
 
 
 def _begins(tiling: Tiling, around: Surroundings, match: SegmentMatch) -> Integers:
-    """The segments of a prototile with which an edge begins."""
+    """Return the segments of a prototile with which an edge begins."""
     sizes = np.array([len(p.ring) for p in tiling.prototiles])
     step = np.where(around.mirrored[match.tile], 1, -1)
     size = sizes[around.copies.prototiles[match.tile]]
@@ -205,7 +205,7 @@ def _begins(tiling: Tiling, around: Surroundings, match: SegmentMatch) -> Intege
 
 
 def _edge_of(begins: Integers, segment: int) -> int:
-    """The edge to which a segment belongs, by the segments with which edges begin."""
+    """Return the edge to which a segment belongs, by the segments with which edges begin."""
     return int(np.searchsorted(begins, segment, side="right") - 1) % len(begins)
 
 
@@ -222,7 +222,7 @@ def _turned(tiling: Tiling, k: int, begins: Integers, first: Integers) -> Intege
 
 
 def _mutual(own: Edges) -> Edges:
-    """With partners chosen where a stabiliser leaves a choice: an edge itself, or each other."""
+    """Choose partners where a stabiliser leaves a choice: an edge itself, or each other."""
     across, partners = list(own.across), list(own.partners)
     done: NDArray[np.bool_] = np.zeros(len(own), dtype=bool)
     for edge in range(len(own)):
@@ -281,7 +281,7 @@ class EdgeClass(NamedTuple):
 
 
 def edge_classes(own: Edges) -> tuple[EdgeClass, ...]:
-    """The classes of a tiling's edges: whoever draws or fits one edge of each draws them all.
+    """Return the classes of a tiling's edges; one edge of each class determines all others.
 
     >>> from orbiflow.symmetry import wallpaper_group
     >>> from orbiflow.tiles import Tiling, edges
@@ -322,7 +322,7 @@ def edge_classes(own: Edges) -> tuple[EdgeClass, ...]:
 
 
 def _links(own: Edges) -> list[list[EdgeImage]]:
-    """For each edge its images next to it: beyond it, and in its own tile."""
+    """Return, for each edge, its images next to it: beyond it, and in its own tile."""
     links: list[list[EdgeImage]] = [[] for _ in range(len(own))]
     for edge, (partner, element) in enumerate(zip(own.partners, own.across, strict=True)):
         plain = Isometry(element.linear, element.translation)
@@ -337,7 +337,7 @@ def _links(own: Edges) -> list[list[EdgeImage]]:
 
 
 def _closed(edge: int, folds: dict[tuple[int, bool], EdgeImage]) -> list[EdgeImage]:
-    """With the third of two."""
+    """Return the folds, with the third one where there are two."""
     if len(folds) == 2:
         one, other = folds.values()
         third = EdgeImage(edge, one.isometry @ other.isometry, one.reversed != other.reversed)
@@ -346,7 +346,7 @@ def _closed(edge: int, folds: dict[tuple[int, bool], EdgeImage]) -> list[EdgeIma
 
 
 def edge_to_edge(tile: Tiles) -> Tiling:
-    """The same tiling, with a vertex wherever a neighbour, or the tile's own image, has one.
+    """Return the same tiling, with a vertex wherever a neighbour, or the tile's own image, has one.
 
     After that the vertices on a boundary are all those of the tiling that lie there, so shared sides
     agree. One that is edge to edge already comes back with the same vertices.
@@ -391,7 +391,7 @@ def _with_vertices(tiling: Tiling, k: int) -> Prototile:
 
 
 def _back(around: Surroundings, own: Prototile, tiling: Tiling) -> Array:
-    """The vertices of the tiles around, in the tiling's own coordinates."""
+    """Return the vertices of the tiles around, in the tiling's own coordinates."""
     return around.points * np.sqrt(tiling.tile_area) + own.center
 
 

@@ -46,7 +46,7 @@ class Aspects:
 
     @classmethod
     def of(cls, group: CrystallographicGroup, stabilisers: Sequence[Stabiliser]) -> Aspects:
-        """Of prototiles with these stabilisers."""
+        """Return the aspects of prototiles with these stabilisers."""
         count, order = len(stabilisers), group.order
         if all(own.order == 1 for own in stabilisers):
             return cls._of_all(count, order)
@@ -67,7 +67,7 @@ class Aspects:
 
     @classmethod
     def _of_all(cls, count: int, order: int) -> Aspects:
-        """Of prototiles without symmetry: every pair."""
+        """Return the aspects of prototiles without symmetry: every pair."""
         none = np.zeros((count, order), dtype=np.int64)
         table = np.arange(count * order).reshape(count, order)
         prototiles, cosets = np.divmod(table.ravel(), order)
@@ -76,7 +76,7 @@ class Aspects:
     def find(
         self, group: CrystallographicGroup, element: Isometry, prototile: int
     ) -> tuple[int, Cell, int]:
-        """(aspect, cell, turn) of the tile that `element` makes of a prototile.
+        """Return (aspect, cell, turn) of the tile that `element` makes of a prototile.
 
         Raises:
             OrbiflowError: for an isometry that is not in the group.
@@ -90,7 +90,7 @@ class Aspects:
 def _first_cosets(
     group: CrystallographicGroup, own: Stabiliser
 ) -> tuple[Integers, Integers, Integers]:
-    """Per coset: the first that makes the same tile, in which cell, after which element."""
+    """Return for each coset the first that makes the same tile, its cell, and the element before."""
     first = np.arange(group.order)
     steps = np.zeros((group.order, 2), dtype=np.int64)
     turns = np.zeros(group.order, dtype=np.int64)
@@ -108,7 +108,7 @@ def _inverse(elements: tuple[Isometry, ...], s: Isometry) -> int:
 
 
 def coset_and_cell(group: CrystallographicGroup, element: Isometry) -> tuple[int, Cell]:
-    """(i, n) with element = translation by B n after the i-th coset representative.
+    """Return (i, n) with element = translation by B n after the i-th coset representative.
 
     Raises:
         OrbiflowError: for an isometry that is not in the group.
@@ -212,7 +212,7 @@ class Tiling:
         return max(p.radius for p in self.prototiles)
 
     def transformed(self, linear: Array, offset: Array) -> Tiling:
-        """Prototiles and group under the affine map p -> linear p + offset (a similarity)."""
+        """Return the image under the affine map p -> linear p + offset, a similarity."""
         by, to = np.asarray(linear), np.asarray(offset)
         moved = [Prototile(p.polygon @ by.T + to, p.corners) for p in self.prototiles]
         return Tiling(self.group.conjugate(by, to), moved)
@@ -269,7 +269,7 @@ class Tile:
         return self.tiling.prototiles[0].radius
 
     def transformed(self, linear: Array, offset: Array) -> Tile:
-        """The tile and its group under the affine map p -> linear p + offset (a similarity)."""
+        """Return the image under the affine map p -> linear p + offset, a similarity."""
         moved = self.polygon @ np.asarray(linear).T + np.asarray(offset)
         group = self.group.conjugate(linear, offset)
         return Tile(moved, group, self.isohedral_class, self.corners)
@@ -280,7 +280,7 @@ Tiles: TypeAlias = Tile | Tiling
 
 
 def as_tiling(tiles: Tiles) -> Tiling:
-    """The tiling that is meant.
+    """Return the tiling that is meant.
 
     Raises:
         OrbiflowError: for what is neither a `Tile` nor a `Tiling`.

@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from PIL import Image
 
+from orbiflow.arrays import Array
 from orbiflow.errors import InputFileError
 from orbiflow.tiles.silhouette.readers.pictures import (
     MIN_CONTRAST,
@@ -28,7 +28,7 @@ class MaskReading:
     - `notes`: what was decided for the user, in plain words.
     """
 
-    levels: NDArray[np.float64]
+    levels: Array
     size: tuple[int, int]
     reduced: int
     notes: tuple[str, ...]
@@ -60,7 +60,7 @@ def _decode(path: Source, image: Image.Image) -> MaskReading:
 
 
 def _channel(path: Source, image: Image.Image) -> tuple[Image.Image, list[str]]:
-    """The channel that emphasises: mode "L" (0 to 255) or "F" (0 to 1)."""
+    """Return the channel that emphasises: mode "L" (0 to 255) or "F" (0 to 1)."""
     if image.mode.startswith(("I", "F")):
         return deep_channel(path, image), []
     if not image.has_transparency_data:

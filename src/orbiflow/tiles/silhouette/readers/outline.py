@@ -75,7 +75,7 @@ def _kind(path: Source, head: bytes) -> str:
 
 
 def _text(head: bytes) -> str | None:
-    """`head` as text without leading blanks, or None where it is binary."""
+    """Return `head` as text without leading blanks, or None where it is binary."""
     utf16 = head.startswith((b"\xff\xfe", b"\xfe\xff"))
     if not utf16 and b"\0" in head:
         return None

@@ -5,9 +5,7 @@ import stat
 from dataclasses import dataclass
 from pathlib import Path, PurePath
 
-import numpy as np
-from numpy.typing import NDArray
-
+from orbiflow.arrays import Array
 from orbiflow.errors import InputFileError
 
 
@@ -31,7 +29,7 @@ Source = Path | Held
 
 
 def opened(source: Source) -> Path | io.BytesIO:
-    """What libraries open: the path, or a stream of the bytes."""
+    """Return what libraries open: the path, or a stream of the bytes."""
     return io.BytesIO(source.data) if isinstance(source, Held) else source
 
 
@@ -47,7 +45,7 @@ class Reading:
     - `corner`: of least coordinates, of that picture or drawing.
     """
 
-    outline: NDArray[np.float64]
+    outline: Array
     y_down: bool
     kind: str
     size: tuple[float, float] | None
@@ -56,7 +54,7 @@ class Reading:
 
 
 def check_file(path: Source) -> int:
-    """Size of the regular file at `path` in bytes; `InputFileError` where there is none to read."""
+    """Return the size in bytes of the regular file at `path`, or raise `InputFileError`."""
     if isinstance(path, Held):
         if not path.data:
             raise InputFileError(f"{path}: there are no bytes in it; give the content of a file")
@@ -77,7 +75,7 @@ def check_file(path: Source) -> int:
 
 
 def read_bytes(path: Source, limit: int) -> bytes:
-    """Content of the file at `path`; refused when it is larger than `limit` bytes."""
+    """Return content of the file at `path`; refused when it is larger than `limit` bytes."""
     data = read_head(path, limit + 1)
     if len(data) > limit:
         raise InputFileError(
@@ -88,7 +86,7 @@ def read_bytes(path: Source, limit: int) -> bytes:
 
 
 def read_head(path: Source, n: int) -> bytes:
-    """First `n` bytes of the file at `path`, or all of a shorter one."""
+    """Return first `n` bytes of the file at `path`, or all of a shorter one."""
     if isinstance(path, Held):
         return path.data[:n]
     try:

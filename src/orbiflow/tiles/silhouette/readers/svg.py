@@ -5,10 +5,10 @@
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from shapely.errors import GEOSException
 from shapely.geometry.base import BaseGeometry
 
+from orbiflow.arrays import Array, Window
 from orbiflow.errors import InputFileError
 from orbiflow.tiles.silhouette.outlines import (
     MAX_COORDINATE,
@@ -80,7 +80,7 @@ def _drawing_size(drawing: Drawing) -> float:
 
 
 def _regions(drawing: Drawing, size: float) -> tuple[list[BaseGeometry], int]:
-    """Regions filled by the elements' closed sub-paths, and how many sub-paths were left open."""
+    """Return the regions filled by closed sub-paths, and the number of open sub-paths."""
     regions: list[BaseGeometry] = []
     n_open, n_points = 0, 0
     for shape in drawing.shapes:
@@ -110,7 +110,7 @@ def _is_closed(path: SubPath, size: float) -> bool:
     return path.closed or gap <= CLOSING_GAP * size
 
 
-def _flatten(paths: list[SubPath], size: float) -> list[NDArray[np.float64]]:
+def _flatten(paths: list[SubPath], size: float) -> list[Array]:
     if not paths:
         return []
     own = float(np.ptp(np.concatenate([path.reach() for path in paths]), axis=0).max())
@@ -121,9 +121,9 @@ def _flatten(paths: list[SubPath], size: float) -> list[NDArray[np.float64]]:
 
 
 def _drop_backgrounds(
-    regions: list[BaseGeometry], box: tuple[float, float, float, float] | None
+    regions: list[BaseGeometry], box: Window | None
 ) -> tuple[list[BaseGeometry], list[str]]:
-    """`regions` without rectangles that cover the page, as long as something else is there."""
+    """Return `regions` without rectangles that cover the page, as long as something else is there."""
     xmin, ymin, xmax, ymax = shapely.total_bounds(regions) if box is None else box
     page = shapely.box(xmin, ymin, xmax, ymax)
     rest = [region for region in regions if not _covers(region, page)]
@@ -137,7 +137,7 @@ def _drop_backgrounds(
 
 
 def _covers(region: BaseGeometry, page: BaseGeometry) -> bool:
-    """Whether `region` is a rectangle that covers `page`, but for 0.1% of it."""
+    """Return whether `region` is a rectangle that covers `page`, but for 0.1% of it."""
     is_box = region.area >= 0.999 * region.envelope.area
     return is_box and region.envelope.intersection(page).area >= 0.999 * page.area
 
@@ -158,7 +158,7 @@ def _overlay(path: Source, regions: list[BaseGeometry]) -> BaseGeometry:
     return union
 
 
-def _thinned(shape: shapely.Polygon, size: float) -> NDArray[np.float64]:
+def _thinned(shape: shapely.Polygon, size: float) -> Array:
     tolerance = COLLINEAR * size
     thin = simplified(shape, tolerance)
     while len(thin.exterior.coords) > MAX_VERTICES:
