@@ -1,4 +1,4 @@
-"""Trigonometric vector fields that commute with a crystallographic group."""
+"""Fourier fields: trigonometric vector fields that commute with a crystallographic group."""
 
 from __future__ import annotations
 
@@ -14,28 +14,29 @@ from orbiflow.arrays import Array
 from orbiflow.fields.invariants import (
     InvariantBasis,
     InvariantField,
+    constant_tensors,
     invariant_basis,
     sobolev_weights,
 )
 from orbiflow.fields.lipschitz import coefficient_bound
 from orbiflow.fields.series import differentiate, evaluate, weight_cotangent
-from orbiflow.symmetry import CrystallographicGroup, cached_as_written
+from orbiflow.symmetry import CrystallographicGroup, cached_by_basis
 
 
 class FourierField(InvariantField):
     """A vector field V with V(g p) = R_g V(p) for every g in the group.
 
     The parameters are coordinates in an orthonormal basis of the invariant Fourier coefficients, so
-    an evaluation costs one Fourier sum whatever the group's order (paper, section 3; design points
-    2-4). Their Euclidean norm is the root mean square of the field.
+    an evaluation costs one Fourier sum for any group (paper, section 3; design points 2-4). Their
+    Euclidean norm is the root mean square of the field.
 
     Args:
-        group: symmetry of the field.
-        max_frequency: the paper's Omega: |k_i| <= Omega and the images of that box.
-        batch: size S of a stack of independent fields, or None for one field.
-        smoothness: s >= 0; the parameter of frequency kappa is multiplied by
+        group: The symmetry of the field.
+        max_frequency: The paper's Omega: |k_i| <= Omega and the images of that box.
+        batch: The size S of a stack of independent fields, or None for one field.
+        smoothness: The power s >= 0; the parameter of frequency kappa is multiplied by
             (1 + |kappa|^2 vol^(2/d))^(-s / 2), which makes descent in the parameters Sobolev descent.
-        dtype, device: of the parameters.
+        dtype, device: The dtype and the device of the parameters.
 
     Shapes:
         `parameters_`: (P,) or (S, P). Points (..., d), or (S, ..., d) for a stack.
@@ -99,13 +100,11 @@ class FourierField(InvariantField):
     def adjoint(self, points: Tensor, forces: Tensor) -> Tensor:
         """Return the gradient of sum forces . V(points) in the parameters, without autograd.
 
-        This is the work of the force.
-
-        The projection of a force on the invariant fields (design point 10). V is linear in the
-        parameters, so their values do not matter.
+        This is the projection of a force on the invariant fields (design point 10). V is linear in
+        the parameters, so their values do not matter.
 
         Args:
-            points, forces: (N, d), or (S, N, d) for a stack.
+            points, forces: Arrays (N, d), or (S, N, d) for a stack.
 
         Returns:
             (P,) or (S, P).
@@ -179,8 +178,8 @@ def _orders(basis: InvariantBasis) -> tuple[int, ...]:
     return tuple(np.abs(basis.frequencies).max(axis=0).tolist())
 
 
-@cached_as_written(maxsize=64)  # the segments of a flow share them
-@torch.inference_mode(False)  # what the first caller may not train, no other could
+@cached_by_basis(maxsize=64)  # the segments of a flow share them
+@torch.inference_mode(False)  # cached in inference mode, they could never be trained
 def _constants(
     group: CrystallographicGroup,
     max_frequency: int,
@@ -189,17 +188,9 @@ def _constants(
     device: torch.device,
 ) -> dict[str, Tensor]:
     basis = invariant_basis(group, max_frequency)
-    rows, columns, values = tensor_layout(basis, _orders(basis))
-    real = {
-        "values": values,
-        "frame": group.inverse_lattice,
-        "scale": sobolev_weights(group, basis, smoothness),
-    }
-    return {
-        "rows": torch.tensor(rows, device=device),
-        "columns": torch.tensor(columns, device=device),
-        **{name: torch.tensor(x, dtype=dtype, device=device) for name, x in real.items()},
-    }
+    scale = sobolev_weights(group, basis, smoothness)
+    layout = tensor_layout(basis, _orders(basis))
+    return constant_tensors(layout, dtype, device, scale=scale, frame=group.inverse_lattice)
 
 
 @lru_cache(maxsize=64)  # bases hash by identity

@@ -1,4 +1,4 @@
-"""The Fourier coefficients that a crystallographic group leaves alone (design point 3)."""
+"""The Fourier coefficients that are invariant under a crystallographic group (design point 3)."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from torch import Tensor, nn
 
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
-from orbiflow.symmetry import CrystallographicGroup, cached_as_written, checked_group
+from orbiflow.symmetry import CrystallographicGroup, cached_by_basis, checked_group
 
 MAX_COEFFICIENTS = 2_000_000
-"""Largest number of real coefficients before symmetrization: about a gigabyte of work."""
+"""The largest number of real coefficients before symmetrization, for about a gigabyte of memory."""
 
 
 @dataclass(frozen=True, eq=False)
 class InvariantBasis:
-    """Orthonormal basis of the invariant real trigonometric vector fields of bounded frequency.
+    """An orthonormal basis of the invariant real trigonometric vector fields of bounded frequency.
 
     A field is V(p) = z_0 + sum over `frequencies` of sqrt(2) (a cos(phase) + b sin(phase)), where
     phase = 2 pi k . B^-1 p and one of k, -k is listed. The flat coefficient vector holds, for each k,
@@ -31,10 +31,10 @@ class InvariantBasis:
     of the parameters is the root mean square of the field.
 
     Args:
-        frequencies: (M, d) integers, k = 0 first.
-        rows, columns, values: (nnz,) each.
-        size: number of parameters P.
-        magnitude: (P,) |kappa| of each parameter, kappa = B^-T k, per unit of length.
+        frequencies: Integers (M, d), k = 0 first.
+        rows, columns, values: The entries of the sparse basis, (nnz,) each.
+        size: The number of parameters P.
+        magnitude: |kappa| (P,) of each parameter, kappa = B^-T k, per unit of length.
     """
 
     frequencies: Array
@@ -132,7 +132,7 @@ def _orthonormal_columns(projector: Array) -> Array:
     return basis
 
 
-@cached_as_written(maxsize=64)  # a flow of many segments shares one basis
+@cached_by_basis(maxsize=64)  # a flow of many segments shares one basis
 def invariant_basis(group: CrystallographicGroup, max_frequency: int) -> InvariantBasis:
     """Build the basis orbit by orbit: the range of the mean over coset representatives.
 
@@ -189,9 +189,9 @@ class InvariantField(nn.Module, ABC):
     The parameters are coordinates in an orthonormal basis of the invariant Fourier coefficients
     (paper, section 3; design points 2-4), each multiplied by `scale`.
 
-    - `parameters_`: (P,), or (S, P) for a stack of S independent fields.
-    - `basis`: the coefficients that the parameters stand for.
-    - `size`: P.
+    - `parameters_`: The coordinates (P,), or (S, P) for a stack of S independent fields.
+    - `basis`: The coefficients that the parameters stand for.
+    - `size`: The number of parameters P.
     """
 
     rows: Tensor
@@ -248,7 +248,7 @@ class InvariantField(nn.Module, ABC):
             self.register_buffer(name, tensor, persistent=False)
 
     def _apply(self, fn: Callable[[Tensor], Tensor], recurse: bool = True) -> Self:
-        # a float32 field made float64 must be as symmetric as one born in float64
+        # a float32 field converted to float64 must be as symmetric as one created in float64
         super()._apply(fn, recurse)  # pyright: ignore[reportUnknownMemberType]
         self._fill_buffers()
         return self
@@ -263,3 +263,16 @@ def sobolev_weights(
     """Return (P,) factors (1 + |kappa|^2 vol^(2/d))^(-smoothness / 2), free of the unit of length."""
     size = group.cell_volume ** (1 / group.dim)
     return (1.0 + (basis.magnitude * size) ** 2) ** (-smoothness / 2)
+
+
+def constant_tensors(
+    layout: tuple[Array, Array, Array], dtype: torch.dtype, device: torch.device, **others: Array
+) -> dict[str, Tensor]:
+    """Return a sparse basis (rows, columns, values) and other real arrays as tensors by name."""
+    rows, columns, values = layout
+    reals = {"values": values, **others}
+    return {
+        "rows": torch.tensor(rows, device=device),
+        "columns": torch.tensor(columns, device=device),
+        **{name: torch.tensor(x, dtype=dtype, device=device) for name, x in reals.items()},
+    }

@@ -1,4 +1,4 @@
-"""Symmetric fields read off a fine spline: a cost that does not grow with their detail."""
+"""Symmetric fields evaluated by splines, at a cost that does not grow with the frequency."""
 
 from __future__ import annotations
 
@@ -14,28 +14,29 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.fields.invariants import (
     InvariantBasis,
     InvariantField,
+    constant_tensors,
     invariant_basis,
     sobolev_weights,
 )
 from orbiflow.fields.splines import padded, spline_sum, spline_sum_with_divergence, symbol
-from orbiflow.symmetry import CrystallographicGroup, cached_as_written
+from orbiflow.symmetry import CrystallographicGroup, cached_by_basis
 from orbiflow.typed_torch import fft, linalg
 
-PER_WAVE = 3
-"""Grid points along the shortest wave, at least: a cubic spline follows it to about 2 per cent."""
+POINTS_PER_WAVE = 3
+"""The least number of grid points on the shortest wave, for an error of about 2 per cent."""
 
 
 class SplineField(InvariantField):
-    """The cubic spline through a `FourierField`'s values on an even grid, a field of its own.
+    """The cubic spline through a `FourierField`'s values on an even grid.
 
-    Same parameters, same symmetry (exactly: the group maps the grid to itself), twice continuously
-    differentiable, its divergence exact. An evaluation reads 4^d coefficients whatever
-    `max_frequency` is; the grid is filled by one fast Fourier transform.
+    It has the same parameters and exactly the same symmetry, as the group maps the grid to itself. It
+    is twice continuously differentiable, and its divergence is exact. An evaluation reads 4^d
+    coefficients for any `max_frequency`; one fast Fourier transform fills the grid.
 
     Args:
-        group: of a rectangular lattice whose linear parts permute and flip the axes, in one to three
-            dimensions.
-        max_frequency, smoothness, dtype, device: see `FourierField`.
+        group: A group with a rectangular lattice in one to three dimensions, whose linear parts
+            permute and flip the axes.
+        max_frequency, smoothness, dtype, device: See `FourierField`.
 
     Shapes:
         `parameters_`: (P,). Points (..., d).
@@ -148,11 +149,13 @@ def grid_sides(group: CrystallographicGroup, basis: InvariantBasis) -> tuple[int
     ):
         raise OrbiflowError(
             "a spline field needs a rectangular lattice in one to three dimensions and linear parts "
-            f"that permute and flip the axes; {group!r} has others: use FourierField"
+            f"that permute and flip the axes; {group!r} has not: use FourierField"
         )
     waves = np.abs(basis.frequencies).max(axis=0) / lengths  # per unit of length
     # multiples of four: half and quarter translations stay on the grid
-    density = 4 * math.ceil(PER_WAVE * waves.max() * lengths.min() / 4 + 1e-9) / lengths.min()
+    density = (
+        4 * math.ceil(POINTS_PER_WAVE * waves.max() * lengths.min() / 4 + 1e-9) / lengths.min()
+    )
     sides: Array = density * lengths
     shifts: Array = np.array([g.translation for g in group.cosets]) * density
     if not np.allclose(sides, np.round(sides)) or not np.allclose(shifts, np.round(shifts)):
@@ -160,8 +163,8 @@ def grid_sides(group: CrystallographicGroup, basis: InvariantBasis) -> tuple[int
     return tuple(round(m) for m in sides)
 
 
-@cached_as_written(maxsize=64)  # the segments of a flow share them
-@torch.inference_mode(False)  # what the first caller may not train, no other could
+@cached_by_basis(maxsize=64)  # the segments of a flow share them
+@torch.inference_mode(False)  # cached in inference mode, they could never be trained
 def _constants(
     group: CrystallographicGroup,
     max_frequency: int,
@@ -170,13 +173,9 @@ def _constants(
     device: torch.device,
 ) -> dict[str, Tensor]:
     basis = invariant_basis(group, max_frequency)
-    rows, columns, values = _spectrum_layout(basis, grid_sides(group, basis))
-    real = {"values": values, "scale": sobolev_weights(group, basis, smoothness)}
-    return {
-        "rows": torch.tensor(rows, device=device),
-        "columns": torch.tensor(columns, device=device),
-        **{name: torch.tensor(x, dtype=dtype, device=device) for name, x in real.items()},
-    }
+    layout = _spectrum_layout(basis, grid_sides(group, basis))
+    scale = sobolev_weights(group, basis, smoothness)
+    return constant_tensors(layout, dtype, device, scale=scale)
 
 
 def _spectrum_layout(basis: InvariantBasis, sides: tuple[int, ...]) -> tuple[Array, Array, Array]:

@@ -1,9 +1,9 @@
 """Sums of cubic B-splines on an even periodic grid, with hand-written derivatives.
 
-A point meets 4^d coefficients whatever the grid's size, so a fine field costs what a coarse one does.
-Points lie last inside: `u` is (d, N), in cells of the grid. The backward pass needs second derivatives,
-because the divergence is a value of its own; cubic splines have them everywhere. Derivatives of the
-backward pass itself are left to autograd.
+A value depends on 4^d coefficients for any size of the grid, so a fine field costs as much as a coarse
+one. Points are on the last axis: `u` is (d, N), in cells of the grid. The backward pass needs second
+derivatives, because the divergence is a result too; cubic splines have them everywhere. Autograd
+differentiates the backward pass itself.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from orbiflow.fields.transforms import plain_gradients, refuse_old_batches, tran
 from orbiflow.typed_torch import applied
 
 TAPS = 4
-"""Coefficients of a cubic spline that a point meets along an axis."""
+"""The number of coefficients along an axis that a cubic spline's value depends on."""
 
 
 @lru_cache(maxsize=16)
@@ -39,8 +39,8 @@ def cubic_weights(fraction: Tensor, orders: int = 1) -> Tensor:
     """Return weights (d, orders, 4, N) of the four nearest B-splines, and of their derivatives.
 
     Args:
-        fraction: (d, N) position in a cell, 0 to 1.
-        orders: 1 for values only, 2 and 3 for first and second derivatives too.
+        fraction: The positions (d, N) in a cell, 0 to 1.
+        orders: 1 for values only, 2 or 3 for first and second derivatives as well.
 
     >>> float(cubic_weights(torch.tensor([[0.25]])).sum())
     1.0
@@ -88,7 +88,7 @@ def _cells(sides: tuple[int, ...], u: Tensor) -> tuple[Tensor, Tensor]:
 
 
 class _Near:
-    """Sums of one channel's near coefficients (4, ..., 4, N) against weights, partial ones kept."""
+    """Sums of one channel's coefficients (4, ..., 4, N) times weights; partial sums are kept."""
 
     def __init__(self, values: Tensor, weights: Tensor) -> None:
         self.weights = weights
@@ -211,11 +211,10 @@ def spline_sum(table: Tensor, u: Tensor) -> Tensor:
     """Return values (C, N) of splines at `u` (d, N), in cells of the grid.
 
     Args:
-        table: coefficients, `padded`.
+        table: The `padded` coefficients.
 
-    Differentiable in both: the first derivatives in closed form, higher ones, and those that
-    `torch.func` takes, by ordinary operations. A cubic spline's third derivatives are constant in each
-    cell.
+    First derivatives in both arguments are in closed form; higher ones, and those of `torch.func`, use
+    ordinary operations. A cubic spline's third derivatives are constant in each cell.
     """
     return _sum(table, u, None)[0]
 

@@ -1,4 +1,4 @@
-"""Symmetrization: any vector field made to commute with a crystallographic group.
+"""Symmetrization, which makes any vector field commute with a crystallographic group.
 
 The mean over coset representatives (Reynolds operator, design point 2) and the paper's three
 operators (equations for P_B, R_c^K and G_l^mu of section 3), which are unnormalised sums.
@@ -29,9 +29,9 @@ from orbiflow.typed_torch import linalg
 
 
 class Symmetrized(nn.Module):
-    """The field V(p) = 1/|G| sum_i R_i^-1 V0(R_i p + t_i), V0 made periodic first.
+    """The field V(p) = 1/|G| sum_i R_i^-1 V0(R_i p + t_i), where V0 is made periodic first.
 
-    See `symmetrize`. Keeps `field` as a submodule if it is one, so its parameters are trained.
+    See `symmetrize`. If `field` is a torch module it is kept as a submodule, so it can be trained.
     """
 
     def __init__(
@@ -53,8 +53,7 @@ class Symmetrized(nn.Module):
     def with_divergence(self, points: Tensor, *time: Tensor) -> tuple[Tensor, Tensor]:
         """Return V (..., d) and its divergence (...,): the mean of the given field's own at the images.
 
-        Derivatives are asked of the given field alone, not of what symmetrizes it: R^-1 J R has the
-        trace of J.
+        Only the given field is differentiated, not the symmetrization: R^-1 J R has the trace of J.
         """
         images = self.group.images(points)
         joint = _at_time(prepared_with_divergence(self.field), time)
@@ -92,16 +91,16 @@ def symmetrize(
     """Make any field commute with `group`: V(g p) = R_g V(p).
 
     Args:
-        field: any callable from points (..., d) to vectors of the same shape: a torch module, a
-            function, a lambda, or a `TimeDependentField`. It need not be periodic: translates of it
-            are blended smoothly over neighbouring cells (2^d evaluations). A field that commutes
-            already is left unchanged.
-        group: of R^d.
-        periodic: set it if `field` is known to be periodic under the group's lattice (for instance a
-            network behind `PeriodicFeatures`): skips the blending.
+        field: Any callable from points (..., d) to vectors of the same shape: a torch module, a
+            function, a lambda, or a `TimeDependentField`. It need not be periodic: its translates
+            are blended smoothly over neighbouring cells (2^d evaluations). A field that already
+            commutes does not change.
+        group: A group of R^d.
+        periodic: Whether `field` is known to be periodic under the group's lattice (for instance a
+            network behind `PeriodicFeatures`), so that it need not be blended.
 
     Raises:
-        OrbiflowError: if `group` is no group, or, when called, for points of another dimension.
+        OrbiflowError: if `group` is not a group or, when called, for points of another dimension.
 
     >>> import torch
     >>> from orbiflow.symmetry import wallpaper_group

@@ -18,7 +18,7 @@ LATTICES: dict[str, list[list[float]]] = {
     "square": [[1.0, 0.0], [0.0, 1.0]],
     "hexagonal": [[1.0, -0.5], [0.0, 0.8660254037844386]],
 }
-"""One lattice of each system, basis vectors as columns; any other of the system may be given."""
+"""A default lattice of each system, with basis vectors as columns."""
 
 
 class WallpaperGroup(NamedTuple):
@@ -64,7 +64,11 @@ WALLPAPER_GROUPS: dict[str, WallpaperGroup] = {
 
 
 def wallpaper_group(name: str, lattice: ArrayLike | None = None) -> CrystallographicGroup:
-    """Return the wallpaper group `name` on `lattice` (2, 2, columns), by default one of its system.
+    """Return the wallpaper group `name`.
+
+    Args:
+        name: The group's name, one of `WALLPAPER_GROUPS`.
+        lattice: The basis vectors as columns, shape (2, 2). Default: a lattice of the group's system.
 
     Raises:
         GroupError: for an unknown name, or a lattice that is not of the group's system.

@@ -24,7 +24,7 @@ from orbiflow.symmetry.isometry import (
 
 
 def checked_lattice(lattice: ArrayLike) -> Array:
-    """Return a read-only float64 copy of a lattice basis, refused with GroupError if degenerate."""
+    """Return a read-only float64 copy of a lattice basis; raise GroupError if it is degenerate."""
     basis = np.array(lattice, dtype=np.float64)
     if basis.ndim != 2 or basis.shape[0] != basis.shape[1] or basis.size == 0:
         raise GroupError(
@@ -43,17 +43,17 @@ def checked_lattice(lattice: ArrayLike) -> Array:
 class CrystallographicGroup:
     """A discrete group of isometries whose translations contain a full lattice.
 
-    Build one with `generate`; the constructor trusts its arguments. Two are equal if they are the same
-    set of isometries, within 1e-9 as in `contains`, whatever their bases, coset representatives and
-    names.
+    Build one with `generate`; the constructor does not check its arguments. Two groups are equal if
+    they are the same set of isometries, within 1e-9 as in `contains`; their bases, coset
+    representatives and names may differ.
 
     Args:
-        lattice: (d, d), basis vectors as columns.
-        cosets: one representative of each coset of the lattice, the identity first, with
+        lattice: The basis vectors as columns, shape (d, d).
+        cosets: One representative of each coset of the lattice, the identity first, with
             translations in the cell (fractional coordinates in [0, 1)).
-        name: for people to read, such as "pgg".
+        name: A name for people to read, such as "pgg".
 
-    Reference: design points 1 and 2; the paper's operators are generators of such a group.
+    Reference: design points 1 and 2. The paper's operators generate such a group.
     """
 
     lattice: Array
@@ -118,7 +118,8 @@ class CrystallographicGroup:
         return np.stack([g.translation for g in self.cosets])
 
     def __eq__(self, other: object) -> bool:
-        """Return whether both are the same set of isometries: each contains the other's generators."""
+        """Return whether both groups are the same set of isometries."""
+        # each must contain the other's generators
         if not isinstance(other, CrystallographicGroup):
             return NotImplemented
         if other is self:
@@ -136,10 +137,10 @@ class CrystallographicGroup:
 
     @cached_property
     def _invariants(self) -> tuple[int, tuple[tuple[int, int, int], ...]]:
-        """Dimension, and how many elements of the point group have each trace and determinant.
+        """The dimension, and how many elements of the point group have each trace and determinant.
 
-        Whole numbers only: equality has a tolerance, so that whatever moves with the group, rounded or
-        not, would give some equal groups two hashes.
+        Only whole numbers: equality has a tolerance, so a quantity that changes with rounding would
+        give some equal groups different hashes.
         """
         integral = np.round(self.inverse_lattice @ self.linear_parts @ self.lattice)
         unique = np.unique(integral, axis=0)
@@ -196,9 +197,9 @@ class CrystallographicGroup:
         are the elements whose image of the tile can meet the region.
 
         Args:
-            center: (d,) point.
-            radius: in the units of the points.
-            source: (d,) point, default `center`.
+            center: A point (d,).
+            radius: The distance, in the units of the points.
+            source: A point (d,). Default: `center`.
         """
         center = np.asarray(center, dtype=np.float64)
         source = center if source is None else np.asarray(source, dtype=np.float64)
@@ -254,7 +255,7 @@ class CrystallographicGroup:
 
 
 def checked_group(group: object) -> CrystallographicGroup:
-    """Return `group` itself.
+    """Return `group` if it is a group.
 
     Raises:
         GroupError: if it is anything else, such as a group's name.
@@ -273,7 +274,7 @@ def _check_maps_lattice(basis: Array, generator: Isometry, number: int) -> None:
     d = basis.shape[0]
     if generator.dim != d:
         raise GroupError(
-            f"generator {number} acts on R^{generator.dim}, the lattice lives in R^{d}"
+            f"generator {number} acts on R^{generator.dim}, but the lattice is in R^{d}"
         )
     integral = np.linalg.solve(basis, generator.linear @ basis)
     deviation = np.abs(integral - np.round(integral)).max()
@@ -294,14 +295,14 @@ def _reduce_translation(basis: Array, element: Isometry) -> Isometry:
 
 
 class _Seen:
-    """Elements already found, looked up by integral linear part and translation modulo lattice."""
+    """The elements found so far, keyed by linear part and translation modulo the lattice."""
 
     def __init__(self, basis: Array) -> None:
         self._basis = basis
         self._translations: dict[bytes, list[Array]] = {}
 
     def add(self, element: Isometry) -> bool:
-        """Record `element`; False if it was known."""
+        """Record `element` and return whether it is new."""
         integral = np.linalg.solve(self._basis, element.linear @ self._basis)
         key = np.round(integral).astype(np.int64).tobytes()
         fractional = np.linalg.solve(self._basis, element.translation)
@@ -325,7 +326,7 @@ def _closure(basis: Array, generators: Sequence[Isometry], max_order: int) -> tu
             break
     raise NotDiscreteError(
         f"the closure modulo the lattice has more than {max_order} elements; generator {number}, "
-        f"{generators[number]!r}, is the first that makes it so together with those before it. "
+        f"{generators[number]!r}, is the first that exceeds this with those before it. "
         "With this lattice they do not make a discrete group: check centres, lines and mu."
     )
 
@@ -333,7 +334,7 @@ def _closure(basis: Array, generators: Sequence[Isometry], max_order: int) -> tu
 def _finite_closure(
     basis: Array, generators: Sequence[Isometry], max_order: int
 ) -> tuple[Isometry, ...] | None:
-    """Return all products modulo the lattice, breadth first, or None if there are over `max_order`."""
+    """Return all products modulo the lattice, or None if there are more than `max_order`."""
     elements = [identity(basis.shape[0])]
     seen = _Seen(basis)
     seen.add(elements[0])

@@ -17,7 +17,7 @@ from orbiflow.errors import GroupError, NotAnIsometryError
 Points = TypeVar("Points", Array, torch.Tensor)
 
 TOLERANCE = 1e-9
-"""Largest deviation from orthogonality, or from a lattice vector, that is read as rounding."""
+"""The largest deviation from orthogonality, or from a lattice vector, that counts as rounding."""
 
 
 def cast_like(array: Array, like: Points) -> Points:
@@ -47,8 +47,8 @@ class Isometry:
     """The map p -> linear @ p + translation.
 
     Args:
-        linear: (d, d) orthogonal matrix.
-        translation: (d,) vector, in the units of the points.
+        linear: An orthogonal matrix (d, d).
+        translation: A vector (d,), in the units of the points.
 
     Raises:
         NotAnIsometryError: if `linear` is not orthogonal within 1e-9 or the shapes disagree.

@@ -1,7 +1,7 @@
-"""Closed rings: area, centroid, sense, evenly divided sides.
+"""Closed rings of the plane: area, centroid, orientation, similarity and even sampling.
 
-A ring is an array (..., N, 2), float64 in NumPy, whose last vertex is not a repeat of the first;
-leading axes are a stack of rings. What torch needs as well takes tensors and is differentiable.
+A ring is a float64 array (..., N, 2) whose last vertex does not repeat the first; leading axes are a
+stack of rings. Functions with `AnyRing` take tensors as well and are differentiable.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ AnyRing = TypeVar("AnyRing", Array, torch.Tensor)
 def signed_area(ring: AnyRing) -> AnyRing:
     """Return the area that each ring encloses, positive where it is counter-clockwise with y up.
 
-    The shoelace formula about the first vertex: far from the origin the plain formula takes the
-    difference of products as large as the squared distance, and none of the area's digits is left.
+    Uses the shoelace formula about the first vertex: about the origin it would lose all digits of a
+    distant ring's area to cancellation.
 
     Args:
-        ring: (..., N, 2), NumPy or torch.
+        ring: Rings (..., N, 2), NumPy or torch.
 
     Returns:
-        (...), a NumPy scalar for a single ring; in square units of the ring.
+        The areas (...), a NumPy scalar for a single ring, in square units of the ring.
 
     >>> square = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]])
     >>> float(signed_area(square)), float(signed_area(square + 1e8))
@@ -54,21 +54,20 @@ def centroid(ring: Array) -> Array:
 
 
 def reverse(ring: Array) -> Array:
-    """Return the same ring (N, 2) run through the other way, from the same first vertex."""
+    """Return the ring (N, 2) in the opposite order, from the same first vertex."""
     return np.roll(ring[::-1], 1, axis=0)
 
 
 def orient(ring: Array, *, counter_clockwise: bool = True) -> Array:
-    """Return `ring` (N, 2), reversed if need be so that it runs as asked (as seen with y up)."""
+    """Return `ring` (N, 2), reversed if needed to run counter-clockwise (with y up), or clockwise."""
     return ring if bool(signed_area(ring) > 0) == counter_clockwise else reverse(ring)
 
 
 def subdivided(ring: AnyRing, pieces: int, phase: float = 0.0) -> AnyRing:
     """Return points (..., N pieces, 2) of rings (..., N, 2): each side divided evenly into `pieces`.
 
-    With phase 0 every vertex is among them; `phase` moves them along by that share of a piece. Sides
-    that are images of each other under an isometry are divided alike, which arc length does not
-    promise to the last digit.
+    With phase 0 they include every vertex; `phase` moves them along by that share of a piece. Sides
+    that are isometric images of each other are divided alike, to the last digit.
 
     >>> subdivided(np.array([[0.0, 0.0], [2.0, 0.0], [0.0, 2.0]]), 2)[:3].tolist()
     [[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]]
@@ -107,16 +106,17 @@ def plane_points(z: Complex) -> Array:
 
 
 def best_similarity(points: Complex, images: Complex) -> Complex:
-    """Return factors of the similarities z -> factor (z - mean) + mean' nearest to given images.
+    """Return the factors of the similarities z -> factor (z - mean) + mean' nearest to given images.
 
-    Least squares over the first axis (Procrustes): a turn and a scale, without mirror images.
+    These are rotations and scalings, without mirror images, by least squares over the first axis
+    (Procrustes).
 
     Args:
-        points: (N,) x + iy.
-        images: (N,) or (N, C), where each point goes, C times.
+        points: Points (N,) x + iy.
+        images: Their images (N,), or C sets of images (N, C).
 
     Returns:
-        () or (C,), in the images' units over the points'.
+        The factors, () or (C,), in the images' units over the points'.
 
     >>> triangle = np.array([0, 1, 1j])
     >>> complex(best_similarity(triangle, 2j * triangle + 5))
@@ -138,7 +138,7 @@ def ring_length(ring: Array) -> float:
 def points_along(ring: Array, at: ArrayLike) -> Array:
     """Return the points (P, 2) of the closed `ring` (N, 2) at the arc lengths `at` (P,).
 
-    Lengths beyond the ring's own, and negative ones, go round.
+    Lengths are measured from the first vertex, modulo the ring's length.
 
     >>> points_along(np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]), [0.5, 4.5]).tolist()
     [[0.5, 0.0], [0.5, 0.0]]
@@ -165,19 +165,19 @@ def resampled_with_corners(
 ) -> tuple[Array, list[int]]:
     """Resample like `resampled`, keeping some vertices of the ring as they are.
 
-    Between one corner and the next the points are evenly spaced; how many there are follows the
-    length between them (largest remainders), at least the corner itself.
+    Points between one corner and the next are evenly spaced; their number is in proportion to the
+    length between the corners (largest remainders), and at least the corner itself.
 
     Args:
-        ring: (N, 2).
-        corners: indices of the vertices to keep, increasing; the first point is the first of them.
-        count: points in all, at least as many as there are corners.
+        ring: A ring (N, 2).
+        corners: The increasing indices of the vertices to keep; the first one is the first point.
+        count: The number of all points, at least the number of corners.
 
     Returns:
         The points (count, 2), and the index of each corner among them.
 
     Raises:
-        OrbiflowError: for corners that do not increase or are not vertices, and for too few points.
+        OrbiflowError: if corners do not increase or are not vertices, or if `count` is too small.
 
     >>> square = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]])
     >>> points, at = resampled_with_corners(square, [1, 3], 4)
@@ -190,7 +190,9 @@ def resampled_with_corners(
             f"corners must be increasing indices of the {len(ring)} vertices, got {kept}"
         )
     if count < len(kept):
-        raise OrbiflowError(f"{len(kept)} corners need at least as many points, got {count}")
+        raise OrbiflowError(
+            f"count must be at least the number of corners, {len(kept)}, got {count}"
+        )
     knots = arc_lengths(ring)
     starts = knots[kept]
     lengths = np.diff(starts, append=starts[0] + knots[-1])
@@ -231,7 +233,7 @@ def _shared_out(lengths: Array, count: int) -> Array:
 
 
 def polygons_in(geometry: BaseGeometry) -> list[Polygon]:
-    """Return the polygons that `geometry` is made of, lines and points left out."""
+    """Return the polygons in `geometry`, without its lines and points."""
     if isinstance(geometry, Polygon):
         return [] if geometry.is_empty else [geometry]
     parts: Iterable[BaseGeometry] = getattr(geometry, "geoms", ())

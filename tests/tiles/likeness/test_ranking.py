@@ -13,7 +13,7 @@ from orbiflow.tiles import (
     rank_score,
     tile_similarity,
 )
-from orbiflow.tiles.likeness.ranking import OTHER_CLASS
+from orbiflow.tiles.likeness.ranking import OTHER_CLASS_FACTOR
 
 SHARES = st.floats(0, 1)
 
@@ -83,7 +83,7 @@ def test_tile_similarity_is_iou_and_less_between_classes(a: float, b: float) -> 
     share = min(a, b) / max(a, b)
     assert alike(0, 1) == pytest.approx(share)
     assert alike(1, 0) == pytest.approx(share)
-    assert alike(0, 2) == pytest.approx(OTHER_CLASS * share)
+    assert alike(0, 2) == pytest.approx(OTHER_CLASS_FACTOR * share)
 
 
 def test_twins_of_one_class_only() -> None:

@@ -1,7 +1,7 @@
-"""How far one shape is from another: areas and distances of polygons, exact, not counted in pixels.
+"""Exact measures of how far one polygon is from another: areas and distances.
 
-Nothing here moves a shape: bring both into one frame first. A shape is a ring (N, 2) or a shapely
-polygon or multipolygon.
+Shapes are compared where they are: bring both into one frame first. A shape is a ring (N, 2) or a
+shapely polygon or multipolygon.
 """
 
 # pyright: reportUnknownMemberType=false
@@ -18,14 +18,14 @@ from orbiflow.arguments import numbers
 from orbiflow.arrays import Array, Integers, Window
 from orbiflow.errors import OrbiflowError
 
-# Of the diagonal of the box around both curves.
-TOLERANCE = 1e-6
+HAUSDORFF_TOLERANCE = 1e-6
+"""The accuracy of Hausdorff distances, as a share of the diagonal of the box around both curves."""
 
 
 def hausdorff_distance(a: Array, b: Array, *, tolerance: float) -> float:
     """Return the Hausdorff distance between the unions of the segments `a` and `b`, each (M, 2, 2).
 
-    Too small by at most `tolerance` (in the unit of the coordinates), never too large.
+    The result is too small by at most `tolerance`, in the unit of the coordinates, never too large.
     """
     forth = _directed(a, b, tolerance)
     return max(forth, _directed(b, a, tolerance, at_least=forth))
@@ -77,14 +77,13 @@ Region = Polygon | MultiPolygon
 
 @dataclass(frozen=True)
 class ShapeMetrics:
-    """Agreement of a tile with its target. Areas are exact; `hausdorff` has no unit, see below.
+    """The agreement of a tile with its target. Areas are exact.
 
-    - `iou`: area of the intersection over area of the union, 0 to 1.
-    - `dice`: twice the area of the intersection over the sum of the areas, 0 to 1.
-    - `pixel_accuracy`: share of `window` on which both agree; it depends on the window.
-    - `window`: (xmin, ymin, xmax, ymax) of that window, in the shapes' own units.
-    - `hausdorff`: distance between the two boundaries, in units of the square root of the target's
-      area.
+    - `iou`: The area of the intersection over the area of the union, 0 to 1.
+    - `dice`: Twice the area of the intersection over the sum of the areas, 0 to 1.
+    - `pixel_accuracy`: The share of `window` on which both agree.
+    - `window`: The window (xmin, ymin, xmax, ymax), in the shapes' own units.
+    - `hausdorff`: The distance between the two boundaries, in square roots of the target's area.
     """
 
     iou: float
@@ -121,11 +120,11 @@ def dice(a: Shape, b: Shape) -> float:
 
 
 def pixel_accuracy(a: Shape, b: Shape, window: Shape | None = None) -> float:
-    """Return the share of `window` on which `a` and `b` agree: both there or both absent. 0 to 1.
+    """Return the share of `window`, 0 to 1, where both or neither of `a` and `b` are present.
 
-    The limit, as pixels shrink, of the share of pixels classified alike. The value depends on the
-    window: the more background it takes in, the nearer 1. `window` is a shape or four numbers
-    (xmin, ymin, xmax, ymax); by default it is `default_window(b)`, with `b` the target.
+    This is the limit, as pixels shrink, of the share of pixels classified alike. It depends on the
+    window: more background brings it nearer to 1. `window` is a shape or four numbers
+    (xmin, ymin, xmax, ymax); by default it is `default_window(b)`, where `b` is the target.
 
     Raises `OrbiflowError` naming the argument that is not a valid polygon or box.
 
@@ -151,9 +150,9 @@ def default_window(target: Shape) -> Polygon:
 def hausdorff(a: Shape, b: Shape) -> float:
     """Return the Hausdorff distance between the boundaries of two shapes, in the shapes' own units.
 
-    The distance between the curves, not between their vertices: the greatest distance from a point
-    of one boundary to the nearest point of the other. It is too small by at most 1e-6 of the
-    diagonal of the box around both shapes, never too large.
+    This is the greatest distance from any point of one boundary, not only a vertex, to the nearest
+    point of the other. It is too small by at most 1e-6 of the diagonal of the box around both shapes,
+    never too large.
 
     Raises `OrbiflowError` naming the argument that is not a valid polygon.
 
@@ -201,12 +200,14 @@ def _pixel_accuracy(a: Region, b: Region, window: Region) -> float:
 def _hausdorff(a: Region, b: Region) -> float:
     xmin, ymin, xmax, ymax = shapely.total_bounds([a, b])
     return hausdorff_distance(
-        _edges(a), _edges(b), tolerance=TOLERANCE * float(np.hypot(xmax - xmin, ymax - ymin))
+        _edges(a),
+        _edges(b),
+        tolerance=HAUSDORFF_TOLERANCE * float(np.hypot(xmax - xmin, ymax - ymin)),
     )
 
 
 def _share(value: float) -> float:
-    # Rounding in the overlay can step outside by an ulp.
+    # rounding in the overlay can exceed the bounds by an ulp
     return min(max(float(value), 0.0), 1.0)
 
 
@@ -228,7 +229,7 @@ def _window(window: Shape) -> Region:
 
 
 def as_region(shape: Shape, name: str) -> Region:
-    """Return `shape` as a valid polygon of positive area, else an error naming the argument."""
+    """Return `shape` as a valid polygon of positive area, or raise an error with its `name`."""
     if not isinstance(shape, Polygon | MultiPolygon):
         shape = _ring_polygon(shape, name)
     if not np.isfinite(shapely.get_coordinates(shape)).all():

@@ -18,22 +18,22 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.geometry import centroid, complex_points, orient, plane_points, signed_area
 from orbiflow.tiles.likeness.ranking import Similarity
 
-MANY, COARSE = 1500, 2e-3
-"""Vertices beyond which a region is simplified, and by how much of its size (area 1)."""
+MAX_REGION_VERTICES, REGION_TOLERANCE = 1500, 2e-3
+"""The number of vertices beyond which a region of area 1 is simplified, and the tolerance."""
 
 
 def prepared_region(ring: Array) -> shapely.Polygon:
     """Return the prepared region of a ring (N, 2) of area about 1, simplified if it is complex.
 
-    For choosing among candidates: intersections with thousands of vertices cost seconds. What is
-    reported is measured with the ring itself.
+    Use it to choose among candidates, as intersections with thousands of vertices take seconds; final
+    results are measured with the ring itself.
     """
     ring = numbers(ring, "the region's ring", ("N", 2))
     if len(ring) < 3:
-        raise OrbiflowError(f"the region's ring needs 3 vertices at least, got {len(ring)}")
+        raise OrbiflowError(f"the region's ring needs at least 3 vertices, got {len(ring)}")
     region = shapely.Polygon(ring)
-    if len(ring) > MANY:
-        simpler = region.simplify(COARSE)
+    if len(ring) > MAX_REGION_VERTICES:
+        simpler = region.simplify(REGION_TOLERANCE)
         if isinstance(simpler, shapely.Polygon) and simpler.is_valid and not simpler.is_empty:
             region = simpler
     shapely.prepare(region)
@@ -51,13 +51,13 @@ def boundary_iou(goal: shapely.Polygon, boundaries: Array) -> Array:
 
 
 class Overlap:
-    """Overlap of rings with one region.
+    """The overlap of rings with one region.
 
-    The area of P and T common changes at the rate of the normal speed integrated over the part of
-    P's boundary inside T; along a side the speed is linear between its ends.
+    The common area of P and T changes at the rate of the normal speed integrated over the part of P's
+    boundary inside T; along a side the speed is linear between its ends.
 
     Args:
-        target: (M, 2) ring of the region, simple, in either sense; see `prepared_region`.
+        target: The simple ring (M, 2) of the region, in either orientation; see `prepared_region`.
     """
 
     def __init__(self, target: Array) -> None:
@@ -109,20 +109,18 @@ class Overlap:
         return early[:, None] * normal + np.roll(late[:, None] * normal, 1, axis=0)
 
 
-def overlaid(
+def best_overlay(
     ring: Complex, overlap: Overlap, factor: complex = 1.0, middle: complex = 0.0
 ) -> tuple[complex, complex, float]:
-    """Lay a ring over a region by the similarity of largest IoU near a first one.
-
-    By L-BFGS on exact gradients.
+    """Find the similarity of largest IoU with a region near a first one, by L-BFGS.
 
     Args:
-        ring: (n,) x + iy about the origin.
-        overlap: with the region.
-        factor, middle: of the first similarity, z -> factor z + middle.
+        ring: A ring (n,) x + iy about the origin.
+        overlap: The overlap with the region.
+        factor, middle: The first similarity, z -> factor z + middle.
 
     Returns:
-        Factor and middle of the best one, and its IoU.
+        The factor and middle of the best one, and its IoU.
     """
 
     def loss(x: Array) -> tuple[float, Array]:
@@ -141,19 +139,19 @@ def overlaid(
     return best, complex(middle + found.x[2] + 1j * found.x[3]), -float(found.fun)
 
 
-CLOSER = 0.15
-"""IoU that laying one tile over the other better is taken to add at most."""
+MAX_IOU_GAIN = 0.15
+"""The largest gain in IoU that is expected from a better overlay of two tiles."""
 
 
 def mutual_iou(tiles: Sequence[Array], decisive: float = 0.9) -> Similarity:
     """Return the mutual IoU of tiles by their indices, for `diverse`.
 
-    The better overlay is looked for only where it may decide: between pairs whose IoU, as they lie
-    and with equal areas and centroids, is at most `CLOSER` below `decisive`.
+    A better overlay is searched only where it can matter: for pairs whose IoU, with equal areas and
+    centroids, is at most `MAX_IOU_GAIN` below `decisive`.
 
     Args:
-        tiles: (n,) simple rings (N, 2), all laid over one silhouette.
-        decisive: what the IoU is compared with.
+        tiles: The tiles (n,), simple rings (N, 2) that all lie over one silhouette.
+        decisive: The value that the IoU is compared with.
 
     >>> square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
     >>> turned = square @ [[0.98, 0.2], [-0.2, 0.98]] * 3 + 7
@@ -170,9 +168,9 @@ def mutual_iou(tiles: Sequence[Array], decisive: float = 0.9) -> Similarity:
     def alike(i: int, j: int) -> float:
         shared = shapely.Polygon(rings[i]).intersection(shapely.Polygon(rings[j])).area
         plain = float(min(shared / (2 - shared), 1.0))
-        if not decisive - CLOSER <= plain < decisive:
+        if not decisive - MAX_IOU_GAIN <= plain < decisive:
             return plain
-        return max(plain, overlaid(complex_points(rings[i]), region(j))[2])
+        return max(plain, best_overlay(complex_points(rings[i]), region(j))[2])
 
     return lambda i, j: alike(min(i, j), max(i, j))
 

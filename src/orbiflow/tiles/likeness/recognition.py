@@ -1,4 +1,4 @@
-"""How well people would know a target in a tile: its outline found again, limb by limb.
+"""How well people would recognise a target in a tile, limb by limb.
 
 Areas reward blobs: a limb has little area, and a smooth body that fills the middle of the target
 scores well without any. Here the target's outline is compared with the tile's, point by point and
@@ -42,14 +42,14 @@ THICKEST = 1.0
 
 @dataclass(frozen=True)
 class Recognisability:
-    """How much of the target is found again in a tile. All values from 0 to 1, larger is better.
+    """How much of the target is found in a tile. All values are from 0 to 1, larger is better.
 
-    - `score`: harmonic mean of `kept` and `clean`.
-    - `kept`: share of the target's outline that is found in the tile; lost limbs lower it.
-    - `clean`: share of the tile's outline that is found in the target; what the tile has besides,
-      spurious limbs, slits and hairs, lowers it.
-    - `limbs`: `kept` with each point weighted by how thin the target is there. It tells what became
-      of the limbs and has no part in the score.
+    - `score`: The harmonic mean of `kept` and `clean`.
+    - `kept`: The share of the target's outline that is found in the tile; lost limbs lower it.
+    - `clean`: The share of the tile's outline that is found in the target; spurious limbs, slits and
+      hairs lower it.
+    - `limbs`: `kept` with each point weighted by how thin the target is there. It shows whether the
+      limbs are kept and has no part in the score.
     """
 
     score: float
@@ -63,10 +63,10 @@ class Recognisability:
 
 
 class Recogniser:
-    """Compares many tiles with one target, whose outline is prepared once.
+    """A comparison of many tiles with one target, whose outline is prepared once.
 
-    `target` is a ring (N, 2) or a shapely polygon or multipolygon. Tiles are compared as they lie,
-    in the target's frame: nothing is aligned.
+    `target` is a ring (N, 2) or a shapely polygon or multipolygon. Tiles must be in the target's
+    frame: they are not aligned.
 
     Raises `OrbiflowError` for a target, or a tile, that is not a valid polygon.
 
@@ -84,7 +84,7 @@ class Recogniser:
         self._origin = np.array(region.centroid.coords[0])
         rings = self._rings(region)
         corners = np.concatenate(rings)
-        # Outlines are run through from about here, so that the same outline gives the same points.
+        # sampling starts near this point, so that the same outline gives the same points
         self._start = corners[np.argmax((corners**2).sum(axis=1))]
         self._spacing = sum(ring_length(ring) for ring in rings) / POINTS
         self._target = _features(rings, self._spacing, self._start)
@@ -115,8 +115,8 @@ class Recogniser:
 def recognisability(tile: Shape, target: Shape) -> Recognisability:
     """Return how much of `target` is recognised in `tile`, both in one frame.
 
-    Invariant under a similarity of both shapes. To compare many tiles with one target, make a
-    `Recogniser`. Raises `OrbiflowError` naming the argument that is not a valid polygon.
+    The result is invariant under a similarity of both shapes. To compare many tiles with one target,
+    use a `Recogniser`. Raises `OrbiflowError` naming the argument that is not a valid polygon.
 
     >>> square = [[0, 0], [2, 0], [2, 2], [0, 2]]
     >>> recognisability(square, square).score
@@ -128,9 +128,9 @@ def recognisability(tile: Shape, target: Shape) -> Recognisability:
 class _Features(NamedTuple):
     """Points on an outline.
 
-    - `lifted`: (P, 5), place, direction and thickness, each divided by its tolerance.
-    - `thickness`: (P,), the radius of the disk inscribed at each point.
-    - `before`, `after`: (P,), indices of each point's neighbours on its ring.
+    - `lifted`: Position, direction and thickness (P, 5), each divided by its tolerance.
+    - `thickness`: The radius (P,) of the disk inscribed at each point.
+    - `before`, `after`: The indices (P,) of each point's neighbours on its ring.
     """
 
     lifted: Array
@@ -149,7 +149,7 @@ def _agreement(goal: _Features, own: _Features) -> Array:
     for neighbour in (own.before, own.after):
         third = own.lifted + (own.lifted[neighbour] - own.lifted) / 3
         np.minimum(squared, cdist(goal.lifted, third, "sqeuclidean"), out=squared)
-    # Flat at the top: what is moved a little is found all the same.
+    # flat at the top, so that small displacements do not matter
     return np.exp(-squared * squared)
 
 

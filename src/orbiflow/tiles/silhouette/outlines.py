@@ -1,4 +1,4 @@
-"""What a silhouette's outline must satisfy, and how one is taken from a shapely geometry."""
+"""Outlines of silhouettes: checking, simplifying and sampling them."""
 
 from __future__ import annotations
 
@@ -41,8 +41,8 @@ def clean_ring(
 ) -> tuple[Array, list[str]]:
     """Check that `points` (N, 2) bound a region, and drop repeated vertices.
 
-    Returns the ring and a note, in plain words, of each thing that was dropped. `where` opens each
-    message (a file name, say).
+    Returns the ring and a note, in plain words, of what was dropped. Each message begins with `where`,
+    such as a file name.
 
     Raises `error` when a coordinate is not a finite number, when fewer than 3 or more than 100,000
     vertices are given, when no area is enclosed, or when the polygon crosses or touches itself.
@@ -79,7 +79,7 @@ def _as_points(points: ArrayLike, where: str, error: type[OrbiflowError]) -> Arr
         raise error(f"{where}: vertices must have shape (N, 2), got {ring.shape}")
     if len(ring) > MAX_VERTICES:
         raise error(
-            f"{where}: {len(ring)} vertices, at most {MAX_VERTICES} are read; simplify the outline"
+            f"{where}: {len(ring)} vertices, at most {MAX_VERTICES} can be read; simplify the outline"
         )
     return ring
 
@@ -95,7 +95,7 @@ def _check_coordinates(ring: Array, where: str, error: type[OrbiflowError]) -> N
     if far.size:
         raise error(
             f"{where}: vertex {far[0]} (counted from 0) is {_pair(ring[far[0]])}; coordinates "
-            f"beyond {MAX_COORDINATE:g} are not read, rescale the outline"
+            f"beyond {MAX_COORDINATE:g} cannot be read, rescale the outline"
         )
 
 
@@ -107,7 +107,7 @@ def _check_region(ring: Array, where: str, error: type[OrbiflowError]) -> None:
             f"{where}: the polygon has no size: its {len(ring)} vertices all lie within {size:.3g} "
             f"of {_pair(low)}; move it nearer the origin or enlarge it"
         )
-    # In units of the box, so that neither a huge nor a tiny shape strains the predicates.
+    # in units of the box, because the predicates lose accuracy for huge and tiny shapes
     local: Array = (ring - low) / size
     polygon = Polygon(np.round(local, CLEARANCE_DIGITS))
     if polygon.convex_hull.area < MIN_RELATIVE_AREA:
@@ -128,7 +128,7 @@ def _pair(point: Array) -> str:
 
 
 def percent(share: float) -> str:
-    """Return `share` (0 to 1) in words, never rounded to none or all of it.
+    """Return `share` (0 to 1) as text, never rounded to 0% or 100%.
 
     >>> percent(0.9213), percent(0.0002), percent(0.9999)
     ('92.1%', 'under 0.1%', 'over 99.9%')
@@ -182,28 +182,28 @@ def outer_outline(geometry: BaseGeometry) -> tuple[Polygon, list[str]]:
     return shape, notes
 
 
-PLAIN = 8.2
-"""Length of an outline of area 1 up to which it is sampled with the fewest points; a disc has 3.5."""
+SHORT_OUTLINE = 8.2
+"""The length of an outline of area 1 that is sampled with the fewest points; a disc has 3.5."""
 
-FEW, MOST = 60, 120
-"""Points for the search."""
+MIN_POINTS, MAX_POINTS = 60, 120
+"""The least and the largest number of points for the search."""
 
-DETAIL = 0.004
-"""What a corner must stand out from the line past it to be kept, in square roots of the area."""
+CORNER_DEPTH = 0.004
+"""The least height of a corner over the line past it to be kept, in square roots of the area."""
 
-MULTIPLES = (4, 6)
-"""Points of the tile for each point of the search."""
+FINE_MULTIPLES = (4, 6)
+"""The numbers of points of the tile for each point of the search, in order of trial."""
 
-MIDDLE = 2
-"""Points between the two for each point of the search; divides all `MULTIPLES` of use."""
+MIDDLE_MULTIPLE = 2
+"""The number of middle points for each point of the search, a divisor of `FINE_MULTIPLES`."""
 
 
 class Samples(NamedTuple):
-    """An outline (M, 2) of area 1, counter-clockwise, sampled three times.
+    """A counter-clockwise outline of area 1, sampled three times.
 
-    - `coarse`: (n, 2) points, evenly spaced.
-    - `middle`: (2 n, 2) points, most of the outline's corners among them; or `fine` itself.
-    - `fine`: (k n, 2) points; every k-th is near one of `coarse`; the outline's corners are among them.
+    - `coarse`: Points (n, 2), evenly spaced.
+    - `middle`: Points (2 n, 2) that include most of the outline's corners; or `fine` itself.
+    - `fine`: Points (k n, 2) that include the outline's corners; every k-th is near one of `coarse`.
     """
 
     coarse: Array
@@ -211,24 +211,26 @@ class Samples(NamedTuple):
     fine: Array
 
 
-def sampled(ring: Array, phase: float = 0.0, multiples: tuple[int, ...] = MULTIPLES) -> Samples:
-    """Return sample an outline, more densely where it is long or rich in corners.
+def sampled(
+    ring: Array, phase: float = 0.0, multiples: tuple[int, ...] = FINE_MULTIPLES
+) -> Samples:
+    """Sample an outline, more densely if it is long or rich in corners.
 
-    Where twice the coarse points make no simple polygon, or do not divide the fine ones, `middle` is
+    If twice the coarse points make no simple polygon, or do not divide the fine ones, `middle` is
     `fine`.
 
     Args:
-        ring: (M, 2) of area about 1, counter-clockwise.
-        phase: of the points, in coarse spacings.
-        multiples: fine points for each coarse one, in the order in which they are tried.
+        ring: A counter-clockwise ring (M, 2) of area about 1.
+        phase: The shift of the points, in coarse spacings.
+        multiples: The numbers of fine points for each coarse one, in order of trial.
 
     Raises:
-        OrbiflowError: if no sampling is free of self-crossings: the silhouette has hairs.
+        OrbiflowError: if all samplings cross themselves because the silhouette has hairs.
     """
-    longer = ring_length(ring) / PLAIN
-    count = int(np.clip(6 * round(FEW * longer / 6), FEW, MOST))
+    longer = ring_length(ring) / SHORT_OUTLINE
+    count = int(np.clip(6 * round(MIN_POINTS * longer / 6), MIN_POINTS, MAX_POINTS))
     coarse = _simple_coarse(ring, count, phase)
-    corners = important_vertices(ring, DETAIL)
+    corners = important_vertices(ring, CORNER_DEPTH)
     fine = None
     for multiple in multiples:
         points = with_corners(ring, corners, multiple * len(coarse), phase * multiple)
@@ -240,7 +242,7 @@ def sampled(ring: Array, phase: float = 0.0, multiples: tuple[int, ...] = MULTIP
         raise OrbiflowError(
             "parts of the silhouette are too thin to be sampled: thicken or remove the hairs"
         )
-    middle = with_corners(ring, corners, MIDDLE * len(coarse), phase * MIDDLE)
+    middle = with_corners(ring, corners, MIDDLE_MULTIPLE * len(coarse), phase * MIDDLE_MULTIPLE)
     if len(fine) % len(middle) or not shapely.Polygon(middle).is_valid:
         middle = fine
     return Samples(coarse, middle, fine)
@@ -257,7 +259,7 @@ def _simple_coarse(ring: Array, count: int, phase: float) -> Array:
             thick = thick[::-1] if not grown.exterior.is_ccw else thick
             start = int(np.argmin(np.linalg.norm(thick - ring[0], axis=1)))
             thick = np.roll(thick, -start, axis=0)
-        for points in dict.fromkeys((count, min(MOST, 3 * count // 2), MOST)):
+        for points in dict.fromkeys((count, min(MAX_POINTS, 3 * count // 2), MAX_POINTS)):
             coarse = resampled(thick, points, phase)
             if shapely.Polygon(coarse).is_valid:
                 return coarse
@@ -274,7 +276,7 @@ def important_vertices(ring: Array, tolerance: float) -> list[int]:
         line = shapely.LineString(part)
         points = shapely.get_coordinates(line.simplify(tolerance, preserve_topology=False))
         at = 0
-        for point in points[:-1]:  # vertices are kept bit for bit and in order
+        for point in points[:-1]:  # kept vertices are bit-identical and in order
             at += int(np.flatnonzero((part[at:] == point).all(axis=1))[0])
             kept.append((start + at + first) % len(ring))
     return sorted(kept)

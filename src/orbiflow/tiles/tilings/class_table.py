@@ -45,8 +45,8 @@ OperatorRow: TypeAlias = RotationRow | TransflectionRow
 class ClassRow(NamedTuple):
     """A row of the table.
 
-    Operators are in the order in which the paper nests them, outermost first. Edges are pairs that are
-    identified, equal where an edge is its own partner; by which isometry, the group says.
+    Operators are in the order in which the paper nests them, outermost first. Edges are identified in
+    pairs, equal where an edge is its own partner; the group has the isometry.
     """
 
     group: str

@@ -15,15 +15,15 @@ from orbiflow.tiles.tilings.tile_copies import Copies, prototile_of
 from orbiflow.tiles.tilings.tiling import Cell, Tiles, Tiling, as_tiling
 
 Graph: TypeAlias = list[set[int]]
-"""Neighbours of each vertex; symmetric, without loops."""
+"""The neighbours of each vertex, symmetric and without loops."""
 
 
 def colour_graph(graph: Graph, count: int, *, max_steps: int = 4000) -> list[int] | None:
     """Return a proper colouring with colours 0 ... count - 1, or None.
 
     Backtracking in the order of saturation (Brélaz, "New methods to color the vertices of a graph",
-    CACM 22, 1979). None means there is none, or that none was found in `max_steps` assignments;
-    with more colours than the largest degree there always is one, found without going back.
+    CACM 22, 1979). None means that there is none, or that none was found in `max_steps` assignments;
+    with more colours than the largest degree it is always found, without backtracking.
 
     >>> colour_graph([{1, 2}, {0, 2}, {0, 1}], 3)
     [0, 1, 2]
@@ -61,7 +61,7 @@ def _advance(trail: list[tuple[int, list[int]]], colours: list[int]) -> bool:
             return True
         colours[vertex] = -1
         trail.pop()
-        # the next vertex back gets its next option in the next round of this loop
+        # the next iteration tries the next option of the vertex before
     return False
 
 
@@ -76,10 +76,10 @@ class Colouring:
     """A colour for each tile, the same for tiles that differ by a vector of a sublattice.
 
     Args:
-        tiling: whose tiles they are.
-        count: number of colours.
-        sublattice: in Hermite normal form, over the basis of the group's lattice.
-        table: (A, a, c) colour by aspect and by cell modulo the sublattice.
+        tiling: The tiling.
+        count: The number of colours.
+        sublattice: The sublattice in Hermite normal form, in the basis of the group's lattice.
+        table: The colour (A, a, c) by aspect and by cell modulo the sublattice.
     """
 
     tiling: Tiling
@@ -99,10 +99,10 @@ class Colouring:
         return int(self.table[aspect, first, second])
 
     def colours(self, copies: Copies) -> Integers:
-        """Return (M,) colour of each copy, all at once.
+        """Return the colour (M,) of each copy.
 
         Args:
-            copies: of `tiling`, or of one with the same group and aspects.
+            copies: Copies in `tiling`, or in one with the same group and aspects.
         """
         a, b, c = self.sublattice
         wraps, second = np.divmod(copies.cells[:, 1], c)
@@ -112,13 +112,13 @@ class Colouring:
 def colouring(tile: Tiles) -> Colouring:
     """Return a proper colouring with the fewest colours that a small sublattice allows.
 
-    Exact search on the quotient of the tiling by each sublattice of index up to 9, for 1, 2, 3 ...
-    colours in turn; among equals the smallest index, so that colours follow the aspects where they
-    can. Colour 0 is the most frequent, and so on down. Never fails: extremely skew lattices, whose
-    tiles meet their own translates modulo all those sublattices, get a larger one.
+    The search is exact on the quotient of the tiling by each sublattice of index up to 9, for 1, 2,
+    3 ... colours in turn. It is deterministic: of equals the smallest index wins, so that colours
+    follow the aspects where possible. Colour 0 is the most frequent, and so on. Extremely skew
+    lattices, whose tiles meet their own translates modulo all those sublattices, get a larger one.
 
     Args:
-        tile: a tile or a tiling.
+        tile: A tile or a tiling.
 
     Raises:
         OrbiflowError: if polygon and group are of very different size.

@@ -1,4 +1,4 @@
-"""The nine isohedral classes: template, group, paper's operators, lattice freedom."""
+"""The nine isohedral classes, with their templates, groups, operators and lattice freedom."""
 
 from __future__ import annotations
 
@@ -111,18 +111,18 @@ def template_vertices(kind: TemplateKind, shape: torch.Tensor) -> torch.Tensor:
     return pentagon(PENTAGONS[kind], shape)
 
 
-_ROUNDING = 1e-9
+_ROUNDING_ERROR = 1e-9
 
 
 def commutant(linear_parts: Array) -> Array:
     """Return an orthonormal basis (m, 2) of the (a, b) whose [[a, b], [b, -a]] commutes with a group.
 
     The mean over the group projects on them: R X R^T turns (a, b) as R turns directions, twice as far.
-    The basis is made by Gram-Schmidt in the order a, b, so that it depends on nothing but the group;
-    saved parameters are coordinates in it.
+    The basis is made by Gram-Schmidt in the order a, b, so that it depends only on the group; saved
+    parameters are coordinates in it.
 
     Args:
-        linear_parts: (n, 2, 2), of every coset.
+        linear_parts: The linear parts (n, 2, 2) of all cosets.
 
     >>> commutant(np.array([np.eye(2), np.diag([1.0, -1.0])])).tolist()
     [[1.0, 0.0]]
@@ -134,11 +134,11 @@ def commutant(linear_parts: Array) -> Array:
         rest = np.array([a, b])
         for known in basis:
             rest = rest - (rest @ known) * known
-        if np.linalg.norm(rest) > _ROUNDING:
+        if np.linalg.norm(rest) > _ROUNDING_ERROR:
             rest = rest / np.linalg.norm(rest)
-            # a group in the frame of its axes has just these: not a rounding beside them
+            # exact for a group in the frame of its axes
             near = np.round(rest)
-            basis.append(near if np.abs(rest - near).max() < _ROUNDING else rest)
+            basis.append(near if np.abs(rest - near).max() < _ROUNDING_ERROR else rest)
     return np.array(basis).reshape(-1, 2)
 
 
@@ -154,7 +154,7 @@ def stretch_matrix(basis: Array, parameters: torch.Tensor) -> torch.Tensor:
 
 
 def _cosh_sinhc(square: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-    """Return cosh r and sinh(r) / r as functions of r^2, by their series where the root would hurt."""
+    """Return cosh r and sinh(r) / r as functions of r^2, by their series near zero."""
     small = square < 1e-2
     root = torch.sqrt(torch.where(small, torch.ones_like(square), square))
     s = torch.where(small, square, torch.zeros_like(square))
@@ -223,8 +223,8 @@ class IsohedralClass:
         """Return vertices (..., K, 2) of the template, counter-clockwise.
 
         Args:
-            shape: (..., shape_dim), NumPy or torch (then differentiable); for the pentagons the
-                displacement of p1 from its default. None means the default, as a NumPy array.
+            shape: Parameters (..., shape_dim), NumPy or torch (then differentiable); for the pentagons
+                the displacement of p1 from its default. None means the default, as a NumPy array.
 
         Raises:
             OrbiflowError: if the last axis of `shape` is not `shape_dim` long.
@@ -238,7 +238,7 @@ class IsohedralClass:
         """Return unimodular maps L (..., 2, 2) that commute with the point group.
 
         Args:
-            parameters: (..., stretch_dim), NumPy or torch (then differentiable).
+            parameters: Parameters (..., stretch_dim), NumPy or torch (then differentiable).
 
         Raises:
             OrbiflowError: if the last axis of `parameters` is not `stretch_dim` long.

@@ -1,4 +1,4 @@
-"""The tiles around a prototile, in coordinates where a tile has area one."""
+"""The tiles around a prototile: how they match its boundary, and which of them touch it."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from orbiflow.tiles.tilings.tile_copies import (
 from orbiflow.tiles.tilings.tiling import Tiles, Tiling, as_tiling
 
 MAX_SPAN = 12.0
-"""Largest radius of a tile, in square roots of its group's area, whose images are listed."""
+"""The largest radius, in square roots of the expected area, of a tile whose images are listed."""
 
 
 def expected_area(tile: Tiles) -> float:
@@ -46,12 +46,12 @@ def span(tile: Tiles) -> float:
 class Surroundings:
     """A prototile and the tiles nearby, moved and scaled so that the expected area is one.
 
-    - `prototile`: its number.
-    - `ring`: (N, 2) the prototile without repeated vertices, centred at zero.
-    - `copies`: the M tiles nearby, not the prototile itself, in the tiling's own coordinates.
-    - `points`: (P, 2) their vertices, one tile after the other, each as its prototile has them.
-    - `counts`: (M,) how many each has.
-    - `mirrored`: (M,) whether the tile's element reverses orientation.
+    - `prototile`: The number of the prototile.
+    - `ring`: The prototile (N, 2) without repeated vertices, centred at zero.
+    - `copies`: The M other tiles nearby, in the tiling's own coordinates.
+    - `points`: Their vertices (P, 2), tile by tile, in the order of their prototile.
+    - `counts`: The number of vertices of each tile, (M,).
+    - `mirrored`: Whether each tile's element reverses orientation, (M,).
     """
 
     prototile: int
@@ -66,18 +66,18 @@ class Surroundings:
 
     @cached_property
     def owner(self) -> Integers:
-        """(P,) which tile each of the points is a vertex of."""
+        """The tile (P,) that each point is a vertex of."""
         return np.repeat(np.arange(len(self.counts)), self.counts)
 
     @cached_property
     def place(self) -> Integers:
-        """(P,) which vertex of its prototile each of the points is."""
+        """The vertex (P,) of its prototile that each point is."""
         first = np.cumsum(self.counts) - self.counts
         return np.arange(len(self.points)) - np.repeat(first, self.counts)
 
     @cached_property
     def ahead(self) -> Array:
-        """(P, 2) the next vertex of the same tile."""
+        """The next vertex (P, 2) of the same tile."""
         following = np.arange(1, len(self.points) + 1)
         last = np.cumsum(self.counts) - 1
         following[last] = last + 1 - self.counts
@@ -85,7 +85,7 @@ class Surroundings:
 
     @cached_property
     def rings(self) -> Any:
-        """(M,) the tiles' boundaries, as shapely's rings."""
+        """The tiles' boundaries (M,) as shapely rings."""
         return np.asarray(shapely.linearrings(self.points, indices=self.owner))
 
     def elements(self) -> tuple[Placed, ...]:
@@ -105,11 +105,9 @@ class Surroundings:
 
 
 def surroundings(tiling: Tiling, prototile: int, margin: float) -> Surroundings:
-    """Return the tiles whose bounding box comes within `margin` of a prototile's.
+    """Return the tiles whose bounding box comes within `margin` of a prototile's, nearest first.
 
     The unit is the side of a square of a tile's area.
-
-    Nearest first.
 
     Raises:
         OrbiflowError: for a tile of span over `MAX_SPAN`, or with fewer than three vertices.
@@ -117,8 +115,8 @@ def surroundings(tiling: Tiling, prototile: int, margin: float) -> Surroundings:
     scale = math.sqrt(tiling.tile_area)
     if span(tiling) > MAX_SPAN:
         raise OrbiflowError(
-            f"the tile reaches {span(tiling):.0f} times the size that its group allows for; "
-            "polygon and group do not belong together (are their units the same?)"
+            f"the tile's radius is {span(tiling):.0f} times the size that its group allows for: "
+            "check that polygon and group belong together and have the same units"
         )
     own = tiling.prototiles[prototile]
     if any(len(p.ring) < 3 for p in tiling.prototiles):
@@ -156,11 +154,11 @@ def _flushed(points: Array) -> Array:
 
 
 class SegmentMatch(NamedTuple):
-    """Nearest reversed segment, of the tiles around, of each segment of a prototile.
+    """The nearest reversed segment, in the tiles around, of each segment of a prototile.
 
-    - `distance`: (N,) distance in R^4 of (a, b) to the nearest (b', a').
-    - `tile`: (N,) whose segment that is, as an index of the surroundings; -1 where there is none.
-    - `partner`: (N,) which segment of that tile's prototile it is.
+    - `distance`: The distance (N,) in R^4 of (a, b) to the nearest (b', a').
+    - `tile`: The index (N,) of its tile in the surroundings, -1 where there is none.
+    - `partner`: The index (N,) of the segment in that tile's prototile.
     """
 
     distance: Array
@@ -195,10 +193,11 @@ def match_segments(around: Surroundings, tolerance: float) -> SegmentMatch:
 def boundaries_cancel(
     tiling: Tiling, around: Sequence[Surroundings], matches: Sequence[SegmentMatch]
 ) -> bool:
-    """Return whether the matched segments of all prototiles, with their signs, add up to nothing.
+    """Return whether the matched segments of all prototiles, with their signs, add up to zero.
 
     Args:
-        around, matches: of each prototile.
+        tiling: The tiling.
+        around, matches: The surroundings and the match of each prototile.
 
     The boundary of all tiles together is, per orbit of the group, the sum of [e] / |S_k| over the
     segments e of each T_k. If e is the reverse of an image of its partner, it is also minus the sum
@@ -261,15 +260,17 @@ def segment_tree(around: Surroundings) -> shapely.STRtree:
     return shapely.STRtree(np.asarray(shapely.linestrings(ends)))
 
 
-_SAMPLES = 200  # points on the boundary at least, so that coarse polygons are seen as curves
+_BOUNDARY_SAMPLES = (
+    200  # points on the boundary at least, so that coarse polygons are seen as curves
+)
 
 
 class Neighbours(NamedTuple):
-    """The other tiles that touch a prototile, each as one group element, nearest first.
+    """The other tiles that touch a prototile, as group elements, nearest first.
 
     Args:
-        edge: those that share a piece of boundary of positive length.
-        point: those that only touch at points.
+        edge: The tiles that share a piece of boundary of positive length.
+        point: The tiles that touch only at points.
     """
 
     edge: tuple[Placed, ...]
@@ -280,9 +281,9 @@ def neighbours(tile: Tiles, prototile: int = 0, *, tolerance: float = 1e-7) -> N
     """Return the tiles that touch a prototile.
 
     Args:
-        tile: a tile or a tiling, certified or not.
-        prototile: whose neighbours; each of them says of which prototile it is a copy.
-        tolerance: what counts as touching, in square roots of the tile's area.
+        tile: A tile or a tiling, which need not be certified.
+        prototile: The number of the prototile; each neighbour names the prototile that it is a copy of.
+        tolerance: The distance that counts as touching, in square roots of the tile's area.
 
     Raises:
         OrbiflowError: if polygon and group are of very different size.
@@ -319,7 +320,11 @@ def touching(around: Surroundings, tolerance: float) -> tuple[Surroundings, NDAr
 
 def _boundary_samples(ring: Array) -> Array:
     """Return interior points of the segments, midpoints among them: never the corners."""
-    per_segment = 2 * math.ceil(_SAMPLES / (2 * len(ring))) + 1 if len(ring) < _SAMPLES else 1
+    per_segment = (
+        2 * math.ceil(_BOUNDARY_SAMPLES / (2 * len(ring))) + 1
+        if len(ring) < _BOUNDARY_SAMPLES
+        else 1
+    )
     return subdivided(ring, per_segment, phase=0.5)
 
 
@@ -327,8 +332,8 @@ def patch(tile: Tiles, window: Sequence[float]) -> list[Placed]:
     """Return the tiles that meet the rectangle, as elements of the group, nearest the middle first.
 
     Args:
-        tile: a tile or a tiling, certified or not.
-        window: (xmin, ymin, xmax, ymax) in the tile's units.
+        tile: A tile or a tiling, which need not be certified.
+        window: A rectangle (xmin, ymin, xmax, ymax) in the tile's units.
 
     Raises:
         OrbiflowError: for an empty window, or one of more than `MAX_TILES` tiles.
@@ -350,8 +355,8 @@ def aspects(tile: Tiles, elements: Sequence[Isometry]) -> list[int]:
     """Return the aspect of each element's tile: tiles of one aspect are translates.
 
     Args:
-        tile: a tile or a tiling.
-        elements: a plain isometry carries prototile 0.
+        tile: A tile or a tiling.
+        elements: The elements; a plain isometry moves prototile 0.
 
     Raises:
         OrbiflowError: for an isometry that is not in the tile's group.

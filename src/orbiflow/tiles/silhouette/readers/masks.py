@@ -1,4 +1,4 @@
-"""Masks: pictures whose light, or opaque, part is what is meant."""
+"""Masks, pictures whose light or opaque part is selected."""
 
 from dataclasses import dataclass
 
@@ -23,9 +23,9 @@ _PAINT = "paint what must survive white and the rest black"
 class MaskReading:
     """A mask as found in a file.
 
-    - `levels`: (H, W), 0 to 1, each an average of `reduced` x `reduced` pixels of the file.
-    - `size`: width and height in pixels of the file.
-    - `notes`: what was decided for the user, in plain words.
+    - `levels`: Levels (H, W), 0 to 1, each a mean of `reduced` x `reduced` pixels of the file.
+    - `size`: The width and height in pixels of the file.
+    - `notes`: What was decided for the user, in plain words.
     """
 
     levels: Array

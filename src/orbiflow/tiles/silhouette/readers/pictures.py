@@ -16,7 +16,13 @@ from skimage.filters import threshold_otsu
 from orbiflow.arguments import described
 from orbiflow.arrays import Array
 from orbiflow.errors import InputFileError, OrbiflowError
-from orbiflow.tiles.silhouette.readers.reading import Held, Reading, Source, check_file, opened
+from orbiflow.tiles.silhouette.readers.reading import (
+    FileContent,
+    Reading,
+    Source,
+    check_file,
+    opened,
+)
 from orbiflow.tiles.silhouette.readers.tracing import Level, trace
 
 MAX_BYTES = 64 * 2**20
@@ -273,7 +279,7 @@ def read_mask_array(
         InputFileError: for over 40 megapixels, and an array without a shape of its own.
     """
     checked_threshold(threshold)
-    source = Held(b"", name)
+    source = FileContent(b"", name)
     array = _array(values, name)
     check_size(source, (array.shape[1], array.shape[0]))
     levels, is_mask = _levels(array, name)

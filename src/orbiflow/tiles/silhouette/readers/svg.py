@@ -33,9 +33,11 @@ MAX_BYTES = 16 * 2**20
 FLATNESS = 1 / 2000
 FLATNESS_FLOOR = 1 / 20_000
 CLOSING_GAP = 1e-6  # of the size of the drawing: ends nearer than this are one point
-GRID = 1e-9  # of the size of the drawing: the grid that the united outline is snapped to
-GRID_FLOOR = 1e-12  # of the largest coordinate
-COLLINEAR = 1e-6  # of the size of the drawing: vertices nearer their chord than this are dropped
+OVERLAY_GRID = 1e-9  # of the size of the drawing: the grid that the united outline is snapped to
+OVERLAY_GRID_FLOOR = 1e-12  # of the largest coordinate
+COLLINEAR_TOLERANCE = (
+    1e-6  # of the size of the drawing: vertices nearer their chord than this are dropped
+)
 
 
 def read_svg(path: Source) -> Reading:
@@ -146,7 +148,7 @@ def _overlay(path: Source, regions: list[BaseGeometry]) -> BaseGeometry:
     # Snapped to a grid: neighbours that all but share an edge would leave cracks between them.
     bounds = shapely.total_bounds(regions)
     size = max(bounds[2] - bounds[0], bounds[3] - bounds[1])
-    grid = max(GRID * size, GRID_FLOOR * float(np.abs(bounds).max()))
+    grid = max(OVERLAY_GRID * size, OVERLAY_GRID_FLOOR * float(np.abs(bounds).max()))
     try:
         union = shapely.union_all(regions, grid_size=grid)
     except GEOSException as exc:
@@ -159,7 +161,7 @@ def _overlay(path: Source, regions: list[BaseGeometry]) -> BaseGeometry:
 
 
 def _thinned(shape: shapely.Polygon, size: float) -> Array:
-    tolerance = COLLINEAR * size
+    tolerance = COLLINEAR_TOLERANCE * size
     thin = simplified(shape, tolerance)
     while len(thin.exterior.coords) > MAX_VERTICES:
         tolerance *= 2

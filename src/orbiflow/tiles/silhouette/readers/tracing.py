@@ -1,4 +1,4 @@
-"""From a picture's level to the outline of its largest shape, to a fraction of a pixel."""
+"""The outline of the largest shape in a picture, to a fraction of a pixel."""
 
 from dataclasses import dataclass
 
@@ -17,8 +17,8 @@ from orbiflow.tiles.silhouette.readers.reading import Source
 MIN_AREA = 30.0  # square pixels
 MAX_OUTLINE_VERTICES = 4000
 SIMPLIFY_TOLERANCE = 0.15  # pixels
-# The steps of a picture of two levels are within this of the line they stand for, and are no detail
-# of the shape. Small shapes are held to the finer tolerance for their size.
+# The steps in a picture of two levels are within this distance of the line that they represent, so they
+# are not details of the shape. Small shapes have the finer tolerance for their size.
 STEP_TOLERANCE = 0.7  # pixels
 STEP_TOLERANCE_OF_SIZE = 0.005  # of the square root of the area
 

@@ -1,10 +1,10 @@
-"""Where a polygon is thin: its narrowest neck and slit, and how much of its outline is hair.
+"""The narrowest neck and slit of a polygon, and the share of its outline that is hair.
 
-Two points of the outline face each other across a neck if the segment between them runs inside, and
-both ways along the outline from one to the other are long: at least `FAR` times the segment, and at
-least `APART`; it is at most `WIDE`. So the tip of a corner is no neck unless it is sharper than 23
-degrees, and then its width is taken where the outline beyond is `APART` long. A slit is the same with
-the segment outside.
+Two points of the outline face each other across a neck if the segment between them is inside and at
+most `MAX_NECK_WIDTH` long, and both ways along the outline between them are long: at least
+`OUTLINE_PER_WIDTH` times the segment and at least `MIN_OUTLINE`. So the tip of a corner is a neck only
+if it is sharper than 23 degrees; its width is then taken where the outline beyond is `MIN_OUTLINE`
+long. A slit is the same with the segment outside.
 """
 
 # pyright: reportUnknownMemberType=false
@@ -26,40 +26,40 @@ from orbiflow.arrays import Array, Integers
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.geometry import arc_lengths, orient, polygons_in, ring_length
 
-FAR = 5.0
-"""Length of the outline beyond a neck, in its widths: 1 / sin(11.5 degrees)."""
+OUTLINE_PER_WIDTH = 5.0
+"""The least length of the outline beyond a neck, in its widths: 1 / sin(11.5 degrees)."""
 
-APART = 0.1
-"""Length of the outline beyond a neck, in square roots of the area."""
+MIN_OUTLINE = 0.1
+"""The least length of the outline beyond a neck, in square roots of the area."""
 
-WIDE = 0.5
-"""Width beyond which nothing is a neck, in square roots of the area."""
+MAX_NECK_WIDTH = 0.5
+"""The largest width of a neck, in square roots of the area."""
 
-PINCHED = 0.25
-"""Part of the silhouette's narrowest neck below which a tile's looks cut through."""
+PINCHED_SHARE = 0.25
+"""The share of the silhouette's narrowest neck below which a tile looks cut through."""
 
-COARSE = 0.003
-"""How far a silhouette's outline may be moved before its necks are looked for, in the same unit."""
+SIMPLIFICATION = 0.003
+"""The tolerance, in that unit, for simplifying a silhouette before necks are searched."""
 
-SOUND = 0.05
-"""Width above which no neck does, in square roots of the area."""
+SOUND_NECK_WIDTH = 0.05
+"""The width, in square roots of the area, above which no neck looks cut through."""
 
-STEP = 0.0125
-"""Distance of points on the outline, in square roots of the area: how exact tapering parts are."""
+POINT_SPACING = 0.0125
+"""The distance of points on the outline, in square roots of the area: the error for tapering parts."""
 
-ROUND = 16
-"""Sides of a quarter of a disc."""
+QUARTER_SEGMENTS = 16
+"""The number of sides of a quarter of a disc."""
 
-SLACK = 0.005
-"""What discs of `ROUND` reach beyond themselves, in radii."""
+DISC_OVERREACH = 0.005
+"""What discs of `QUARTER_SEGMENTS` reach beyond themselves, in radii."""
 
 
 class Thinnest(NamedTuple):
     """The narrowest place of a polygon.
 
-    - `width`: in the polygon's own units.
-    - `share`: the width in square roots of the polygon's area.
-    - `ends`: (2, 2), the two points of the outline that are as far apart.
+    - `width`: The width in the polygon's own units.
+    - `share`: The width in square roots of the polygon's area.
+    - `ends`: The two points (2, 2) of the outline at this distance.
     """
 
     width: float
@@ -68,7 +68,7 @@ class Thinnest(NamedTuple):
 
     @property
     def place(self) -> Array:
-        """(2,) the middle."""
+        """The middle (2,) of the narrowest place."""
         return self.ends.mean(axis=0)
 
 
@@ -84,8 +84,8 @@ def neck_factor(share: float, min_neck: float) -> float:
 def least_neck(silhouette: ArrayLike, min_neck: float) -> float:
     """Return how wide the necks of a silhouette's tiles should be, in square roots of the area.
 
-    `min_neck`, or `PINCHED` times the silhouette's own narrowest but at most `SOUND`, if that is more;
-    0 if `min_neck` is 0.
+    It is the larger of `min_neck` and `PINCHED_SHARE` times the silhouette's own narrowest neck, the
+    latter at most `SOUND_NECK_WIDTH`; 0 if `min_neck` is 0.
 
     >>> bar = [[0.0, 0.0], [20.0, 0.0], [20.0, 0.2], [0.0, 0.2]]
     >>> least_neck(bar, 0.01), least_neck(bar, 0.1), least_neck(bar, 0.0)
@@ -95,19 +95,19 @@ def least_neck(silhouette: ArrayLike, min_neck: float) -> float:
         return 0.0
     _, polygon = _checked(silhouette)
     # a photo's outline may have 20,000 vertices, whose pairs fill gigabytes
-    plain = shapely.simplify(polygon, COARSE * math.sqrt(polygon.area))
+    plain = shapely.simplify(polygon, SIMPLIFICATION * math.sqrt(polygon.area))
     ring = shapely.get_coordinates(plain.exterior)[:-1]
-    return max(min_neck, min(PINCHED * narrowest_neck(ring).share, SOUND))
+    return max(min_neck, min(PINCHED_SHARE * narrowest_neck(ring).share, SOUND_NECK_WIDTH))
 
 
 def narrowest_neck(ring: ArrayLike) -> Thinnest:
     """Return the narrowest neck of a polygon; without a neck, the diameter of its largest disc.
 
-    Exact where the sides of the neck are parallel or a vertex is at its narrowest; where it tapers, the
-    place is found to two `STEP`s along the outline, never too narrow.
+    The result is exact if the sides of the neck are parallel or a vertex is at its narrowest place; if
+    it tapers, the place is found to two `POINT_SPACING`s along the outline, and never too narrow.
 
     Args:
-        ring: (n, 2) vertices of a simple polygon, in either sense.
+        ring: The vertices (n, 2) of a simple polygon, in either orientation.
 
     Raises:
         OrbiflowError: for a polygon that crosses itself or has no area.
@@ -131,7 +131,7 @@ def narrowest_neck(ring: ArrayLike) -> Thinnest:
 def narrowest_slit(ring: ArrayLike) -> Thinnest | None:
     """Return the narrowest gap between parts of a polygon, outside of it; None if there is none.
 
-    As `narrowest_neck`.
+    Arguments, accuracy and errors are those of `narrowest_neck`.
     """
     points, polygon = _checked(ring)
     shapely.prepare(polygon)
@@ -143,16 +143,16 @@ def narrowest_slit(ring: ArrayLike) -> Thinnest | None:
 def hair_share(ring: ArrayLike, width: float) -> float:
     """Return the share of a polygon's outline that bounds parts thinner than `width`.
 
-    Thin is what no disc of that diameter inside the polygon covers (the residue of a morphological
-    opening); a part counts if it has more than `FAR` widths of the outline, so that corners do not
-    count unless they are sharper than 23 degrees.
+    A part is thin if no disc of that diameter inside the polygon covers it (the residue of a
+    morphological opening). It counts if it has more than `OUTLINE_PER_WIDTH` widths of the outline, so
+    corners count only if they are sharper than 23 degrees.
 
     Args:
-        ring: (n, 2) vertices of a simple polygon, in either sense.
-        width: in the polygon's own units.
+        ring: The vertices (n, 2) of a simple polygon, in either orientation.
+        width: The width, in the polygon's own units.
 
     Returns:
-        From 0 to 1.
+        The share, 0 to 1.
 
     Raises:
         OrbiflowError: for a polygon that crosses itself or has no area, or a width of 0 or less.
@@ -177,18 +177,18 @@ def _checked(ring: ArrayLike) -> tuple[Array, shapely.Polygon]:
     points = numbers(ring, "the polygon", ("N", 2))
     polygon = shapely.Polygon(points) if len(points) > 2 else shapely.Polygon()
     if not polygon.is_valid or not polygon.area > 0:
-        raise OrbiflowError("a polygon that crosses itself or has no area has no thinnest place")
+        raise OrbiflowError("the polygon crosses itself or has no area: give a simple polygon")
     return points, polygon
 
 
 def _facing(ring: Array, size: float, runs_well: Callable[[Any], Any]) -> Thinnest | None:
     """Return the nearest two points that face each other on the left of the ring."""
-    points = _dense(ring, STEP * size)
+    points = _dense(ring, POINT_SPACING * size)
     tree = KDTree(points)
-    widest = min(ring_length(ring) / 2 / FAR, WIDE * size)
-    reach = min(2 * STEP * size, widest)
+    widest = min(ring_length(ring) / 2 / OUTLINE_PER_WIDTH, MAX_NECK_WIDTH * size)
+    reach = min(2 * POINT_SPACING * size, widest)
     while True:
-        found = _nearest_within(points, tree, reach, APART * size, runs_well)
+        found = _nearest_within(points, tree, reach, MIN_OUTLINE * size, runs_well)
         if found is not None:
             width = float(np.linalg.norm(found[1] - found[0]))
             return Thinnest(width, float(width / size), found)
@@ -227,7 +227,9 @@ def _nearest_within(
     width = np.linalg.norm(points[i] - ends, axis=1)
     way = abs(knots[i] - knots[j] - along * lengths[j])
     way = np.minimum(way, knots[-1] - way)
-    counts = np.flatnonzero((way >= np.maximum(apart, FAR * width)) & (width <= reach))
+    counts = np.flatnonzero(
+        (way >= np.maximum(apart, OUTLINE_PER_WIDTH * width)) & (width <= reach)
+    )
     left = _on_the_left(steps, i[counts], j[counts], along[counts], (ends - points[i])[counts])
     counts = counts[left]
     counts = counts[_local_minima(i[counts], j[counts], width[counts])]
@@ -271,8 +273,8 @@ def _thin_share(
     polygon: shapely.Polygon, region: shapely.geometry.base.BaseGeometry, width: float
 ) -> float:
     """Return the share of the polygon's outline on parts of the region that no disc in it covers."""
-    eroded = region.buffer(-width / 2, quad_segs=ROUND)
-    opened = eroded.buffer(width / 2 * (1 + SLACK), quad_segs=ROUND)
+    eroded = region.buffer(-width / 2, quad_segs=QUARTER_SEGMENTS)
+    opened = eroded.buffer(width / 2 * (1 + DISC_OVERREACH), quad_segs=QUARTER_SEGMENTS)
     parts = polygons_in(region.difference(opened))
     lines = shapely.get_parts(polygon.exterior.difference(opened))
     lengths = shapely.length(lines)
@@ -283,4 +285,4 @@ def _thin_share(
         shapely.line_interpolate_point(lines, 0.5, normalized=True)
     )
     totals = np.bincount(own, lengths)
-    return float(totals[totals > FAR * width].sum() / polygon.exterior.length)
+    return float(totals[totals > OUTLINE_PER_WIDTH * width].sum() / polygon.exterior.length)
