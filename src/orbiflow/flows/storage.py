@@ -13,13 +13,7 @@ from torch import Tensor, nn
 from orbiflow.arguments import instance, number, whole
 from orbiflow.arguments import path as as_path
 from orbiflow.errors import InputFileError, OrbiflowError
-from orbiflow.fields import (
-    FourierField,
-    InvariantField,
-    PeriodicFeatures,
-    SplineField,
-    Symmetrized,
-)
+from orbiflow.fields import FourierField, InvariantField, PeriodicFeatures, SplineField, Symmetrized
 from orbiflow.flows.flow import Flow
 from orbiflow.runtime import is_list, read_tensors, tensor_bytes, write_atomic
 from orbiflow.symmetry import CrystallographicGroup, group_from_header, group_header

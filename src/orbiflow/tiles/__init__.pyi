@@ -53,6 +53,11 @@ from .likeness.metrics import dice as dice
 from .likeness.metrics import hausdorff as hausdorff
 from .likeness.metrics import iou as iou
 from .likeness.metrics import pixel_accuracy as pixel_accuracy
+from .likeness.necks import Thinnest as Thinnest
+from .likeness.necks import hair_share as hair_share
+from .likeness.necks import narrowest_neck as narrowest_neck
+from .likeness.necks import narrowest_slit as narrowest_slit
+from .likeness.necks import slit_share as slit_share
 from .likeness.overlap import Overlap as Overlap
 from .likeness.overlap import prepared_region as prepared_region
 from .likeness.ranking import diverse as diverse
@@ -61,11 +66,6 @@ from .likeness.ranking import tile_similarity as tile_similarity
 from .likeness.recognition import Recognisability as Recognisability
 from .likeness.recognition import Recogniser as Recogniser
 from .likeness.recognition import recognisability as recognisability
-from .likeness.necks import Thinnest as Thinnest
-from .likeness.necks import hair_share as hair_share
-from .likeness.necks import narrowest_neck as narrowest_neck
-from .likeness.necks import narrowest_slit as narrowest_slit
-from .likeness.necks import slit_share as slit_share
 from .motion.animations import AnimationSettings as AnimationSettings
 from .motion.animations import animate as animate
 from .motion.animations import animation as animation

@@ -15,8 +15,8 @@ from orbiflow.runtime import Cancel, one_blas_thread
 from orbiflow.tiles.geometry import best_similarity, plane_points
 from orbiflow.tiles.likeness import (
     Overlap,
-    least_neck,
     best_overlay,
+    least_neck,
 )
 from orbiflow.tiles.search.bending import Bent, bent_tiles
 from orbiflow.tiles.search.co_deformation import Hand

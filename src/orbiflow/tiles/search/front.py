@@ -89,9 +89,9 @@ def behind(cost: Array, overlap: Array) -> Array:
 def deformation(hand: Hand, ring: Array) -> float:
     """What it costs to bend a silhouette until its outline is a ring: as `Elastic.cost`.
 
-    The forgiving energy in areas of the bent silhouette, and its displacement, at the best laying
-    that `likeness.bending_onto.bent_onto` finds: outline points correspond by dynamic programming, four times
-    with other weights, and slide along the ring, which may change its size, while the energy falls.
+    The forgiving energy in areas of the bent silhouette, and its displacement, at the best result
+    of `bent_onto`: outline points correspond by dynamic programming, four times with other weights,
+    and slide along the ring, which may change its size, while the energy falls.
     So it is an upper bound of the least cost, as the search's own cost of a tile that it found is.
 
     Args:
