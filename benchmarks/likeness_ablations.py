@@ -23,7 +23,7 @@ from likeness_methods import silhouette
 
 from orbiflow.runtime import one_blas_thread
 from orbiflow.tiles import CLASSES, BendingSettings, fidelity
-from orbiflow.tiles.likeness.faithful import USUAL
+from orbiflow.tiles.likeness.faithful import USUAL_VALUES
 from orbiflow.tiles.search import bending, corner_shifts
 from orbiflow.tiles.search.co_deformation import (
     FIRM,
@@ -95,7 +95,7 @@ def damage(bent: bending.Bent) -> float:
     body, few = bent.hand.fine, 2 * len(bent.hand.samples.coarse)
     every = slice(0, body.size, body.size // few)
     return fidelity(
-        body.rest[: body.size][every], bent.points[: body.size][every], USUAL[-1]
+        body.rest[: body.size][every], bent.points[: body.size][every], USUAL_VALUES[-1]
     ).damage
 
 

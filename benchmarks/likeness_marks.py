@@ -19,7 +19,7 @@ import numpy as np
 from common import ROOT, Ring
 
 from orbiflow.tiles import Fidelity
-from orbiflow.tiles.likeness.elastic import POSE
+from orbiflow.tiles.likeness.elastic import POSE_WEIGHT
 
 Row = dict[str, Any]
 
@@ -30,7 +30,7 @@ def _fidelity(row: Row) -> Fidelity:
 
 
 VALUES: dict[str, Callable[[Row], float]] = {
-    "energy": lambda row: float(np.log(row["cost"] - POSE * row["displacement"])),
+    "energy": lambda row: float(np.log(row["cost"] - POSE_WEIGHT * row["displacement"])),
     "displacement": lambda row: float(np.log(row["displacement"])),
     "cost: both": lambda row: float(np.log(row["cost"])),
     "small pieces": lambda row: float(np.log(row["pieces"][0])),

@@ -1,4 +1,4 @@
-"""Types of arrays, and rectangles of the plane."""
+"""The types of arrays, and rectangles of the plane."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ Complex: TypeAlias = NDArray[np.complex128]
 Integers: TypeAlias = NDArray[np.int64]
 
 Window: TypeAlias = tuple[float, float, float, float]
-"""xmin, ymin, xmax, ymax, in the tile's units."""
+"""A rectangle (xmin, ymin, xmax, ymax), in the units of the points in it."""
 
 
 def checked_window(window: Sequence[float]) -> Window:
-    """`window` as four numbers.
+    """Return `window` as four numbers xmin < xmax and ymin < ymax.
 
     Raises:
-        OrbiflowError: unless xmin < xmax and ymin < ymax.
+        OrbiflowError: for anything else.
     """
     try:
         values = numbers(window, "window", (4,)).tolist()

@@ -1,7 +1,7 @@
-"""Errors that orbiflow raises for a user's mistake.
+"""The errors that orbiflow raises for a user's mistake.
 
-Every message says what was wrong, where, and what to do. All derive from `OrbiflowError`, which is
-a `ValueError`, so one `except` catches them; the command line turns them into exit status 2.
+Every message says what is wrong, where, and what to do. All are kinds of `OrbiflowError`, a
+`ValueError`, so one `except` catches them; the command line ends with exit status 2.
 """
 
 import re
@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 
 class OrbiflowError(ValueError):
-    """Base of all errors caused by an argument, a file or a setting that cannot be used."""
+    """An argument, a file or a setting that cannot be used: the base of all other errors."""
 
 
 class SettingError(OrbiflowError):
@@ -52,7 +52,7 @@ class InputFileError(OrbiflowError):
 
 
 class OutputError(OrbiflowError):
-    """A result that cannot be written where it was asked for."""
+    """A result that cannot be written to the requested place."""
 
 
 class GroupError(OrbiflowError):

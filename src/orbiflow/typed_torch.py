@@ -1,7 +1,7 @@
-"""What torch exports without types, with them: the same functions under the same names.
+"""Types of the torch functions that have none: the same functions under the same names.
 
-Its special functions, transforms and linear algebra are compiled and have no signatures, and some of
-its Python functions and methods are not annotated. Only what orbiflow calls is here.
+torch's compiled functions have no signatures and some of its Python functions no annotations. Stubs
+cannot replace this file: a partial stub package makes pyright lose the rest of torch's own types.
 """
 
 from __future__ import annotations
@@ -106,17 +106,17 @@ def adam(
     lr: float = 1e-3,
     betas: tuple[float, float] = (0.9, 0.999),
 ) -> Optimizer:
-    """`torch.optim.Adam`, whose own `step` has no types."""
+    """Return `torch.optim.Adam`, whose own `step` has no types."""
     return torch.optim.Adam(parameters, lr=lr, betas=betas)
 
 
 def applied(function: type[Function], *arguments: Any) -> Any:
-    """`function.apply`: its values, with the derivatives that it says."""
+    """Return `function.apply(*arguments)`."""
     untyped: Any = function
     return untyped.apply(*arguments)
 
 
 def listed(tensor: Tensor) -> list[Any]:
-    """The numbers of a tensor, in lists as deep as it has dimensions (one at least)."""
+    """Return the numbers of a tensor as nested lists, one level per dimension (at least one)."""
     values: Any = tensor
     return values.tolist()

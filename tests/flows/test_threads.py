@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 
 from orbiflow.flows import Flow
-from orbiflow.flows.flow import MANY
+from orbiflow.flows.flow import MULTITHREADED_COORDINATES
 
 
 @pytest.fixture
@@ -21,7 +21,7 @@ def seen() -> Iterator[list[int]]:
     torch.set_num_threads(before)
 
 
-@pytest.mark.parametrize(("count", "threads"), [(5, 1), (MANY, 3)])
+@pytest.mark.parametrize(("count", "threads"), [(5, 1), (MULTITHREADED_COORDINATES, 3)])
 @pytest.mark.parametrize("apply", ["forward", "inverse", "forward_and_log_det", "trajectories"])
 def test_how_many_threads_carry(seen: list[int], count: int, threads: int, apply: str) -> None:
     def field(points: Tensor) -> Tensor:

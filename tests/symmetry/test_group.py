@@ -280,7 +280,7 @@ def test_degenerate_lattices_are_refused(lattice, match):
 
 
 def test_generators_of_another_dimension_are_refused():
-    with pytest.raises(GroupError, match=r"generator 0 acts on R\^3, the lattice lives in R\^2"):
+    with pytest.raises(GroupError, match=r"generator 0 acts on R\^3, but the lattice is in R\^2"):
         CrystallographicGroup.generate(np.eye(2), [identity(3)])
 
 

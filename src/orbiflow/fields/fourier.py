@@ -1,4 +1,4 @@
-"""Trigonometric vector fields that commute with a crystallographic group."""
+"""Fourier fields: trigonometric vector fields that commute with a crystallographic group."""
 
 from __future__ import annotations
 
@@ -14,32 +14,29 @@ from orbiflow.arrays import Array
 from orbiflow.fields.invariants import (
     InvariantBasis,
     InvariantField,
+    constant_tensors,
     invariant_basis,
     sobolev_weights,
 )
 from orbiflow.fields.lipschitz import coefficient_bound
-from orbiflow.fields.series import (
-    differentiate,
-    evaluate,
-    weight_cotangent,
-)
-from orbiflow.symmetry import CrystallographicGroup, cached_as_written
+from orbiflow.fields.series import differentiate, evaluate, weight_cotangent
+from orbiflow.symmetry import CrystallographicGroup, cached_by_basis
 
 
 class FourierField(InvariantField):
     """A vector field V with V(g p) = R_g V(p) for every g in the group.
 
     The parameters are coordinates in an orthonormal basis of the invariant Fourier coefficients, so
-    an evaluation costs one Fourier sum whatever the group's order (paper, section 3; design points
-    2-4). Their Euclidean norm is the root mean square of the field.
+    an evaluation costs one Fourier sum for any group (paper, section 3; design points 2-4). Their
+    Euclidean norm is the root mean square of the field.
 
     Args:
-        group: symmetry of the field.
-        max_frequency: the paper's Omega: |k_i| <= Omega and the images of that box.
-        batch: size S of a stack of independent fields, or None for one field.
-        smoothness: s >= 0; the parameter of frequency kappa is multiplied by
+        group: The symmetry of the field.
+        max_frequency: The paper's Omega: |k_i| <= Omega and the images of that box.
+        batch: The size S of a stack of independent fields, or None for one field.
+        smoothness: The power s >= 0; the parameter of frequency kappa is multiplied by
             (1 + |kappa|^2 vol^(2/d))^(-s / 2), which makes descent in the parameters Sobolev descent.
-        dtype, device: of the parameters.
+        dtype, device: The dtype and the device of the parameters.
 
     Shapes:
         `parameters_`: (P,) or (S, P). Points (..., d), or (S, ..., d) for a stack.
@@ -66,12 +63,7 @@ class FourierField(InvariantField):
         device: torch.device | str | None = None,
     ) -> None:
         super().__init__(
-            group,
-            max_frequency,
-            batch=batch,
-            smoothness=smoothness,
-            dtype=dtype,
-            device=device,
+            group, max_frequency, batch=batch, smoothness=smoothness, dtype=dtype, device=device
         )
         self._orders = _orders(self.basis)
         self._fill_buffers()
@@ -84,12 +76,15 @@ class FourierField(InvariantField):
         # not reshape(-1, P): P is 0 for Omega = 0 and a group without invariant vectors
         return parameters if parameters.dim() == 2 else parameters.unsqueeze(0)
 
-    def sobolev_weights(self, smoothness: float) -> np.ndarray:
-        """(P,) factors (1 + |kappa|^2 vol^(2/d))^(-smoothness / 2), free of the unit of length."""
+    def sobolev_weights(self, smoothness: float) -> Array:
+        """Return factors (P,) (1 + |kappa|^2 vol^(2/d))^(-smoothness / 2), which have no unit."""
         return sobolev_weights(self.group, self.basis, smoothness)
 
     def weights(self) -> Tensor:
-        """Fourier weights in the tensor basis of `series`: (S, d, A_1, ..., A_d), S = 1 if single."""
+        """Return the Fourier weights in the tensor basis of `series`.
+
+        Shape (S, d, A_1, ..., A_d), with S = 1 for a single field.
+        """
         flat = self._stacked(self.parameters_) * self.scale
         shape = (self.group.dim, *(2 * k + 1 for k in self._orders))
         weights = flat.new_zeros(flat.shape[0], math.prod(shape))
@@ -97,19 +92,19 @@ class FourierField(InvariantField):
         return weights.reshape(flat.shape[0], *shape)
 
     def bound(self) -> Callable[[Tensor], Tensor]:
-        """The field with its weights worked out once, for many evaluations (an integrator's)."""
+        """Return the field with its weights computed once, for many evaluations (an integrator's)."""
         weights = self.weights()
         return lambda points: self._values(weights, points)
 
     @torch.no_grad()
     def adjoint(self, points: Tensor, forces: Tensor) -> Tensor:
-        """Gradient of sum forces . V(points) in the parameters, without autograd: the force's work.
+        """Return the gradient of sum forces . V(points) in the parameters, without autograd.
 
-        The projection of a force on the invariant fields (design point 10). V is linear in the
-        parameters, so their values do not matter.
+        This is the projection of a force on the invariant fields (design point 10). V is linear in
+        the parameters, so their values do not matter.
 
         Args:
-            points, forces: (N, d), or (S, N, d) for a stack.
+            points, forces: Arrays (N, d), or (S, N, d) for a stack.
 
         Returns:
             (P,) or (S, P).
@@ -125,15 +120,15 @@ class FourierField(InvariantField):
         return (gradient * self.scale).reshape(self.parameters_.shape)
 
     def forward(self, points: Tensor) -> Tensor:
-        """V at points (..., d): vectors of the same shape."""
+        """Return V at points (..., d): vectors of the same shape."""
         return self._values(self.weights(), points)
 
     def divergence(self, points: Tensor) -> Tensor:
-        """Trace of the Jacobian, (...,), in closed form: itself one Fourier sum."""
+        """Return the trace of the Jacobian, (...,), in closed form: itself one Fourier sum."""
         return self._values(self._divergence_weights(self.weights()), points)[..., 0]
 
     def bound_with_divergence(self) -> Callable[[Tensor], tuple[Tensor, Tensor]]:
-        """As `bound`, returning V and its divergence from the same matrix product."""
+        """Return, as `bound` does, a function for V and its divergence from one matrix product."""
         weights = self.weights()
         joint = torch.cat([weights, self._divergence_weights(weights)], dim=1)
 
@@ -144,7 +139,7 @@ class FourierField(InvariantField):
         return both
 
     def jacobian(self, points: Tensor) -> Tensor:
-        """dV_i / dp_j as (..., d, d), in closed form: d^2 Fourier sums from one matrix product."""
+        """Return dV_i / dp_j as (..., d, d): d^2 Fourier sums from one matrix product."""
         d = self.group.dim
         weights = self.weights()
         by_axis = torch.stack([differentiate(weights, j, d) for j in range(d)], dim=2)
@@ -153,7 +148,7 @@ class FourierField(InvariantField):
         return values.reshape(*values.shape[:-1], d, d)
 
     def lipschitz_bound(self) -> Tensor:
-        """An upper bound of the Jacobian's spectral norm anywhere, () or (S,): `coefficient_bound`.
+        """Return `coefficient_bound`: an upper bound of the Jacobian's spectral norm, () or (S,).
 
         Rigorous but pessimistic; a Runge-Kutta step h with h * bound below the method's
         `RungeKutta.injective_below` is injective (design point 5).
@@ -183,8 +178,8 @@ def _orders(basis: InvariantBasis) -> tuple[int, ...]:
     return tuple(np.abs(basis.frequencies).max(axis=0).tolist())
 
 
-@cached_as_written(maxsize=64)  # the segments of a flow share them
-@torch.inference_mode(False)  # what the first caller may not train, no other could
+@cached_by_basis(maxsize=64)  # the segments of a flow share them
+@torch.inference_mode(False)  # cached in inference mode, they could never be trained
 def _constants(
     group: CrystallographicGroup,
     max_frequency: int,
@@ -193,24 +188,14 @@ def _constants(
     device: torch.device,
 ) -> dict[str, Tensor]:
     basis = invariant_basis(group, max_frequency)
-    rows, columns, values = tensor_layout(basis, _orders(basis))
-    real = {
-        "values": values,
-        "frame": group.inverse_lattice,
-        "scale": sobolev_weights(group, basis, smoothness),
-    }
-    return {
-        "rows": torch.tensor(rows, device=device),
-        "columns": torch.tensor(columns, device=device),
-        **{name: torch.tensor(x, dtype=dtype, device=device) for name, x in real.items()},
-    }
+    scale = sobolev_weights(group, basis, smoothness)
+    layout = tensor_layout(basis, _orders(basis))
+    return constant_tensors(layout, dtype, device, scale=scale, frame=group.inverse_lattice)
 
 
 @lru_cache(maxsize=64)  # bases hash by identity
-def tensor_layout(
-    basis: InvariantBasis, orders: tuple[int, ...]
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The invariant basis rewritten in the tensor basis of `series`, as sparse (row, column, value).
+def tensor_layout(basis: InvariantBasis, orders: tuple[int, ...]) -> tuple[Array, Array, Array]:
+    """Rewrite the invariant basis in the tensor basis of `series`, as sparse (row, column, value).
 
     exp(2 pi i k.u) is a product over the axes of cos(2 pi k u) + i sin(2 pi k u): each mode becomes
     2^d products of cosines and sines.

@@ -1,4 +1,4 @@
-"""The Fourier coefficients that a crystallographic group leaves alone (design point 3)."""
+"""The Fourier coefficients that are invariant under a crystallographic group (design point 3)."""
 
 from __future__ import annotations
 
@@ -14,19 +14,15 @@ from torch import Tensor, nn
 
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
-from orbiflow.symmetry import (
-    CrystallographicGroup,
-    cached_as_written,
-    checked_group,
-)
+from orbiflow.symmetry import CrystallographicGroup, cached_by_basis, checked_group
 
 MAX_COEFFICIENTS = 2_000_000
-"""Largest number of real coefficients before symmetrization: about a gigabyte of work."""
+"""The largest number of real coefficients before symmetrization, for about a gigabyte of memory."""
 
 
 @dataclass(frozen=True, eq=False)
 class InvariantBasis:
-    """Orthonormal basis of the invariant real trigonometric vector fields of bounded frequency.
+    """An orthonormal basis of the invariant real trigonometric vector fields of bounded frequency.
 
     A field is V(p) = z_0 + sum over `frequencies` of sqrt(2) (a cos(phase) + b sin(phase)), where
     phase = 2 pi k . B^-1 p and one of k, -k is listed. The flat coefficient vector holds, for each k,
@@ -35,10 +31,10 @@ class InvariantBasis:
     of the parameters is the root mean square of the field.
 
     Args:
-        frequencies: (M, d) integers, k = 0 first.
-        rows, columns, values: (nnz,) each.
-        size: number of parameters P.
-        magnitude: (P,) |kappa| of each parameter, kappa = B^-T k, per unit of length.
+        frequencies: Integers (M, d), k = 0 first.
+        rows, columns, values: The entries of the sparse basis, (nnz,) each.
+        size: The number of parameters P.
+        magnitude: |kappa| (P,) of each parameter, kappa = B^-T k, per unit of length.
     """
 
     frequencies: Array
@@ -50,7 +46,7 @@ class InvariantBasis:
 
 
 def frequency_set(group: CrystallographicGroup, max_frequency: int) -> Array:
-    """(M, d) integer frequencies, one of each pair +-k, k = 0 first.
+    """Return (M, d) integer frequencies, one of each pair +-k, k = 0 first.
 
     The box |k_i| <= max_frequency and its images under the dual point group: a set that is not a
     union of orbits would lose symmetry (hexagonal groups).
@@ -75,13 +71,13 @@ def frequency_set(group: CrystallographicGroup, max_frequency: int) -> Array:
 
 
 def _integral_parts(group: CrystallographicGroup) -> Array:
-    """(|G|, d, d) integer matrices B^-1 R B; a frequency k (a row) goes to k @ M."""
+    """Return (|G|, d, d) integer matrices B^-1 R B; a frequency k (a row) goes to k @ M."""
     m = group.inverse_lattice @ group.linear_parts @ group.lattice
     return np.round(m).astype(np.int64)
 
 
 def _half(k: Array) -> tuple[Array, Array]:
-    """The lexicographically non-negative one of k and -k, and whether it was -k."""
+    """Return the lexicographically non-negative one of k and -k, and whether it was -k."""
     first = np.zeros(len(k), dtype=np.int64)
     for column in range(k.shape[1] - 1, -1, -1):
         first = np.where(k[:, column] != 0, k[:, column], first)
@@ -90,14 +86,14 @@ def _half(k: Array) -> tuple[Array, Array]:
 
 
 def _index(frequencies: Array, k: Array) -> Array:
-    """Rows of `frequencies` (sorted lexicographically) at which the rows of `k` stand."""
+    """Return rows of `frequencies` (sorted lexicographically) at which the rows of `k` stand."""
     base = int(np.abs(frequencies).max(initial=0)) * 2 + 3
     radix = base ** np.arange(frequencies.shape[1] - 1, -1, -1, dtype=np.int64)
     return np.searchsorted(frequencies @ radix, k @ radix)
 
 
 def _action(group: CrystallographicGroup, frequencies: Array) -> tuple[Array, Array]:
-    """Where each element sends each frequency, and the real (2d, 2d) block it applies on the way.
+    """Return where each element sends each frequency, and the (2d, 2d) block it applies.
 
     (g V)(p) = R^-1 V(R p + t) sends the coefficient at k to k M times R^-1 exp(2 pi i k . B^-1 t).
     """
@@ -122,7 +118,7 @@ def _action(group: CrystallographicGroup, frequencies: Array) -> tuple[Array, Ar
 
 
 def _orthonormal_columns(projector: Array) -> Array:
-    """Basis of the range of an orthogonal projector, by Gram-Schmidt in a fixed order.
+    """Return the basis of the range of an orthogonal projector, by Gram-Schmidt in a fixed order.
 
     Deterministic, unlike eigenvectors of a repeated eigenvalue: saved parameters depend on it.
     """
@@ -136,7 +132,7 @@ def _orthonormal_columns(projector: Array) -> Array:
     return basis
 
 
-@cached_as_written(maxsize=64)  # a flow of many segments shares one basis
+@cached_by_basis(maxsize=64)  # a flow of many segments shares one basis
 def invariant_basis(group: CrystallographicGroup, max_frequency: int) -> InvariantBasis:
     """Build the basis orbit by orbit: the range of the mean over coset representatives.
 
@@ -181,7 +177,7 @@ def invariant_basis(group: CrystallographicGroup, max_frequency: int) -> Invaria
 
 
 def _members(labels: Array) -> list[Array]:
-    """Positions that share a label, each list ascending, in the order of the labels."""
+    """Return positions that share a label, each list ascending, in the order of the labels."""
     order = np.argsort(labels, kind="stable")
     cuts = np.flatnonzero(np.diff(labels[order])) + 1
     return np.split(order, cuts)
@@ -193,9 +189,9 @@ class InvariantField(nn.Module, ABC):
     The parameters are coordinates in an orthonormal basis of the invariant Fourier coefficients
     (paper, section 3; design points 2-4), each multiplied by `scale`.
 
-    - `parameters_`: (P,), or (S, P) for a stack of S independent fields.
-    - `basis`: the coefficients that the parameters stand for.
-    - `size`: P.
+    - `parameters_`: The coordinates (P,), or (S, P) for a stack of S independent fields.
+    - `basis`: The coefficients that the parameters stand for.
+    - `size`: The number of parameters P.
     """
 
     rows: Tensor
@@ -225,11 +221,11 @@ class InvariantField(nn.Module, ABC):
 
     @abstractmethod
     def _constants(self, dtype: torch.dtype, device: torch.device) -> dict[str, Tensor]:
-        """Buffers by name; segments of a flow should share them."""
+        """Return buffers by name; segments of a flow should share them."""
 
     @abstractmethod
     def adjoint(self, points: Tensor, forces: Tensor) -> Tensor:
-        """Gradient (P,) of sum forces . V(points) in the parameters; points, forces (N, d)."""
+        """Return the gradient (P,) of sum forces . V(points) in the parameters; inputs (N, d)."""
 
     def _check_points(self, points: Tensor) -> None:
         """Raise OrbiflowError for points that the field cannot be evaluated at."""
@@ -252,7 +248,7 @@ class InvariantField(nn.Module, ABC):
             self.register_buffer(name, tensor, persistent=False)
 
     def _apply(self, fn: Callable[[Tensor], Tensor], recurse: bool = True) -> Self:
-        # a float32 field made float64 must be as symmetric as one born in float64
+        # a float32 field converted to float64 must be as symmetric as one created in float64
         super()._apply(fn, recurse)  # pyright: ignore[reportUnknownMemberType]
         self._fill_buffers()
         return self
@@ -263,7 +259,20 @@ class InvariantField(nn.Module, ABC):
 
 def sobolev_weights(
     group: CrystallographicGroup, basis: InvariantBasis, smoothness: float
-) -> np.ndarray:
-    """(P,) factors (1 + |kappa|^2 vol^(2/d))^(-smoothness / 2), free of the unit of length."""
+) -> Array:
+    """Return (P,) factors (1 + |kappa|^2 vol^(2/d))^(-smoothness / 2), free of the unit of length."""
     size = group.cell_volume ** (1 / group.dim)
     return (1.0 + (basis.magnitude * size) ** 2) ** (-smoothness / 2)
+
+
+def constant_tensors(
+    layout: tuple[Array, Array, Array], dtype: torch.dtype, device: torch.device, **others: Array
+) -> dict[str, Tensor]:
+    """Return a sparse basis (rows, columns, values) and other real arrays as tensors by name."""
+    rows, columns, values = layout
+    reals = {"values": values, **others}
+    return {
+        "rows": torch.tensor(rows, device=device),
+        "columns": torch.tensor(columns, device=device),
+        **{name: torch.tensor(x, dtype=dtype, device=device) for name, x in reals.items()},
+    }

@@ -1,4 +1,4 @@
-"""How steep a sum of invariant waves can be: the one place that bounds a field's Jacobian.
+"""Bounds of the Jacobian of a field of invariant waves.
 
 A wave of unit root mean square is sqrt 2 (a cos(phase) + b sin(phase)) at each frequency kappa of an
 orbit, with |a|^2 + |b|^2 summed over the orbit equal to 1. Its Jacobian is the sum over the orbit of
@@ -9,7 +9,7 @@ A single frequency is therefore at most 2 pi sqrt 2 |kappa| steep; `steepness` a
 of M pairs +-kappa can be `group_factor` times steeper: sqrt M by the triangle inequality and the even
 share 1 / sqrt M of each, but less where the matrices at its frequencies point differently.
 
-Proof of the smaller one. Decompose the (d, 2) matrix [b, -a] at each frequency as the sum of its
+Proof of the smaller bound. Decompose the (d, 2) matrix [b, -a] at each frequency as the sum of its
 singular values times u (x) v: as (cos, sin) runs over the unit circle, v . (cos, sin) stays in
 [-1, 1]. So the Jacobian is 2 pi sqrt 2 times a sum of s_i A_i with A_i = sigma_i u_i (x) kappa_i and
 s_i in [-1, 1]. The spectral norm is convex in s, hence largest at a corner of the cube: the largest
@@ -30,29 +30,29 @@ from orbiflow.arrays import Array
 from orbiflow.fields.invariants import InvariantBasis
 from orbiflow.symmetry import CrystallographicGroup
 
-MOST_SIGNS = 6
-"""Largest orbit, in terms, of which all signs are tried: no plane group has a larger one."""
+MAX_SIGNED_TERMS = 6
+"""The largest number of terms whose signs are all tried; orbits of plane groups have no more."""
 
 
 def steepness(parameters: Tensor, magnitude: Tensor) -> Tensor:
-    """sum_j |c_j| 2 pi sqrt 2 |kappa_j|: times `group_factor`, a bound of |DV| anywhere.
+    """Return sum_j |c_j| 2 pi sqrt 2 |kappa_j|: times `group_factor`, a bound of |DV| anywhere.
 
     Args:
-        parameters: (..., P) coordinates c in the orthonormal basis.
-        magnitude: (P,) |kappa| of each, `InvariantBasis.magnitude`.
+        parameters: Coordinates c (..., P) in the orthonormal basis.
+        magnitude: |kappa| (P,) of each, `InvariantBasis.magnitude`.
 
     Returns:
-        (...,), per unit of time.
+        The bounds (...,), per unit of time.
     """
     return math.sqrt(2.0) * (parameters.abs() * (2.0 * math.pi * magnitude)).sum(dim=-1)
 
 
 @lru_cache(maxsize=64)  # bases hash by identity
 def group_factor(group: CrystallographicGroup, basis: InvariantBasis) -> float:
-    """The least f known with |DV| <= f `steepness` for all parameters and at all points.
+    """Return the smallest known f with |DV| <= f `steepness` for all parameters and points.
 
-    1 for p1 and p2, up to sqrt 2 for pg and pgg, sqrt 1/2 for p4, sqrt 3/4 for p3 and p6, sqrt 3/2 for
-    p6m: it belongs to the group, its lattice and the frequencies at hand.
+    It depends on the group, its lattice and the frequencies: 1 for p1 and p2, up to sqrt 2 for pg and
+    pgg, sqrt 1/2 for p4, sqrt 3/4 for p3 and p6, sqrt 3/2 for p6m.
 
     >>> from orbiflow.fields import FourierField
     >>> from orbiflow.symmetry import wallpaper_group
@@ -71,7 +71,7 @@ def group_factor(group: CrystallographicGroup, basis: InvariantBasis) -> float:
 
 
 def _terms(group: CrystallographicGroup, basis: InvariantBasis) -> tuple[Array, Array]:
-    """Parameters (T,), ascending, and the matrices A_i (T, d, d) of each for |kappa| = 1."""
+    """Return ascending parameter indices (T,) and their matrices A_i (T, d, d) for |kappa| = 1."""
     d, modes = group.dim, len(basis.frequencies)
     pair = basis.columns * modes + basis.rows // (2 * d)
     pairs, place = np.unique(pair, return_inverse=True)
@@ -89,9 +89,9 @@ def _terms(group: CrystallographicGroup, basis: InvariantBasis) -> tuple[Array, 
 
 
 def _largest_sum(terms: Array) -> Array:
-    """Bound of the spectral norm of sum_i s_i A_i over signs s: (P, n, d, d) -> (P,)."""
+    """Return a bound (P,) of the spectral norm of sum_i s_i A_i over all signs, A (P, n, d, d)."""
     count = terms.shape[1]
-    if count > MOST_SIGNS:
+    if count > MAX_SIGNED_TERMS:
         return np.linalg.norm(terms, axis=(2, 3)).sum(axis=1)
     signs = np.array([(1.0, *s) for s in itertools.product((1.0, -1.0), repeat=count - 1)])
     sums = np.einsum("sn,pnij->psij", signs, terms)
@@ -101,16 +101,18 @@ def _largest_sum(terms: Array) -> Array:
 def coefficient_bound(
     group: CrystallographicGroup, basis: InvariantBasis, coefficients: Tensor
 ) -> Tensor:
-    """An upper bound of the Jacobian's spectral norm: sum over kappa of 2 pi sqrt 2 |kappa| |[a, b]|.
+    """Return an upper bound of the Jacobian's spectral norm for given coefficients.
+
+    The bound is the sum over kappa of 2 pi sqrt 2 |kappa| |[a, b]|.
 
     Sharper than `group_factor` for given coefficients, since parameters at one frequency are added
     before their size is taken.
 
     Args:
-        coefficients: (S, P) in the orthonormal basis.
+        coefficients: Coordinates (S, P) in the orthonormal basis.
 
     Returns:
-        (S,).
+        The bounds (S,).
     """
     d, modes = group.dim, len(basis.frequencies)
     rows, columns = (

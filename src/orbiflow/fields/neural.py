@@ -16,12 +16,12 @@ from orbiflow.typed_torch import random
 
 
 class PeriodicFeatures(nn.Module):
-    """Points (..., d) to cosines and sines of low frequencies, (..., 2 M): periodic by construction.
+    """Periodic features of points (..., d): cosines and sines of low frequencies, (..., 2 M).
 
     Args:
-        group: its lattice is the period.
-        max_frequency: all k in [-max, max]^d up to sign, without 0, if d <= 3; in higher dimensions
-            only the multiples 1..max of each axis.
+        group: The group whose lattice is the period.
+        max_frequency: The largest frequency. If d <= 3, all k in [-max, max]^d are taken up to sign,
+            without 0; in higher dimensions only the multiples 1..max of each axis.
 
     Raises:
         OrbiflowError: if `max_frequency` < 1 or `group` is no group.
@@ -39,7 +39,7 @@ class PeriodicFeatures(nn.Module):
             k = np.array([v for v in box if v > (0,) * d], dtype=np.float64)
         else:
             k = np.concatenate([m * np.eye(d) for m in range(1, max_frequency + 1)])
-        with torch.inference_mode(False):  # or no derivative could be taken through it, ever
+        with torch.inference_mode(False):  # otherwise it could never be differentiated
             waves = torch.tensor(k @ group.inverse_lattice)
         self.group, self.max_frequency = group, max_frequency
         self.register_buffer("frequencies", waves, persistent=False)
@@ -50,7 +50,7 @@ class PeriodicFeatures(nn.Module):
         return 2 * self.frequencies.shape[0]
 
     def forward(self, points: Tensor) -> Tensor:
-        """Features of shape (..., 2 M)."""
+        """Return features of shape (..., 2 M)."""
         phase = 2.0 * math.pi * points @ self.frequencies.to(points).mT
         return torch.cat([phase.cos(), phase.sin()], dim=-1)
 
@@ -64,10 +64,10 @@ def neural_field(
     seed: int = 0,
     dtype: torch.dtype = torch.float64,
 ) -> Symmetrized:
-    """A multilayer perceptron on periodic features, symmetrized over `group`.
+    """Return a multilayer perceptron on periodic features, symmetrized over `group`.
 
     The last layer starts at zero, so the flow starts at the identity. The same seed gives the same
-    weights; the global random state is left alone.
+    weights; the global random state does not change.
     """
     features = PeriodicFeatures(group, max_frequency)
     sizes = (features.size, *hidden, group.dim)

@@ -1,15 +1,15 @@
-"""What a vector field must offer, and what it may offer to be used better.
+"""The protocols of vector fields, and their derivatives.
 
 A field is any callable from points (..., d) to vectors of the same shape: a function, a lambda, a torch
-module. Nothing else is asked for. What it has beside that is found by these protocols, once, in
-`orbiflow.fields.derivatives`; a method of these names must mean what is said here.
+module. Nothing else is required. These protocols find what else it offers; a method of one of these
+names must do what is described here.
 
 | the field has | then |
 |---|---|
 | `jacobian(points)`, `divergence(points)` | closed forms are used in place of autograd |
-| `bound()` | what depends on the parameters alone is worked out once for many evaluations |
+| `bound()` | what depends only on the parameters is computed once for many evaluations |
 | `bound_with_divergence()` | V and its divergence come from shared work |
-| `lipschitz_bound()` | steps are judged without trying them |
+| `lipschitz_bound()` | the accuracy of integration steps is judged without trying them |
 | `time_dependent` true | it is called as V(points, time), see `TimeDependentField` |
 """
 
@@ -54,7 +54,7 @@ class Bindable(Protocol):
 
 @runtime_checkable
 class BindableWithDivergence(Protocol):
-    """As `Bindable`, giving V (..., d) and its divergence (...,) together."""
+    """A field that prepares a function for V (..., d) and its divergence (...,) together."""
 
     def bound_with_divergence(self) -> Callable[[Tensor], tuple[Tensor, Tensor]]: ...
 
@@ -100,7 +100,7 @@ class _Marked:
 def time_dependent(function: Callable[[Tensor, Tensor], Tensor]) -> TimeDependentField:
     """Mark a plain function V(points, time) as a time-dependent field; also a decorator.
 
-    A torch module says so itself, by an attribute `time_dependent = True`.
+    A torch module has an attribute `time_dependent = True` instead.
 
     >>> import torch
     >>> from orbiflow.flows import Flow
@@ -112,33 +112,31 @@ def time_dependent(function: Callable[[Tensor, Tensor], Tensor]) -> TimeDependen
 
 
 def is_time_dependent(field: object) -> bool:
-    """Whether `field` is to be called as V(points, time)."""
+    """Return whether `field` is to be called as V(points, time)."""
     return bool(getattr(field, "time_dependent", False))
 
 
 def jacobian(field: VectorField, points: Tensor) -> Tensor:
-    """dV_i / dp_j at points (..., d), as (..., d, d): exact, d backward passes."""
+    """Return dV_i / dp_j at points (..., d), as (..., d, d): exact, d backward passes."""
     if isinstance(field, HasJacobian):
         return field.jacobian(points)
     return _by_autograd(field, points, field)[1]
 
 
 def divergence(field: VectorField, points: Tensor) -> Tensor:
-    """Trace of the Jacobian at points (..., d), as (...,): exact."""
+    """Return the trace of the Jacobian at points (..., d), as (...,): exact."""
     if isinstance(field, HasDivergence):
         return field.divergence(points)
     return _trace(jacobian(field, points))
 
 
 def prepared(field: Callable[..., Tensor]) -> Callable[..., Tensor]:
-    """The field for many evaluations at unchanged parameters; takes what the field takes."""
+    """Return a function with the field's arguments, for many evaluations at fixed parameters."""
     return field.bound() if isinstance(field, Bindable) else field
 
 
-def prepared_with_divergence(
-    field: Callable[..., Tensor],
-) -> Callable[..., tuple[Tensor, Tensor]]:
-    """As `prepared`, giving V and its divergence together, sharing work where the field can."""
+def prepared_with_divergence(field: Callable[..., Tensor]) -> Callable[..., tuple[Tensor, Tensor]]:
+    """Return, as `prepared` does, a function for V and its divergence, sharing work if possible."""
     if is_time_dependent(field):
         if isinstance(field, HasDivergenceInTime):
             return field.with_divergence
@@ -160,7 +158,7 @@ def prepared_with_divergence(
 
 
 def lipschitz_bound(field: object) -> float | None:
-    """The field's own bound of its Jacobian's spectral norm, None if it knows none."""
+    """Return the field's own bound of its Jacobian's spectral norm, or None if it has none."""
     if isinstance(field, HasLipschitzBound):
         return float(field.lipschitz_bound().max())
     return None
@@ -176,7 +174,7 @@ def _with_trace(function: VectorField, points: Tensor, owner: object) -> tuple[T
 
 
 def _by_autograd(function: VectorField, points: Tensor, owner: object) -> tuple[Tensor, Tensor]:
-    """V and its Jacobian, differentiable if V is: in the points or in anything the field holds."""
+    """Return V and its Jacobian, differentiable in the points and in what the field holds."""
     if transformed():
         return _functionally(function, points)
     keep = torch.is_grad_enabled() and _is_differentiable(function, points, owner)
@@ -201,7 +199,7 @@ def _by_autograd(function: VectorField, points: Tensor, owner: object) -> tuple[
 
 
 def _functionally(function: VectorField, points: Tensor) -> tuple[Tensor, Tensor]:
-    """The same under `torch.func`, where no tensor may be told to require a gradient."""
+    """Return V and its Jacobian under `torch.func`, where requires_grad cannot be set."""
     values, pull, *_ = torch.func.vjp(function, points)
     units = torch.eye(points.shape[-1], dtype=points.dtype, device=points.device)
     rows = [pull(unit.expand(points.shape))[0] for unit in units]
@@ -213,5 +211,5 @@ def _is_differentiable(function: VectorField, points: Tensor, owner: object) -> 
         return True
     if isinstance(owner, nn.Module) and any(p.requires_grad for p in owner.parameters()):
         return True
-    # a plain function may hold parameters that only its values betray
+    # a plain function may use parameters that show only in its values
     return function(points).requires_grad

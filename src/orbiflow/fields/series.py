@@ -3,8 +3,8 @@
 A stack of C scalar series in d variables is an array `weights` of shape (S, C, A_1, ..., A_d),
 A_i = 2 K_i + 1, in the tensor basis 1, cos, ..., cos K, sin, ..., sin K (angles 2 pi k u_i) of each
 axis; S counts independent stacks. Points lie last: `u` is (S, d, N), values are (S, C, N). One matrix
-product over the last axis does nearly all the work (design point 4). The backward pass works the
-tables out anew, block by block: no slower than reading them back, and it needs no memory.
+product over the last axis does nearly all the work (design point 4). The backward pass recomputes the
+tables block by block: this is as fast as reading them back and needs no memory.
 """
 
 from __future__ import annotations
@@ -17,27 +17,23 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from orbiflow.fields.transforms import (
-    plain_gradients,
-    refuse_old_batches,
-    transformed,
-)
+from orbiflow.fields.transforms import plain_gradients, refuse_old_batches, transformed
 from orbiflow.typed_torch import applied
 
 BLOCK_BYTES = 2**21
-"""Size of the working arrays for one block of points; measured best between 1 and 3 MiB."""
+"""The size of the working arrays for one block of points; 1 to 3 MiB measured fastest."""
 
 
 def trigonometric_table(u: Tensor, order: int, out: Tensor | None = None) -> Tensor:
-    """Rows 1, cos 2 pi u, ..., cos 2 pi K u, sin 2 pi u, ..., sin 2 pi K u.
+    """Return rows 1, cos 2 pi u, ..., cos 2 pi K u, sin 2 pi u, ..., sin 2 pi K u.
 
     Args:
-        u: (..., N) fractional coordinates.
-        order: K.
-        out: where to put the result.
+        u: Fractional coordinates (..., N).
+        order: The largest frequency K.
+        out: A tensor for the result.
 
     Returns:
-        (..., 2 K + 1, N), not tracked by autograd.
+        A tensor (..., 2 K + 1, N), not tracked by autograd.
     """
     if out is None:
         out = u.new_empty(*u.shape[:-1], 2 * order + 1, u.shape[-1])
@@ -61,7 +57,7 @@ def _frequencies(order: int, like: Tensor) -> Tensor:
 
 
 def differentiate(weights: Tensor, axis: int, dim: int) -> Tensor:
-    """Weights of the derivative with respect to u_axis; the last `dim` axes are the variables."""
+    """Return the weights of the derivative in u_axis; the last `dim` axes are the variables."""
     moved = weights.movedim(axis - dim, -1)
     order = (moved.shape[-1] - 1) // 2
     factor = _frequencies(order, moved)
@@ -71,7 +67,7 @@ def differentiate(weights: Tensor, axis: int, dim: int) -> Tensor:
 
 
 def _derivative_dot(table: Tensor, dual: Tensor) -> Tensor:
-    """Sum over rows of (d table / du) times `dual`: (S, A, N), (S, A, N) -> (S, N)."""
+    """Return the sum over rows of (d table / du) times `dual`: (S, A, N), (S, A, N) -> (S, N)."""
     order = (table.shape[-2] - 1) // 2
     if order == 0:
         return torch.zeros_like(table[:, 0])
@@ -94,8 +90,8 @@ def _partial_sums(weights: Tensor, table: Tensor, out: Tensor | None = None) -> 
     return torch.bmm(flat, table, out=target).reshape(*weights.shape[:-1], table.shape[-1])
 
 
-class _Room:
-    """Working arrays for blocks of `size` points, used again and again: fresh memory is slow."""
+class _Workspace:
+    """Working arrays for blocks of `size` points, reused because allocating memory is slow."""
 
     def __init__(self, weights: Tensor, size: int) -> None:
         self.size = size
@@ -110,7 +106,7 @@ class _Room:
 
 
 def _blocks(weights: Tensor, points: int) -> list[slice]:
-    """Ranges of points whose tables and partial sums stay in a processor's cache."""
+    """Return ranges of points whose tables and partial sums fit into a processor's cache."""
     if weights.device.type != "cpu" or points == 0:
         return [slice(0, points)]
     rows = math.prod(weights.shape[:-1]) + weights.shape[0] * sum(weights.shape[2:])
@@ -120,21 +116,21 @@ def _blocks(weights: Tensor, points: int) -> list[slice]:
     return [slice(start, start + size) for start in range(0, points, size)]
 
 
-def _in_blocks(weights: Tensor, points: int) -> Iterator[tuple[slice, _Room]]:
-    room = None
+def _blocks_with_workspace(weights: Tensor, points: int) -> Iterator[tuple[slice, _Workspace]]:
+    workspace = None
     for block in _blocks(weights, points):
         size = min(block.stop, points) - block.start
-        if room is None or room.size != size:
-            room = _Room(weights, size)
-        yield block, room
+        if workspace is None or workspace.size != size:
+            workspace = _Workspace(weights, size)
+        yield block, workspace
 
 
 def _forward(weights: Tensor, u: Tensor) -> Tensor:
     dim, points = u.shape[1], u.shape[2]
     values = u.new_empty(weights.shape[0], weights.shape[1], points)
-    for block, room in _in_blocks(weights, points):
-        tables = room.fill(u[..., block])
-        sums = _partial_sums(weights, tables[-1], room.sums)
+    for block, workspace in _blocks_with_workspace(weights, points):
+        tables = workspace.fill(u[..., block])
+        sums = _partial_sums(weights, tables[-1], workspace.sums)
         for level in range(dim - 2, -1, -1):
             sums = sums.mul_(_align(tables[level], level)).sum(dim=-2)
         values[..., block] = sums
@@ -142,13 +138,13 @@ def _forward(weights: Tensor, u: Tensor) -> Tensor:
 
 
 def _backward_block(
-    weights: Tensor, u: Tensor, grad: Tensor, want_points: bool, room: _Room
+    weights: Tensor, u: Tensor, grad: Tensor, want_points: bool, workspace: _Workspace
 ) -> tuple[Tensor, Tensor | None]:
-    """Cotangents of the flattened weights and of u, the partial sums worked out anew."""
+    """Return the cotangents of the flattened weights and of u, recomputing the partial sums."""
     dim = u.shape[1]
-    tables = room.fill(u)
+    tables = workspace.fill(u)
     flat = weights.reshape(weights.shape[0], -1, weights.shape[-1])
-    before = [_partial_sums(weights, tables[-1], room.sums)] if want_points and dim > 1 else []
+    before = [_partial_sums(weights, tables[-1], workspace.sums)] if want_points and dim > 1 else []
     for level in range(dim - 2, 0, -1) if want_points else ():
         before.append((before[-1] * _align(tables[level], level)).sum(dim=-2))
     point_grads: list[Tensor] = []
@@ -157,8 +153,8 @@ def _backward_block(
         if want_points:
             shared = before.pop().mul_(dual.unsqueeze(-2)).flatten(1, -3).sum(dim=1)
             point_grads.append(_derivative_dot(tables[level], shared))
-        # at the last level the partial sums have been used up: their room is free
-        free = room.sums if level == dim - 2 else None
+        # at the last level the partial sums have been used up: their workspace is free
+        free = workspace.sums if level == dim - 2 else None
         dual = torch.mul(dual.unsqueeze(-2), _align(tables[level], level), out=free)
     dual = dual.flatten(1, -2)
     if want_points:
@@ -167,7 +163,7 @@ def _backward_block(
 
 
 class _Series(torch.autograd.Function):
-    """Keeps its arguments only: memory does not grow with the number of modes."""
+    """An autograd function that keeps only its arguments, so memory is independent of the modes."""
 
     @staticmethod
     def forward(ctx: Any, weights: Tensor, u: Tensor) -> Tensor:
@@ -184,9 +180,9 @@ class _Series(torch.autograd.Function):
         want_weights, want_points = ctx.needs_input_grad
         grad_weights = torch.zeros_like(weights)
         grad_points = torch.empty_like(u) if want_points else None
-        for block, room in _in_blocks(weights, u.shape[2]):
+        for block, workspace in _blocks_with_workspace(weights, u.shape[2]):
             part, moved = _backward_block(
-                weights, u[..., block], grad[..., block], want_points, room
+                weights, u[..., block], grad[..., block], want_points, workspace
             )
             grad_weights += part.reshape(weights.shape)
             if grad_points is not None and moved is not None:
@@ -195,11 +191,11 @@ class _Series(torch.autograd.Function):
 
 
 def evaluate_plainly(weights: Tensor, u: Tensor) -> Tensor:
-    """The same values by ordinary differentiable operations, for derivatives of any order."""
+    """Return the same values by ordinary differentiable operations, for derivatives of any order."""
     u = u - u.detach().round()
     *others, last = (_plain_table(weights, u, i) for i in range(u.shape[1]))
     flat = weights.flatten(1, -2)
-    # of a single stack a plain product: `vmap` would copy the weights for a batched one
+    # a plain product for a single stack: `vmap` would copy the weights for a batched one
     sums: Tensor = (flat[0] @ last[0])[None] if len(flat) == 1 else flat @ last
     sums = torch.unflatten(sums, 1, weights.shape[1:-1])
     for i, table in reversed(list(enumerate(others))):
@@ -213,15 +209,15 @@ def _plain_table(weights: Tensor, u: Tensor, i: int) -> Tensor:
 
 
 def evaluate(weights: Tensor, u: Tensor) -> Tensor:
-    """Values of the series at points.
+    """Return values of the series at points.
 
     Args:
-        weights: (S, C, A_1, ..., A_d).
-        u: (S, d, N), fractional coordinates.
+        weights: Coefficients (S, C, A_1, ..., A_d).
+        u: Fractional coordinates (S, d, N).
 
     Returns:
-        (S, C, N). First derivatives with respect to both arguments are in closed form; derivatives
-        of higher order, and those that `torch.func` takes, fall back to ordinary operations.
+        Values (S, C, N). First derivatives in both arguments are in closed form; higher ones, and
+        those of `torch.func`, use ordinary operations.
     """
     if transformed():
         return evaluate_plainly(weights, u)
@@ -232,21 +228,18 @@ def evaluate(weights: Tensor, u: Tensor) -> Tensor:
 
 @torch.no_grad()
 def weight_cotangent(shape: tuple[int, ...], u: Tensor, grad: Tensor) -> Tensor:
-    """Gradient of sum grad . values in the weights; it depends on the points alone.
+    """Return the gradient of sum grad . values in the weights, of their shape.
 
     Args:
-        shape: of the weights, (S, C, A_1, ..., A_d).
-        u: (S, d, N).
-        grad: (S, C, N).
-
-    Returns:
-        As the weights.
+        shape: The shape of the weights, (S, C, A_1, ..., A_d).
+        u: Fractional coordinates (S, d, N).
+        grad: Cotangents of the values, (S, C, N).
     """
     weights = u.new_zeros(shape)
     if transformed():
         return torch.func.vjp(partial(evaluate_plainly, u=u), weights)[1](grad)[0]
     total = torch.zeros_like(weights)
-    for block, room in _in_blocks(weights, u.shape[2]):
-        part, _ = _backward_block(weights, u[..., block], grad[..., block], False, room)
+    for block, workspace in _blocks_with_workspace(weights, u.shape[2]):
+        part, _ = _backward_block(weights, u[..., block], grad[..., block], False, workspace)
         total += part.reshape(shape)
     return total

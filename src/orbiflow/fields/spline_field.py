@@ -1,4 +1,4 @@
-"""Symmetric fields read off a fine spline: a cost that does not grow with their detail."""
+"""Symmetric fields evaluated by splines, at a cost that does not grow with the frequency."""
 
 from __future__ import annotations
 
@@ -14,33 +14,29 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.fields.invariants import (
     InvariantBasis,
     InvariantField,
+    constant_tensors,
     invariant_basis,
     sobolev_weights,
 )
-from orbiflow.fields.splines import (
-    padded,
-    spline_sum,
-    spline_sum_with_divergence,
-    symbol,
-)
-from orbiflow.symmetry import CrystallographicGroup, cached_as_written
+from orbiflow.fields.splines import padded, spline_sum, spline_sum_with_divergence, symbol
+from orbiflow.symmetry import CrystallographicGroup, cached_by_basis
 from orbiflow.typed_torch import fft, linalg
 
-PER_WAVE = 3
-"""Grid points along the shortest wave, at least: a cubic spline follows it to about 2 per cent."""
+POINTS_PER_WAVE = 3
+"""The least number of grid points on the shortest wave, for an error of about 2 per cent."""
 
 
 class SplineField(InvariantField):
-    """The cubic spline through a `FourierField`'s values on an even grid, a field of its own.
+    """The cubic spline through a `FourierField`'s values on an even grid.
 
-    Same parameters, same symmetry (exactly: the group maps the grid to itself), twice continuously
-    differentiable, its divergence exact. An evaluation reads 4^d coefficients whatever
-    `max_frequency` is; the grid is filled by one fast Fourier transform.
+    It has the same parameters and exactly the same symmetry, as the group maps the grid to itself. It
+    is twice continuously differentiable, and its divergence is exact. An evaluation reads 4^d
+    coefficients for any `max_frequency`; one fast Fourier transform fills the grid.
 
     Args:
-        group: of a rectangular lattice whose linear parts permute and flip the axes, in one to three
-            dimensions.
-        max_frequency, smoothness, dtype, device: see `FourierField`.
+        group: A group with a rectangular lattice in one to three dimensions, whose linear parts
+            permute and flip the axes.
+        max_frequency, smoothness, dtype, device: See `FourierField`.
 
     Shapes:
         `parameters_`: (P,). Points (..., d).
@@ -72,7 +68,7 @@ class SplineField(InvariantField):
         return _constants(self.group, self.max_frequency, self.smoothness, dtype, device)
 
     def table(self) -> Tensor:
-        """The spline's coefficients (d, M_1, ..., M_d)."""
+        """Return the spline's coefficients (d, M_1, ..., M_d)."""
         d, half = self.group.dim, self.sides[-1] // 2 + 1
         shape = (d, *self.sides[:-1], half, 2)
         spectrum = self.parameters_.new_zeros(math.prod(shape))
@@ -81,7 +77,7 @@ class SplineField(InvariantField):
         return fft.irfftn(spectrum, s=self.sides, dim=tuple(range(1, d + 1)), norm="forward")
 
     def bound(self) -> Callable[[Tensor], Tensor]:
-        """The field with its grid filled once, for many evaluations (an integrator's)."""
+        """Return the field with its grid filled once, for many evaluations (an integrator's)."""
         table = padded(self.table())
 
         def values(points: Tensor) -> Tensor:
@@ -90,7 +86,7 @@ class SplineField(InvariantField):
         return values
 
     def bound_with_divergence(self) -> Callable[[Tensor], tuple[Tensor, Tensor]]:
-        """As `bound`, returning V and its divergence from the same coefficients."""
+        """Return, as `bound` does, a function for V and its divergence from the same coefficients."""
         table = padded(self.table())
 
         def both(points: Tensor) -> tuple[Tensor, Tensor]:
@@ -101,16 +97,16 @@ class SplineField(InvariantField):
         return both
 
     def forward(self, points: Tensor) -> Tensor:
-        """V at points (..., d): vectors of the same shape."""
+        """Return V at points (..., d): vectors of the same shape."""
         return self.bound()(points)
 
     def divergence(self, points: Tensor) -> Tensor:
-        """Trace of the Jacobian, (...,), exact."""
+        """Return the trace of the Jacobian, (...,), exact."""
         return self.bound_with_divergence()(points)[1]
 
     @torch.no_grad()
     def lipschitz_bound(self) -> Tensor:
-        """An upper bound of the Jacobian's spectral norm anywhere, ().
+        """Return an upper bound of the Jacobian's spectral norm anywhere, ().
 
         The derivative of a spline along an axis is a convex combination of the differences of
         neighbouring coefficients, per cell; the norm of the Jacobian is at most that of its columns'
@@ -124,7 +120,7 @@ class SplineField(InvariantField):
         return linalg.vector_norm(torch.stack(steepest))
 
     def adjoint(self, points: Tensor, forces: Tensor) -> Tensor:
-        """Gradient (P,) of sum forces . V(points) in the parameters; points, forces (N, d)."""
+        """Return the gradient (P,) of sum forces . V(points) in the parameters; inputs (N, d)."""
         with torch.enable_grad():
             work = (self.forward(points.detach()) * forces.detach()).sum()
             return torch.autograd.grad(work, self.parameters_)[0]
@@ -137,7 +133,9 @@ class SplineField(InvariantField):
 
 
 def grid_sides(group: CrystallographicGroup, basis: InvariantBasis) -> tuple[int, ...]:
-    """Points of the grid along each lattice vector, equally spaced and mapped to itself by the group.
+    """Return the number of points along each lattice vector of a grid that the group preserves.
+
+    The points are equally spaced.
 
     Raises:
         OrbiflowError: if there is no such grid.
@@ -151,11 +149,13 @@ def grid_sides(group: CrystallographicGroup, basis: InvariantBasis) -> tuple[int
     ):
         raise OrbiflowError(
             "a spline field needs a rectangular lattice in one to three dimensions and linear parts "
-            f"that permute and flip the axes; {group!r} has others: use FourierField"
+            f"that permute and flip the axes; {group!r} has not: use FourierField"
         )
     waves = np.abs(basis.frequencies).max(axis=0) / lengths  # per unit of length
     # multiples of four: half and quarter translations stay on the grid
-    density = 4 * math.ceil(PER_WAVE * waves.max() * lengths.min() / 4 + 1e-9) / lengths.min()
+    density = (
+        4 * math.ceil(POINTS_PER_WAVE * waves.max() * lengths.min() / 4 + 1e-9) / lengths.min()
+    )
     sides: Array = density * lengths
     shifts: Array = np.array([g.translation for g in group.cosets]) * density
     if not np.allclose(sides, np.round(sides)) or not np.allclose(shifts, np.round(shifts)):
@@ -163,8 +163,8 @@ def grid_sides(group: CrystallographicGroup, basis: InvariantBasis) -> tuple[int
     return tuple(round(m) for m in sides)
 
 
-@cached_as_written(maxsize=64)  # the segments of a flow share them
-@torch.inference_mode(False)  # what the first caller may not train, no other could
+@cached_by_basis(maxsize=64)  # the segments of a flow share them
+@torch.inference_mode(False)  # cached in inference mode, they could never be trained
 def _constants(
     group: CrystallographicGroup,
     max_frequency: int,
@@ -173,22 +173,13 @@ def _constants(
     device: torch.device,
 ) -> dict[str, Tensor]:
     basis = invariant_basis(group, max_frequency)
-    rows, columns, values = _spectrum_layout(basis, grid_sides(group, basis))
-    real = {
-        "values": values,
-        "scale": sobolev_weights(group, basis, smoothness),
-    }
-    return {
-        "rows": torch.tensor(rows, device=device),
-        "columns": torch.tensor(columns, device=device),
-        **{name: torch.tensor(x, dtype=dtype, device=device) for name, x in real.items()},
-    }
+    layout = _spectrum_layout(basis, grid_sides(group, basis))
+    scale = sobolev_weights(group, basis, smoothness)
+    return constant_tensors(layout, dtype, device, scale=scale)
 
 
-def _spectrum_layout(
-    basis: InvariantBasis, sides: tuple[int, ...]
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The invariant basis as sparse (row, column, value) of the half spectrum's real numbers.
+def _spectrum_layout(basis: InvariantBasis, sides: tuple[int, ...]) -> tuple[Array, Array, Array]:
+    """Return the invariant basis as sparse (row, column, value) of the half spectrum's real numbers.
 
     sqrt 2 (a cos + b sin) is (a - i b) / sqrt 2 at k and its conjugate at -k; divided by the
     B-splines' own transform, so that the spline goes through the field's values.

@@ -1,9 +1,9 @@
 """Sums of cubic B-splines on an even periodic grid, with hand-written derivatives.
 
-A point meets 4^d coefficients whatever the grid's size, so a fine field costs what a coarse one does.
-Points lie last inside: `u` is (d, N), in cells of the grid. The backward pass needs second derivatives,
-because the divergence is a value of its own; cubic splines have them everywhere. Derivatives of the
-backward pass itself are left to autograd.
+A value depends on 4^d coefficients for any size of the grid, so a fine field costs as much as a coarse
+one. Points are on the last axis: `u` is (d, N), in cells of the grid. The backward pass needs second
+derivatives, because the divergence is a result too; cubic splines have them everywhere. Autograd
+differentiates the backward pass itself.
 """
 
 from __future__ import annotations
@@ -16,20 +16,16 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from orbiflow.fields.transforms import (
-    plain_gradients,
-    refuse_old_batches,
-    transformed,
-)
+from orbiflow.fields.transforms import plain_gradients, refuse_old_batches, transformed
 from orbiflow.typed_torch import applied
 
 TAPS = 4
-"""Coefficients of a cubic spline that a point meets along an axis."""
+"""The number of coefficients along an axis that a cubic spline's value depends on."""
 
 
 @lru_cache(maxsize=16)
 def _polynomials(orders: int, dtype: torch.dtype, device: torch.device) -> Tensor:
-    """(4 orders, 4): the B-splines' pieces and their derivatives as polynomials of the fraction."""
+    """Return the B-splines' pieces and derivatives as polynomials of the fraction, (4 orders, 4)."""
     pieces = np.array([[1, -3, 3, -1], [4, 0, -6, 3], [1, 3, 3, -3], [0, 0, 0, 1]]) / 6
     rows = [pieces]
     for _ in range(orders - 1):
@@ -40,11 +36,11 @@ def _polynomials(orders: int, dtype: torch.dtype, device: torch.device) -> Tenso
 
 
 def cubic_weights(fraction: Tensor, orders: int = 1) -> Tensor:
-    """Weights (d, orders, 4, N) of the four nearest B-splines, and of their derivatives.
+    """Return weights (d, orders, 4, N) of the four nearest B-splines, and of their derivatives.
 
     Args:
-        fraction: (d, N) position in a cell, 0 to 1.
-        orders: 1 for values only, 2 and 3 for first and second derivatives too.
+        fraction: The positions (d, N) in a cell, 0 to 1.
+        orders: 1 for values only, 2 or 3 for first and second derivatives as well.
 
     >>> float(cubic_weights(torch.tensor([[0.25]])).sum())
     1.0
@@ -56,7 +52,7 @@ def cubic_weights(fraction: Tensor, orders: int = 1) -> Tensor:
 
 
 def symbol(size: int) -> Tensor:
-    """Fourier transform (size,) of the B-spline on its grid: what interpolation divides by.
+    """Return the Fourier transform (size,) of the B-spline on its grid: what interpolation divides by.
 
     >>> float(symbol(8)[0])
     1.0
@@ -66,7 +62,7 @@ def symbol(size: int) -> Tensor:
 
 
 def padded(table: Tensor) -> Tensor:
-    """A periodic table (C, M_1, ..., M_d) with the three cells beyond each end that splines reach."""
+    """Return a periodic table (C, M_1, ..., M_d) with the three more cells that splines reach."""
     for axis in range(1, table.dim()):
         side = table.shape[axis]
         table = torch.cat(
@@ -76,7 +72,7 @@ def padded(table: Tensor) -> Tensor:
 
 
 def _cells(sides: tuple[int, ...], u: Tensor) -> tuple[Tensor, Tensor]:
-    """Flat positions (4^d, N) in a padded table that each point meets, and its fractions (d, N)."""
+    """Return flat positions (4^d, N) in a padded table that points meet, and fractions (d, N)."""
     period = torch.tensor(sides, dtype=u.dtype, device=u.device)[:, None] - (TAPS - 1)
     u = u - period * (u / period).floor()
     first = u.floor()
@@ -92,14 +88,14 @@ def _cells(sides: tuple[int, ...], u: Tensor) -> tuple[Tensor, Tensor]:
 
 
 class _Near:
-    """Sums of one channel's near coefficients (4, ..., 4, N) against weights, partial ones kept."""
+    """Sums of one channel's coefficients (4, ..., 4, N) times weights; partial sums are kept."""
 
     def __init__(self, values: Tensor, weights: Tensor) -> None:
         self.weights = weights
         self.kept: dict[tuple[int, ...], Tensor] = {(): values}
 
     def sum(self, *orders: int) -> Tensor:
-        """(N,) for derivatives of these orders along the axes; the last axis is summed first."""
+        """Return the derivative (N,) of these orders along the axes; the last axis is summed first."""
         if orders not in self.kept:
             rest, w = self.sum(*orders[1:]), self.weights[-len(orders)][orders[0]]
             self.kept[orders] = (rest * w).sum(dim=-2)
@@ -107,7 +103,7 @@ class _Near:
 
 
 def _near(table: Tensor, flat: Tensor) -> list[Tensor]:
-    """The coefficients (4, ..., 4, N) of each channel that the points meet."""
+    """Return the coefficients (4, ..., 4, N) of each channel that the points meet."""
     shape = (*(TAPS,) * (table.dim() - 1), -1)
     return [c.reshape(-1).index_select(0, flat.reshape(-1)).reshape(shape) for c in table]
 
@@ -115,7 +111,7 @@ def _near(table: Tensor, flat: Tensor) -> list[Tensor]:
 def _sums(
     near: list[Tensor], fraction: Tensor, rates: tuple[float, ...] | None
 ) -> tuple[Tensor, Tensor]:
-    """Values (C, N) and divergence (N,), zero without rates; autograd may differentiate them."""
+    """Return values (C, N) and divergence (N,), zero without rates; autograd can differentiate it."""
     d = len(fraction)
     weights = cubic_weights(fraction, 1 if rates is None else 2)
     sums = [_Near(c, weights) for c in near]
@@ -197,12 +193,12 @@ def _on_table(
 
 
 def _unit(d: int, *axes: int) -> tuple[int, ...]:
-    """How often each of d axes is among `axes`."""
+    """Return how often each of d axes is among `axes`."""
     return tuple(axes.count(i) for i in range(d))
 
 
 def _outer(factors: list[Tensor]) -> Tensor:
-    """Product (4, ..., 4, N) of one (4, N) an axis."""
+    """Return the product (4, ..., 4, N) of one (4, N) an axis."""
     d = len(factors)
     shaped = [w.reshape(*(1,) * i, TAPS, *(1,) * (d - 1 - i), -1) for i, w in enumerate(factors)]
     product = shaped[-1]
@@ -212,14 +208,13 @@ def _outer(factors: list[Tensor]) -> Tensor:
 
 
 def spline_sum(table: Tensor, u: Tensor) -> Tensor:
-    """Values (C, N) of splines at `u` (d, N), in cells of the grid.
+    """Return values (C, N) of splines at `u` (d, N), in cells of the grid.
 
     Args:
-        table: coefficients, `padded`.
+        table: The `padded` coefficients.
 
-    Differentiable in both: the first derivatives in closed form, higher ones, and those that
-    `torch.func` takes, by ordinary operations. A cubic spline's third derivatives are constant in each
-    cell.
+    First derivatives in both arguments are in closed form; higher ones, and those of `torch.func`, use
+    ordinary operations. A cubic spline's third derivatives are constant in each cell.
     """
     return _sum(table, u, None)[0]
 
@@ -227,7 +222,7 @@ def spline_sum(table: Tensor, u: Tensor) -> Tensor:
 def spline_sum_with_divergence(
     table: Tensor, u: Tensor, rates: tuple[float, ...]
 ) -> tuple[Tensor, Tensor]:
-    """As `spline_sum` for a vector field (C = d), and sum_i rates_i d value_i / du_i (N,)."""
+    """Return `spline_sum` of a vector field (C = d), and sum_i rates_i d value_i / du_i (N,)."""
     return _sum(table, u, rates)
 
 
@@ -240,6 +235,6 @@ def _sum(table: Tensor, u: Tensor, rates: tuple[float, ...] | None) -> tuple[Ten
 def _plain_sum(
     table: Tensor, u: Tensor, rates: tuple[float, ...] | None, count: int = 2
 ) -> tuple[Tensor, ...]:
-    """The first `count` of values and divergence, by ordinary differentiable operations."""
+    """Return the first `count` of values and divergence, by ordinary differentiable operations."""
     flat, fraction = _cells(tuple(table.shape[1:]), u)
     return _sums(_near(table, flat), fraction, rates)[:count]

@@ -1,4 +1,4 @@
-"""Symmetrization: any vector field made to commute with a crystallographic group.
+"""Symmetrization, which makes any vector field commute with a crystallographic group.
 
 The mean over coset representatives (Reynolds operator, design point 2) and the paper's three
 operators (equations for P_B, R_c^K and G_l^mu of section 3), which are unnormalised sums.
@@ -15,11 +15,7 @@ import torch
 from numpy.typing import ArrayLike
 from torch import Tensor, nn
 
-from orbiflow.fields.protocol import (
-    VectorField,
-    is_time_dependent,
-    prepared_with_divergence,
-)
+from orbiflow.fields.protocol import VectorField, is_time_dependent, prepared_with_divergence
 from orbiflow.symmetry import (
     CrystallographicGroup,
     Isometry,
@@ -33,9 +29,9 @@ from orbiflow.typed_torch import linalg
 
 
 class Symmetrized(nn.Module):
-    """The field V(p) = 1/|G| sum_i R_i^-1 V0(R_i p + t_i), V0 made periodic first.
+    """The field V(p) = 1/|G| sum_i R_i^-1 V0(R_i p + t_i), where V0 is made periodic first.
 
-    See `symmetrize`. Keeps `field` as a submodule if it is one, so its parameters are trained.
+    See `symmetrize`. If `field` is a torch module it is kept as a submodule, so it can be trained.
     """
 
     def __init__(
@@ -48,17 +44,16 @@ class Symmetrized(nn.Module):
         self.time_dependent = is_time_dependent(field)
 
     def forward(self, points: Tensor, *time: Tensor) -> Tensor:
-        """V at points (..., d), and at a time () if the field is time-dependent."""
+        """Return V at points (..., d), and at a time () if the field is time-dependent."""
         images = self.group.images(points)
         field = _at_time(self.field, time)
         values = field(images) if self.periodic else blend(field, self.group.lattice, images)
         return self._mean(values, points)
 
     def with_divergence(self, points: Tensor, *time: Tensor) -> tuple[Tensor, Tensor]:
-        """V (..., d) and its divergence (...,): the mean of the given field's own at the images.
+        """Return V (..., d) and its divergence (...,): the mean of the given field's own at the images.
 
-        Derivatives are asked of the given field alone, not of what symmetrizes it: R^-1 J R has the
-        trace of J.
+        Only the given field is differentiated, not the symmetrization: R^-1 J R has the trace of J.
         """
         images = self.group.images(points)
         joint = _at_time(prepared_with_divergence(self.field), time)
@@ -69,11 +64,11 @@ class Symmetrized(nn.Module):
         return self._mean(values, points), divergence.mean(dim=0)
 
     def divergence(self, points: Tensor, *time: Tensor) -> Tensor:
-        """Trace of the Jacobian at points (..., d), as (...,)."""
+        """Return the trace of the Jacobian at points (..., d), as (...,)."""
         return self.with_divergence(points, *time)[1]
 
     def bound_with_divergence(self) -> Callable[[Tensor], tuple[Tensor, Tensor]]:
-        """V and its divergence together, see `with_divergence`."""
+        """Return V and its divergence together, see `with_divergence`."""
         return self.with_divergence
 
     def _mean(self, values: Tensor, points: Tensor) -> Tensor:
@@ -96,16 +91,16 @@ def symmetrize(
     """Make any field commute with `group`: V(g p) = R_g V(p).
 
     Args:
-        field: any callable from points (..., d) to vectors of the same shape: a torch module, a
-            function, a lambda, or a `TimeDependentField`. It need not be periodic: translates of it
-            are blended smoothly over neighbouring cells (2^d evaluations). A field that commutes
-            already is left unchanged.
-        group: of R^d.
-        periodic: set it if `field` is known to be periodic under the group's lattice (for instance a
-            network behind `PeriodicFeatures`): skips the blending.
+        field: Any callable from points (..., d) to vectors of the same shape: a torch module, a
+            function, a lambda, or a `TimeDependentField`. It need not be periodic: its translates
+            are blended smoothly over neighbouring cells (2^d evaluations). A field that already
+            commutes does not change.
+        group: A group of R^d.
+        periodic: Whether `field` is known to be periodic under the group's lattice (for instance a
+            network behind `PeriodicFeatures`), so that it need not be blended.
 
     Raises:
-        OrbiflowError: if `group` is no group, or, when called, for points of another dimension.
+        OrbiflowError: if `group` is not a group or, when called, for points of another dimension.
 
     >>> import torch
     >>> from orbiflow.symmetry import wallpaper_group
@@ -120,7 +115,7 @@ def symmetrize(
 
 
 def blend(field: VectorField, lattice: ArrayLike, points: Tensor) -> Tensor:
-    """A periodic field from any field: sum over n of w(u - n) field(B (u - n)), u = B^-1 p.
+    """Return a periodic field from any field: sum over n of w(u - n) field(B (u - n)), u = B^-1 p.
 
     w(u) = prod cos^2(pi u_i / 2) on [-1, 1]^d sums to one over the translates, so a periodic field is
     unchanged and a smooth field stays continuously differentiable.
@@ -133,7 +128,7 @@ def blend(field: VectorField, lattice: ArrayLike, points: Tensor) -> Tensor:
 def blend_with_divergence(
     joint: Callable[[Tensor], tuple[Tensor, Tensor]], lattice: ArrayLike, points: Tensor
 ) -> tuple[Tensor, Tensor]:
-    """As `blend` for a field that gives V and its divergence, both: div(w V) = w div V + grad w . V."""
+    """Blend V and its divergence: div(w V) = w div V + grad w . V."""
     shifted, at = _translates(lattice, points)
     values, divergence = joint(at)
     single = torch.cos(shifted * (torch.pi / 2)).square()
@@ -149,7 +144,7 @@ def blend_with_divergence(
 
 
 def _translates(lattice: ArrayLike, points: Tensor) -> tuple[Tensor, Tensor]:
-    """u - n for the 2^d corners n of the cell, fractional (2^d, ..., d), and as points."""
+    """Return u - n for the 2^d corners n of the cell, fractional (2^d, ..., d), and as points."""
     basis = torch.as_tensor(np.array(lattice), dtype=points.dtype, device=points.device)
     u = points @ _inverse(lattice, points).mT
     u = u - u.detach().floor()
@@ -163,7 +158,7 @@ def _inverse(lattice: ArrayLike, like: Tensor) -> Tensor:
 
 
 def periodic_operator(field: VectorField, lattice: ArrayLike) -> VectorField:
-    """P_B(V) = B o V o B^-1: a field with period 1 on each axis becomes B-periodic (eq. P_B)."""
+    """Return P_B(V) = B o V o B^-1: a field with period 1 on each axis becomes B-periodic (eq. P_B)."""
     basis = torch.as_tensor(np.array(lattice), dtype=torch.float64)
 
     def operated(points: Tensor) -> Tensor:
@@ -174,7 +169,7 @@ def periodic_operator(field: VectorField, lattice: ArrayLike) -> VectorField:
 
 
 def rotation_operator(field: VectorField, center: ArrayLike, order: int) -> VectorField:
-    """R_c^K(V) = sum over k = 1..K of R_o^-k o V o R_c^k (eq. R_c^K): a sum, not a mean."""
+    """Return R_c^K(V) = sum over k = 1..K of R_o^-k o V o R_c^k (eq. R_c^K): a sum, not a mean."""
     turn = rotation(center, order)
     powers = [identity(2)]
     for _ in range(order - 1):
@@ -183,7 +178,7 @@ def rotation_operator(field: VectorField, center: ArrayLike, order: int) -> Vect
 
 
 def transflection_operator(field: VectorField, line: Line, mu: float) -> VectorField:
-    """G_l^mu(V) = V + M_l0 o V o T_l^mu o M_l (eq. G_l^mu): a sum, not a mean."""
+    """Return G_l^mu(V) = V + M_l0 o V o T_l^mu o M_l (eq. G_l^mu): a sum, not a mean."""
     return _summed(field, [identity(2), transflection(line, mu)])
 
 

@@ -1,8 +1,8 @@
-"""Whether torch transforms what is being computed, and what hand-written derivatives do then.
+"""Hand-written derivatives under the transforms of torch.
 
-A field is evaluated by autograd functions with derivatives written by hand. `torch.func` gets the same
-sums by ordinary operations instead: nested forward mode (`jacfwd` of `jacfwd`) through an autograd
-function is silently wrong in torch 2.13, even where it has its own rules.
+Autograd functions with hand-written derivatives evaluate a field. Under `torch.func` ordinary
+operations compute the same sums: nested forward mode (`jacfwd` of `jacfwd`) through an autograd
+function is silently wrong in torch 2.13, even if the function has its own rules.
 """
 
 from __future__ import annotations
@@ -16,16 +16,16 @@ from torch.autograd import forward_ad
 
 from orbiflow.errors import OrbiflowError
 
-# torch asks them itself, and has neither a public name nor types for them
+# torch uses these itself, but has neither public names nor types for them
 _core: Any = torch._C  # pyright: ignore[reportPrivateUsage]
 _forward_mode: Any = forward_ad
 
 
 def transformed() -> bool:
-    """Whether `torch.func` (vmap, grad, jvp and what is made of them) or forward mode is at work.
+    """Return whether `torch.func` (vmap, grad, jvp and what builds on them) or forward mode is active.
 
-    Tensors may then stand for many, or carry tangents. torch has no public word for this; its own
-    autograd functions ask the same.
+    Tensors may then stand for batches, or carry tangents. torch has no public function for this; its
+    own autograd functions ask the same.
     """
     return _core._are_functorch_transforms_active() or _forward_mode._current_level >= 0
 
@@ -33,14 +33,14 @@ def transformed() -> bool:
 def plain_gradients(
     function: Callable[..., Any], inputs: tuple[Tensor, ...], ctx: Any, cotangents: Any
 ) -> list[Tensor | None]:
-    """The backward pass of an autograd function that is `function` by ordinary operations.
+    """Return the gradients of `function`, written in ordinary operations, for a backward pass.
 
-    May itself be differentiated, in any mode, and batched; None for inputs that need no gradient.
+    They can be differentiated in any mode and batched; None for inputs that need no gradient.
     """
     needed = ctx.needs_input_grad[: len(inputs)]
     if not transformed():
-        # views: were one input to depend on another, a gradient with respect to that one would also
-        # follow that path, which the outer pass follows as well
+        # views, because one input may depend on another: the gradient would follow that path here
+        # and again in the outer pass
         inputs = tuple(t.view_as(t) for t in inputs)
         chosen = [t for n, t in zip(needed, inputs, strict=True) if n]
         values = function(*inputs)
@@ -57,9 +57,10 @@ def plain_gradients(
 
 
 def refuse_old_batches(*gradients: Tensor) -> None:
-    """
+    """Refuse gradients that torch's older vectorization has batched.
+
     Raises:
-        OrbiflowError: for gradients batched by torch's older means, which know no autograd functions.
+        OrbiflowError: for such gradients, which autograd functions do not support.
     """
     if any(_core._functorch.is_legacy_batchedtensor(gradient) for gradient in gradients):
         raise OrbiflowError(

@@ -19,25 +19,20 @@ from orbiflow.fields import (
     prepared,
     prepared_with_divergence,
 )
-from orbiflow.flows.integrators import (
-    RungeKutta,
-    Watch,
-)
-from orbiflow.flows.integrators import (
-    method as find_method,
-)
+from orbiflow.flows.integrators import RungeKutta, StepCheck
+from orbiflow.flows.integrators import method as runge_kutta
 from orbiflow.runtime import one_thread
 from orbiflow.typed_torch import linalg
 
 AnyField = VectorField | TimeDependentField
 State = tuple[Tensor, ...]
 
-MANY = 2**17
-"""Coordinates from which several threads can be worth their waiting for each other."""
+MULTITHREADED_COORDINATES = 2**17
+"""The number of coordinates from which several threads can be faster than one."""
 
 
-class _Plain(nn.Module):
-    """Holds a plain callable in a module list."""
+class _FunctionSegment(nn.Module):
+    """A module that holds a plain callable."""
 
     def __init__(self, field: AnyField) -> None:
         super().__init__()
@@ -50,22 +45,22 @@ class _Plain(nn.Module):
 class Flow(nn.Module):
     """The time-one map of dx/dt = V(x, t), or of several fields one after another.
 
-    One stationary segment is the paper's model (section 2.1), more are more expressive (design point
-    5); a field may depend on time, see `orbiflow.fields.protocol`. Each segment lasts `duration`, and
-    its own clock begins at 0. If every field commutes with a group, so does the flow, to rounding, at
-    any number of steps. Small clouds of points are carried on one thread; put training, whose backward
-    passes torch runs by itself, into a block of `orbiflow.threads.one_thread`.
+    One stationary segment is the paper's model (section 2.1); more are more expressive (design point
+    5). A field may depend on time, see `orbiflow.fields.protocol`. Each segment lasts `duration`, and
+    its time begins at 0. If every field commutes with a group, so does the flow, up to rounding, for
+    any number of steps. Few points are moved on one thread; torch runs the backward passes of training
+    itself, so run those inside `orbiflow.runtime.one_thread`.
 
     Args:
-        fields: vector fields, one a segment: points (..., d) to vectors (..., d).
-        steps: Runge-Kutta steps in each segment.
+        fields: The vector fields, one per segment, from points (..., d) to vectors (..., d).
+        steps: The number of Runge-Kutta steps in each segment.
         method: "euler", "midpoint", "rk3", "rk4" or "rk5".
-        duration: length of time of each segment.
-        warn: whether to look, where parameters are new, if the steps are fine enough.
+        duration: The length of time of each segment.
+        warn: Whether to check, for new parameters, that the steps are fine enough.
 
     Raises:
-        OrbiflowError: for no field, `steps` < 1 or an unknown method; when called, for points of
-            another dtype or shape than the fields take, or a field whose values have another shape.
+        OrbiflowError: for no field, `steps` < 1 or an unknown method; when called, for points of a
+            dtype or shape that the fields do not take, or a field whose values have another shape.
 
     Warns:
         CoarseStepsWarning: once, when called, if the steps are too coarse for the fields.
@@ -100,11 +95,13 @@ class Flow(nn.Module):
                     f"a field is a callable from points to vectors, got {field!r}: see "
                     "orbiflow.fields"
                 )
-        self.segments = nn.ModuleList(f if isinstance(f, nn.Module) else _Plain(f) for f in listed)
+        self.segments = nn.ModuleList(
+            f if isinstance(f, nn.Module) else _FunctionSegment(f) for f in listed
+        )
         self._duration = float(duration)
         self._steps = _checked_steps(steps)
-        self._method: RungeKutta = find_method(method)
-        self._watch = Watch() if warn else None
+        self._method: RungeKutta = runge_kutta(method)
+        self._step_check = StepCheck() if warn else None
 
     @property
     def steps(self) -> int:
@@ -128,22 +125,21 @@ class Flow(nn.Module):
 
     @property
     def warns(self) -> bool:
-        """Whether it looks if its steps are fine enough."""
-        return self._watch is not None
+        """Whether the flow checks that its steps are fine enough."""
+        return self._step_check is not None
 
     def fields(self) -> list[Any]:
-        """The vector fields, one a segment, as they were given."""
-        return [s.field if isinstance(s, _Plain) else s for s in self.segments]
+        """Return the given vector fields, one per segment."""
+        return [s.field if isinstance(s, _FunctionSegment) else s for s in self.segments]
 
     def with_steps(self, steps: int, *, method: str | None = None) -> Self:
-        """The same flow integrated otherwise: a view that shares fields and parameters.
+        """Return a view of the flow, with the same fields and parameters, integrated otherwise.
 
-        This flow stays as it is, so others that hold it notice nothing. A view has the same
-        `state_dict`; training it trains this flow.
+        This flow does not change. The view has the same `state_dict`; training it trains this flow.
 
         Args:
-            steps: Runge-Kutta steps in each segment.
-            method: as in the constructor; default this flow's.
+            steps: The number of Runge-Kutta steps in each segment.
+            method: As in the constructor. Default: this flow's.
 
         Raises:
             OrbiflowError: for `steps` < 1 or an unknown method.
@@ -152,55 +148,55 @@ class Flow(nn.Module):
         >>> flow.with_steps(2 * flow.steps).steps, flow.steps
         (16, 8)
         """
-        view = copy.copy(self)  # shallow: of modules and parameters it holds the very same
+        view = copy.copy(self)  # shallow: it shares modules and parameters
         view._steps = _checked_steps(steps)
         if method is not None:
-            view._method = find_method(method)
-        view._watch = None if self._watch is None else Watch()
+            view._method = runge_kutta(method)
+        view._step_check = None if self._step_check is None else StepCheck()
         return view
 
     def forward(self, points: Tensor) -> Tensor:
-        """Where points (..., d) are carried."""
-        self._look(points)
+        """Return where the flow takes points (..., d)."""
+        self._check(points)
         return self.carried(points)
 
     def inverse(self, points: Tensor) -> Tensor:
-        """Where points (..., d) come from: the same equation backwards, to the integrator's order."""
-        self._look(points, inverse=True)
+        """Return where points (..., d) come from: the equation backwards, to the integrator's order."""
+        self._check(points, inverse=True)
         return self.carried(points, inverse=True)
 
     def carried(self, points: Tensor, *, inverse: bool = False) -> Tensor:
-        """`forward` or `inverse`, without a look at whether the steps are fine enough."""
+        """Return `forward` or `inverse` without the check that the steps are fine enough."""
         return self._last(points, (points,), inverse=inverse)[0]
 
     def forward_and_log_det(self, points: Tensor) -> tuple[Tensor, Tensor]:
-        """`forward` and the log-determinant of its Jacobian, from one integration.
+        """Return `forward` and the log-determinant of its Jacobian, from one integration.
 
         The second is the integral of the divergence along the path (instantaneous change of
         variables; paper, section 5.2), shape (...,).
         """
-        self._look(points)
+        self._check(points)
         return self._with_log_det(points, inverse=False)
 
     def inverse_and_log_det(self, points: Tensor) -> tuple[Tensor, Tensor]:
-        """`inverse` and the log-determinant of the inverse's Jacobian."""
-        self._look(points, inverse=True)
+        """Return `inverse` and the log-determinant of the inverse's Jacobian."""
+        self._check(points, inverse=True)
         return self._with_log_det(points, inverse=True)
 
     def log_abs_det_jacobian(self, points: Tensor) -> Tensor:
-        """log |det D forward| at points (..., d), as (...,)."""
+        """Return log |det D forward| at points (..., d), as (...,)."""
         return self.forward_and_log_det(points)[1]
 
     def trajectories(self, points: Tensor) -> Tensor:
-        """The paths: (T + 1, ..., d) with T = segments x steps, the points themselves first."""
-        self._look(points)
-        with _calmly(points):
+        """Return the paths: (T + 1, ..., d) with T = segments x steps, the points themselves first."""
+        self._check(points)
+        with _thread_limit(points):
             states = self._walk((points,), inverse=False)
             return torch.stack([points, *(state[0] for state in states)])
 
     @torch.no_grad()
     def error_estimate(self, points: Tensor, *, inverse: bool = False) -> float:
-        """Largest distance between the results with `steps` and with twice as many.
+        """Return the largest distance between the results with `steps` and with twice as many.
 
         For a method of order p the error at `steps` is about 2^p / (2^p - 1) times this.
         """
@@ -208,10 +204,10 @@ class Flow(nn.Module):
         apart = self.carried(points, inverse=inverse) - fine
         return float(linalg.vector_norm(apart, dim=-1).max())
 
-    def _look(self, points: Tensor, *, inverse: bool = False) -> None:
+    def _check(self, points: Tensor, *, inverse: bool = False) -> None:
         _check_points(points)
-        if self._watch is not None:
-            self._watch.look(self, points, inverse=inverse)
+        if self._step_check is not None:
+            self._step_check.look(self, points, inverse=inverse)
 
     def _with_log_det(self, points: Tensor, *, inverse: bool) -> tuple[Tensor, Tensor]:
         start = (points, points.new_zeros(points.shape[:-1]))
@@ -220,7 +216,7 @@ class Flow(nn.Module):
 
     def _last(self, points: Tensor, start: State, *, inverse: bool) -> State:
         last = start
-        with _calmly(points):
+        with _thread_limit(points):
             try:
                 for state in self._walk(start, inverse=inverse):
                     last = state
@@ -230,7 +226,7 @@ class Flow(nn.Module):
         return last
 
     def _walk(self, state: State, *, inverse: bool) -> Iterator[State]:
-        """The states after every step: points (..., d) and, if begun with one, the log-determinant."""
+        """Yield the state after every step: points (..., d), and the log-determinant if given one."""
         size = len(state)
         h = (-self.duration if inverse else self.duration) / self.steps
         fields = self.fields()
@@ -246,7 +242,7 @@ class Flow(nn.Module):
             state = state[:size]
 
     def _explain(self, points: Tensor, error: RuntimeError) -> None:
-        """Raise in torch's place if the dtypes of points and parameters differ."""
+        """Explain torch's error if the dtypes of points and parameters differ."""
         for name, parameter in self.named_parameters():
             if parameter.is_floating_point() and parameter.dtype != points.dtype:
                 raise OrbiflowError(
@@ -277,13 +273,13 @@ def _check_points(points: Tensor) -> None:
         )
 
 
-def _calmly(points: Tensor) -> contextlib.AbstractContextManager[None]:
-    small = points.device.type == "cpu" and points.numel() < MANY
+def _thread_limit(points: Tensor) -> contextlib.AbstractContextManager[None]:
+    small = points.device.type == "cpu" and points.numel() < MULTITHREADED_COORDINATES
     return one_thread() if small else contextlib.nullcontext()
 
 
 def _slope(field: Callable[..., Tensor], with_log_det: bool) -> Callable[[State], State]:
-    # fields that prepare weights do so once a segment, not once a stage
+    # fields prepare their weights once per segment, not once per stage
     timed = is_time_dependent(field)
     both = prepared_with_divergence(field) if with_log_det else None
     plain = None if with_log_det else prepared(field)

@@ -31,13 +31,13 @@ State = TypeVar("State", bound=tuple[Tensor, ...])
 
 @dataclass(frozen=True)
 class RungeKutta:
-    """Butcher tableau of an explicit method for an autonomous equation.
+    """The Butcher tableau of an explicit method for an autonomous equation.
 
     Args:
-        name: for people and files.
-        order: of convergence.
-        stages: row i holds the coefficients of the earlier slopes at stage i + 1.
-        weights: of the slopes in the step.
+        name: The method's name, for people and files.
+        order: The order of convergence.
+        stages: The coefficients; row i holds those of the earlier slopes at stage i + 1.
+        weights: The weights of the slopes in the step.
     """
 
     name: str
@@ -47,11 +47,11 @@ class RungeKutta:
 
     @cached_property
     def injective_below(self) -> float:
-        """Largest h L for which a step h of a field of Lipschitz constant L is injective for sure.
+        """The largest h L for which a step h of a field of Lipschitz constant L must be injective.
 
         A step is x + h I(x), injective if h I has a Lipschitz constant below 1. That of a stage's
         slope is at most L (1 + h sum_k |a_ik| times the earlier stages'), that of I their sum with
-        |weights|: a polynomial in h L, of which this is the place where h I reaches 1.
+        |weights|: a polynomial in h L. The result is where h I reaches 1.
 
         >>> round(METHODS["midpoint"].injective_below, 3)
         0.732
@@ -70,7 +70,7 @@ class RungeKutta:
         return low
 
     def step(self, slope: Callable[[State], State], state: State, h: float) -> State:
-        """One step of length h of d state / dt = slope(state)."""
+        """Return the state after one step of length h of d state / dt = slope(state)."""
         slopes = [slope(state)]
         for row in self.stages:
             slopes.append(slope(_advance(state, slopes, row, h)))
@@ -92,12 +92,7 @@ METHODS: dict[str, RungeKutta] = {
     for method in (
         RungeKutta("euler", 1, (), (1.0,)),
         RungeKutta("midpoint", 2, ((0.5,),), (0.0, 1.0)),
-        RungeKutta(
-            "rk4",
-            4,
-            ((0.5,), (0.0, 0.5), (0.0, 0.0, 1.0)),
-            (1 / 6, 1 / 3, 1 / 3, 1 / 6),
-        ),
+        RungeKutta("rk4", 4, ((0.5,), (0.0, 0.5), (0.0, 0.0, 1.0)), (1 / 6, 1 / 3, 1 / 3, 1 / 6)),
         # Kutta's third-order method
         RungeKutta("rk3", 3, ((0.5,), (-1.0, 2.0)), (1 / 6, 2 / 3, 1 / 6)),
         # Butcher's six-stage fifth-order method (Hairer, Norsett, Wanner, section II.5)
@@ -129,21 +124,21 @@ def method(name: str) -> RungeKutta:
     return METHODS[name]
 
 
-SAMPLE = 128
-"""Points that are carried at twice the steps."""
+CHECKED_POINTS = 128
+"""The number of points that are also moved with twice the steps."""
 
-TOLERANCE = 0.05
-"""Largest error that is let pass, as a share of the way that the points are carried."""
+COARSE_ERROR = 0.05
+"""The largest accepted error, as a share of the distance that the points move."""
 
-GOOD = 1e-4
-"""Error at the steps that a warning advises."""
+FINE_ERROR = 1e-4
+"""The largest error with the number of steps that a warning advises."""
 
-MOST_STEPS = 1024
-"""Up to which a warning looks for steps that are fine enough."""
+MAX_ADVISED_STEPS = 1024
+"""The largest number of steps that a warning tries."""
 
 
-class Watch:
-    """Looks at a flow where its parameters are new, in training ever more rarely; warns once."""
+class StepCheck:
+    """A check of a flow's steps for new parameters, less and less often in training; warns once."""
 
     def __init__(self) -> None:
         self.warned = False
@@ -151,16 +146,16 @@ class Watch:
         self._calls, self._next = 0, 1
 
     def look(self, flow: Flow, points: Tensor, *, inverse: bool) -> None:
-        """Warn if `flow` carries some of `points` (..., d) elsewhere at twice its steps.
+        """Warn if `flow` moves some of `points` (..., d) elsewhere with twice its steps.
 
         Warns:
             CoarseStepsWarning: with the error found and how many steps to take.
         """
         if self.warned or transformed() or points.numel() == 0 or not self._is_due(flow):
-            return  # where torch transforms a flow there are no numbers to look at
-        # a check may not break what it checks, be it traced
+            return  # under the transforms of torch there are no numbers to check
+        # the check must not break a flow that is being traced
         with contextlib.suppress(RuntimeError):
-            message = _complaint(flow, points, inverse)
+            message = _warning(flow, points, inverse)
             if message:
                 self.warned = True
                 warnings.warn(message, CoarseStepsWarning, stacklevel=6)
@@ -180,43 +175,43 @@ class Watch:
 
 
 @torch.no_grad()
-def _complaint(flow: Flow, points: Tensor, inverse: bool) -> str:
-    if _surely_fine(flow):
+def _warning(flow: Flow, points: Tensor, inverse: bool) -> str:
+    if _provably_fine(flow):
         return ""
-    few = _some(points.detach())
+    few = _sampled(points.detach())
     error = _relative_error(flow, few, inverse)
-    if not error > TOLERANCE:
+    if not error > COARSE_ERROR:
         return ""
     steps = flow.steps
     now = error
-    while now > GOOD and steps < MOST_STEPS:
+    while now > FINE_ERROR and steps < MAX_ADVISED_STEPS:
         steps *= 2
         now = _relative_error(flow.with_steps(steps), few, inverse)
-    advice = f"raise steps to {steps}" if now <= GOOD else f"raise steps beyond {steps}"
+    advice = f"raise steps to {steps}" if now <= FINE_ERROR else f"raise steps beyond {steps}"
     return (
-        f"{flow.steps} {flow.method} steps a segment are too coarse for this flow: twice as many "
-        f"carry points elsewhere by {100 * error:.0f} % of their way; {advice}, "
+        f"{flow.steps} {flow.method} steps per segment are too coarse for this flow: with twice as "
+        f"many, points move elsewhere by {100 * error:.0f} % of their way; {advice}, "
         "flow.with_steps(n) or Flow(..., steps=n), or make the field smaller"
     )
 
 
-def _surely_fine(flow: Flow) -> bool:
-    """Whether the fields' own bounds say that each step errs little: (h L)^p / (p + 1)!."""
+def _provably_fine(flow: Flow) -> bool:
+    """Return whether the fields' bounds prove the error of a step small: (h L)^p / (p + 1)!."""
     bounds = [lipschitz_bound(field) for field in flow.fields()]
     known = [bound for bound in bounds if bound is not None]
     if len(known) < len(bounds):
         return False
     product = abs(flow.duration) / flow.steps * max(known)
     order = flow.integrator.order
-    return product**order / math.factorial(order + 1) <= TOLERANCE / 10
+    return product**order / math.factorial(order + 1) <= COARSE_ERROR / 10
 
 
-def _some(points: Tensor) -> Tensor:
-    """Some of the points; the first axes may be those of a stack of fields."""
-    if points.dim() < 2 or points.shape[-2] <= SAMPLE:
+def _sampled(points: Tensor) -> Tensor:
+    """Return a sample of the points; the first axes may be those of a stack of fields."""
+    if points.dim() < 2 or points.shape[-2] <= CHECKED_POINTS:
         return points
     count = points.shape[-2]
-    chosen: Iterable[int] = (i * count // SAMPLE for i in range(SAMPLE))
+    chosen: Iterable[int] = (i * count // CHECKED_POINTS for i in range(CHECKED_POINTS))
     return points[..., list(chosen), :]
 
 

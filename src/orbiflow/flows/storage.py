@@ -10,37 +10,16 @@ from typing import Any, cast
 import torch
 from torch import Tensor, nn
 
-from orbiflow.arguments import (
-    instance,
-    number,
-    whole,
-)
-from orbiflow.arguments import (
-    path as as_path,
-)
+from orbiflow.arguments import instance, number, whole
+from orbiflow.arguments import path as as_path
 from orbiflow.errors import InputFileError, OrbiflowError
-from orbiflow.fields import (
-    FourierField,
-    InvariantField,
-    PeriodicFeatures,
-    SplineField,
-    Symmetrized,
-)
+from orbiflow.fields import FourierField, InvariantField, PeriodicFeatures, SplineField, Symmetrized
 from orbiflow.flows.flow import Flow
-from orbiflow.runtime import (
-    is_list,
-    read_tensors,
-    tensor_bytes,
-    write_atomic,
-)
-from orbiflow.symmetry import (
-    CrystallographicGroup,
-    group_from_header,
-    group_header,
-)
+from orbiflow.runtime import is_list, read_tensors, tensor_bytes, write_atomic
+from orbiflow.symmetry import CrystallographicGroup, group_from_header, group_header
 
-Makers = Mapping[str, Callable[[], Any]]
-"""What makes a user's own fields, without their parameters, by the field's name or place."""
+FieldFactories = Mapping[str, Callable[[], Any]]
+"""Functions that create a user's own fields, by the name or the place of the field."""
 
 MAX_GROUPS, MAX_LAYERS, MAX_NESTING, MAX_FREQUENCY = 64, 64, 4, 10**6
 
@@ -56,16 +35,16 @@ DTYPES = {
 
 
 class Writer:
-    """Takes fields apart; `groups` are those that they share, by the numbers they are written in."""
+    """A writer of fields as JSON; `groups` holds the headers of the groups that they share."""
 
     def __init__(self) -> None:
         self.groups: list[dict[str, Any]] = []
 
     def header(self, field: Any, place: str) -> dict[str, Any]:
-        """The field at `place` in the flow, ready for JSON.
+        """Return the field at `place` in the flow, ready for JSON.
 
         Raises:
-            OrbiflowError: for a function without a name to ask for it by.
+            OrbiflowError: for a function without a name.
         """
         kind = type(cast(object, field))
         if kind in _SERIES_NAMES:
@@ -110,22 +89,24 @@ class Writer:
 
 
 class Reader:
-    """Makes fields again, without their parameters; sizes are checked before anything is made."""
+    """A reader that creates fields without their parameters, after it has checked all sizes."""
 
-    def __init__(self, groups: Any, shapes: Mapping[str, tuple[int, ...]], makers: Makers) -> None:
+    def __init__(
+        self, groups: Any, shapes: Mapping[str, tuple[int, ...]], makers: FieldFactories
+    ) -> None:
         if not is_list(groups) or len(groups) > MAX_GROUPS:
             raise OrbiflowError(f"expected at most {MAX_GROUPS} groups")
         self.groups = [group_from_header(header, header["name"]) for header in groups]
         self.shapes, self.makers = shapes, makers
 
     def field(self, header: Mapping[str, Any], place: str, nesting: int = 0) -> Any:
-        """The field whose tensors' names begin with `place`.
+        """Return the field whose tensors' names begin with `place`.
 
         Raises:
             OrbiflowError, KeyError, TypeError, ValueError: for what does not fit.
         """
         if nesting > MAX_NESTING:
-            raise OrbiflowError(f"fields within more than {MAX_NESTING} others")
+            raise OrbiflowError(f"fields are nested more than {MAX_NESTING} deep")
         kind = header["kind"]
         if kind in SERIES:
             return self._series(header, place)
@@ -152,7 +133,7 @@ class Reader:
         batch = None if header["batch"] is None else whole(header["batch"], "batch", 0)
         expected = (count,) if batch is None else (batch, count)
         self._check(f"{place}.parameters_", expected)
-        # nearly one coefficient in |G| is free: no header makes more work than its file has numbers
+        # about one coefficient in |G| is free, so the file's size bounds the work of its header
         if (2 * frequency + 1) ** group.dim * group.dim > 4 * group.order * (count + 100):
             raise OrbiflowError(f"max_frequency {frequency} with {count} parameters")
         options: dict[str, Any] = {
@@ -185,12 +166,12 @@ class Reader:
         make = self.makers.get(place) or self.makers.get(name)
         if make is None:
             raise OrbiflowError(
-                f"{place} is a field of your own, {name}, of which a file holds the parameters "
-                f"alone: load_flow(path, modules={{{name!r}: make}}), make() giving one"
+                f"{place} is a field of your own, {name}, and the file holds only its parameters: "
+                f"call load_flow(path, modules={{{name!r}: make}}), where make() creates the field"
             )
         made = make()
         if not callable(made):
-            raise OrbiflowError(f"modules[{name!r}] made no field but {made!r}")
+            raise OrbiflowError(f"modules[{name!r}] must create a field, it created {made!r}")
         return made
 
     def _check(self, name: str, expected: tuple[int, ...]) -> None:
@@ -199,7 +180,7 @@ class Reader:
 
 
 def is_perceptron(field: Any) -> bool:
-    """Whether it is built as that of `neural_field` is."""
+    """Return whether `field` is built like the network of `neural_field`."""
     if type(field) is not nn.Sequential or len(field) < 2 or len(field) % 2:
         return False
     wanted = [PeriodicFeatures, *[nn.Linear, nn.Tanh] * (len(field) // 2)][: len(field)]
@@ -213,8 +194,8 @@ def _own_name(field: Any, place: str) -> str:
     name = type(field).__name__ if isinstance(field, nn.Module) else getattr(field, "__name__", "")
     if not name.isidentifier():
         raise OrbiflowError(
-            f"{place} is a function without a name, {field!r}, which no file holds: define it with "
-            "def, or as a torch module, and give it to load_flow(path, modules=...) by its name"
+            f"{place} is a function without a name, {field!r}, which cannot be saved: define it "
+            "with def, or as a torch module, and pass it to load_flow(path, modules=...) by its name"
         )
     return name
 
@@ -222,12 +203,14 @@ def _own_name(field: Any, place: str) -> str:
 def _dtype(tensor: torch.Tensor) -> str:
     name = str(tensor.dtype).removeprefix("torch.")
     if name not in DTYPES:
-        raise OrbiflowError(f"parameters of {tensor.dtype} are not saved: {', '.join(DTYPES)} are")
+        raise OrbiflowError(
+            f"parameters of {tensor.dtype} cannot be saved: convert them to {', '.join(DTYPES)}"
+        )
     return name
 
 
 def finite(value: Any, name: str) -> float:
-    """`value` as a finite number."""
+    """Return `value` if it is a finite number."""
     return number(value, name, -math.inf)
 
 
@@ -236,13 +219,13 @@ MAX_SEGMENTS, MAX_STEPS = 256, 2**20
 
 
 def save_flow(flow: Flow, path: str | Path) -> Path:
-    """Write a flow to a file that `load_flow` reads, parameters bit for bit; returns the path.
+    """Write a flow to a file that `load_flow` reads, with bit-identical parameters; return the path.
 
-    Its fields may be of any kind of `orbiflow.fields`, symmetrized ones included. Of a field of your
-    own, a module or a function, the file holds the parameters and the name: `load_flow` asks for it.
+    Its fields may be of any kind in `orbiflow.fields`, also symmetrized. For a field of your own, a
+    module or a function, the file holds the parameters and the name, by which `load_flow` takes it.
 
     Raises:
-        OrbiflowError: naming the part that cannot be saved.
+        OrbiflowError: if a part, which it names, cannot be saved.
         OutputError: if the file cannot be written.
     """
     path = as_path(path, "the flow's file")
@@ -255,8 +238,8 @@ def save_flow(flow: Flow, path: str | Path) -> Path:
     fields = flow.fields()
     if len(fields) > MAX_SEGMENTS or flow.steps > MAX_STEPS:
         raise OrbiflowError(
-            f"the flow has {len(fields)} segments of {flow.steps} steps; saved are at most "
-            f"{MAX_SEGMENTS} of {MAX_STEPS}"
+            f"the flow has {len(fields)} segments of {flow.steps} steps; at most {MAX_SEGMENTS} "
+            f"segments of {MAX_STEPS} steps can be saved"
         )
     tensors = flow.state_dict()
     _check_finite(tensors)
@@ -280,14 +263,14 @@ def save_flow(flow: Flow, path: str | Path) -> Path:
     return write_atomic(path, tensor_bytes(header, tensors, "a flow"))
 
 
-def load_flow(path: str | Path, *, modules: Makers | None = None) -> Flow:
-    """The flow that `save_flow` wrote, on the CPU.
+def load_flow(path: str | Path, *, modules: FieldFactories | None = None) -> Flow:
+    """Return the flow that `save_flow` wrote, on the CPU.
 
     Args:
-        path: of the file.
-        modules: for each field of your own, by the name of its class or function, or by its place such
-            as "segments.0.field": a callable without arguments that gives one, whose parameters are
-            then filled in. Nothing in a file is ever run.
+        path: The path of the file.
+        modules: A function without arguments that creates each field of your own, by the name of its
+            class or function, or by its place such as "segments.0.field". Its parameters are filled
+            in. Nothing in a file is ever run.
 
     Raises:
         InputFileError: if the file is missing, too large, damaged or of another kind, or asks for a
@@ -305,13 +288,15 @@ def load_flow(path: str | Path, *, modules: Makers | None = None) -> Flow:
     try:
         if header["format"] != FORMAT:
             raise OrbiflowError(f"format {header['format']!r}")
-        with torch.inference_mode(False):  # what is made in it could never be differentiated
+        with torch.inference_mode(False):  # otherwise it could never be differentiated
             return _restored(header, tensors, modules or {})
     except (OrbiflowError, ValueError, KeyError, TypeError, RecursionError, RuntimeError) as error:
-        raise InputFileError(f"{path}: no flow can be made of it: {error}") from error
+        raise InputFileError(f"{path}: cannot be read as a flow: {error}") from error
 
 
-def _restored(header: Mapping[str, Any], tensors: dict[str, Tensor], makers: Makers) -> Flow:
+def _restored(
+    header: Mapping[str, Any], tensors: dict[str, Tensor], makers: FieldFactories
+) -> Flow:
     _check_finite(tensors)
     segments = header["segments"]
     if not is_list(segments) or not 1 <= len(segments) <= MAX_SEGMENTS:
@@ -340,7 +325,7 @@ def _fill(flow: Flow, tensors: Mapping[str, Tensor]) -> None:
     for name in (*expected, *tensors):
         if name not in tensors or name not in expected:
             where = "its fields" if name in expected else "the file"
-            raise OrbiflowError(f"{name} is in {where} alone")
+            raise OrbiflowError(f"{name} is only in {where}")
         if expected[name].shape != tensors[name].shape:
             raise OrbiflowError(
                 f"{name} has shape {tuple(tensors[name].shape)}, expected "

@@ -12,7 +12,7 @@ from .group import CrystallographicGroup as CrystallographicGroup
 from .group import checked_group as checked_group
 from .group import checked_lattice as checked_lattice
 from .group import reduced_basis as reduced_basis
-from .headers import cached_as_written as cached_as_written
+from .headers import cached_by_basis as cached_by_basis
 from .headers import group_from_header as group_from_header
 from .headers import group_header as group_header
 from .isometry import Isometry as Isometry

@@ -9,12 +9,7 @@ from numpy.typing import ArrayLike
 
 from orbiflow.errors import GroupError, NotAnIsometryError
 from orbiflow.symmetry.group import CrystallographicGroup, checked_lattice
-from orbiflow.symmetry.isometry import (
-    Isometry,
-    Line,
-    rotation,
-    transflection,
-)
+from orbiflow.symmetry.isometry import Isometry, Line, rotation, transflection
 
 LATTICES: dict[str, list[list[float]]] = {
     "oblique": [[1.0, 0.3], [0.0, 1.1]],
@@ -23,7 +18,7 @@ LATTICES: dict[str, list[list[float]]] = {
     "square": [[1.0, 0.0], [0.0, 1.0]],
     "hexagonal": [[1.0, -0.5], [0.0, 0.8660254037844386]],
 }
-"""One lattice of each system, basis vectors as columns; any other of the system may be given."""
+"""A default lattice of each system, with basis vectors as columns."""
 
 
 class WallpaperGroup(NamedTuple):
@@ -69,7 +64,11 @@ WALLPAPER_GROUPS: dict[str, WallpaperGroup] = {
 
 
 def wallpaper_group(name: str, lattice: ArrayLike | None = None) -> CrystallographicGroup:
-    """The wallpaper group `name` on `lattice` (2, 2, columns), by default one of its system.
+    """Return the wallpaper group `name`.
+
+    Args:
+        name: The group's name, one of `WALLPAPER_GROUPS`.
+        lattice: The basis vectors as columns, shape (2, 2). Default: a lattice of the group's system.
 
     Raises:
         GroupError: for an unknown name, or a lattice that is not of the group's system.
@@ -123,7 +122,7 @@ IDENTIFICATION_SPACES: dict[str, IdentificationSpace] = {
 
 
 def identification_group(space: str) -> CrystallographicGroup:
-    """The group of an identification space, acting on the plane with canonical square [0, 1]^2.
+    """Return the group of an identification space, with canonical square [0, 1]^2.
 
     Raises:
         GroupError: for an unknown space.

@@ -1,4 +1,4 @@
-"""Reduce points to a fundamental domain: the Dirichlet domain of a site."""
+"""Dirichlet domains, which contain one point of each orbit of a group."""
 
 from __future__ import annotations
 
@@ -11,22 +11,18 @@ from numpy.typing import ArrayLike
 from orbiflow.arrays import Array
 from orbiflow.errors import GroupError
 from orbiflow.symmetry.group import CrystallographicGroup
-from orbiflow.symmetry.isometry import (
-    Isometry,
-    Points,
-    cast_like,
-)
+from orbiflow.symmetry.isometry import Isometry, Points, cast_like
 
 
 class DirichletDomain:
-    """The points nearer to `site` than to any other point of its orbit: a fundamental domain.
+    """The fundamental domain of the points nearer to `site` than to any other point of its orbit.
 
     For the four identification spaces and the site (1/2, 1/2) it is the paper's canonical square,
     and `project` the canonical projection (paper, section 5.2; design point 12).
 
     Args:
-        group: any crystallographic group.
-        site: (d,) point moved by every element but the identity.
+        group: Any crystallographic group.
+        site: A point (d,) that every element but the identity moves.
 
     Raises:
         GroupError: if an element fixes the site.
@@ -39,7 +35,9 @@ class DirichletDomain:
             raise GroupError(f"the site must be {group.dim} finite numbers, got {site!r}")
         size = group.cell_volume ** (1 / group.dim)
         for g in group.elements_near(self.site, 1e-6 * size)[1:]:
-            raise GroupError(f"the site {self.site.tolist()} is fixed by {g!r}: move it off")
+            raise GroupError(
+                f"the site {self.site.tolist()} is fixed by {g!r}: choose another point"
+            )
 
     @cached_property
     def _candidates(self) -> list[Isometry]:
@@ -53,7 +51,7 @@ class DirichletDomain:
         return np.stack([g(self.site) for g in self._candidates])
 
     def locate(self, points: Points) -> tuple[Points, Array]:
-        """Points wrapped to the lattice cell, and the index of the nearest image of the site."""
+        """Return the points wrapped to the lattice cell, and the nearest image of the site."""
         wrapped = self.group.wrap(points)
         plain = wrapped.detach().cpu().numpy() if isinstance(wrapped, torch.Tensor) else wrapped
         flat = np.asarray(plain, dtype=np.float64).reshape(-1, self.group.dim)
@@ -65,7 +63,7 @@ class DirichletDomain:
         return wrapped, nearest.reshape(plain.shape[:-1])
 
     def project(self, points: Points) -> Points:
-        """Representatives in the domain of the orbits of points, shape (..., d).
+        """Return the points (..., d) of the domain in the orbits of `points` (..., d).
 
         Differentiable almost everywhere for torch tensors.
         """

@@ -13,14 +13,14 @@ from orbiflow.symmetry.isometry import Isometry, Line
 
 
 class RotationCenter(NamedTuple):
-    """A point (2,) about which the group has rotations by 2 pi / order, and no smaller angle."""
+    """A point (2,) about which 2 pi / order is the group's smallest angle of rotation."""
 
     point: Array
     order: int
 
 
 class GlideLine(NamedTuple):
-    """A line along which the group glides by `shift`, the least such; a mirror if it is zero."""
+    """A line along which `shift` is the group's smallest glide; a mirror if it is zero."""
 
     line: Line
     shift: float
@@ -32,7 +32,7 @@ class GlideLine(NamedTuple):
 
 
 class SymmetryElements(NamedTuple):
-    """What `symmetry_elements` finds."""
+    """The rotation centres and the mirror and glide lines that `symmetry_elements` finds."""
 
     centers: tuple[RotationCenter, ...]
     lines: tuple[GlideLine, ...]
@@ -41,12 +41,12 @@ class SymmetryElements(NamedTuple):
 def symmetry_elements(
     group: CrystallographicGroup, center: Array | None = None, radius: float | None = None
 ) -> SymmetryElements:
-    """Rotation centres in a disc, and the mirror and glide lines that cross it.
+    """Return the rotation centres in a disc, and the mirror and glide lines that cross it.
 
     Args:
-        group: of the plane.
-        center: (2,) middle of the disc, default the middle of the cell B [0, 1)^2.
-        radius: of the disc, default the radius of the cell, so that every orbit is represented.
+        group: A group of the plane.
+        center: The centre (2,) of the disc. Default: the middle of the cell B [0, 1)^2.
+        radius: The radius of the disc. Default: the cell's, so that every orbit is represented.
 
     Raises:
         GroupError: if the group is not one of the plane.
@@ -98,7 +98,7 @@ def _lines(elements: list[Isometry], middle: Array, reach: float) -> list[GlideL
 
 
 def _axis(g: Isometry, middle: Array, reach: float) -> GlideLine:
-    """Line and glide of an orientation-reversing isometry, with the point next to `middle`."""
+    """Return the line (its point nearest to `middle`) and glide of a reversing isometry."""
     angle = np.arctan2(g.linear[1, 0], g.linear[0, 0]) / 2
     direction = np.array([np.cos(angle), np.sin(angle)])
     moved = g(middle) - middle

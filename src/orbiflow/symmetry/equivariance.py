@@ -20,10 +20,10 @@ Kind = Literal["field", "map", "invariant"]
 
 
 class EquivarianceError(AssertionError):
-    """A function that does not commute with a group; the message names the element and the error.
+    """A function that does not commute with a group.
 
-    - `element`: of the group.
-    - `error`: the largest deviation.
+    - `element`: The element of the group for which it fails.
+    - `error`: The largest deviation.
     """
 
     def __init__(self, message: str, element: Isometry, error: float) -> None:
@@ -45,25 +45,25 @@ def assert_equivariant(
 ) -> None:
     """Raise unless `function` commutes with `group` at sampled points, in any dimension.
 
-    For tests of your own fields and maps. Every coset representative g is tried, moved by up to
-    `cells` cells along each lattice vector, against what the kind asks for:
+    Use it to test your own fields and maps. Every coset representative g, moved by up to `cells`
+    cells along each lattice vector, is checked against the law of the kind:
 
     - "field": V(g p) = R_g V(p), vectors are pushed forward by the linear part (paper, section 3);
     - "map": D(g p) = g D(p), such as a flow;
     - "invariant": f(g p) = f(p), such as a log-density.
 
     Args:
-        function: of points (N, d).
-        group: of R^d.
+        function: A function of points (N, d).
+        group: A group of R^d.
         kind: "field", "map" or "invariant".
-        points: (N, d); default 32 random ones of float64 in a cell.
-        atol, rtol: deviations up to atol + rtol times the largest value are let pass.
-        cells: how far to go.
-        seed: of the default points and of the translations.
+        points: Points (N, d). Default: 32 random float64 points in a cell.
+        atol, rtol: Deviations up to atol + rtol times the largest value are accepted.
+        cells: The largest number of cells to move by.
+        seed: The seed of the default points and of the translations.
 
     Raises:
         EquivarianceError: an AssertionError that names the worst coset, the error and the point.
-        OrbiflowError: for an unknown kind, or values of another shape than asked for.
+        OrbiflowError: for an unknown kind, or values of the wrong shape.
 
     >>> from orbiflow.symmetry import wallpaper_group
     >>> p4 = wallpaper_group("p4")
@@ -114,7 +114,7 @@ def _failure(
 def _elements(
     group: CrystallographicGroup, cells: int, seed: int
 ) -> Iterator[tuple[int, Isometry]]:
-    """Each coset's number from 1 with: its representative, and some of it in other cells."""
+    """Yield each coset's number, from 1, with its representative and some translates of it."""
     d = group.dim
     steps: list[Array] = [
         np.array(s) for s in itertools.product((-cells, 0, cells), repeat=d) if any(s)

@@ -11,11 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from orbiflow.arrays import Array
-from orbiflow.errors import (
-    GroupError,
-    LatticeMismatchError,
-    NotDiscreteError,
-)
+from orbiflow.errors import GroupError, LatticeMismatchError, NotDiscreteError
 from orbiflow.symmetry.isometry import (
     TOLERANCE,
     Isometry,
@@ -28,7 +24,7 @@ from orbiflow.symmetry.isometry import (
 
 
 def checked_lattice(lattice: ArrayLike) -> Array:
-    """A read-only float64 copy of a lattice basis, refused with GroupError if degenerate."""
+    """Return a read-only float64 copy of a lattice basis; raise GroupError if it is degenerate."""
     basis = np.array(lattice, dtype=np.float64)
     if basis.ndim != 2 or basis.shape[0] != basis.shape[1] or basis.size == 0:
         raise GroupError(
@@ -47,17 +43,17 @@ def checked_lattice(lattice: ArrayLike) -> Array:
 class CrystallographicGroup:
     """A discrete group of isometries whose translations contain a full lattice.
 
-    Build one with `generate`; the constructor trusts its arguments. Two are equal if they are the same
-    set of isometries, within 1e-9 as in `contains`, whatever their bases, coset representatives and
-    names.
+    Build one with `generate`; the constructor does not check its arguments. Two groups are equal if
+    they are the same set of isometries, within 1e-9 as in `contains`; their bases, coset
+    representatives and names may differ.
 
     Args:
-        lattice: (d, d), basis vectors as columns.
-        cosets: one representative of each coset of the lattice, the identity first, with
+        lattice: The basis vectors as columns, shape (d, d).
+        cosets: One representative of each coset of the lattice, the identity first, with
             translations in the cell (fractional coordinates in [0, 1)).
-        name: for people to read, such as "pgg".
+        name: A name for people to read, such as "pgg".
 
-    Reference: design points 1 and 2; the paper's operators are generators of such a group.
+    Reference: design points 1 and 2. The paper's operators generate such a group.
     """
 
     lattice: Array
@@ -122,7 +118,8 @@ class CrystallographicGroup:
         return np.stack([g.translation for g in self.cosets])
 
     def __eq__(self, other: object) -> bool:
-        """Whether both are the same set of isometries: each contains the other's generators."""
+        """Return whether both groups are the same set of isometries."""
+        # each must contain the other's generators
         if not isinstance(other, CrystallographicGroup):
             return NotImplemented
         if other is self:
@@ -140,10 +137,10 @@ class CrystallographicGroup:
 
     @cached_property
     def _invariants(self) -> tuple[int, tuple[tuple[int, int, int], ...]]:
-        """Dimension, and how many elements of the point group have each trace and determinant.
+        """The dimension, and how many elements of the point group have each trace and determinant.
 
-        Whole numbers only: equality has a tolerance, so that whatever moves with the group, rounded or
-        not, would give some equal groups two hashes.
+        Only whole numbers: equality has a tolerance, so a quantity that changes with rounding would
+        give some equal groups different hashes.
         """
         integral = np.round(self.inverse_lattice @ self.linear_parts @ self.lattice)
         unique = np.unique(integral, axis=0)
@@ -157,7 +154,7 @@ class CrystallographicGroup:
         yield from self.cosets
 
     def contains(self, isometry: Isometry, tolerance: float = TOLERANCE) -> bool:
-        """Whether `isometry` is an element of the group, within `tolerance` of the cell's size."""
+        """Return whether `isometry` is in the group, within `tolerance` of the cell's size."""
         if isometry.dim != self.dim:
             return False
         offset = (isometry.translation - self.translations) @ self.inverse_lattice.T
@@ -180,7 +177,7 @@ class CrystallographicGroup:
         return points - floor @ cast_like(self.lattice, points).T
 
     def images(self, points: Points) -> Points:
-        """Images of points (..., d) under the coset representatives, shape (|G|, ..., d).
+        """Return images of points (..., d) under the coset representatives, shape (|G|, ..., d).
 
         Raises:
             GroupError: for points of another dimension.
@@ -194,15 +191,15 @@ class CrystallographicGroup:
     def elements_near(
         self, center: ArrayLike, radius: float, *, source: ArrayLike | None = None
     ) -> list[Isometry]:
-        """All elements that take the point `source` within `radius` of `center`, nearest first.
+        """Return all elements that take the point `source` within `radius` of `center`, nearest first.
 
         With the bounding disc of a tile as source, and radius = tile radius + region radius, these
         are the elements whose image of the tile can meet the region.
 
         Args:
-            center: (d,) point.
-            radius: in the units of the points.
-            source: (d,) point, default `center`.
+            center: A point (d,).
+            radius: The distance, in the units of the points.
+            source: A point (d,). Default: `center`.
         """
         center = np.asarray(center, dtype=np.float64)
         source = center if source is None else np.asarray(source, dtype=np.float64)
@@ -225,7 +222,7 @@ class CrystallographicGroup:
     def conjugate(
         self, linear: ArrayLike, offset: ArrayLike | None = None
     ) -> CrystallographicGroup:
-        """The group M G M^-1 for the affine map M: p -> linear p + offset.
+        """Return the group M G M^-1 for the affine map M: p -> linear p + offset.
 
         If a map D commutes with G then M o D carries tiles of G to tiles of M G M^-1. `linear` may
         be any similarity, or any map that commutes with the point group (lattice freedom).
@@ -258,7 +255,7 @@ class CrystallographicGroup:
 
 
 def checked_group(group: object) -> CrystallographicGroup:
-    """`group` itself.
+    """Return `group` if it is a group.
 
     Raises:
         GroupError: if it is anything else, such as a group's name.
@@ -277,7 +274,7 @@ def _check_maps_lattice(basis: Array, generator: Isometry, number: int) -> None:
     d = basis.shape[0]
     if generator.dim != d:
         raise GroupError(
-            f"generator {number} acts on R^{generator.dim}, the lattice lives in R^{d}"
+            f"generator {number} acts on R^{generator.dim}, but the lattice is in R^{d}"
         )
     integral = np.linalg.solve(basis, generator.linear @ basis)
     deviation = np.abs(integral - np.round(integral)).max()
@@ -298,14 +295,14 @@ def _reduce_translation(basis: Array, element: Isometry) -> Isometry:
 
 
 class _Seen:
-    """Elements already found, looked up by integral linear part and translation modulo lattice."""
+    """The elements found so far, keyed by linear part and translation modulo the lattice."""
 
     def __init__(self, basis: Array) -> None:
         self._basis = basis
         self._translations: dict[bytes, list[Array]] = {}
 
     def add(self, element: Isometry) -> bool:
-        """Record `element`; False if it was known."""
+        """Record `element` and return whether it is new."""
         integral = np.linalg.solve(self._basis, element.linear @ self._basis)
         key = np.round(integral).astype(np.int64).tobytes()
         fractional = np.linalg.solve(self._basis, element.translation)
@@ -329,7 +326,7 @@ def _closure(basis: Array, generators: Sequence[Isometry], max_order: int) -> tu
             break
     raise NotDiscreteError(
         f"the closure modulo the lattice has more than {max_order} elements; generator {number}, "
-        f"{generators[number]!r}, is the first that makes it so together with those before it. "
+        f"{generators[number]!r}, is the first that exceeds this with those before it. "
         "With this lattice they do not make a discrete group: check centres, lines and mu."
     )
 
@@ -337,7 +334,7 @@ def _closure(basis: Array, generators: Sequence[Isometry], max_order: int) -> tu
 def _finite_closure(
     basis: Array, generators: Sequence[Isometry], max_order: int
 ) -> tuple[Isometry, ...] | None:
-    """All products modulo the lattice, breadth first, or None if there are over `max_order`."""
+    """Return all products modulo the lattice, or None if there are more than `max_order`."""
     elements = [identity(basis.shape[0])]
     seen = _Seen(basis)
     seen.add(elements[0])
@@ -353,7 +350,7 @@ def _finite_closure(
 
 
 def reduced_basis(lattice: Array) -> Array:
-    """Shortest basis (columns) of a plane lattice, with an angle of 60 to 120 degrees.
+    """Return the shortest basis (columns) of a plane lattice, with an angle of 60 to 120 degrees.
 
     Lagrange's and Gauss's reduction.
 

@@ -1,4 +1,4 @@
-"""A group as JSON, number for number: saved parameters are coordinates in its basis."""
+"""Groups as JSON with their exact bases, in which saved parameters are coordinates."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ MAX_ORDER, MAX_DIM, MAX_NAME = 2048, 64, 200
 
 
 def group_header(group: CrystallographicGroup) -> dict[str, Any]:
-    """Lattice (columns are basis vectors) and coset representatives, ready for JSON."""
+    """Return the lattice (columns are basis vectors) and coset representatives, ready for JSON."""
     return {
         "lattice": group.lattice.tolist(),
         "linear": group.linear_parts.tolist(),
@@ -25,24 +25,24 @@ def group_header(group: CrystallographicGroup) -> dict[str, Any]:
 
 
 def group_from_header(header: Mapping[str, Any], name: str = "") -> CrystallographicGroup:
-    """The group of `group_header`, with the same basis and representatives, bit for bit.
+    """Return the group of a `group_header`, with bit-identical basis and representatives.
 
     Raises:
-        GroupError: for what is no group.
+        GroupError: if the header does not describe a group.
     """
     try:
         lattice, linear, shifts = (
             np.array(header[key], dtype=np.float64) for key in ("lattice", "linear", "translations")
         )
     except (KeyError, TypeError, ValueError, OverflowError) as error:
-        raise GroupError(f"a group without its numbers: {error}") from error
+        raise GroupError(f"the group's numbers are missing or invalid: {error}") from error
     d, order = len(np.atleast_1d(lattice)), len(np.atleast_1d(linear))
     shapes = (lattice.shape, linear.shape, shifts.shape)
     if shapes != ((d, d), (order, d, d), (order, d)) or not (d <= MAX_DIM and order <= MAX_ORDER):
-        raise GroupError(f"a group of tables {', '.join(map(str, shapes))}")
+        raise GroupError(f"the group's tables have invalid shapes {', '.join(map(str, shapes))}")
     cosets = tuple(Isometry(*parts) for parts in zip(linear, shifts, strict=True))
     if not order or not cosets[0].is_close(Isometry(np.eye(d), np.zeros(d))):
-        raise GroupError("a group whose first coset is not the identity's")
+        raise GroupError("the group's first coset is not that of the identity")
     closed = CrystallographicGroup.generate(lattice)
     chosen: list[Isometry] = []
     for coset in cosets:  # each that is new at least doubles the order
@@ -50,7 +50,7 @@ def group_from_header(header: Mapping[str, Any], name: str = "") -> Crystallogra
             chosen.append(coset)
             closed = CrystallographicGroup.generate(lattice, chosen, max_order=order)
     if closed.order != order:
-        raise GroupError(f"{order} cosets, of which {closed.order} differ")
+        raise GroupError(f"the group has {order} cosets, of which only {closed.order} differ")
     return CrystallographicGroup(closed.lattice, cosets, str(name)[:MAX_NAME])
 
 
@@ -58,8 +58,8 @@ Rest = ParamSpec("Rest")
 Result = TypeVar("Result")
 
 
-class _Written:
-    """A group that equals another one only if their numbers are the same, bit for bit."""
+class _ExactGroup:
+    """A cache key for a group, equal to another only if their numbers are bit-identical."""
 
     def __init__(self, group: CrystallographicGroup) -> None:
         self.group = group
@@ -67,36 +67,35 @@ class _Written:
         self._key = tuple((table.shape, table.tobytes()) for table in tables)
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Written) and other._key == self._key
+        return isinstance(other, _ExactGroup) and other._key == self._key
 
     def __hash__(self) -> int:
         return hash(self._key)
 
 
-def cached_as_written(
+def cached_by_basis(
     maxsize: int,
 ) -> Callable[
     [Callable[Concatenate[CrystallographicGroup, Rest], Result]],
     Callable[Concatenate[CrystallographicGroup, Rest], Result],
 ]:
-    """As `lru_cache`, for functions of a group whose result depends on its basis and cosets.
+    """Cache a function of a group, as `lru_cache` does, by the group's exact basis and cosets.
 
-    Groups are equal by value: Fourier coefficients of one are not those of an equal group in another
-    basis, so that `lru_cache` would hand out wrong ones.
+    `lru_cache` would mix up equal groups with different bases, whose Fourier coefficients differ.
     """
 
     def decorate(
         function: Callable[Concatenate[CrystallographicGroup, Rest], Result],
     ) -> Callable[Concatenate[CrystallographicGroup, Rest], Result]:
         @lru_cache(maxsize=maxsize)
-        def kept(written: _Written, /, *args: Rest.args, **kwargs: Rest.kwargs) -> Result:
-            return function(written.group, *args, **kwargs)
+        def cached(exact: _ExactGroup, /, *args: Rest.args, **kwargs: Rest.kwargs) -> Result:
+            return function(exact.group, *args, **kwargs)
 
         @wraps(function)
         def call(
             group: CrystallographicGroup, /, *args: Rest.args, **kwargs: Rest.kwargs
         ) -> Result:
-            return kept(_Written(group), *args, **kwargs)
+            return cached(_ExactGroup(group), *args, **kwargs)
 
         return call
 

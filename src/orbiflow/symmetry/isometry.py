@@ -17,11 +17,13 @@ from orbiflow.errors import GroupError, NotAnIsometryError
 Points = TypeVar("Points", Array, torch.Tensor)
 
 TOLERANCE = 1e-9
-"""Largest deviation from orthogonality, or from a lattice vector, that is read as rounding."""
+"""The largest deviation from orthogonality, or from a lattice vector, that counts as rounding."""
 
 
 def cast_like(array: Array, like: Points) -> Points:
-    """A float64 array as it is for NumPy, as a tensor of the dtype and device of `like` for torch.
+    """Return a float64 array in the form of `like`.
+
+    For NumPy it is returned as it is, for torch as a tensor of the dtype and device of `like`.
 
     Raises:
         GroupError: for an integer tensor, in which a rotation would be truncated.
@@ -45,8 +47,8 @@ class Isometry:
     """The map p -> linear @ p + translation.
 
     Args:
-        linear: (d, d) orthogonal matrix.
-        translation: (d,) vector, in the units of the points.
+        linear: An orthogonal matrix (d, d).
+        translation: A vector (d,), in the units of the points.
 
     Raises:
         NotAnIsometryError: if `linear` is not orthogonal within 1e-9 or the shapes disagree.
@@ -92,7 +94,7 @@ class Isometry:
         return 1 if np.linalg.det(self.linear) > 0 else -1
 
     def __call__(self, points: Points) -> Points:
-        """Image of points, shape (..., d), NumPy or torch.
+        """Return the image of points, shape (..., d), NumPy or torch.
 
         Raises:
             GroupError: for points of another dimension.
@@ -102,7 +104,7 @@ class Isometry:
         return points @ linear.T + translation
 
     def push(self, vectors: Points) -> Points:
-        """Push-forward of tangent vectors, shape (..., d): the linear part alone.
+        """Return the push-forward of tangent vectors, shape (..., d): the linear part alone.
 
         Raises:
             GroupError: for vectors of another dimension.
@@ -111,7 +113,7 @@ class Isometry:
         return vectors @ cast_like(self.linear, vectors).T
 
     def __matmul__(self, other: Isometry) -> Isometry:
-        """Composition: `(g @ h)(p) == g(h(p))`."""
+        """Compose two isometries: `(g @ h)(p) == g(h(p))`."""
         if not is_a(other, Isometry):
             return NotImplemented
         if other.dim != self.dim:
@@ -121,11 +123,11 @@ class Isometry:
         )
 
     def inverse(self) -> Isometry:
-        """The isometry that undoes this one."""
+        """Return the isometry that undoes this one."""
         return Isometry(self.linear.T, -self.linear.T @ self.translation)
 
     def is_close(self, other: Isometry, tolerance: float = TOLERANCE) -> bool:
-        """Whether both parts agree within `tolerance`."""
+        """Return whether both parts agree within `tolerance`."""
         return (
             other.dim == self.dim
             and bool(np.abs(self.linear - other.linear).max() <= tolerance)
@@ -138,12 +140,12 @@ class Isometry:
 
 
 def identity(dim: int) -> Isometry:
-    """The identity of R^dim."""
+    """Return the identity of R^dim."""
     return Isometry(np.eye(dim), np.zeros(dim))
 
 
 def translation(vector: ArrayLike) -> Isometry:
-    """Translation by `vector`, shape (d,)."""
+    """Return the translation by `vector`, shape (d,)."""
     vector = np.asarray(vector, dtype=np.float64)
     return Isometry(np.eye(vector.size), vector)
 
@@ -177,7 +179,7 @@ class Line:
 
 
 def rotation_matrix(angle: float) -> Array:
-    """Counter-clockwise rotation by `angle` radians, exact at multiples of a quarter turn."""
+    """Return the counter-clockwise rotation by `angle` radians, exact at quarter turns."""
     quarters = angle / (math.pi / 2)
     if abs(quarters - round(quarters)) < 1e-15 * max(1.0, abs(quarters)):
         c, s = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[round(quarters) % 4]
@@ -187,7 +189,7 @@ def rotation_matrix(angle: float) -> Array:
 
 
 def rotation(center: ArrayLike, order: int) -> Isometry:
-    """The (c, K)-rotation: counter-clockwise by 2 pi / `order` about `center`.
+    """Return the (c, K)-rotation: counter-clockwise by 2 pi / `order` about `center`.
 
     Raises:
         GroupError: if `order` is not a non-zero integer (negative turns clockwise).
@@ -203,7 +205,7 @@ def rotation(center: ArrayLike, order: int) -> Isometry:
 
 
 def transflection(line: Line, mu: float) -> Isometry:
-    """The (l, mu)-transflection: mirror in `line`, then move by `mu` along its direction.
+    """Return the (l, mu)-transflection: mirror in `line`, then move by `mu` along its direction.
 
     A glide reflection; `mu` is in the units of the points.
 
@@ -216,5 +218,5 @@ def transflection(line: Line, mu: float) -> Isometry:
 
 
 def reflection(line: Line) -> Isometry:
-    """Mirror in `line`: the transflection with mu = 0."""
+    """Return the mirror in `line`: the transflection with mu = 0."""
     return transflection(line, 0.0)

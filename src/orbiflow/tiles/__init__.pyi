@@ -53,6 +53,11 @@ from .likeness.metrics import dice as dice
 from .likeness.metrics import hausdorff as hausdorff
 from .likeness.metrics import iou as iou
 from .likeness.metrics import pixel_accuracy as pixel_accuracy
+from .likeness.necks import Thinnest as Thinnest
+from .likeness.necks import hair_share as hair_share
+from .likeness.necks import narrowest_neck as narrowest_neck
+from .likeness.necks import narrowest_slit as narrowest_slit
+from .likeness.necks import slit_share as slit_share
 from .likeness.overlap import Overlap as Overlap
 from .likeness.overlap import prepared_region as prepared_region
 from .likeness.ranking import diverse as diverse
@@ -61,11 +66,6 @@ from .likeness.ranking import tile_similarity as tile_similarity
 from .likeness.recognition import Recognisability as Recognisability
 from .likeness.recognition import Recogniser as Recogniser
 from .likeness.recognition import recognisability as recognisability
-from .likeness.thinnest import Thinnest as Thinnest
-from .likeness.thinnest import hair_share as hair_share
-from .likeness.thinnest import narrowest_neck as narrowest_neck
-from .likeness.thinnest import narrowest_slit as narrowest_slit
-from .likeness.thinnest import slit_share as slit_share
 from .motion.animations import AnimationSettings as AnimationSettings
 from .motion.animations import animate as animate
 from .motion.animations import animation as animation
@@ -125,7 +125,7 @@ from .silhouette.frame import Frame as Frame
 from .silhouette.pins import Pins as Pins
 from .silhouette.readers.outline import read_outline as read_outline
 from .silhouette.readers.pictures import read_mask_array as read_mask_array
-from .silhouette.readers.reading import Held as Held
+from .silhouette.readers.reading import FileContent as FileContent
 from .silhouette.readers.reading import Reading as Reading
 from .silhouette.soft_target import SoftTarget as SoftTarget
 from .silhouette.soft_target import signed_distance as signed_distance

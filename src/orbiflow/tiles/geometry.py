@@ -1,37 +1,37 @@
-"""Closed rings: area, centroid, sense, evenly divided sides.
+"""Closed rings of the plane: area, centroid, orientation, similarity and even sampling.
 
-A ring is an array (..., N, 2), float64 in NumPy, whose last vertex is not a repeat of the first;
-leading axes are a stack of rings. What torch needs as well takes tensors and is differentiable.
+A ring is a float64 array (..., N, 2) whose last vertex does not repeat the first; leading axes are a
+stack of rings. Functions with `AnyRing` take tensors as well and are differentiable.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 import torch
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
+from orbiflow.arrays import Array, Complex
 from orbiflow.errors import OrbiflowError
 
-Ring = NDArray[Any]
-AnyRing = TypeVar("AnyRing", NDArray[Any], torch.Tensor)
+AnyRing = TypeVar("AnyRing", Array, torch.Tensor)
 
 
 def signed_area(ring: AnyRing) -> AnyRing:
-    """Area that each ring encloses, positive where it is counter-clockwise with y up.
+    """Return the area that each ring encloses, positive where it is counter-clockwise with y up.
 
-    The shoelace formula about the first vertex: far from the origin the plain formula takes the
-    difference of products as large as the squared distance, and none of the area's digits is left.
+    Uses the shoelace formula about the first vertex: about the origin it would lose all digits of a
+    distant ring's area to cancellation.
 
     Args:
-        ring: (..., N, 2), NumPy or torch.
+        ring: Rings (..., N, 2), NumPy or torch.
 
     Returns:
-        (...), a NumPy scalar for a single ring; in square units of the ring.
+        The areas (...), a NumPy scalar for a single ring, in square units of the ring.
 
     >>> square = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]])
     >>> float(signed_area(square)), float(signed_area(square + 1e8))
@@ -40,8 +40,8 @@ def signed_area(ring: AnyRing) -> AnyRing:
     return 0.5 * _crosses(ring - ring[..., :1, :]).sum(-1)  # pyright: ignore[reportReturnType]
 
 
-def centroid(ring: Ring) -> Ring:
-    """Centre of mass (..., 2) of the region that each ring (..., N, 2) encloses.
+def centroid(ring: Array) -> Array:
+    """Return the centre of mass (..., 2) of the region that each ring (..., N, 2) encloses.
 
     >>> centroid(np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]]))
     array([1. , 0.5])
@@ -53,22 +53,21 @@ def centroid(ring: Ring) -> Ring:
     return first[..., 0, :] + moment / (3 * cross.sum(axis=-1)[..., None])
 
 
-def reverse(ring: Ring) -> Ring:
-    """The same ring (N, 2) run through the other way, from the same first vertex."""
+def reverse(ring: Array) -> Array:
+    """Return the ring (N, 2) in the opposite order, from the same first vertex."""
     return np.roll(ring[::-1], 1, axis=0)
 
 
-def orient(ring: Ring, *, counter_clockwise: bool = True) -> Ring:
-    """`ring` (N, 2), reversed if need be so that it runs as asked (as seen with y up)."""
+def orient(ring: Array, *, counter_clockwise: bool = True) -> Array:
+    """Return `ring` (N, 2), reversed if needed to run counter-clockwise (with y up), or clockwise."""
     return ring if bool(signed_area(ring) > 0) == counter_clockwise else reverse(ring)
 
 
 def subdivided(ring: AnyRing, pieces: int, phase: float = 0.0) -> AnyRing:
-    """Points (..., N pieces, 2) of rings (..., N, 2): each side divided evenly into `pieces`.
+    """Return points (..., N pieces, 2) of rings (..., N, 2): each side divided evenly into `pieces`.
 
-    With phase 0 every vertex is among them; `phase` moves them along by that share of a piece. Sides
-    that are images of each other under an isometry are divided alike, which arc length does not
-    promise to the last digit.
+    With phase 0 they include every vertex; `phase` moves them along by that share of a piece. Sides
+    that are isometric images of each other are divided alike, to the last digit.
 
     >>> subdivided(np.array([[0.0, 0.0], [2.0, 0.0], [0.0, 2.0]]), 2)[:3].tolist()
     [[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]]
@@ -86,13 +85,13 @@ def subdivided(ring: AnyRing, pieces: int, phase: float = 0.0) -> AnyRing:
 
 
 def _crosses(local: AnyRing) -> AnyRing:
-    """Twice the area (..., N) of the triangle of each side and the origin."""
+    """Return twice the area (..., N) of the triangle of each side and the origin."""
     ahead = local[..., [*range(1, local.shape[-2]), 0], :]
     return local[..., 0] * ahead[..., 1] - ahead[..., 0] * local[..., 1]
 
 
-def complex_points(points: ArrayLike) -> NDArray[np.complex128]:
-    """Points (..., 2) as complex numbers x + iy (...).
+def complex_points(points: ArrayLike) -> Complex:
+    """Return points (..., 2) as complex numbers x + iy (...).
 
     >>> complex_points([[1.0, 2.0]])
     array([1.+2.j])
@@ -101,24 +100,23 @@ def complex_points(points: ArrayLike) -> NDArray[np.complex128]:
     return array[..., 0] + 1j * array[..., 1]
 
 
-def plane_points(z: NDArray[np.complex128]) -> NDArray[np.float64]:
-    """Complex numbers (...) as points (..., 2): the inverse of `complex_points`."""
+def plane_points(z: Complex) -> Array:
+    """Return complex numbers (...) as points (..., 2): the inverse of `complex_points`."""
     return np.stack([z.real, z.imag], axis=-1)
 
 
-def best_similarity(
-    points: NDArray[np.complex128], images: NDArray[np.complex128]
-) -> NDArray[np.complex128]:
-    """Factors of the similarities z -> factor (z - mean) + mean' nearest to given images.
+def best_similarity(points: Complex, images: Complex) -> Complex:
+    """Return the factors of the similarities z -> factor (z - mean) + mean' nearest to given images.
 
-    Least squares over the first axis (Procrustes): a turn and a scale, without mirror images.
+    These are rotations and scalings, without mirror images, by least squares over the first axis
+    (Procrustes).
 
     Args:
-        points: (N,) x + iy.
-        images: (N,) or (N, C), where each point goes, C times.
+        points: Points (N,) x + iy.
+        images: Their images (N,), or C sets of images (N, C).
 
     Returns:
-        () or (C,), in the images' units over the points'.
+        The factors, () or (C,), in the images' units over the points'.
 
     >>> triangle = np.array([0, 1, 1j])
     >>> complex(best_similarity(triangle, 2j * triangle + 5))
@@ -128,8 +126,8 @@ def best_similarity(
     return np.conj(own) @ (images - images.mean(axis=0)) / (abs(own) ** 2).sum()
 
 
-def ring_length(ring: Ring) -> float:
-    """Length of the closed `ring` (N, 2), the side from its last vertex to its first included.
+def ring_length(ring: Array) -> float:
+    """Return the length of the closed `ring` (N, 2), including the side that closes it.
 
     >>> ring_length(np.array([[0.0, 0.0], [3.0, 0.0], [3.0, 4.0]]))
     12.0
@@ -137,10 +135,10 @@ def ring_length(ring: Ring) -> float:
     return float(arc_lengths(ring)[-1])
 
 
-def points_along(ring: Ring, at: ArrayLike) -> Ring:
-    """Points (P, 2) of the closed `ring` (N, 2) at the arc lengths `at` (P,) from its first vertex.
+def points_along(ring: Array, at: ArrayLike) -> Array:
+    """Return the points (P, 2) of the closed `ring` (N, 2) at the arc lengths `at` (P,).
 
-    Lengths beyond the ring's own, and negative ones, go round.
+    Lengths are measured from the first vertex, modulo the ring's length.
 
     >>> points_along(np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]), [0.5, 4.5]).tolist()
     [[0.5, 0.0], [0.5, 0.0]]
@@ -149,8 +147,8 @@ def points_along(ring: Ring, at: ArrayLike) -> Ring:
     return _interpolated(ring, knots, np.asarray(at, dtype=np.float64) % knots[-1])
 
 
-def resampled(ring: Ring, count: int, phase: float = 0.0) -> Ring:
-    """`count` points (count, 2) evenly spaced along the closed `ring` (N, 2).
+def resampled(ring: Array, count: int, phase: float = 0.0) -> Array:
+    """Return `count` points (count, 2) evenly spaced along the closed `ring` (N, 2).
 
     `phase`, from 0 to 1, moves them along by that share of their spacing.
 
@@ -163,23 +161,23 @@ def resampled(ring: Ring, count: int, phase: float = 0.0) -> Ring:
 
 
 def resampled_with_corners(
-    ring: Ring, corners: Sequence[int], count: int
-) -> tuple[Ring, list[int]]:
-    """As `resampled`, with some vertices of the ring kept as they are.
+    ring: Array, corners: Sequence[int], count: int
+) -> tuple[Array, list[int]]:
+    """Resample like `resampled`, keeping some vertices of the ring as they are.
 
-    Between one corner and the next the points are evenly spaced; how many there are follows the
-    length between them (largest remainders), at least the corner itself.
+    Points between one corner and the next are evenly spaced; their number is in proportion to the
+    length between the corners (largest remainders), and at least the corner itself.
 
     Args:
-        ring: (N, 2).
-        corners: indices of the vertices to keep, increasing; the first point is the first of them.
-        count: points in all, at least as many as there are corners.
+        ring: A ring (N, 2).
+        corners: The increasing indices of the vertices to keep; the first one is the first point.
+        count: The number of all points, at least the number of corners.
 
     Returns:
         The points (count, 2), and the index of each corner among them.
 
     Raises:
-        OrbiflowError: for corners that do not increase or are not vertices, and for too few points.
+        OrbiflowError: if corners do not increase or are not vertices, or if `count` is too small.
 
     >>> square = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]])
     >>> points, at = resampled_with_corners(square, [1, 3], 4)
@@ -192,12 +190,14 @@ def resampled_with_corners(
             f"corners must be increasing indices of the {len(ring)} vertices, got {kept}"
         )
     if count < len(kept):
-        raise OrbiflowError(f"{len(kept)} corners need at least as many points, got {count}")
+        raise OrbiflowError(
+            f"count must be at least the number of corners, {len(kept)}, got {count}"
+        )
     knots = arc_lengths(ring)
     starts = knots[kept]
     lengths = np.diff(starts, append=starts[0] + knots[-1])
     shares = _shared_out(lengths, count)
-    at: list[Ring] = [
+    at: list[Array] = [
         start + length * np.arange(share) / share
         for start, length, share in zip(starts, lengths, shares, strict=True)
     ]
@@ -207,8 +207,8 @@ def resampled_with_corners(
     return points, indices
 
 
-def arc_lengths(ring: Ring) -> Ring:
-    """Arc lengths (N + 1,) at each vertex of the closed `ring` (N, 2), and at the first again.
+def arc_lengths(ring: Array) -> Array:
+    """Return arc lengths (N + 1,) at each vertex of the closed `ring` (N, 2), and at the first again.
 
     >>> arc_lengths(np.array([[0.0, 0.0], [3.0, 0.0], [3.0, 4.0]])).tolist()
     [0.0, 3.0, 7.0, 12.0]
@@ -217,13 +217,13 @@ def arc_lengths(ring: Ring) -> Ring:
     return np.concatenate([[0.0], np.cumsum(np.linalg.norm(sides, axis=1))])
 
 
-def _interpolated(ring: Ring, knots: Ring, at: Ring) -> Ring:
+def _interpolated(ring: Array, knots: Array, at: Array) -> Array:
     closed = np.concatenate([ring, ring[:1]])
     return np.stack([np.interp(at, knots, closed[:, k]) for k in (0, 1)], axis=-1)
 
 
-def _shared_out(lengths: Ring, count: int) -> np.ndarray:
-    """Whole numbers of at least 1 with sum `count`, in proportion to `lengths`."""
+def _shared_out(lengths: Array, count: int) -> Array:
+    """Return whole numbers of at least 1 with sum `count`, in proportion to `lengths`."""
     spare = count - len(lengths)
     exact = spare * lengths / lengths.sum()
     whole = np.floor(exact).astype(int)
@@ -233,7 +233,7 @@ def _shared_out(lengths: Ring, count: int) -> np.ndarray:
 
 
 def polygons_in(geometry: BaseGeometry) -> list[Polygon]:
-    """The polygons that `geometry` is made of, lines and points left out."""
+    """Return the polygons in `geometry`, without its lines and points."""
     if isinstance(geometry, Polygon):
         return [] if geometry.is_empty else [geometry]
     parts: Iterable[BaseGeometry] = getattr(geometry, "geoms", ())

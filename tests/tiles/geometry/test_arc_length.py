@@ -70,7 +70,7 @@ def test_every_vertex_a_corner_is_the_ring() -> None:
         ([2, 1], 5, "increasing indices"),
         ([0, 4], 5, "increasing indices"),
         ([-1, 2], 5, "increasing indices"),
-        ([0, 1, 2], 2, "3 corners need at least as many points, got 2"),
+        ([0, 1, 2], 2, "count must be at least .* 3, got 2"),
     ],
 )
 def test_corners_that_cannot_be_kept(corners: list[int], count: int, message: str) -> None:

@@ -221,7 +221,7 @@ def test_stiff_parts_bend_less() -> None:
 
     assert moved(stiff) < 0.2 * moved(free)
     for wrong in (np.ones(3), np.zeros(len(ring)), -factors):
-        with pytest.raises(OrbiflowError, match="stiff needs"):
+        with pytest.raises(OrbiflowError, match="stiff must be"):
             Elastic(ring, stiff=wrong)
 
 

@@ -6,7 +6,7 @@ import pytest
 from orbiflow.arrays import Complex
 from orbiflow.tiles import plane_points, resampled
 from orbiflow.tiles.likeness import Elastic, Pinned
-from orbiflow.tiles.likeness.pinned import PINNED
+from orbiflow.tiles.likeness.pinned import SHAPE_WEIGHT
 from outlines import animal
 
 RING = resampled(animal("squirrel.dat").normal, 60)
@@ -90,7 +90,7 @@ def test_similar_copies_cost_what_their_size_does() -> None:
     assert pinned.misfit(turned[: pinned.size, 0]) == pytest.approx(0, abs=1e-6)
     bent = turned.copy()
     bent[PARTS[0][0]] += 0.1
-    assert pinned.energy(bent)[0] > PLAIN.energy(bent)[0] + 0.001 * PINNED / len(pinned)
+    assert pinned.energy(bent)[0] > PLAIN.energy(bent)[0] + 0.001 * SHAPE_WEIGHT / len(pinned)
 
 
 def test_a_part_follows_at_once() -> None:

@@ -11,7 +11,7 @@ from orbiflow.tiles import (
     escherize_class,
     prepared_region,
 )
-from orbiflow.tiles.likeness.overlap import MANY
+from orbiflow.tiles.likeness.overlap import MAX_REGION_VERTICES
 
 FAST = DescentSettings.for_effort("fast")
 
@@ -37,11 +37,11 @@ def test_templates_join_where_the_outline_gives_poor_starts() -> None:
 
 
 def test_regions_of_many_vertices_are_simplified_for_choosing() -> None:
-    t = np.linspace(0, 2 * np.pi, 2 * MANY, endpoint=False)
+    t = np.linspace(0, 2 * np.pi, 2 * MAX_REGION_VERTICES, endpoint=False)
     radius = 0.56 + 0.002 * np.random.default_rng(0).normal(size=len(t))
     ring = np.stack([radius * np.cos(t), radius * np.sin(t)], axis=-1)
     simple = prepared_region(ring)
-    assert len(simple.exterior.coords) < MANY
+    assert len(simple.exterior.coords) < MAX_REGION_VERTICES
     assert abs(simple.area - shapely.Polygon(ring).area) < 0.01
     assert len(prepared_region(ring[::4]).exterior.coords) == len(ring[::4]) + 1
     assert Overlap(ring[::4]).region.area == shapely.Polygon(ring[::4]).area

@@ -15,7 +15,7 @@ from torch.nn.functional import grid_sample
 from mask_files import CORNERS, SIZE, assert_emphasised, drawing, mask, picture, polygon, save
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.tiles import Emphasis, Target, iou
-from orbiflow.tiles.silhouette.emphasis import FADE, emphasised_iou
+from orbiflow.tiles.silhouette.emphasis import FADE_WIDTH, emphasised_iou
 
 # Which way round
 
@@ -166,11 +166,11 @@ def test_weights_are_bilinear_between_pixel_centres() -> None:
 
 def test_weights_fade_to_one_beyond_the_frame() -> None:
     emphasis = Emphasis(np.ones((4, 4)), (-1, -1, 1, 1), strength=5.0)
-    beyond = np.linspace(0, 2 * FADE, 201)
+    beyond = np.linspace(0, 2 * FADE_WIDTH, 201)
     for ray in ([1, 0], [0, 1], [-1, 0], [0, -1]):
         weights = emphasis.weight(np.multiply.outer(1 + beyond, ray))
         assert weights[0] == pytest.approx(5)
-        assert (weights[beyond > FADE] == 1).all()
+        assert (weights[beyond > FADE_WIDTH] == 1).all()
         assert (np.diff(weights) <= 0).all()
         assert np.abs(np.diff(weights)).max() < 0.07
     assert emphasis.weight([1e9, -1e9]) == 1

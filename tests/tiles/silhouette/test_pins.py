@@ -64,8 +64,8 @@ def test_each_connected_part_is_one() -> None:
         ([(300, 650, 20)], "lies outside the silhouette"),
         ([(300, 300, 0)], "the radius of a pin must be positive, got 0"),
         ([(300, 300, -5)], "the radius of a pin must be positive, got -5"),
-        ([(300,)], "a pin is x,y or x,y,radius, got 1 numbers"),
-        ([(1, 2, 3, 4)], "a pin is x,y or x,y,radius, got 4 numbers"),
+        ([(300,)], "a pin must be x,y or x,y,radius, got 1 numbers"),
+        ([(1, 2, 3, 4)], "a pin must be x,y or x,y,radius, got 4 numbers"),
         ([(np.nan, 2)], "a pin.*finite"),
         ([], "no pin was given"),
         (
@@ -87,5 +87,5 @@ def test_mistakes_of_masks(tmp_path: Path) -> None:
     ImageDraw.Draw(corner).rectangle((0, 0, 5, 5), fill=255)
     with pytest.raises(InputFileError, match="does not touch the silhouette"):
         Pins.read([save(tmp_path, corner)], target)
-    with pytest.raises(InputFileError, match=r"^12;80: a pin is x,y or x,y,radius or a mask, and"):
+    with pytest.raises(InputFileError, match=r"^12;80: there is no such file"):
         Pins.read(["12;80"], target)

@@ -1,4 +1,4 @@
-"""Polygon files, and files of no kind that is read."""
+"""Polygon files, and files of an unknown kind."""
 
 import json
 import os
@@ -124,13 +124,13 @@ def test_bad_dat(tmp_path: Path, content: str | bytes, message: str) -> None:
 @pytest.mark.parametrize(
     ("content", "name", "message"),
     [
-        ("hello there", "a.png", r"holds text of no kind that is read although .* \.png"),
-        (b"\x00\x01\x02\x03" * 9, "a.bin", r"holds data of no kind that is read although .* \.bin"),
-        ("hello", "noname", "holds text of no kind that is read; give a PNG"),
+        ("hello there", "a.png", r"holds text of an unknown kind although .* \.png"),
+        (b"\x00\x01\x02\x03" * 9, "a.bin", r"holds data of an unknown kind although .* \.bin"),
+        ("hello", "noname", "holds text of an unknown kind; give a PNG"),
         (b"", "a.png", "the file is empty"),
         (b"\x1f\x8b\x08\x00rest", "a.svgz", "gzip-compressed"),
         (b"%PDF-1.7 ...", "a.svg", "a PDF file; convert it"),
-        ("<html><body/></html>", "a.html", "holds text of no kind"),
+        ("<html><body/></html>", "a.html", "holds text of an unknown kind"),
     ],
 )
 def test_unknown_content(tmp_path: Path, content: str | bytes, name: str, message: str) -> None:

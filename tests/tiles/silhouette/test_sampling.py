@@ -12,9 +12,9 @@ from orbiflow.tiles import BendingSettings, Target, resampled, ring_length
 from orbiflow.tiles.search.co_deformation import FIRM, hands
 from orbiflow.tiles.silhouette import sampled
 from orbiflow.tiles.silhouette.outlines import (
-    DETAIL,
-    FEW,
-    MOST,
+    CORNER_DEPTH,
+    MAX_POINTS,
+    MIN_POINTS,
     important_vertices,
     with_corners,
 )
@@ -39,7 +39,7 @@ def spacing(ring: Array, count: int) -> float:
 def test_coarse_and_fine_points_go_together(name: str, phase: float) -> None:
     ring = RINGS[name]
     coarse, middle, fine = sampled(ring, phase)
-    assert FEW <= len(coarse) <= MOST
+    assert MIN_POINTS <= len(coarse) <= MAX_POINTS
     assert shapely.Polygon(coarse).is_valid
     for points in (middle, fine):
         multiple = len(points) // len(coarse)
@@ -56,7 +56,7 @@ def test_corners_stay_where_they_are(name: str, phase: float) -> None:
     ring = RINGS[name]
     fine = sampled(ring, phase).fine
     step = spacing(ring, len(fine))
-    corners = ring[important_vertices(ring, DETAIL)]
+    corners = ring[important_vertices(ring, CORNER_DEPTH)]
     apart = np.linalg.norm(fine[:, None] - corners[None], axis=2).min(axis=0)
     # two corners nearest to one point: the first is kept
     near = np.linalg.norm(np.roll(corners, 1, axis=0) - corners, axis=1) < 1.01 * step
@@ -80,7 +80,7 @@ def test_points_stay_within_a_spacing(seed: int, count: int, more: int, phase: f
 
 def test_simplification_keeps_what_stands_out() -> None:
     square = resampled(SHAPES["square"], 400)
-    assert len(important_vertices(square, DETAIL)) == 4
+    assert len(important_vertices(square, CORNER_DEPTH)) == 4
     every = important_vertices(np.asarray(animal("squirrel.dat").normal), 0.0)
     assert every == sorted(set(every))
     assert 50 < len(every) <= 60

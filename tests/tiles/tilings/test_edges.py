@@ -54,5 +54,5 @@ def test_bricks_in_half_bond_have_sides_that_no_neighbour_has() -> None:
     brick = Tile(
         np.array([[0, 0], [2, 0], [2, 1], [0, 1]]), wallpaper_group("p1", [[2, 1], [0, 1]])
     )
-    with pytest.raises(OrbiflowError, match="2 of the tile's 4 sides are no side of a neighbour"):
+    with pytest.raises(OrbiflowError, match="2 of the tile's 4 sides are not sides of a neighbour"):
         edges(brick)

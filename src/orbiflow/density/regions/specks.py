@@ -1,9 +1,13 @@
 """What is as small as a grid's cells, drawn anew about seeds that lie in it."""
 
+# pyright: reportUnknownMemberType=false
+# shapely's stubs leave the keyword arguments of its functions of arrays without types.
+
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 import shapely
@@ -25,7 +29,6 @@ from orbiflow.density.spaces import (
     whole_turn,
 )
 from orbiflow.errors import OrbiflowError
-from orbiflow.typed_shapely import ufuncs
 
 PARTS = 12
 """A cell is cut into, each way."""
@@ -84,7 +87,8 @@ def _wrong(
 ) -> NDArray[np.int64]:
     """Cells (C, 2) with seeds on the wrong side, those with most first."""
     shapely.prepare(shape)
-    wrong = ufuncs.intersects_xy(shape, *seeds.points.T) != (seeds.values >= level)
+    meets = cast(NDArray[np.bool_], shapely.intersects_xy(shape, *seeds.points.T))
+    wrong = meets != (seeds.values >= level)
     most = np.array(grid.values.shape) - 2
     at = np.clip(np.floor((seeds.points[wrong] - grid.low) / grid.step).astype(int), 0, most)
     cells, counts = np.unique(at, axis=0, return_counts=True)
@@ -161,7 +165,7 @@ class Window:
         """Natural area of a polygon or several: steradians on the globe, where sides are straight in
         longitude and latitude."""
         if not self.on_globe:
-            return float(ufuncs.area(shape))
+            return float(shapely.area(shape))
         return sum(_on_globe(part) for part in shapely.get_parts(shape))
 
 

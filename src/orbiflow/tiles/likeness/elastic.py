@@ -1,12 +1,12 @@
-"""A silhouette as an elastic body: what it costs to deform it, and the shape of least cost.
+"""A silhouette as an elastic body, and the energy of its deformations.
 
 As rigid as possible (Sorkine and Alexa, As-Rigid-As-Possible Surface Modeling, SGP 2007; a distance
 for Escher tiles since Nagata and Imahori, 2021): with points x at rest, moved to z, and a rotation r_i
 of each, the energy is the sum over all pairs of w_ij |(z_i - z_j) - r_i (x_i - x_j)|^2. Cotangent
 weights measure the strain of areas; weights along the outline measure strain by length, so that
-small parts count: an ear has little area and much outline. To these comes what it costs to bend the
-outline as a rod: the square of the change of its curvature, so that straight parts stay straight and
-corners stay corners. Points are complex numbers x + iy; a batch of C shapes is (N, C).
+small parts count: an ear has little area and much outline. The outline also bends as a rod, at the
+square of the change of its curvature, so that straight parts stay straight and corners stay corners.
+Points are complex numbers x + iy; a batch of C shapes is (N, C).
 """
 
 from __future__ import annotations
@@ -19,51 +19,39 @@ from typing import Any
 import numpy as np
 import scipy.linalg
 import scipy.sparse
-from numpy.typing import NDArray
 
-from orbiflow.arrays import Complex
+from orbiflow.arrays import Array, Complex, Integers
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles.geometry import (
-    best_similarity,
-    complex_points,
-    plane_points,
-    signed_area,
-)
-from orbiflow.tiles.silhouette import (
-    Mesh,
-    local_thickness,
-    triangulate,
-)
+from orbiflow.tiles.geometry import best_similarity, complex_points, plane_points, signed_area
+from orbiflow.tiles.silhouette import Mesh, local_thickness, triangulate
 
-Array = NDArray[np.float64]
+COTANGENT_BOUNDS = (0.05, 40.0)
+"""The bounds of the weights of areas, which are negative for obtuse triangles."""
 
-COTANGENTS = (0.05, 40.0)
-"""Bounds of the areas' weights: obtuse triangles have negative ones."""
+THICK_RADIUS = 0.25
+"""The radius of a part that is not thin, in square roots of the area; a disc has 0.56."""
 
-THICK = 0.25
-"""Radius of a part that is not thin, in square roots of the area; a disc has 0.56."""
+SALIENCE_BOUNDS = (0.25, 8.0)
+"""The bounds of the factor of thin parts' weights."""
 
-SALIENT = (0.25, 8.0)
-"""Bounds of what thinness may multiply weights by."""
+POSE_WEIGHT = 4.0
+"""The weight of the displacement relative to the energy, when shapes are ranked."""
 
-
-POSE = 4.0
-"""What a displacement weighs beside the energy, in the order of shapes."""
-
-REWEIGHTINGS = 50
-"""Steps to the rotations of least forgiving energy, at most."""
+MAX_REWEIGHTINGS = 50
+"""The largest number of steps to the rotations of least forgiving energy."""
 
 
 @dataclass(frozen=True)
 class Stiffness:
-    """What deforming costs, in a silhouette of area 1.
+    """The costs of deforming a silhouette of area 1.
 
-    - `stretch`: of the outline, per unit of its length and squared strain.
-    - `bend`: of the outline, per unit of its length and squared change of curvature.
-    - `salience`: power of the thinness by which areas of thin parts weigh more: with 0 a leg of half
-      the width weighs half as much a length, with 1 the same; below 0 thin parts give way first.
-    - `pose`: of the mean squared distance from the silhouette's best similar copy.
-    - `forgiven`: strain, and angle of a kink in radians, beyond which `forgiving_energy` forgives.
+    - `stretch`: The cost of stretching the outline, per unit of length and squared strain.
+    - `bend`: The cost of bending the outline, per unit of length and squared change of curvature.
+    - `salience`: The power of thinness in the weights of areas: with 0 a leg of half the width weighs
+      half as much per length, with 1 the same; below 0 thin parts deform first.
+    - `pose`: The cost of the mean squared distance from the silhouette's best similar copy.
+    - `forgiven`: The strain, and the angle of a kink in radians, beyond which `forgiving_energy` grows
+      only in proportion.
     """
 
     stretch: float = 0.2
@@ -77,10 +65,10 @@ class Elastic:
     """A triangulated silhouette of area about 1 and its energies.
 
     Args:
-        ring: (n, 2) outline, counter-clockwise; the first n points of the body.
-        stiffness: what deforming costs.
-        stiff: (n,) or (N,) factors of the stiffness at the points, if some may deform less.
-        mesh: of the ring, if it is at hand.
+        ring: The outline (n, 2), counter-clockwise; the first n points of the body.
+        stiffness: The costs of deforming.
+        stiff: Factors (n,) or (N,) of the stiffness at the points, if some should deform less.
+        mesh: A mesh of the ring, if there is one already.
 
     Raises:
         OrbiflowError: for a ring that cannot be triangulated.
@@ -121,34 +109,34 @@ class Elastic:
         return len(self.rest)
 
     def rotations(self, z: Complex) -> Complex:
-        """The rotations (N, C), complex units, that suit shapes (N, C) best."""
+        """Return the rotations (N, C), complex units, that suit shapes (N, C) best."""
         n = self.size
         sums = self._own_conjugate[:, None] * z - self._conjugate @ z
         sums[:n] += (self._rod_cost * np.conj(self._curved))[:, None] * (self._rod @ z[:n])
         return sums / np.maximum(abs(sums), 1e-300)
 
     def energy(self, z: Complex) -> Array:
-        """Energies (C,) of shapes (N, C) without the pose's."""
+        """Return the energies (C,) of shapes (N, C) without that of the pose."""
         r = self.rotations(z)
         strain, bent = self._misfits(z, r)
         return self._w @ _squares(strain) + self._rod_cost @ _squares(bent)
 
     def forgiving_energy(self, z: Complex) -> Array:
-        """Energies (C,) that grow only in proportion to strains and kinks once these are large.
+        """Return energies (C,) that grow only in proportion to strains and kinks once these are large.
 
-        2 f^2 (sqrt(1 + (s / f)^2) - 1) in place of s^2 (Charbonnier et al., 1994), with f the
-        stiffness' `forgiven` strain and angle: a joint that bends, or a toe that is lost, costs
-        less than the same spread over all of the outline.
+        A strain s costs 2 f^2 (sqrt(1 + (s / f)^2) - 1) instead of s^2 (Charbonnier et al., 1994),
+        where f is `Stiffness.forgiven`: a bent joint or a lost toe costs less than the same strain
+        spread over the whole outline.
         """
         return self._forgiven(*self._forgiven_misfits(z))
 
     def cost(self, z: Complex) -> Array:
-        """(C,) what shapes (N, C) cost: `forgiving_energy` in their areas, and the displacement."""
+        """Return the cost (C,) of shapes (N, C): `forgiving_energy` over area, and displacement."""
         area = signed_area(plane_points(z[: self.size].T))
-        return self.forgiving_energy(z) / area + POSE * self.displacement(z)
+        return self.forgiving_energy(z) / area + POSE_WEIGHT * self.displacement(z)
 
     def lenient_energy(self, z: Complex) -> Array:
-        """`forgiving_energy` (C,) at the rotations of least plain energy: never less, and quick."""
+        """Return `forgiving_energy` (C,) at the rotations of least plain energy: an upper bound."""
         return self._forgiven(*self._relative(z, self.rotations(z)))
 
     def _forgiven(self, strain: Array, kinks: Array) -> Array:
@@ -157,10 +145,9 @@ class Elastic:
         return (self._w * (f * abs(self._d)) ** 2) @ stretched + (self._rod_cost * g**2) @ bent
 
     def forgiving(self, z: Complex) -> Elastic:
-        """The body whose energy touches `forgiving_energy` at a shape (N,) or (N, 1) from above.
+        """Return the body whose energy touches `forgiving_energy` at a shape (N,) from above.
 
-        Minimising with it, anew and anew, minimises that energy (iteratively reweighted least
-        squares).
+        Minimising with it repeatedly minimises that energy (iteratively reweighted least squares).
         """
         strain, bent = self._forgiven_misfits(z.reshape(-1, 1))
         body = copy.copy(self)
@@ -170,13 +157,13 @@ class Elastic:
         return body
 
     def _forgiven_misfits(self, z: Complex) -> tuple[Array, Array]:
-        """What is forgiven, see `_relative`, at the rotations of least forgiving energy."""
+        """Return the squared strains and kinks of `_relative` at the best rotations."""
         n = self.size
         turned = np.conj(self._d)[:, None] * (z[self._i] - z[self._j])
         curved = np.conj(self._curved)[:, None] * (self._rod @ z[:n])
         r = self.rotations(z)
         misfits = self._relative(z, r)
-        for _ in range(REWEIGHTINGS - 1):
+        for _ in range(MAX_REWEIGHTINGS - 1):
             weights = (self._w[:, None] / np.sqrt(1 + misfits[0])) * turned
             sums = self._gather @ weights
             sums[:n] += self._rod_cost[:, None] / np.sqrt(1 + misfits[1]) * curved
@@ -187,9 +174,9 @@ class Elastic:
         return misfits
 
     def _relative(self, z: Complex, r: Complex) -> tuple[Array, Array]:
-        """Squared strains of pairs and squared kinks, in units of the stiffness' `forgiven`.
+        """Return the squared strains of pairs and squared kinks, in units of `Stiffness.forgiven`.
 
-        Strains are the mean of both ends', so that weights stay symmetric.
+        Strains are means over both ends, so that weights stay symmetric.
         """
         f, g = self.stiffness.forgiven
         strain, bent = self._misfits(z, r)
@@ -197,15 +184,15 @@ class Elastic:
         return (relative + relative[self._mates]) / 2, _squares(bent) / g**2
 
     @cached_property
-    def _mates(self) -> NDArray[np.int64]:
-        """For each pair, the same pair from its other end."""
+    def _mates(self) -> Integers:
+        """The same pair from its other end, for each pair."""
         own = self._i * len(self) + self._j
         order = np.argsort(own)
         return order[np.searchsorted(own[order], self._j * len(self) + self._i)]
 
     @cached_property
     def _gather(self) -> scipy.sparse.csr_matrix:
-        """(N, P): sums over the pairs of each point."""
+        """The matrix (N, P) of the sums over the pairs of each point."""
         count = len(self._i)
         at = (self._i, np.arange(count))
         return scipy.sparse.csr_matrix((np.ones(count), at), shape=(len(self), count))
@@ -216,13 +203,13 @@ class Elastic:
         return strain, bent
 
     def displacement(self, z: Complex) -> Array:
-        """(C,) mean squared distance from the best similar copy, in areas of the copy."""
+        """Return the mean squared distance (C,) from the best similar copy, in areas of the copy."""
         copy, factor = self.copies(z)
         size = np.maximum(abs(factor) ** 2, 1e-12)
         return (abs(z - copy) ** 2).mean(axis=0) / size
 
     def forces(self, z: Complex) -> Complex:
-        """What the rotations and the pose of shapes (N, C) pull towards: b of matrix z = b."""
+        """Return the right side b of matrix z = b for the rotations and pose of shapes (N, C)."""
         r = self.rotations(z)
         copy, _ = self.copies(z)
         pull = r * self._own[:, None] + self._sums @ r
@@ -232,7 +219,7 @@ class Elastic:
 
     @cached_property
     def matrix(self) -> Array:
-        """(N, N) dense stiffness matrix, the pose's part included."""
+        """The dense stiffness matrix (N, N), including the pose's part."""
         degree = np.asarray(self._weights.sum(axis=1)).ravel()
         pose = self.stiffness.pose / len(self)
         matrix = np.diag(2 * degree + pose) - 2 * self._weights.toarray()
@@ -241,13 +228,13 @@ class Elastic:
         return matrix
 
     def pulled(self, z: Complex, towards: Complex, strength: float, rounds: int) -> Complex:
-        """Let the outline (n, C) be pulled towards other points, as a spring a point would.
+        """Return shapes whose outline is pulled towards other points by a spring at each point.
 
         Args:
-            z: shapes (N, C) to start from.
-            towards: (n, C).
-            strength: of all springs together, in the unit of the energy.
-            rounds: of choosing rotations and solving.
+            z: The shapes (N, C) to start from.
+            towards: The points (n, C) that the outline is pulled towards.
+            strength: The strength of all springs together, in the unit of the energy.
+            rounds: The number of rounds of choosing rotations and solving.
         """
         mu = strength / self.size
         solve = self._pulled_solver(mu)
@@ -259,7 +246,7 @@ class Elastic:
 
     @cached_property
     def condensed(self) -> Condensed:
-        """The inner points solved for: a matrix of the outline alone."""
+        """The body with its inner points eliminated, so that only the outline is free."""
         n = self.size
         inner = self.matrix[n:, n:]
         if not len(inner):
@@ -281,7 +268,7 @@ class Elastic:
         return solver
 
     def copies(self, z: Complex) -> tuple[Complex, Complex]:
-        """Best similar copies (N, C) of the body at rest, and the similarities' factors (C,)."""
+        """Return best similar copies (N, C) of the body at rest, and the similarities' factors (C,)."""
         center = z.mean(axis=0)
         factor = best_similarity(self.rest, z)
         return center + (self.rest - self.rest.mean())[:, None] * factor, factor
@@ -289,8 +276,8 @@ class Elastic:
     def _pairs(self, stiff: Array | None) -> Any:
         triangles, count, n = self.mesh.triangles, len(self), self.size
         factors = self._salience()
-        rows: list[NDArray[np.int64]] = []
-        columns: list[NDArray[np.int64]] = []
+        rows: list[Integers] = []
+        columns: list[Integers] = []
         values: list[Array] = []
         for k in range(3):
             i, j, apex = triangles[:, k], triangles[:, k - 2], triangles[:, k - 1]
@@ -300,7 +287,7 @@ class Elastic:
             cotangent = np.clip(u.real / np.maximum(abs(u.imag), 1e-300), -5.0, 5.0)
             values.append(factors * cotangent / 2)
         areas = _symmetric(rows, columns, values, count)
-        areas.data = np.clip(areas.data, *COTANGENTS)
+        areas.data = np.clip(areas.data, *COTANGENT_BOUNDS)
         own = np.arange(n)
         after = (own + 1) % n
         # each side counts twice, with either end's rotation
@@ -314,11 +301,11 @@ class Elastic:
     def _salience(self) -> Array:
         if not self.stiffness.salience:
             return np.ones(len(self.mesh.triangles))
-        thinness = THICK / local_thickness(self.mesh)
-        return np.clip(thinness**self.stiffness.salience, *SALIENT)
+        thinness = THICK_RADIUS / local_thickness(self.mesh)
+        return np.clip(thinness**self.stiffness.salience, *SALIENCE_BOUNDS)
 
     def _bending(self, stiff: Array | None) -> tuple[scipy.sparse.csr_matrix, Array]:
-        """The difference of unit steps at each of the outline's points (n, n), and its cost (n,)."""
+        """Return the differences of unit steps along the outline (n, n), and their costs (n,)."""
         n, rest = self.size, self.rest[: self.size]
         own, after = np.arange(n), (np.arange(n) + 1) % n
         length = np.maximum(abs(rest[after] - rest), 1e-6)
@@ -333,7 +320,7 @@ class Elastic:
         factors = np.asarray(stiff, dtype=np.float64)
         if factors.shape not in ((self.size,), (len(self),)) or not (factors > 0).all():
             raise OrbiflowError(
-                f"stiff needs ({self.size},) or ({len(self)},) positive factors, "
+                f"stiff must be ({self.size},) or ({len(self)},) positive factors, "
                 f"got shape {factors.shape}"
             )
         return np.concatenate([factors, np.ones(len(self) - len(factors))])
@@ -343,9 +330,9 @@ class Elastic:
 class Condensed:
     """A body whose inner points follow its outline.
 
-    - `outline`: (n, n) stiffness matrix of the outline.
-    - `follow`: (N - n, n) where the inner points go with it.
-    - `inverse`: (N - n, N - n) of the inner points' own matrix.
+    - `outline`: The stiffness matrix (n, n) of the outline.
+    - `follow`: The matrix (N - n, n) that takes the outline to the inner points.
+    - `inverse`: The inverse (N - n, N - n) of the inner points' own matrix.
     """
 
     outline: Array
@@ -354,35 +341,37 @@ class Condensed:
 
     @property
     def low(self) -> Complex | None:
-        """(n, k), or None: the outline's matrix is `outline` less this times its adjoint."""
+        """A factor (n, k) or None: the outline's matrix is `outline` less it times its adjoint."""
         return None
 
     def forces(self, forces: Complex) -> Complex:
-        """Forces (N, C) as forces (n, C) on the outline."""
+        """Return forces (N, C) as forces (n, C) on the outline."""
         n = len(self.outline)
         return forces[:n] + _times(self.follow.T, forces[n:])
 
     def whole(self, outline: Complex, forces: Complex) -> Complex:
-        """All points (N, C), from the outline (n, C) and the forces (N, C)."""
+        """Return all points (N, C), from the outline (n, C) and the forces (N, C)."""
         n = len(self.outline)
         inner = _times(self.follow, outline) + _times(self.inverse, forces[n:])
         return np.concatenate([outline, inner])
 
 
 def _times(matrix: Array, z: Complex) -> Complex:
-    """A real matrix times complex columns, without making it complex."""
+    """Return the product of a real matrix and complex columns, in real arithmetic."""
     z = np.ascontiguousarray(z)
     return (matrix @ z.view(np.float64)).view(np.complex128)
 
 
 def _inverse(matrix: Array) -> Array:
-    """Of a positive definite matrix, by Cholesky: a third of the work of a general one."""
+    """Return the inverse of a positive definite matrix by Cholesky, in a third of the usual work."""
     functions: Any = scipy.linalg.get_lapack_funcs(("potrf", "potri"), (matrix,))
     factorize, invert = functions
     factor, failed = factorize(matrix, lower=True)
     inverse, missing = invert(factor, lower=True)
     if failed or missing:
-        raise OrbiflowError("the silhouette's stiffness has no inverse: is a part without width?")
+        raise OrbiflowError(
+            "the silhouette's stiffness has no inverse: check that no part is without width"
+        )
     lower: Array = inverse
     return np.tril(lower) + np.tril(lower, -1).T
 
@@ -392,10 +381,7 @@ def _squares(z: Complex) -> Array:
 
 
 def _symmetric(
-    rows: list[NDArray[np.int64]],
-    columns: list[NDArray[np.int64]],
-    values: list[Array],
-    count: int,
+    rows: list[Integers], columns: list[Integers], values: list[Array], count: int
 ) -> scipy.sparse.csr_matrix:
     i, j, v = np.concatenate(rows), np.concatenate(columns), np.concatenate(values)
     both = (np.concatenate([v, v]), (np.concatenate([i, j]), np.concatenate([j, i])))

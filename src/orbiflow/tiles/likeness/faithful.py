@@ -1,20 +1,20 @@
-"""How much of a silhouette is left in its bent outline, as eyes see it: pose-blind, point by point.
+"""How faithful a bent outline is to its silhouette, as people judge it, point by point.
 
-What people say of bent silhouettes goes with six things, most of which do not mind where a limb points
-(docs/likeness.md has the evidence), and a seventh keeps threads away that no cutter can make:
+People's judgement of bent silhouettes depends on six measures, most of them independent of the pose
+(docs/likeness.md has the evidence); a seventh avoids threads that no cutter can make:
 
 - `pieces`: how well pieces of the outline are kept, each compared after its own best motion
-  (Procrustes; Gower, 1975), by the mean of the roots: a few pieces may be lost, the rest is to be
-  exact. Small pieces tell of corners and toes, middle ones of limbs and heads, large ones of the whole;
-  a piece counts by the root of the body's thickness there, a head more than a leg.
-- `notches`: where the space outside has become narrower than it was: slits, notches and folds that
-  the silhouette does not have. The width is that of the largest disc outside that touches the outline
+  (Procrustes; Gower, 1975), by the mean of the roots: a few pieces may be lost, the rest should be
+  exact. Small pieces show corners and toes, middle ones limbs and heads, large ones the whole. The
+  weight of a piece is the root of the body's thickness there, larger for a head than for a leg.
+- `notches`: where the space outside has become narrower: slits, notches and folds that the
+  silhouette does not have. The width is that of the largest disc outside that touches the outline
   (the outer medial axis; found as by Ma, Bae and Choi, 3D medial axis point approximation, 2012).
-- `narrowed`: the same inside: limbs and bodies grown thin.
-- `cost`: of bending (`Elastic.cost`): energy, and displacement from the pose.
-- `necks`: how much narrower the inside has become at its worst place beyond half: threads.
+- `narrowed`: the same inside: limbs and bodies that have become thin.
+- `cost`: the cost of bending (`Elastic.cost`): energy, and displacement from the pose.
+- `necks`: how much narrower than half the inside has become at its worst place: threads.
 
-Outlines are given point by point: this compares a shape with what it was bent from, not any two.
+Outlines correspond point by point: this compares a shape with the one that was bent into it.
 """
 
 from __future__ import annotations
@@ -25,47 +25,39 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from orbiflow.arguments import numbers
-from orbiflow.arrays import Complex
-from orbiflow.tiles.geometry import (
-    centroid,
-    complex_points,
-    orient,
-    plane_points,
-    signed_area,
-)
+from orbiflow.arrays import Array, Complex
+from orbiflow.tiles.geometry import centroid, complex_points, orient, plane_points, signed_area
+from orbiflow.tiles.likeness.bending_onto import bent_onto
 from orbiflow.tiles.likeness.elastic import Elastic
-from orbiflow.tiles.likeness.laid import laid_on
 from orbiflow.tiles.likeness.metrics import as_region
-from orbiflow.tiles.likeness.overlap import Overlap, overlaid
+from orbiflow.tiles.likeness.overlap import Overlap, best_overlay
 from orbiflow.tiles.silhouette import sampled
 
-Array = NDArray[np.float64]
+PIECE_LENGTHS = (0.04, 0.15, 0.4)
+"""The lengths of the pieces, as shares of the outline."""
 
-PIECES = (0.04, 0.15, 0.4)
-"""Lengths of the pieces, as shares of the outline."""
+WIDTH_OFFSET = 0.02
+"""The offset of widths, in square roots of the area, below which differences matter little."""
 
-CLEAR = 0.02
-"""Added to widths, in square roots of the area: below it, differences matter little."""
-
-USUAL = (0.12, 0.16, 0.13, 0.3, 0.037, 0.25)
-"""Of the pieces, of notches, of what is narrowed, of the cost: in a tile of middling likeness."""
+USUAL_VALUES = (0.12, 0.16, 0.13, 0.3, 0.037, 0.25)
+"""The values of three pieces, `notches`, `narrowed` and `cost` in a tile of medium likeness."""
 
 WEIGHTS = (6.5, 6.5, 6.5, 2.6, 2.3, 6.5)
-"""Of their logarithms: one over how much these differ between tiles of one silhouette."""
+"""The weights of their logarithms, the inverse of how much these vary over a silhouette's tiles."""
 
-LITTLE = 0.3
-"""Share of the usual values below which differences matter little."""
+NEGLIGIBLE_SHARE = 0.3
+"""The share of the usual values below which differences matter little."""
 
 
 @dataclass(frozen=True)
 class Fidelity:
-    """What bending left of an outline; all values from 0, smaller is better, but for `score`.
+    """How much of an outline is kept in its bending. Values are from 0; smaller is better.
 
-    - `pieces`: of three lengths, small to large.
-    - `notches`, `narrowed`, `necks`, `cost`: see the module.
+    - `pieces`: The misfits of pieces of three lengths, small to large.
+    - `notches`, `narrowed`, `necks`, `cost`: See the module.
     """
 
     pieces: tuple[float, float, float]
@@ -76,21 +68,23 @@ class Fidelity:
 
     @property
     def damage(self) -> float:
-        """About 0 for a tile of middling likeness, smaller is better.
+        """The overall damage, about 0 for a tile of medium likeness; smaller is better.
 
-        The sum of `necks` and of the others' logarithms, each relative to its usual value,
-        with `LITTLE` added, and weighted.
+        This is `necks` plus the weighted logarithms of the other values, each relative to its usual
+        value, with `NEGLIGIBLE_SHARE` added.
         """
         values = (*self.pieces, self.notches, self.narrowed, self.cost)
-        relative = [value / usual for value, usual in zip(values, USUAL, strict=True)]
-        parts = [math.log((LITTLE + value) / (LITTLE + 1)) for value in relative]
+        relative = [value / usual for value, usual in zip(values, USUAL_VALUES, strict=True)]
+        parts = [
+            math.log((NEGLIGIBLE_SHARE + value) / (NEGLIGIBLE_SHARE + 1)) for value in relative
+        ]
         return self.necks + float(np.dot(WEIGHTS, parts))
 
     @property
     def score(self) -> float:
-        """From 0 to 1, larger is better; 0.5 for a tile of middling likeness, 1 for no change.
+        """The score 1 / (1 + exp(damage / 4)), larger is better.
 
-        1 / (1 + exp(damage / 4)).
+        It is 0.5 for a tile of medium likeness and 1 for no change.
         """
         return 1 / (1 + math.exp(min(self.damage / 4, 700.0)))
 
@@ -99,9 +93,9 @@ def fidelity(rest: Complex, bent: Complex, cost: float) -> Fidelity:
     """Compare an outline with what it was bent from.
 
     Args:
-        rest, bent: (n,) x + iy, counter-clockwise, nearly evenly spaced; point k of the one became
-            point k of the other.
-        cost: of bending, `Elastic.cost`.
+        rest, bent: Outlines (n,) x + iy, counter-clockwise and nearly evenly spaced, whose points
+            correspond.
+        cost: The cost of bending, `Elastic.cost`.
 
     >>> square = np.array([0, 1, 2, 2 + 1j, 2 + 2j, 1 + 2j, 2j, 1j])
     >>> fidelity(square, 3 * square * 1j + 7, 0.0).score > 0.999
@@ -115,7 +109,7 @@ def fidelity(rest: Complex, bent: Complex, cost: float) -> Fidelity:
     inside = np.log(thick / _clearance(bent, inside=True))
     small, middle, large = (
         float(np.average(np.sqrt(_misfits(rest, bent, length)), weights=np.sqrt(thick)))
-        for length in PIECES
+        for length in PIECE_LENGTHS
     )
     return Fidelity(
         (small, middle, large),
@@ -127,7 +121,7 @@ def fidelity(rest: Complex, bent: Complex, cost: float) -> Fidelity:
 
 
 def _misfits(rest: Complex, bent: Complex, length: float) -> Array:
-    """(n,) of the piece about each point: squared distance after the best motion, relative, 0 to 1."""
+    """Return, for the piece about each point, the misfit (n,) after the best motion, 0 to 1."""
     n = len(rest)
     half = min(max(3, round(length * n / 2)), (n - 1) // 2)
     index = (np.arange(n)[:, None] + np.arange(-half, half + 1)) % n
@@ -139,7 +133,7 @@ def _misfits(rest: Complex, bent: Complex, length: float) -> Array:
 
 
 def _clearance(z: Complex, *, inside: bool = False) -> Array:
-    """(n,) radius of the largest disc outside that touches the outline at each point, at most 1."""
+    """Return the radius (n,) of the largest disc outside that touches each point, at most 1."""
     z = z[::-1] if inside else z
     n = len(z)
     along = np.roll(z, -1) - np.roll(z, 1)
@@ -152,29 +146,29 @@ def _clearance(z: Complex, *, inside: bool = False) -> Array:
     for near in range(-2, 3):
         radius[own, (own + near) % n] = np.inf
     least = np.minimum(radius.min(axis=1), 1.0)
-    smooth = (np.roll(least, 1) + 2 * least + np.roll(least, -1)) / 4 + CLEAR
+    smooth = (np.roll(least, 1) + 2 * least + np.roll(least, -1)) / 4 + WIDTH_OFFSET
     return smooth[::-1] if inside else smooth
 
 
 TURNS = 24
-"""Turns of either hand that are tried, of which the best `TRIED` are worked out."""
+"""The number of rotations tried for each orientation; the best `REFINED_TURNS` are refined."""
 
-TRIED = 3
+REFINED_TURNS = 3
 
 
 def faithfulness(silhouette: ArrayLike, shape: ArrayLike, *, mirror: bool = True) -> Fidelity:
-    """What bending a silhouette into a shape would leave of it.
+    """Return how much of a silhouette would be kept if it were bent into a shape.
 
-    Some tenths of a second; the silhouette's triangulation is kept for the next shape.
+    This takes some tenths of a second; the silhouette's triangulation is cached.
 
     Args:
-        silhouette: (n, 2) its outline, a simple polygon in either sense.
-        shape: (m, 2) another one, in any place, size and turn.
-        mirror: whether the shape's mirror image is as good.
+        silhouette: The outline (n, 2), a simple polygon in either orientation.
+        shape: Another one (m, 2), with any position, size and rotation.
+        mirror: Whether the shape may be mirrored.
 
     Returns:
-        The `Fidelity` of the best laying that is found; its `score` is 1 for the same shape, near
-        0.5 for a tile of middling likeness.
+        The `Fidelity` of the best overlay; its `score` is 1 for the same shape, and near 0.5 for a
+        tile of medium likeness.
 
     Raises:
         OrbiflowError: for a polygon that crosses itself, has no area, or is too thin to sample.
@@ -187,35 +181,35 @@ def faithfulness(silhouette: ArrayLike, shape: ArrayLike, *, mirror: bool = True
     body, overlap = _body(own.tobytes())
     turns = np.exp(2j * np.pi * np.arange(TURNS) / TURNS).tolist()
     rough = [
-        _Laying(overlap.iou(plane_points(turn * ring))[0], turn, ring)
-        for ring in _hands(other, mirror=mirror)
+        _Overlay(overlap.iou(plane_points(turn * ring))[0], turn, ring)
+        for ring in _orientations(other, mirror=mirror)
         for turn in turns
     ]
-    rough.sort(key=lambda laying: -laying.iou)
+    rough.sort(key=lambda overlay: -overlay.iou)
     found: list[tuple[float, Complex]] = []
-    for laying in rough[:TRIED]:
-        factor, middle, _ = overlaid(laying.ring, overlap, laying.turn)
-        z = laid_on(body, plane_points(factor * laying.ring + middle))[:, None]
+    for overlay in rough[:REFINED_TURNS]:
+        factor, middle, _ = best_overlay(overlay.ring, overlap, overlay.turn)
+        z = bent_onto(body, plane_points(factor * overlay.ring + middle))[:, None]
         found.append((float(body.cost(z)[0]), z[: body.size, 0]))
     cost, outline = min(found, key=lambda one: one[0])
     return fidelity(body.rest[: body.size], outline, cost)
 
 
-class _Laying(NamedTuple):
-    """A ring (m,) about the origin, of area 1, turned by `turn`, and its IoU with the silhouette."""
+class _Overlay(NamedTuple):
+    """A ring (m,) of area 1 about the origin, rotated by `turn`, and its IoU with the silhouette."""
 
     iou: float
     turn: complex
     ring: Complex
 
 
-def _hands(ring: Array, *, mirror: bool) -> list[Complex]:
+def _orientations(ring: Array, *, mirror: bool) -> list[Complex]:
     z = complex_points(ring)
     return [z, np.conj(z[::-1])] if mirror else [z]
 
 
 def _ring(points: ArrayLike, what: str) -> Array:
-    """(n, 2) counter-clockwise about the origin, of area 1."""
+    """Return the ring (n, 2), counter-clockwise about the origin, with area 1."""
     as_region(points, what)
     ring = orient(numbers(points, what, ("N", 2)), counter_clockwise=True)
     return np.ascontiguousarray((ring - centroid(ring)) / np.sqrt(signed_area(ring)))

@@ -1,39 +1,38 @@
-"""How far one shape is from another: areas and distances of polygons, exact, not counted in pixels.
+"""Exact measures of how far one polygon is from another: areas and distances.
 
-Nothing here moves a shape: bring both into one frame first. A shape is a ring (N, 2) or a shapely
-polygon or multipolygon.
+Shapes are compared where they are: bring both into one frame first. A shape is a ring (N, 2) or a
+shapely polygon or multipolygon.
 """
+
+# pyright: reportUnknownMemberType=false
+# shapely's stubs leave the keyword arguments of its functions of arrays without types.
 
 from dataclasses import asdict, dataclass
 
 import numpy as np
 import shapely
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from shapely.geometry import MultiPolygon, Polygon, box
 
 from orbiflow.arguments import numbers
+from orbiflow.arrays import Array, Integers, Window
 from orbiflow.errors import OrbiflowError
-from orbiflow.typed_shapely import ufuncs
 
-# Of the diagonal of the box around both curves.
-TOLERANCE = 1e-6
+HAUSDORFF_TOLERANCE = 1e-6
+"""The accuracy of Hausdorff distances, as a share of the diagonal of the box around both curves."""
 
 
-def hausdorff_distance(
-    a: NDArray[np.float64], b: NDArray[np.float64], *, tolerance: float
-) -> float:
-    """Hausdorff distance between the unions of the segments `a` and `b`, each (M, 2, 2).
+def hausdorff_distance(a: Array, b: Array, *, tolerance: float) -> float:
+    """Return the Hausdorff distance between the unions of the segments `a` and `b`, each (M, 2, 2).
 
-    Too small by at most `tolerance` (in the unit of the coordinates), never too large.
+    The result is too small by at most `tolerance`, in the unit of the coordinates, never too large.
     """
     forth = _directed(a, b, tolerance)
     return max(forth, _directed(b, a, tolerance, at_least=forth))
 
 
-def _directed(
-    a: NDArray[np.float64], b: NDArray[np.float64], tolerance: float, at_least: float = 0.0
-) -> float:
-    """Greatest distance from a point of `a` to the nearest point of `b`."""
+def _directed(a: Array, b: Array, tolerance: float, at_least: float = 0.0) -> float:
+    """Return the greatest distance from a point of `a` to the nearest point of `b`."""
     tree = shapely.STRtree(list(np.asarray(shapely.linestrings(b), dtype=object)))
     start, end = a[:, 0], a[:, 1]
     best = at_least
@@ -54,18 +53,16 @@ def _directed(
     return best
 
 
-def _nearest(
-    tree: shapely.STRtree, points: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
-    """Distance to, and index of, the edge of `tree` nearest to each of `points` (P, 2)."""
+def _nearest(tree: shapely.STRtree, points: Array) -> tuple[Array, Integers]:
+    """Return the distance to, and index of, the edge of `tree` nearest to each of `points` (P, 2)."""
     pairs, distance = tree.query_nearest(
         shapely.points(points), return_distance=True, all_matches=False
     )
     return distance, pairs[1]
 
 
-def _distance(points: NDArray[np.float64], edges: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Distance of each of `points` (P, 2) to the edge (P, 2, 2) of the same index."""
+def _distance(points: Array, edges: Array) -> Array:
+    """Return the distance of each of `points` (P, 2) to the edge (P, 2, 2) of the same index."""
     origin, along = edges[:, 0], edges[:, 1] - edges[:, 0]
     length2 = np.maximum((along**2).sum(axis=1), np.finfo(float).tiny)
     t = np.clip(((points - origin) * along).sum(axis=1) / length2, 0.0, 1.0)
@@ -80,29 +77,28 @@ Region = Polygon | MultiPolygon
 
 @dataclass(frozen=True)
 class ShapeMetrics:
-    """Agreement of a tile with its target. Areas are exact; `hausdorff` has no unit, see below.
+    """The agreement of a tile with its target. Areas are exact.
 
-    - `iou`: area of the intersection over area of the union, 0 to 1.
-    - `dice`: twice the area of the intersection over the sum of the areas, 0 to 1.
-    - `pixel_accuracy`: share of `window` on which both agree; it depends on the window.
-    - `window`: (xmin, ymin, xmax, ymax) of that window, in the shapes' own units.
-    - `hausdorff`: distance between the two boundaries, in units of the square root of the target's
-      area.
+    - `iou`: The area of the intersection over the area of the union, 0 to 1.
+    - `dice`: Twice the area of the intersection over the sum of the areas, 0 to 1.
+    - `pixel_accuracy`: The share of `window` on which both agree.
+    - `window`: The window (xmin, ymin, xmax, ymax), in the shapes' own units.
+    - `hausdorff`: The distance between the two boundaries, in square roots of the target's area.
     """
 
     iou: float
     dice: float
     pixel_accuracy: float
-    window: tuple[float, float, float, float]
+    window: Window
     hausdorff: float
 
     def as_dict(self) -> dict[str, float | list[float]]:
-        """The same values, ready for JSON."""
+        """Return the same values, ready for JSON."""
         return asdict(self) | {"window": list(self.window)}
 
 
 def iou(a: Shape, b: Shape) -> float:
-    """Intersection over union (the Jaccard index) of two shapes, 0 to 1.
+    """Return the intersection over union (the Jaccard index) of two shapes, 0 to 1.
 
     Raises `OrbiflowError` naming the argument that is not a valid polygon.
 
@@ -113,7 +109,7 @@ def iou(a: Shape, b: Shape) -> float:
 
 
 def dice(a: Shape, b: Shape) -> float:
-    """Dice coefficient of two shapes, 0 to 1: twice the shared area over the sum of the areas.
+    """Return the Dice coefficient of two shapes, 0 to 1: twice the shared over the total area.
 
     Raises `OrbiflowError` naming the argument that is not a valid polygon.
 
@@ -124,11 +120,11 @@ def dice(a: Shape, b: Shape) -> float:
 
 
 def pixel_accuracy(a: Shape, b: Shape, window: Shape | None = None) -> float:
-    """Share of `window` on which `a` and `b` agree: both there or both absent. 0 to 1.
+    """Return the share of `window`, 0 to 1, where both or neither of `a` and `b` are present.
 
-    The limit, as pixels shrink, of the share of pixels classified alike. The value depends on the
-    window: the more background it takes in, the nearer 1. `window` is a shape or four numbers
-    (xmin, ymin, xmax, ymax); by default it is `default_window(b)`, with `b` the target.
+    This is the limit, as pixels shrink, of the share of pixels classified alike. It depends on the
+    window: more background brings it nearer to 1. `window` is a shape or four numbers
+    (xmin, ymin, xmax, ymax); by default it is `default_window(b)`, where `b` is the target.
 
     Raises `OrbiflowError` naming the argument that is not a valid polygon or box.
 
@@ -141,7 +137,7 @@ def pixel_accuracy(a: Shape, b: Shape, window: Shape | None = None) -> float:
 
 
 def default_window(target: Shape) -> Polygon:
-    """The bounding box of `target`, enlarged by 10% of its width and height on every side.
+    """Return the bounding box of `target`, enlarged by 10% of its width and height on every side.
 
     >>> default_window([[0, 0], [10, 0], [0, 20]]).bounds
     (-1.0, -2.0, 11.0, 22.0)
@@ -152,11 +148,11 @@ def default_window(target: Shape) -> Polygon:
 
 
 def hausdorff(a: Shape, b: Shape) -> float:
-    """Hausdorff distance between the boundaries of two shapes, in the shapes' own units.
+    """Return the Hausdorff distance between the boundaries of two shapes, in the shapes' own units.
 
-    The distance between the curves, not between their vertices: the greatest distance from a point
-    of one boundary to the nearest point of the other. It is too small by at most 1e-6 of the
-    diagonal of the box around both shapes, never too large.
+    This is the greatest distance from any point of one boundary, not only a vertex, to the nearest
+    point of the other. It is too small by at most 1e-6 of the diagonal of the box around both shapes,
+    never too large.
 
     Raises `OrbiflowError` naming the argument that is not a valid polygon.
 
@@ -167,7 +163,7 @@ def hausdorff(a: Shape, b: Shape) -> float:
 
 
 def compare(tile: Shape, target: Shape, window: Shape | None = None) -> ShapeMetrics:
-    """All metrics of `tile` against `target`, both in one frame.
+    """Return all metrics of `tile` against `target`, both in one frame.
 
     `window` is as in `pixel_accuracy`; `hausdorff` is in units of the square root of the target's
     area. Raises `OrbiflowError` naming the argument that is not a valid polygon.
@@ -202,19 +198,21 @@ def _pixel_accuracy(a: Region, b: Region, window: Region) -> float:
 
 
 def _hausdorff(a: Region, b: Region) -> float:
-    xmin, ymin, xmax, ymax = ufuncs.total_bounds([a, b])
+    xmin, ymin, xmax, ymax = shapely.total_bounds([a, b])
     return hausdorff_distance(
-        _edges(a), _edges(b), tolerance=TOLERANCE * float(np.hypot(xmax - xmin, ymax - ymin))
+        _edges(a),
+        _edges(b),
+        tolerance=HAUSDORFF_TOLERANCE * float(np.hypot(xmax - xmin, ymax - ymin)),
     )
 
 
 def _share(value: float) -> float:
-    # Rounding in the overlay can step outside by an ulp.
+    # rounding in the overlay can exceed the bounds by an ulp
     return min(max(float(value), 0.0), 1.0)
 
 
-def _edges(region: Region) -> NDArray[np.float64]:
-    """Boundary segments of `region`, (M, 2 ends, 2 coordinates)."""
+def _edges(region: Region) -> Array:
+    """Return boundary segments of `region`, (M, 2 ends, 2 coordinates)."""
     polygons = region.geoms if isinstance(region, MultiPolygon) else [region]
     rings = [ring for part in polygons for ring in (part.exterior, *part.interiors)]
     coords = [np.asarray(ring.coords, dtype=np.float64)[:, :2] for ring in rings]
@@ -231,7 +229,7 @@ def _window(window: Shape) -> Region:
 
 
 def as_region(shape: Shape, name: str) -> Region:
-    """`shape` as a valid polygon of positive area, else an error naming the argument."""
+    """Return `shape` as a valid polygon of positive area, or raise an error with its `name`."""
     if not isinstance(shape, Polygon | MultiPolygon):
         shape = _ring_polygon(shape, name)
     if not np.isfinite(shapely.get_coordinates(shape)).all():

@@ -1,5 +1,8 @@
 """The exact overlap of polygons with a region, and its exact gradient in the vertices."""
 
+# pyright: reportUnknownMemberType=false
+# shapely's stubs leave the keyword arguments of its functions of arrays without types.
+
 from __future__ import annotations
 
 from collections.abc import Sequence
@@ -12,32 +15,25 @@ import shapely
 from orbiflow.arguments import numbers
 from orbiflow.arrays import Array, Complex
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles.geometry import (
-    centroid,
-    complex_points,
-    orient,
-    plane_points,
-    signed_area,
-)
+from orbiflow.tiles.geometry import centroid, complex_points, orient, plane_points, signed_area
 from orbiflow.tiles.likeness.ranking import Similarity
-from orbiflow.typed_shapely import ufuncs
 
-MANY, COARSE = 1500, 2e-3
-"""Vertices beyond which a region is simplified, and by how much of its size (area 1)."""
+MAX_REGION_VERTICES, REGION_TOLERANCE = 1500, 2e-3
+"""The number of vertices beyond which a region of area 1 is simplified, and the tolerance."""
 
 
 def prepared_region(ring: Array) -> shapely.Polygon:
-    """The region of a ring (N, 2) of area about 1, prepared; simplified if its vertices are many.
+    """Return the prepared region of a ring (N, 2) of area about 1, simplified if it is complex.
 
-    For choosing among candidates: intersections with thousands of vertices cost seconds. What is
-    reported is measured with the ring itself.
+    Use it to choose among candidates, as intersections with thousands of vertices take seconds; final
+    results are measured with the ring itself.
     """
     ring = numbers(ring, "the region's ring", ("N", 2))
     if len(ring) < 3:
-        raise OrbiflowError(f"the region's ring needs 3 vertices at least, got {len(ring)}")
+        raise OrbiflowError(f"the region's ring needs at least 3 vertices, got {len(ring)}")
     region = shapely.Polygon(ring)
-    if len(ring) > MANY:
-        simpler = region.simplify(COARSE)
+    if len(ring) > MAX_REGION_VERTICES:
+        simpler = region.simplify(REGION_TOLERANCE)
         if isinstance(simpler, shapely.Polygon) and simpler.is_valid and not simpler.is_empty:
             region = simpler
     shapely.prepare(region)
@@ -45,30 +41,30 @@ def prepared_region(ring: Array) -> shapely.Polygon:
 
 
 def boundary_iou(goal: shapely.Polygon, boundaries: Array) -> Array:
-    """IoU (S,) of rings (S, N, 2) with a polygon; -1 for those that cross themselves."""
+    """Return the IoU (S,) of rings (S, N, 2) with a polygon; -1 for those that cross themselves."""
     polygons = np.asarray(shapely.polygons(boundaries))
     good = np.asarray(shapely.is_valid(polygons))
     scores = np.full(len(polygons), -1.0)
-    common = ufuncs.area(shapely.intersection(polygons[good], goal))
-    scores[good] = common / (ufuncs.area(polygons[good]) + goal.area - common)
+    common = shapely.area(shapely.intersection(polygons[good], goal))
+    scores[good] = common / (shapely.area(polygons[good]) + goal.area - common)
     return scores
 
 
 class Overlap:
-    """Overlap of rings with one region.
+    """The overlap of rings with one region.
 
-    The area of P and T common changes at the rate of the normal speed integrated over the part of
-    P's boundary inside T; along a side the speed is linear between its ends.
+    The common area of P and T changes at the rate of the normal speed integrated over the part of P's
+    boundary inside T; along a side the speed is linear between its ends.
 
     Args:
-        target: (M, 2) ring of the region, simple, in either sense; see `prepared_region`.
+        target: The simple ring (M, 2) of the region, in either orientation; see `prepared_region`.
     """
 
     def __init__(self, target: Array) -> None:
         self.region = prepared_region(target)
 
     def iou(self, ring: Array) -> tuple[float, Array]:
-        """IoU of a simple ring (N, 2) with the region and its gradient (N, 2).
+        """Return the IoU of a simple ring (N, 2) with the region and its gradient (N, 2).
 
         >>> square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
         >>> value, gradient = Overlap(square).iou(0.5 * square + 0.25)
@@ -89,17 +85,17 @@ class Overlap:
         return common / union, ((union + common) * inside - common * whole) / union**2
 
     def area_gradient(self, ring: Array) -> Array:
-        """Gradient (N, 2) of the area of the ring's part inside the region."""
+        """Return the gradient (N, 2) of the area of the ring's part inside the region."""
         ends = np.roll(ring, -1, axis=0)
         sides = ends - ring
         lines = shapely.linestrings(np.stack([ring, ends], axis=1))
         pieces, owner = shapely.get_parts(
             shapely.intersection(lines, self.region), return_index=True
         )
-        lengths = ufuncs.length(pieces)
+        lengths = shapely.length(pieces)
         pieces, owner = pieces[lengths > 0], owner[lengths > 0]  # not where they only touch
         first, last = (
-            shapely.get_coordinates(ufuncs.get_point(pieces, index)) for index in (0, -1)
+            shapely.get_coordinates(shapely.get_point(pieces, index)) for index in (0, -1)
         )
         square = np.maximum((sides**2).sum(axis=1), 1e-300)[owner]
         start, stop = (
@@ -113,20 +109,18 @@ class Overlap:
         return early[:, None] * normal + np.roll(late[:, None] * normal, 1, axis=0)
 
 
-def overlaid(
+def best_overlay(
     ring: Complex, overlap: Overlap, factor: complex = 1.0, middle: complex = 0.0
 ) -> tuple[complex, complex, float]:
-    """Lay a ring over a region by the similarity of largest IoU near a first one.
-
-    By L-BFGS on exact gradients.
+    """Find the similarity of largest IoU with a region near a first one, by L-BFGS.
 
     Args:
-        ring: (n,) x + iy about the origin.
-        overlap: with the region.
-        factor, middle: of the first similarity, z -> factor z + middle.
+        ring: A ring (n,) x + iy about the origin.
+        overlap: The overlap with the region.
+        factor, middle: The first similarity, z -> factor z + middle.
 
     Returns:
-        Factor and middle of the best one, and its IoU.
+        The factor and middle of the best one, and its IoU.
     """
 
     def loss(x: Array) -> tuple[float, Array]:
@@ -145,19 +139,19 @@ def overlaid(
     return best, complex(middle + found.x[2] + 1j * found.x[3]), -float(found.fun)
 
 
-CLOSER = 0.15
-"""IoU that laying one tile over the other better is taken to add at most."""
+MAX_IOU_GAIN = 0.15
+"""The largest gain in IoU that is expected from a better overlay of two tiles."""
 
 
 def mutual_iou(tiles: Sequence[Array], decisive: float = 0.9) -> Similarity:
-    """Mutual IoU of tiles by their indices, for `diverse`.
+    """Return the mutual IoU of tiles by their indices, for `diverse`.
 
-    The better overlay is looked for only where it may decide: between pairs whose IoU, as they lie
-    and with equal areas and centroids, is at most `CLOSER` below `decisive`.
+    A better overlay is searched only where it can matter: for pairs whose IoU, with equal areas and
+    centroids, is at most `MAX_IOU_GAIN` below `decisive`.
 
     Args:
-        tiles: (n,) simple rings (N, 2), all laid over one silhouette.
-        decisive: what the IoU is compared with.
+        tiles: The tiles (n,), simple rings (N, 2) that all lie over one silhouette.
+        decisive: The value that the IoU is compared with.
 
     >>> square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
     >>> turned = square @ [[0.98, 0.2], [-0.2, 0.98]] * 3 + 7
@@ -174,9 +168,9 @@ def mutual_iou(tiles: Sequence[Array], decisive: float = 0.9) -> Similarity:
     def alike(i: int, j: int) -> float:
         shared = shapely.Polygon(rings[i]).intersection(shapely.Polygon(rings[j])).area
         plain = float(min(shared / (2 - shared), 1.0))
-        if not decisive - CLOSER <= plain < decisive:
+        if not decisive - MAX_IOU_GAIN <= plain < decisive:
             return plain
-        return max(plain, overlaid(complex_points(rings[i]), region(j))[2])
+        return max(plain, best_overlay(complex_points(rings[i]), region(j))[2])
 
     return lambda i, j: alike(min(i, j), max(i, j))
 

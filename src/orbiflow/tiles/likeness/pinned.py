@@ -1,15 +1,14 @@
-"""An elastic body some parts of which keep their shape: pinned parts.
+"""An elastic body with pinned parts, which keep their shape.
 
 A part costs, for each of its points, the squared distance from the nearest similar copy a x + b of
 the part x at rest, with complex a and b (shape matching: Mueller et al., Meshless Deformations Based
 on Shape Matching, 2005). Stiffer springs would do the same, but with them a part turns, in each step
 of choosing rotations and solving, only by the ratio of the stiffnesses; a and b are solved for
-together with the points, so that a part goes where it likes at once. To this comes what it costs a to
-differ from a rotation at the whole body's size or, where parts keep their angle, from the whole
-body's own rotation.
+together with the points, so that a part moves freely at once. A cost is added if a differs from a
+rotation at the whole body's size or, if parts keep their angle, from the whole body's own rotation.
 
-With a and b eliminated the stiffness matrix is a real one less W W^H, with two complex columns a
-part: all equations are solved with the real matrix and corrected (Sherman, Morrison, Woodbury).
+With a and b eliminated, the stiffness matrix is a real one less W W^H, where W has two complex columns
+per part. All equations are solved with the real matrix and corrected (Sherman, Morrison, Woodbury).
 """
 
 from __future__ import annotations
@@ -17,45 +16,38 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from orbiflow.arrays import Complex, Integers
+from orbiflow.arrays import Array, Complex, Integers
 from orbiflow.tiles.geometry import best_similarity
-from orbiflow.tiles.likeness.elastic import (
-    Array,
-    Condensed,
-    Elastic,
-    Stiffness,
-)
+from orbiflow.tiles.likeness.elastic import Condensed, Elastic, Stiffness
 from orbiflow.tiles.silhouette import Mesh
 
-PINNED = 1e5
-"""Weight of the mean over all points of the body of the squared distance from similar copies."""
+SHAPE_WEIGHT = 1e5
+"""The weight of the mean squared distance of the body's points from similar copies."""
 
-SIZE = 30.0
-"""Weight of a part's growing or shrinking, for the whole body."""
+SIZE_WEIGHT = 30.0
+"""The weight of a part's change of size, for the whole body."""
 
-ANGLE = 3e4
-"""Weight of a part's turning for the whole body, if it is to keep its angle."""
+ANGLE_WEIGHT = 3e4
+"""The weight of a part's rotation, for the whole body, if it keeps its angle."""
 
-FEWEST = 3
-"""Points of a part at least: a similarity takes any two points anywhere."""
+MIN_PART_POINTS = 3
+"""The least number of points of a part: a similarity can take two points anywhere."""
 
 
 class Pinned(Elastic):
     """A triangulated silhouette with parts that keep their shape.
 
-    `energy` and `lenient_energy` hold what the parts cost; `forgiving_energy` is the body's without
-    them, so that it compares with that of bodies which are pinned elsewhere or nowhere.
+    `energy` and `lenient_energy` include the parts' cost; `forgiving_energy` leaves it out, so that it
+    can be compared with that of bodies with other pins or none.
 
     Args:
-        ring: (n, 2) outline, counter-clockwise; the first n points of the body.
-        parts: indices of the points of each; those of fewer than three points are left out.
-        keep_angle: whether parts turn only with the whole body.
-        stiffness, stiff, mesh: as of `Elastic`.
+        ring: The outline (n, 2), counter-clockwise; the first n points of the body.
+        parts: The indices of the points of each part; parts of fewer than three points are ignored.
+        keep_angle: Whether parts rotate only with the whole body.
+        stiffness, stiff, mesh: As in `Elastic`.
 
     Raises:
         OrbiflowError: for a ring that cannot be triangulated.
@@ -73,41 +65,41 @@ class Pinned(Elastic):
     ) -> None:
         super().__init__(ring, stiffness, stiff=stiff, mesh=mesh)
         self.keep_angle = keep_angle
-        # what is stiffer all over holds its parts no less
+        # a stiffer body holds its parts more strongly
         unit = (1.0 if stiff is None else float(np.mean(stiff))) / len(self)
-        held = unit * (ANGLE if keep_angle else SIZE)
+        held = unit * (ANGLE_WEIGHT if keep_angle else SIZE_WEIGHT)
         self.parts = [
-            _Part(self.rest, index, PINNED * unit, held * len(index))
+            _Part(self.rest, index, SHAPE_WEIGHT * unit, held * len(index))
             for index in parts
-            if len(index) >= FEWEST
+            if len(index) >= MIN_PART_POINTS
         ]
         self._low = np.zeros((len(self), 2 * len(self.parts)), dtype=complex)
         for k, part in enumerate(self.parts):
             self._low[part.index, 2 * k : 2 * k + 2] = part.columns
 
     def energy(self, z: Complex) -> Array:
-        """Energies (C,) of shapes (N, C) without the pose's, with the parts'."""
+        """Return the energies (C,) of shapes (N, C), with the parts' but without the pose's."""
         return super().energy(z) + self._held(z)
 
     def lenient_energy(self, z: Complex) -> Array:
-        """As of `Elastic`, with the parts': placements that hold them are to be preferred."""
+        """Return `Elastic.lenient_energy` and the parts' cost: placements that hold them are better."""
         return super().lenient_energy(z) + self._held(z)
 
     def _held(self, z: Complex) -> Array:
-        """What the parts cost (C,)."""
+        """Return the cost (C,) of the parts."""
         goals = zip(self.parts, self._goals(z), strict=True)
         return np.sum([part.cost(z, goal) for part, goal in goals], axis=0)
 
     def misfit(self, outline: Complex) -> float | None:
-        """How far the worst part of an outline (n,) is from similar to what it was, 0 to 1.
+        """Return how dissimilar the worst part of an outline (n,) is to its original, 0 to 1.
 
-        The root of the mean squared distance after the best similarity over that from the part's
+        This is the root mean square distance after the best similarity, over that from the part's
         middle (Procrustes); None if no part has three points of the outline.
         """
         found: list[float] = []
         for part in self.parts:
             index = part.index[part.index < self.size]
-            if len(index) >= FEWEST:
+            if len(index) >= MIN_PART_POINTS:
                 rest: Complex = self.rest[index] - self.rest[index].mean()
                 bent: Complex = outline[index] - outline[index].mean()
                 sizes = np.vdot(rest, rest).real * np.vdot(bent, bent).real
@@ -115,14 +107,14 @@ class Pinned(Elastic):
         return float(max(found)) if found else None
 
     def forces(self, z: Complex) -> Complex:
-        """As of `Elastic`, the parts' pull to their sizes or angles included."""
+        """Return the forces of `Elastic` and the parts' pull to their sizes or angles."""
         pull = super().forces(z)
         for part, goal in zip(self.parts, self._goals(z), strict=True):
             pull[part.index] += part.pull[:, None] * goal
         return pull
 
     def _goals(self, z: Complex) -> list[Complex]:
-        """What each part's a is drawn to, (C,) each."""
+        """Return the values (C,) that each part's a is pulled to."""
         whole = best_similarity(self.rest, z)
         if self.keep_angle:
             return [whole] * len(self.parts)
@@ -131,7 +123,7 @@ class Pinned(Elastic):
 
     @cached_property
     def matrix(self) -> Array:
-        """(N, N) stiffness matrix, but for what the parts' similar copies take away from it."""
+        """The stiffness matrix (N, N) without the correction W W^H for the parts."""
         spring = np.zeros(len(self))
         for part in self.parts:
             spring[part.index] += part.weight
@@ -139,7 +131,7 @@ class Pinned(Elastic):
 
     @cached_property
     def condensed(self) -> PinnedCondensed:
-        """The inner points solved for: a matrix of the outline alone."""
+        """The body with its inner points eliminated, so that only the outline is free."""
         plain, n = super().condensed, self.size
         low = self._low
         spread = _complex(plain.inverse @ low[n:])
@@ -153,7 +145,7 @@ class Pinned(Elastic):
         )
 
     def pulled(self, z: Complex, towards: Complex, strength: float, rounds: int) -> Complex:
-        """As of `Elastic`: let the outline be pulled towards other points."""
+        """Let the outline be pulled towards other points, as `Elastic.pulled` does."""
         mu = strength / self.size
         solve = self._pulled_solver(mu)
         spread = _complex(solve @ self._low)
@@ -172,9 +164,9 @@ class PinnedCondensed(Condensed):
 
     The outline's matrix is `outline` less `low` times its adjoint.
 
-    - `coupling`: (n, k) of the outline and the copies.
-    - `spread`: (N - n, k) where the inner points go with the copies.
-    - `solve`: (k, k) inverse of the copies' own matrix.
+    - `coupling`: The coupling (n, k) of the outline and the copies.
+    - `spread`: The matrix (N - n, k) that takes the copies to the inner points.
+    - `solve`: The inverse (k, k) of the copies' own matrix.
     """
 
     coupling: Complex
@@ -183,16 +175,16 @@ class PinnedCondensed(Condensed):
 
     @property
     def low(self) -> Complex:
-        """(n, k) what is taken away from the outline's matrix, as one factor."""
+        """The factor (n, k) of the correction of the outline's matrix."""
         return self.coupling @ np.linalg.cholesky(self.solve)
 
     def forces(self, forces: Complex) -> Complex:
-        """Forces (N, C) as forces (n, C) on the outline."""
+        """Return forces (N, C) as forces (n, C) on the outline."""
         inner = self.spread.conj().T @ forces[len(self.outline) :]
         return super().forces(forces) + self.coupling @ (self.solve @ inner)
 
     def whole(self, outline: Complex, forces: Complex) -> Complex:
-        """All points (N, C), from the outline (n, C) and the forces (N, C)."""
+        """Return all points (N, C), from the outline (n, C) and the forces (N, C)."""
         n = len(self.outline)
         z = super().whole(outline, forces)
         pull = self.coupling.conj().T @ outline + self.spread.conj().T @ forces[n:]
@@ -204,10 +196,10 @@ class _Part:
     """Points that keep their shape.
 
     Args:
-        rest: (N,) of the body.
-        index: of the part's points.
-        weight: of each point's squared distance from the part's similar copy.
-        held: of |a - goal|^2.
+        rest: The points (N,) of the body at rest.
+        index: The indices of the part's points.
+        weight: The weight of each point's squared distance from the part's similar copy.
+        held: The weight of |a - goal|^2.
     """
 
     def __init__(self, rest: Complex, index: Integers, weight: float, held: float) -> None:
@@ -222,22 +214,22 @@ class _Part:
         self.columns: Complex = np.stack([weight / np.sqrt(both) * self.rest, middle], axis=1)
 
     def factor(self, z: Complex) -> Complex:
-        """(C,) the a of the similar copies nearest to shapes (N, C)."""
+        """Return the factors a (C,) of the similar copies nearest to shapes (N, C)."""
         return np.conj(self.rest) @ z[self.index] / self.moment
 
     def cost(self, z: Complex, goal: Complex) -> Array:
-        """(C,) of shapes."""
+        """Return the cost (C,) of the part in shapes (N, C)."""
         own = z[self.index] - z[self.index].mean(axis=0)
         a = self.factor(z)
         apart = (abs(own - self.rest[:, None] * a) ** 2).sum(axis=0)
         return self.weight * apart + self.stays * abs(a - goal) ** 2
 
 
-def _complex(array: NDArray[Any]) -> Complex:
+def _complex(array: Array) -> Complex:
     return np.asarray(array, dtype=np.complex128)
 
 
 def _one_less(low: Complex, spread: Complex) -> Complex:
-    """1 - W^H S W, made Hermitian."""
+    """Return 1 - W^H S W, made Hermitian."""
     product = low.conj().T @ spread
     return np.eye(low.shape[1]) - (product + product.conj().T) / 2

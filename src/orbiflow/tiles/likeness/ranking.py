@@ -1,31 +1,32 @@
-"""The order in which tiles are shown, and a short list of the best without repeats."""
+"""The ranking of tiles, and a short list of the best tiles without repeats."""
 
 from collections.abc import Callable, Sequence
 
 import numpy as np
 import shapely
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from orbiflow.arguments import number, whole
+from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.likeness.metrics import Shape, as_region
 
 IOU_WEIGHT = 0.25
-OTHER_CLASS = 0.5  # how alike two equal tiles of different classes are
-TWIN = 0.97
-VARIETY = 0.1
+OTHER_CLASS_FACTOR = 0.5  # how alike two equal tiles of different classes are
+TWIN_SIMILARITY = 0.97
+VARIETY_WEIGHT = 0.1
 
 Similarity = Callable[[int, int], float]
-"""How alike two candidates are, from their indices: 0 to 1, the same in both orders."""
+"""A symmetric function of two candidates' indices: how alike they are, 0 to 1."""
 
 
 def rank_score(iou: float, recognisability: float) -> float:
-    """What tiles are ranked by, 0 to 1: the geometric mean of both, IoU with weight 1/4.
+    """Return the score of a tile, 0 to 1: the geometric mean of both, IoU with weight 1/4.
 
-    A geometric mean compares ratios, so it does not matter that IoU moves little from tile to tile
-    (a blob without limbs has nine tenths of the best tile's) and recognisability much; and what has
-    nothing of one of them has nothing. With more weight, IoU brings the blobs back; with none, a
-    tile may lie beside its target. docs/recognisability.md has the numbers.
+    A geometric mean compares ratios, so it does not matter that IoU varies little between tiles (a
+    blob without limbs has nine tenths of the best tile's) and recognisability much; and a tile needs
+    some of both. With more weight on IoU blobs win; with none, a tile may lie beside its target.
+    docs/recognisability.md has the numbers.
 
     Raises `OrbiflowError` for a value outside [0, 1].
 
@@ -42,28 +43,28 @@ def diverse(
     count: int,
     similarity: Similarity,
     *,
-    twin: float = TWIN,
-    variety: float = VARIETY,
+    twin: float = TWIN_SIMILARITY,
+    variety: float = VARIETY_WEIGHT,
 ) -> list[int]:
-    """Up to `count` good candidates that differ from each other, the best first.
+    """Choose up to `count` good candidates that differ from each other, the best first.
 
-    Maximal marginal relevance (Carbonell, Goldstein, 1998): first the candidate with the largest
-    score, then again and again the one with the largest score minus `variety` times its similarity
-    to the most alike of those already chosen. Candidates whose similarity to a chosen one is above
-    `twin` are left out, so there may be fewer than `count`.
+    This is maximal marginal relevance (Carbonell, Goldstein, 1998): the first candidate has the
+    largest score, each next one the largest score minus `variety` times its largest similarity to a
+    chosen one. Candidates with a similarity above `twin` to a chosen one are left out, so there may be
+    fewer than `count`.
 
     Args:
-        scores: (n,), larger is better; of equal ones the earlier comes first.
-        count: at least 1.
-        similarity: asked only about a candidate and a chosen one, once for each such pair.
-        twin: 0 to 1; at 1 nothing is left out.
-        variety: at least 0, in the unit of the scores; at 0 only twins matter.
+        scores: The scores (n,), larger is better; of equal ones the earlier comes first.
+        count: The largest number of candidates, at least 1.
+        similarity: The similarity of a candidate and a chosen one, called once for each pair.
+        twin: The largest similarity, 0 to 1; with 1 nothing is left out.
+        variety: The weight of similarity, at least 0, in the unit of the scores.
 
     Returns:
-        Indices into `scores`, in the order of choice.
+        Indices of `scores`, in the order of choice.
 
     Raises:
-        OrbiflowError: for scores that are not finite numbers and for arguments out of range.
+        OrbiflowError: for scores that are not finite numbers, and for arguments out of range.
 
     >>> position = [0.0, 0.01, 0.5, 1.0]
     >>> diverse([0.9, 0.89, 0.8, 0.81], 3, lambda i, j: 1 - abs(position[i] - position[j]))
@@ -84,17 +85,17 @@ def diverse(
 
 
 def tile_similarity(tiles: Sequence[Shape], classes: Sequence[str]) -> Similarity:
-    """How alike tiles are, for `diverse`: their mutual IoU, half of it if the classes differ.
+    """Return the similarity of tiles, for `diverse`: their IoU, halved if the classes differ.
 
-    So tiles are twins only within a class, and a class that is not yet in the list has the better
-    of an equally good second tile of one that is.
+    So tiles are twins only within a class, and a new class is preferred to an equally good second
+    tile of a class in the list.
 
     Args:
-        tiles: (n,) rings (N, 2) or shapely polygons, in one frame.
-        classes: (n,), the tiles' isohedral classes.
+        tiles: The tiles (n,), rings (N, 2) or shapely polygons, in one frame.
+        classes: The tiles' isohedral classes (n,).
 
     Raises:
-        OrbiflowError: for a tile that is not a valid polygon, or numbers of both that differ.
+        OrbiflowError: for a tile that is not a valid polygon, or if the numbers of both differ.
 
     >>> square, flat = [[0, 0], [2, 0], [2, 2], [0, 2]], [[0, 0], [2, 0], [2, 1], [0, 1]]
     >>> alike = tile_similarity([square, flat, flat], ["IH1", "IH1", "IH4"])
@@ -109,12 +110,12 @@ def tile_similarity(tiles: Sequence[Shape], classes: Sequence[str]) -> Similarit
     def alike(i: int, j: int) -> float:
         shared = shapely.intersection(regions[i], regions[j]).area
         iou = min(shared / (areas[i] + areas[j] - shared), 1.0)
-        return float(iou if classes[i] == classes[j] else OTHER_CLASS * iou)
+        return float(iou if classes[i] == classes[j] else OTHER_CLASS_FACTOR * iou)
 
     return alike
 
 
-def _check(scores: ArrayLike, count: int, twin: float, variety: float) -> NDArray[np.float64]:
+def _check(scores: ArrayLike, count: int, twin: float, variety: float) -> Array:
     try:
         values = np.asarray(scores, dtype=np.float64)
     except (TypeError, ValueError) as exc:

@@ -1,4 +1,4 @@
-"""How well people would know a target in a tile: its outline found again, limb by limb.
+"""How well people would recognise a target in a tile, limb by limb.
 
 Areas reward blobs: a limb has little area, and a smooth body that fills the middle of the target
 scores well without any. Here the target's outline is compared with the tile's, point by point and
@@ -18,21 +18,13 @@ from typing import NamedTuple
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial.distance import cdist
 from shapely.geometry.polygon import orient
 
-from orbiflow.tiles.geometry import (
-    points_along,
-    polygons_in,
-    ring_length,
-)
-from orbiflow.tiles.likeness.metrics import (
-    Region,
-    Shape,
-    as_region,
-)
+from orbiflow.arrays import Array, Integers
+from orbiflow.tiles.geometry import points_along, polygons_in, ring_length
+from orbiflow.tiles.likeness.metrics import Region, Shape, as_region
 
 POINTS = 256  # on the target's outline, and as dense on the tile's
 MOST_POINTS = 4 * POINTS  # on a tile's outline, however long it is
@@ -50,14 +42,14 @@ THICKEST = 1.0
 
 @dataclass(frozen=True)
 class Recognisability:
-    """How much of the target is found again in a tile. All values from 0 to 1, larger is better.
+    """How much of the target is found in a tile. All values are from 0 to 1, larger is better.
 
-    - `score`: harmonic mean of `kept` and `clean`.
-    - `kept`: share of the target's outline that is found in the tile; lost limbs lower it.
-    - `clean`: share of the tile's outline that is found in the target; what the tile has besides,
-      spurious limbs, slits and hairs, lowers it.
-    - `limbs`: `kept` with each point weighted by how thin the target is there. It tells what became
-      of the limbs and has no part in the score.
+    - `score`: The harmonic mean of `kept` and `clean`.
+    - `kept`: The share of the target's outline that is found in the tile; lost limbs lower it.
+    - `clean`: The share of the tile's outline that is found in the target; spurious limbs, slits and
+      hairs lower it.
+    - `limbs`: `kept` with each point weighted by how thin the target is there. It shows whether the
+      limbs are kept and has no part in the score.
     """
 
     score: float
@@ -66,15 +58,15 @@ class Recognisability:
     limbs: float
 
     def as_dict(self) -> dict[str, float]:
-        """The same values, ready for JSON."""
+        """Return the same values, ready for JSON."""
         return asdict(self)
 
 
 class Recogniser:
-    """Compares many tiles with one target, whose outline is prepared once.
+    """A comparison of many tiles with one target, whose outline is prepared once.
 
-    `target` is a ring (N, 2) or a shapely polygon or multipolygon. Tiles are compared as they lie,
-    in the target's frame: nothing is aligned.
+    `target` is a ring (N, 2) or a shapely polygon or multipolygon. Tiles must be in the target's
+    frame: they are not aligned.
 
     Raises `OrbiflowError` for a target, or a tile, that is not a valid polygon.
 
@@ -92,7 +84,7 @@ class Recogniser:
         self._origin = np.array(region.centroid.coords[0])
         rings = self._rings(region)
         corners = np.concatenate(rings)
-        # Outlines are run through from about here, so that the same outline gives the same points.
+        # sampling starts near this point, so that the same outline gives the same points
         self._start = corners[np.argmax((corners**2).sum(axis=1))]
         self._spacing = sum(ring_length(ring) for ring in rings) / POINTS
         self._target = _features(rings, self._spacing, self._start)
@@ -113,18 +105,18 @@ class Recogniser:
             limbs=_share(float(self._limb_weights[goal_points] @ found)),
         )
 
-    def _rings(self, region: Region) -> list[NDArray[np.float64]]:
-        """Rings (M, 2) of `region` in units of the target, the inside on their left."""
+    def _rings(self, region: Region) -> list[Array]:
+        """Return rings (M, 2) of `region` in units of the target, the inside on their left."""
         polygons = [orient(polygon) for polygon in polygons_in(region)]
         rings = [ring for part in polygons for ring in (part.exterior, *part.interiors)]
         return [(shapely.get_coordinates(r)[:-1] - self._origin) / self._unit for r in rings]
 
 
 def recognisability(tile: Shape, target: Shape) -> Recognisability:
-    """How much of `target` is found again in `tile`, both in one frame; see `Recognisability`.
+    """Return how much of `target` is recognised in `tile`, both in one frame.
 
-    Invariant under a similarity of both shapes. To compare many tiles with one target, make a
-    `Recogniser`. Raises `OrbiflowError` naming the argument that is not a valid polygon.
+    The result is invariant under a similarity of both shapes. To compare many tiles with one target,
+    use a `Recogniser`. Raises `OrbiflowError` naming the argument that is not a valid polygon.
 
     >>> square = [[0, 0], [2, 0], [2, 2], [0, 2]]
     >>> recognisability(square, square).score
@@ -136,19 +128,19 @@ def recognisability(tile: Shape, target: Shape) -> Recognisability:
 class _Features(NamedTuple):
     """Points on an outline.
 
-    - `lifted`: (P, 5), place, direction and thickness, each divided by its tolerance.
-    - `thickness`: (P,), the radius of the disk inscribed at each point.
-    - `before`, `after`: (P,), indices of each point's neighbours on its ring.
+    - `lifted`: Position, direction and thickness (P, 5), each divided by its tolerance.
+    - `thickness`: The radius (P,) of the disk inscribed at each point.
+    - `before`, `after`: The indices (P,) of each point's neighbours on its ring.
     """
 
-    lifted: NDArray[np.float64]
-    thickness: NDArray[np.float64]
-    before: NDArray[np.intp]
-    after: NDArray[np.intp]
+    lifted: Array
+    thickness: Array
+    before: Integers
+    after: Integers
 
 
-def _agreement(goal: _Features, own: _Features) -> NDArray[np.float64]:
-    """How far each point of the target (P,) agrees with each of the tile (Q,): (P, Q), 0 to 1.
+def _agreement(goal: _Features, own: _Features) -> Array:
+    """Return how far each point of the target (P,) agrees with each of the tile (Q,): (P, Q), 0 to 1.
 
     A point of the tile stands for its piece of the outline, a third of the way to its neighbours,
     so that it does not matter where on an outline the first point falls.
@@ -157,13 +149,11 @@ def _agreement(goal: _Features, own: _Features) -> NDArray[np.float64]:
     for neighbour in (own.before, own.after):
         third = own.lifted + (own.lifted[neighbour] - own.lifted) / 3
         np.minimum(squared, cdist(goal.lifted, third, "sqeuclidean"), out=squared)
-    # Flat at the top: what is moved a little is found all the same.
+    # flat at the top, so that small displacements do not matter
     return np.exp(-squared * squared)
 
 
-def _features(
-    rings: list[NDArray[np.float64]], spacing: float, start: NDArray[np.float64]
-) -> _Features:
+def _features(rings: list[Array], spacing: float, start: Array) -> _Features:
     spacing = max(spacing, sum(ring_length(ring) for ring in rings) / MOST_POINTS)
     samples = [_sample(ring, spacing, start) for ring in rings]
     points = np.concatenate([xy for xy, _ in samples])
@@ -179,10 +169,8 @@ def _features(
     return _Features(lifted, thickness, before, after)
 
 
-def _sample(
-    ring: NDArray[np.float64], spacing: float, start: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Evenly spaced points (P, 2) of a closed ring, and the outward normal around each.
+def _sample(ring: Array, spacing: float, start: Array) -> tuple[Array, Array]:
+    """Return evenly spaced points (P, 2) of a closed ring, and the outward normal around each.
 
     The normal is the mean of the unit normals within `WINDOW`: shorter than 1 at a bend, so that a
     corner and its rounding are alike.
@@ -196,10 +184,8 @@ def _sample(
     return points_along(ring, at), np.column_stack([tangent[:, 1], -tangent[:, 0]])
 
 
-def _inscribed_radius(
-    points: NDArray[np.float64], normals: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Radius (P,) of the largest disk that touches the outline at each point from the inside.
+def _inscribed_radius(points: Array, normals: Array) -> Array:
+    """Return the radius (P,) of the largest disk inside that touches the outline at each point.
 
     The disk through p, tangent there, and through q has curvature 2 n . (p - q) / |q - p|^2; the
     largest disk that holds no other point of the outline has the largest of these curvatures.

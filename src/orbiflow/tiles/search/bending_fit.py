@@ -15,8 +15,8 @@ from orbiflow.runtime import Cancel, one_blas_thread
 from orbiflow.tiles.geometry import best_similarity, plane_points
 from orbiflow.tiles.likeness import (
     Overlap,
+    best_overlay,
     least_neck,
-    overlaid,
 )
 from orbiflow.tiles.search.bending import Bent, bent_tiles
 from orbiflow.tiles.search.co_deformation import Hand
@@ -140,7 +140,7 @@ def placed_best(bent: Bent, overlap: Overlap) -> PlacedBent:
     rest, points = bent.hand.fine.rest, bent.points
     center = points.mean()
     ring = bent.points[: bent.hand.fine.size] - center
-    factor, middle, _ = overlaid(ring, overlap, complex(best_similarity(points, rest)), rest.mean())
+    factor, middle, _ = best_overlay(ring, overlap, complex(best_similarity(points, rest)), rest.mean())
     return PlacedBent(bent, factor, complex(middle - factor * center))
 
 

@@ -1,5 +1,8 @@
 """The map from a silhouette to a tile that it was bent to: its mesh, laid onto the tile's polygon."""
 
+# pyright: reportUnknownMemberType=false
+# shapely's stubs leave the keyword arguments of its functions of arrays without types.
+
 from __future__ import annotations
 
 from itertools import pairwise
@@ -14,7 +17,6 @@ from orbiflow.tiles.geometry import arc_lengths
 from orbiflow.tiles.search.bending import Bent
 from orbiflow.tiles.silhouette import Bending, Mesh, unfolded
 from orbiflow.tiles.tilings import Tile
-from orbiflow.typed_shapely import ufuncs
 
 SAME = 1e-9
 """Distance along the outline, in outlines, below which points are one."""
@@ -101,7 +103,7 @@ def _places(ring: Array, polygon: Array, knots: Array, own: Integers, goal: Inte
     ends = zip(own, [*own[1:], len(ring)], goal, [*goal[1:], len(polygon)], strict=True)
     for a, b, p, q in ends:
         edge = shapely.LineString(closed[a : b + 1])
-        at = knots[a] + ufuncs.line_locate_point(edge, ufuncs.points(loop[p : q + 1]))
+        at = knots[a] + shapely.line_locate_point(edge, shapely.points(loop[p : q + 1]))
         at[0], at[-1] = knots[a], knots[b]
         at = _on_vertices(at, loop[p : q + 1], closed[a : b + 1], knots[a : b + 1])
         if (np.diff(at) <= SAME * knots[-1]).any():

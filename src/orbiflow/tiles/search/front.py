@@ -12,7 +12,7 @@ import numpy as np
 
 from orbiflow.arrays import Array
 from orbiflow.tiles.geometry import orient
-from orbiflow.tiles.likeness import laid_on, mutual_iou
+from orbiflow.tiles.likeness import bent_onto, mutual_iou
 from orbiflow.tiles.search.co_deformation import Hand
 from orbiflow.tiles.tile import EscherTile
 
@@ -89,9 +89,9 @@ def behind(cost: Array, overlap: Array) -> Array:
 def deformation(hand: Hand, ring: Array) -> float:
     """What it costs to bend a silhouette until its outline is a ring: as `Elastic.cost`.
 
-    The forgiving energy in areas of the bent silhouette, and its displacement, at the best laying
-    that `likeness.laid.laid_on` finds: outline points correspond by dynamic programming, four times
-    with other weights, and slide along the ring, which may change its size, while the energy falls.
+    The forgiving energy in areas of the bent silhouette, and its displacement, at the best result
+    of `bent_onto`: outline points correspond by dynamic programming, four times with other weights,
+    and slide along the ring, which may change its size, while the energy falls.
     So it is an upper bound of the least cost, as the search's own cost of a tile that it found is.
 
     Args:
@@ -99,7 +99,7 @@ def deformation(hand: Hand, ring: Array) -> float:
         ring: (M, 2) simple, in the normal form, laid over the silhouette.
     """
     body = hand.fine
-    z = laid_on(body, orient(ring, counter_clockwise=True))
+    z = bent_onto(body, orient(ring, counter_clockwise=True))
     return float(body.cost(z[:, None])[0])
 
 

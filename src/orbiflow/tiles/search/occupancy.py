@@ -1,5 +1,8 @@
 """The paper's method: occupancy loss, affine phase, then flow phase (paper, section 4.1)."""
 
+# pyright: reportUnknownMemberType=false
+# shapely's stubs leave the keyword arguments of its functions of arrays without types.
+
 from __future__ import annotations
 
 import math
@@ -25,7 +28,6 @@ from orbiflow.tiles.search.settings import check_max_frequency
 from orbiflow.tiles.search.starts import initial_poses, template_symmetries
 from orbiflow.tiles.silhouette import Target, signed_distance
 from orbiflow.tiles.tilings import IsohedralClass, isohedral_class
-from orbiflow.typed_shapely import ufuncs
 from orbiflow.typed_torch import (
     adam,
     linalg,
@@ -102,7 +104,7 @@ class OccupancySamples:
         region = shapely.Polygon(target.normal)
         uniform = count // 3
         along = rng.random(count - uniform) * region.exterior.length
-        near = shapely.get_coordinates(ufuncs.line_interpolate_point(region.exterior, along))
+        near = shapely.get_coordinates(shapely.line_interpolate_point(region.exterior, along))
         spread = rng.choice([0.02, 0.06, 0.15], size=(len(near), 1))
         near += spread * rng.standard_normal(near.shape)
         low, high = target.normal.min(axis=0) - 0.2, target.normal.max(axis=0) + 0.2

@@ -56,7 +56,7 @@ class BendingSettings:
     - `below`: levels of effort below that are searched, too, so that more effort never finds less.
     - `multiples`: points of a tile for each point of the search, the first that holds the corners.
     - `min_neck`: width of necks below which a tile's score falls, in square roots of the area; if
-      above 0, a part of the silhouette's own narrowest if more, see `likeness.thinnest.least_neck`.
+      above 0, a part of the silhouette's own narrowest if more, see `likeness.necks.least_neck`.
     - `seed`: moves the outline's points.
     """
 

@@ -13,7 +13,7 @@ from .readers.pictures import deep_channel as deep_channel
 from .readers.pictures import open_image as open_image
 from .readers.pictures import read_mask_array as read_mask_array
 from .readers.pictures import upright as upright
-from .readers.reading import Held as Held
+from .readers.reading import FileContent as FileContent
 from .readers.reading import Reading as Reading
 from .readers.reading import check_file as check_file
 from .readers.reading import read_bytes as read_bytes

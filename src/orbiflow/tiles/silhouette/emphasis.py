@@ -1,4 +1,4 @@
-"""Emphasis: a mask painted over the input picture, as weights of the plane in the normal form."""
+"""Emphasis, a mask painted over the input picture that gives the plane's points weights."""
 
 from __future__ import annotations
 
@@ -11,11 +11,8 @@ import shapely
 from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import gaussian_filter, map_coordinates
 
-from orbiflow.arguments import (
-    instance,
-    number,
-    numbers,
-)
+from orbiflow.arguments import instance, number, numbers
+from orbiflow.arrays import Array, Window
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.tiles.silhouette.outlines import clean_ring, percent
 from orbiflow.tiles.silhouette.readers import MaskReading, read_mask
@@ -23,33 +20,33 @@ from orbiflow.tiles.silhouette.target import Target
 
 MAX_STRENGTH = 100.0
 MAX_ASPECT_ERROR = 0.01
-# In the normal form, where the silhouette has area 1: the mask's edges are drawn out over a few
-# points of a tile's boundary, so that the pull on it has no jump.
+# In the normal form, where the silhouette has area 1. The mask's edges are smoothed over a few points
+# of a tile's boundary, so that the force on it is continuous.
 SMOOTHING = 0.02  # standard deviation
-FADE = 0.05  # beyond the mask's box
+FADE_WIDTH = 0.05  # beyond the mask's box
 MAX_SMOOTHING = 32.0  # pixels: a bound of the work
-TOUCH = 0.01  # of full emphasis: what is nowhere above this on the silhouette does not touch it
-GRID = 512  # pixels along a side of the grids that integrals are taken on
+MIN_TOUCHING_LEVEL = (
+    0.01  # of full emphasis: what is nowhere above this on the silhouette does not touch it
+)
+GRID_SIDE = 512  # pixels along a side of the grids that integrals are taken on
 
 _OUTLINE_BOX = "the outline's bounding box"
-
-Box = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True, eq=False)
 class Emphasis:
-    """How much each point of the plane matters: 1 + (strength - 1) m, with m from 0 to 1.
+    """The weight 1 + (strength - 1) m of each point of the plane, with m from 0 to 1.
 
-    Make one with `Emphasis.read`. All points are in the target's normal form (y up).
+    Create one with `Emphasis.read`. All points are in the target's normal form (y up).
 
-    - `mask`: m, (H, W), 0 to 1, kept as float32, its first row at the top of the picture; read-only.
-    - `box`: (xmin, ymin, xmax, ymax), the box in the normal form that the mask's pixels cover.
-    - `strength`: weight of what is wholly emphasised, above 1 and at most 100.
-    - `source`: the mask's file name, or what stands in for it.
-    - `share`: mean of m over the silhouette, where it is known.
-    - `notes`: what was decided for the user, in plain words.
+    - `mask`: The values m (H, W), 0 to 1, as float32, the picture's top row first; read-only.
+    - `box`: The box (xmin, ymin, xmax, ymax) in the normal form that the mask's pixels cover.
+    - `strength`: The weight of full emphasis, above 1 and at most 100.
+    - `source`: The mask's file name, or a name for another source.
+    - `share`: The mean of m over the silhouette, if it is known.
+    - `notes`: What was decided for the user, in plain words.
 
-    Raises `OrbiflowError` for a strength out of range and for a mask or a box of another kind.
+    Raises `OrbiflowError` for a strength out of range and for an invalid mask or box.
 
     >>> emphasis = Emphasis(np.array([[1.0, 0.0], [0.0, 0.0]]), (-1, -1, 1, 1), strength=5.0)
     >>> emphasis.weight([[-0.5, 0.5], [0.0, 0.5], [0.5, -0.5], [9.0, 9.0]])
@@ -57,7 +54,7 @@ class Emphasis:
     """
 
     mask: NDArray[np.floating]
-    box: Box
+    box: Window
     strength: float = 4.0
     source: str = "mask"
     share: float | None = None
@@ -81,15 +78,14 @@ class Emphasis:
     def read(cls, path: str | Path, target: Target, *, strength: float = 4.0) -> Self:
         """Read a mask (PNG, JPEG, WebP) painted over the picture that `target` was read from.
 
-        Light is emphasised and dark is not, in proportion to the level between; where some of the
-        mask is more transparent than the rest, opaque is emphasised, whatever its colour. The mask
-        covers the picture of an image, the page (viewBox) of an SVG drawing, the outline's bounding
-        box where there is neither, and must have its aspect within 1%. Its edges are smoothed by
-        1/50 of the square root of the silhouette's area.
+        White is fully emphasised and black not at all. If some of the mask is more transparent than the
+        rest, opaque is emphasised, in any colour. The mask covers the picture of an image, the page
+        (viewBox) of an SVG drawing, or else the outline's bounding box, and must have its aspect
+        within 1%. Its edges are smoothed by 1/50 of the square root of the silhouette's area.
 
-        Raises `InputFileError` for a file over 64 MB or 40 megapixels, one that is no image or is
-        damaged, a mask of another aspect, one that is all of one level, and one that emphasises no
-        part of the silhouette; `OrbiflowError` for a strength that is not above 1 and at most 100.
+        Raises `InputFileError` for a file over 64 MB or 40 megapixels, one that is damaged or not an
+        image, a mask of another aspect, a uniform mask, and one that emphasises no part of the
+        silhouette; `OrbiflowError` for a strength that is not above 1 and at most 100.
         """
         instance(target, Target, "the target", "Target.read and Target.from_polygon make one")
         path = Path(path)
@@ -97,7 +93,7 @@ class Emphasis:
         box, covered = _covered(target)
         placed = _check_aspect(path, picture, box, covered)
         levels = picture.levels
-        # The last row and column of an averaged mask may reach beyond the picture.
+        # the last row and column of an averaged mask may extend beyond the picture
         overhang = np.array(levels.shape[::-1]) * picture.reduced / picture.size
         own = _normal_box(target, box, overhang)
         plain = cls(_smoothed(levels, own), own, strength, str(path))
@@ -105,16 +101,16 @@ class Emphasis:
         notes = (*picture.notes, *placed, *_warnings(levels, share, plain.strength))
         return cls(plain.mask, own, strength, str(path), share, notes)
 
-    def weight(self, points: ArrayLike) -> NDArray[np.float64]:
-        """Weights (...) at `points` (..., 2) of the normal form, from 1 to the strength.
+    def weight(self, points: ArrayLike) -> Array:
+        """Return weights (...) at `points` (..., 2) of the normal form, from 1 to the strength.
 
         Bilinear between the centres of the mask's pixels; beyond the box it fades to 1 within
         0.05. Raises `OrbiflowError` for points of another shape or that are not finite.
         """
         return 1 + (self.strength - 1) * self.level(points)
 
-    def image(self, center: ArrayLike, reach: float, resolution: int) -> NDArray[np.float64]:
-        """Weights at the pixel centres of a square, (resolution, resolution), row 0 at least y.
+    def image(self, center: ArrayLike, reach: float, resolution: int) -> Array:
+        """Return weights at the pixel centres of a square, (resolution, resolution), row 0 at least y.
 
         The grid of `SoftTarget`, and of `torch.nn.functional.grid_sample` without aligned corners:
         pixel (i, j) lies at `center` + `reach` * ((2 j + 1) / resolution - 1,
@@ -125,7 +121,7 @@ class Emphasis:
         return self.weight(np.stack(np.meshgrid(x0 + axis, y0 + axis), axis=-1))
 
     def report(self) -> dict[str, Any]:
-        """What was read and decided, ready for JSON."""
+        """Return what was read and decided, ready for JSON."""
         return {
             "source": self.source,
             "strength": float(self.strength),
@@ -133,7 +129,7 @@ class Emphasis:
             "notes": list(self.notes),
         }
 
-    def level(self, points: ArrayLike) -> NDArray[np.float64]:
+    def level(self, points: ArrayLike) -> Array:
         at = np.asarray(points, dtype=np.float64)
         if at.ndim == 0 or at.shape[-1] != 2 or not np.isfinite(at).all():
             raise OrbiflowError(
@@ -147,12 +143,12 @@ class Emphasis:
         level = map_coordinates(
             self.mask, [row.ravel(), column.ravel()], output=np.float64, order=1, mode="nearest"
         ).reshape(row.shape)
-        beyond = np.minimum(np.linalg.norm(at - inside, axis=-1) / FADE, 1.0)
+        beyond = np.minimum(np.linalg.norm(at - inside, axis=-1) / FADE_WIDTH, 1.0)
         return level * (1 - beyond**2 * (3 - 2 * beyond))
 
 
 def emphasised_iou(tile: ArrayLike, target: ArrayLike, emphasis: Emphasis) -> float:
-    """Weighted intersection over weighted union of two rings (N, 2) in the normal form, 0 to 1.
+    """Return the weighted intersection over union, 0 to 1, of two rings (N, 2) in the normal form.
 
     The areas are sums of weights over the pixel centres of a grid of 512 x 512 on the box around
     both shapes, the same ones every time. For outlines of animals the result is within 0.001 of
@@ -177,22 +173,22 @@ def emphasised_iou(tile: ArrayLike, target: ArrayLike, emphasis: Emphasis) -> fl
     return float(weight[(own & goal)[either]].sum()) / total if total else 0.0
 
 
-def _grid(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Centres (GRID^2, 2) of the pixels of the box around `points`."""
+def _grid(points: Array) -> Array:
+    """Return centres (GRID_SIDE^2, 2) of the pixels of the box around `points`."""
     low, high = points.min(axis=0), points.max(axis=0)
-    steps = (np.arange(GRID) + 0.5) / GRID
-    along: list[NDArray[np.float64]] = [low[i] + (high[i] - low[i]) * steps for i in range(2)]
+    steps = (np.arange(GRID_SIDE) + 0.5) / GRID_SIDE
+    along: list[Array] = [low[i] + (high[i] - low[i]) * steps for i in range(2)]
     return np.stack(np.meshgrid(*along), axis=-1).reshape(-1, 2)
 
 
-def _contains(ring: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.bool_]:
+def _contains(ring: Array, points: Array) -> NDArray[np.bool_]:
     region = shapely.Polygon(ring)
     shapely.prepare(region)
     return shapely.contains_xy(region, points[:, 0], points[:, 1])
 
 
-def _covered(target: Target) -> tuple[Box, str]:
-    """What a mask covers, (xmin, ymin, xmax, ymax) in input units, and its name."""
+def _covered(target: Target) -> tuple[Window, str]:
+    """Return what a mask covers, (xmin, ymin, xmax, ymax) in input units, and its name."""
     if target.size is None:
         xmin, ymin = target.outline.min(axis=0)
         xmax, ymax = target.outline.max(axis=0)
@@ -203,22 +199,22 @@ def _covered(target: Target) -> tuple[Box, str]:
     return (xmin, ymin, xmin + width, ymin + height), name
 
 
-def _check_aspect(path: Path, picture: MaskReading, box: Box, covered: str) -> list[str]:
-    """Notes of how the mask was laid over what it covers; an error where it does not fit."""
+def _check_aspect(path: Path, picture: MaskReading, box: Window, covered: str) -> list[str]:
+    """Return notes of where the mask was placed, or raise an error if it does not fit."""
     (width, height), wide, high = picture.size, box[2] - box[0], box[3] - box[1]
     mask, size = f"{width} x {height} pixels", f"{wide:.6g} x {high:.6g}"
     if abs(width * high / (height * wide) - 1) > MAX_ASPECT_ERROR:
         raise InputFileError(
-            f"{path}: the mask is {mask} and {covered} is {size}; a mask covers all of it and must "
-            "have its aspect within 1%, so paint it over a copy of that size"
+            f"{path}: the mask is {mask} and {covered} is {size}; their aspects must agree within "
+            "1%, so paint the mask over a copy of that size"
         )
     if (width, height) == (wide, high) and covered != _OUTLINE_BOX:
         return []
     return [f"laid the mask ({mask}) over {covered} ({size})"]
 
 
-def _normal_box(target: Target, box: Box, overhang: NDArray[np.float64]) -> Box:
-    """`box` of the input in the normal form, drawn out to the right and downwards by `overhang`."""
+def _normal_box(target: Target, box: Window, overhang: Array) -> Window:
+    """Return `box` in the normal form, extended to the right and downwards by `overhang`."""
     corners = target.to_normal([box[:2], box[2:]])
     xmin, ymin = corners.min(axis=0)
     xmax, ymax = corners.max(axis=0)
@@ -231,7 +227,7 @@ def _normal_box(target: Target, box: Box, overhang: NDArray[np.float64]) -> Box:
     )
 
 
-def _smoothed(levels: NDArray[np.float64], box: Box) -> NDArray[np.float32]:
+def _smoothed(levels: Array, box: Window) -> NDArray[np.float32]:
     xmin, ymin, xmax, ymax = box
     pixel = np.array([ymax - ymin, xmax - xmin]) / levels.shape
     sigma = np.minimum(SMOOTHING / pixel, MAX_SMOOTHING)
@@ -240,20 +236,20 @@ def _smoothed(levels: NDArray[np.float64], box: Box) -> NDArray[np.float32]:
 
 
 def _share_of(emphasis: Emphasis, target: Target) -> float:
-    """Mean emphasis of the silhouette; an error where the mask does not touch it."""
+    """Return the mean emphasis of the silhouette; an error where the mask does not touch it."""
     ring = target.normal
     points = _grid(ring)
     levels = emphasis.level(points[_contains(ring, points)])
     on_outline = emphasis.level(ring)
-    if max(levels.max(initial=0), on_outline.max()) < TOUCH:
+    if max(levels.max(initial=0), on_outline.max()) < MIN_TOUCHING_LEVEL:
         raise InputFileError(
             f"{emphasis.source}: the light (or opaque) part of the mask does not touch the "
-            "silhouette, or is a mere speck; paint it over the silhouette, in the same picture"
+            "silhouette, or is only a speck; paint it over the silhouette, in the same picture"
         )
     return float(levels.mean()) if levels.size else float(on_outline.mean())
 
 
-def _warnings(levels: NDArray[np.float64], share: float, strength: float) -> list[str]:
+def _warnings(levels: Array, share: float, strength: float) -> list[str]:
     notes: list[str] = []
     lightest = float(levels.max())
     if lightest < 0.9:

@@ -1,4 +1,4 @@
-"""The affine frame between a silhouette's normal form and the input that it was read from."""
+"""The affine map between a silhouette's normal form and the input that it was read from."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from orbiflow.errors import OrbiflowError
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """Where a normal form (y up, area 1, centroid 0) lies in the input: input = linear normal + offset.
+    """The map input = linear normal + offset from a normal form (y up, area 1, centroid 0).
 
-    - `linear`: (2, 2), invertible, input units for one unit of the normal form; read-only.
-    - `offset`: (2,), the normal form's origin in input units; read-only.
-    - `kind`: of the input: "image", "svg", "dat", "json" or "polygon".
-    - `size`: width and height of the picture or page in input units, where there is one.
-    - `corner`: its corner of least coordinates. In an image that is (0, 0) and the unit is the pixel:
-      the pixel in row i, column j, counted from 0, has its centre at (j + 1/2, i + 1/2).
+    - `linear`: An invertible matrix (2, 2), in input units per unit of the normal form; read-only.
+    - `offset`: The origin (2,) of the normal form in input units; read-only.
+    - `kind`: The kind of the input: "image", "svg", "dat", "json" or "polygon".
+    - `size`: The width and height of the picture or page in input units, if there is one.
+    - `corner`: Its corner of least coordinates. In an image it is (0, 0) and the unit is the pixel: the
+      pixel in row i, column j, counted from 0, has its centre at (j + 1/2, i + 1/2).
 
     Raises `OrbiflowError` for arrays of other shapes, entries that are not finite numbers, and a
     matrix without an inverse.
@@ -71,7 +71,7 @@ class Frame:
     @overload
     def to_input(self, points: ArrayLike) -> Array: ...
     def to_input(self, points: torch.Tensor | ArrayLike) -> torch.Tensor | Array:
-        """Points (..., 2) of the normal form in the input's units; arrays, lists or tensors."""
+        """Return points (..., 2) of the normal form in the input's units; arrays, lists or tensors."""
         if isinstance(points, torch.Tensor):
             points = _tensor(points)
             return points @ points.new_tensor(self.linear).T + points.new_tensor(self.offset)
@@ -82,7 +82,7 @@ class Frame:
     @overload
     def to_normal(self, points: ArrayLike) -> Array: ...
     def to_normal(self, points: torch.Tensor | ArrayLike) -> torch.Tensor | Array:
-        """Points (..., 2) in the input's units, in the normal form; arrays, lists or tensors."""
+        """Return points (..., 2) in the input's units, in the normal form; arrays, lists or tensors."""
         if isinstance(points, torch.Tensor):
             points = _tensor(points)
             return (points - points.new_tensor(self.offset)) @ points.new_tensor(self.inverse).T
@@ -93,7 +93,7 @@ class Frame:
         return local @ self.inverse.T
 
     def as_dict(self) -> dict[str, Any]:
-        """Everything, ready for JSON; `from_dict` undoes it bit for bit."""
+        """Return everything, ready for JSON; `from_dict` undoes it bit for bit."""
         return {
             "linear": self.linear.tolist(),
             "offset": self.offset.tolist(),
@@ -105,7 +105,7 @@ class Frame:
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Self:
-        """The frame that `as_dict` wrote.
+        """Return the frame that `as_dict` wrote.
 
         Raises `OrbiflowError` for values that are missing or do not make a frame.
         """
@@ -122,7 +122,9 @@ class Frame:
         except (KeyError, TypeError) as error:
             raise OrbiflowError(f"the frame is incomplete: {error}") from error
         if y_down is not frame.y_down:
-            raise OrbiflowError(f"the frame's y_down is {y_down!r}, its linear part says otherwise")
+            raise OrbiflowError(
+                f"the frame's y_down is {y_down!r}, but its linear part has y_down {frame.y_down}"
+            )
         return frame
 
 

@@ -1,36 +1,36 @@
-"""A triangulation of a silhouette: fine along its outline and in thin parts, coarser inside."""
+"""Triangulations of silhouettes, fine along the outline and coarser inside."""
+
+# pyright: reportUnknownMemberType=false
+# shapely's stubs leave the keyword arguments of its functions of arrays without types.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 from scipy.spatial import Delaunay, Voronoi
 
-from orbiflow.arrays import Integers
+from orbiflow.arrays import Array, Integers
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.geometry import subdivided
-from orbiflow.typed_shapely import ufuncs
 
-Array = NDArray[np.float64]
+MAX_HALVINGS = 24
+"""The number of times that missing sides of the outline are halved."""
 
-ROUNDS = 24
-"""Times that missing sides of the outline are halved."""
-
-FLAT = 1e-12
-"""Twice the area of a triangle, in areas of the polygon, below which it counts as flat."""
+FLAT_AREA = 1e-12
+"""Twice the area, in areas of the polygon, below which a triangle counts as flat."""
 
 
 class Mesh(NamedTuple):
-    """Triangles that fill a polygon.
+    """The triangles that fill a polygon.
 
-    - `points`: (N, 2); the polygon's n vertices first, then points on its sides, then inside.
-    - `triangles`: (M, 3) indices, counter-clockwise.
-    - `sides`: (k,) for each of the points n .. n + k, the side that it lies on.
-    - `shares`: (k,) how far along that side, 0 to 1.
-    - `size`: n.
+    - `points`: The points (N, 2): the polygon's n vertices, then points on its sides, then inside.
+    - `triangles`: The indices (M, 3) of corners, counter-clockwise.
+    - `sides`: The side (k,) that each of the points n .. n + k lies on.
+    - `shares`: The position (k,) along that side, 0 to 1.
+    - `size`: The number n of the polygon's vertices.
     """
 
     points: Array
@@ -43,14 +43,14 @@ class Mesh(NamedTuple):
 def triangulate(ring: Array, spacing: float | None = None) -> Mesh:
     """Triangulate the inside of a simple polygon, its sides among the triangles' sides.
 
-    A Delaunay triangulation of the vertices and of points inside; sides of the polygon that are no
-    sides of triangles are halved until they are (Ruppert's first rule). Sides of triangles that cross
-    the inside from one point of the outline to another are halved, so that every triangle can follow
-    wherever the outline is moved.
+    This is a Delaunay triangulation of the vertices and of points inside. Sides of the polygon that
+    are not sides of triangles are halved until they are (Ruppert's first rule). Sides of triangles
+    that connect two points of the outline through the inside are halved, so that every triangle can
+    follow when the outline moves.
 
     Args:
-        ring: (n, 2), counter-clockwise.
-        spacing: of the points inside next to the outline; default the mean length of a side.
+        ring: A counter-clockwise ring (n, 2).
+        spacing: The spacing of inner points next to the outline. Default: the mean length of a side.
 
     Raises:
         OrbiflowError: for a ring that crosses itself, or too thin to be filled in double precision.
@@ -66,7 +66,7 @@ def triangulate(ring: Array, spacing: float | None = None) -> Mesh:
     extra: Array = np.zeros((0, 2))
     own_side: Integers = np.zeros(0, dtype=np.int64)
     own_share: Array = np.zeros(0)
-    for _ in range(ROUNDS):
+    for _ in range(MAX_HALVINGS):
         points = np.concatenate([ring, extra, inside])
         triangles = Delaunay(points).simplices.astype(np.int64)
         missing = ~_are_sides(ends, triangles, len(points))
@@ -78,7 +78,7 @@ def triangulate(ring: Array, spacing: float | None = None) -> Mesh:
         extra = np.concatenate([extra, at + middle[:, None] * (after - at)])
         own_side = np.concatenate([own_side, sides[missing]])
         own_share = np.concatenate([own_share, middle])
-        near = ufuncs.distance(ufuncs.points(inside), shapely.MultiPoint(extra))
+        near = shapely.distance(shapely.points(inside), shapely.MultiPoint(extra))
         inside = inside[near > spacing / 4]
         old = ends[missing]
         halves = np.concatenate([np.stack([old[:, 0], fresh], 1), np.stack([fresh, old[:, 1]], 1)])
@@ -94,7 +94,7 @@ def triangulate(ring: Array, spacing: float | None = None) -> Mesh:
 
 
 def _inside(polygon: shapely.Polygon, spacing: float) -> Array:
-    """Points inside on triangular grids, the farther from the outline the wider."""
+    """Return points inside on triangular grids, wider farther from the outline."""
     xmin, ymin, xmax, ymax = polygon.bounds
     found: list[Array] = []
     for level, (least, most) in enumerate(((0.6, 1.7), (1.7, 4.5), (4.5, np.inf))):
@@ -104,8 +104,8 @@ def _inside(polygon: shapely.Polygon, spacing: float) -> Array:
         grid = np.stack(np.meshgrid(x, y), axis=-1)
         grid[1::2, :, 0] += step / 2
         points = grid.reshape(-1, 2)
-        points = points[ufuncs.contains_xy(polygon, points[:, 0], points[:, 1])]
-        depth = ufuncs.distance(ufuncs.points(points), polygon.exterior) / spacing
+        points = points[shapely.contains_xy(polygon, points[:, 0], points[:, 1])]
+        depth = shapely.distance(shapely.points(points), polygon.exterior) / spacing
         found.append(points[(depth >= least) & (depth < most)])
     return np.concatenate(found)
 
@@ -120,14 +120,14 @@ def _are_sides(ends: Integers, triangles: Integers, count: int) -> NDArray[np.bo
 
 
 def _kept(mesh: Mesh, polygon: shapely.Polygon) -> Mesh:
-    """The triangles inside the polygon, counter-clockwise, and the points that they use."""
+    """Return the triangles inside the polygon, counter-clockwise, and the points that they use."""
     corners = mesh.points[mesh.triangles]
     middle = corners.mean(axis=1)
     u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     area = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
     triangles = np.where((area < 0)[:, None], mesh.triangles[:, ::-1], mesh.triangles)
-    inside = ufuncs.contains_xy(polygon, *middle.T)
-    flat = abs(area) < FLAT * polygon.area
+    inside = cast(NDArray[np.bool_], shapely.contains_xy(polygon, *middle.T))
+    flat = abs(area) < FLAT_AREA * polygon.area
     triangles = _without_flat(triangles[inside & ~flat], mesh.triangles[flat])
     used = np.zeros(len(mesh.points), dtype=bool)
     used[: mesh.size + len(mesh.sides)] = True
@@ -137,7 +137,7 @@ def _kept(mesh: Mesh, polygon: shapely.Polygon) -> Mesh:
 
 
 def _without_flat(triangles: Integers, flat: Integers) -> Integers:
-    """Vertices in line may be the corners of one flat triangle alone: its neighbour is divided."""
+    """Divide the neighbour of each flat triangle whose middle vertex is in no other triangle."""
     known = set(triangles.ravel().tolist())
     lost = [(row, k) for row in flat.tolist() for k in range(3) if row[k] not in known]
     for row, k in lost:
@@ -173,7 +173,7 @@ def _divided(mesh: Mesh) -> Mesh:
 
 
 def _pieces(corners: tuple[int, int, int], middles: list[int | None]) -> list[tuple[int, int, int]]:
-    """A triangle whose sides ab, bc, ca have these middles or none, in pieces without loose ends."""
+    """Return the pieces of a triangle whose sides ab, bc, ca have these middles or none."""
     a, b, c = corners
     count = sum(m is not None for m in middles)
     if count == 0:
@@ -191,10 +191,10 @@ def _pieces(corners: tuple[int, int, int], middles: list[int | None]) -> list[tu
 
 
 class Located(NamedTuple):
-    """Where P points lie in a mesh.
+    """The location of P points in a mesh.
 
-    - `triangle`: (P,) the one that holds the point, or the nearest; of several, any.
-    - `nearest`: (P, 2) the triangle's point next to it: the point itself inside the mesh.
+    - `triangle`: A triangle (P,) that contains the point, or the nearest one.
+    - `nearest`: The triangle's nearest point (P, 2), which inside the mesh is the point itself.
     """
 
     triangle: Integers
@@ -202,18 +202,18 @@ class Located(NamedTuple):
 
 
 class Locator:
-    """The triangles of a mesh in a tree.
+    """A search tree of the triangles of a mesh.
 
     Args:
-        points: (N, 2).
-        triangles: (M, 3) indices of the points, none of the triangles flat.
+        points: The points (N, 2).
+        triangles: The indices (M, 3) of the corners; no triangle may be flat.
     """
 
     def __init__(self, points: Array, triangles: Integers) -> None:
         self._tree = shapely.STRtree(np.asarray(shapely.polygons(points[triangles])))
 
     def locate(self, points: Array) -> Located:
-        """The triangle of each point (P, 2); finite points alone."""
+        """Return the triangle of each of the finite points (P, 2)."""
         found = np.full(len(points), -1)
         where = np.asarray(shapely.points(points))
         index, triangle = self._tree.query(where, predicate="intersects")
@@ -222,43 +222,43 @@ class Locator:
         outside = np.flatnonzero(found < 0)
         if len(outside):
             found[outside] = self._tree.nearest(where[outside])
-            lines = ufuncs.shortest_line(self._tree.geometries[found[outside]], where[outside])
+            lines = shapely.shortest_line(self._tree.geometries[found[outside]], where[outside])
             nearest[outside] = shapely.get_coordinates(lines)[::2]
         return Located(found, nearest)
 
 
-PIECES = 3
-"""Parts of each side of the outline: more make the medial axis finer."""
+PIECES_PER_SIDE = 3
+"""The number of parts of each side of the outline: more make the medial axis finer."""
 
-ROUNDING = 1.02
-"""Balls reach a little beyond themselves: triangles have size."""
+DISC_OVERREACH = 1.02
+"""The factor of the discs' radii that makes up for the size of triangles."""
 
 
 def local_thickness(mesh: Mesh) -> Array:
-    """Radius (M,) of the largest disc in the polygon that covers the middle of each triangle.
+    """Return the radius (M,) of the largest disc inside that covers each triangle's middle.
 
-    The local thickness of Hildebrand and Rüegsegger (1997), over discs about the Voronoi
+    This is the local thickness of Hildebrand and Rüegsegger (1997), over discs about the Voronoi
     vertices of points on the outline, which lie near the medial axis.
 
     Args:
-        mesh: of the polygon.
+        mesh: A mesh of the polygon.
     """
     polygon = shapely.Polygon(mesh.points[: mesh.size])
     corners = mesh.points[mesh.triangles]
-    dense = subdivided(mesh.points[: mesh.size], PIECES)
+    dense = subdivided(mesh.points[: mesh.size], PIECES_PER_SIDE)
     centers = Voronoi(dense).vertices
     centers = centers[shapely.contains_xy(polygon, centers[:, 0], centers[:, 1])]
     middle = corners.mean(axis=1)
     outline = polygon.exterior
     shapely.prepare(outline)
-    own = ufuncs.distance(ufuncs.points(middle), outline)
+    own: Array = shapely.distance(cast(NDArray[np.object_], shapely.points(middle)), outline)
     if not len(centers):
         return own
-    radius = ufuncs.distance(ufuncs.points(centers), outline)
+    radius = shapely.distance(shapely.points(centers), outline)
     found = own.copy()
     for start in range(0, len(middle), 512):  # bounds the memory
         part = middle[start : start + 512]
         apart = np.hypot(*(part[:, None] - centers[None]).transpose(2, 0, 1))
-        covering = np.where(apart <= ROUNDING * radius, radius, 0.0).max(axis=1)
+        covering = np.where(apart <= DISC_OVERREACH * radius, radius, 0.0).max(axis=1)
         found[start : start + 512] = np.maximum(own[start : start + 512], covering)
     return found

@@ -1,4 +1,4 @@
-"""What a silhouette's outline must satisfy, and how one is taken from a shapely geometry."""
+"""Outlines of silhouettes: checking, simplifying and sampling them."""
 
 from __future__ import annotations
 
@@ -7,11 +7,12 @@ from typing import NamedTuple
 
 import numpy as np
 import shapely
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from orbiflow.arguments import numbers
+from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.geometry import (
     arc_lengths,
@@ -37,11 +38,11 @@ _POSITION = re.compile(r"\[(\S+) (\S+)\]")
 
 def clean_ring(
     points: ArrayLike, where: str, error: type[OrbiflowError] = OrbiflowError
-) -> tuple[NDArray[np.float64], list[str]]:
+) -> tuple[Array, list[str]]:
     """Check that `points` (N, 2) bound a region, and drop repeated vertices.
 
-    Returns the ring and a note, in plain words, of each thing that was dropped. `where` opens each
-    message (a file name, say).
+    Returns the ring and a note, in plain words, of what was dropped. Each message begins with `where`,
+    such as a file name.
 
     Raises `error` when a coordinate is not a finite number, when fewer than 3 or more than 100,000
     vertices are given, when no area is enclosed, or when the polygon crosses or touches itself.
@@ -65,9 +66,9 @@ def clean_ring(
     return kept, notes
 
 
-def _as_points(points: ArrayLike, where: str, error: type[OrbiflowError]) -> NDArray[np.float64]:
+def _as_points(points: ArrayLike, where: str, error: type[OrbiflowError]) -> Array:
     try:
-        ring: NDArray[np.float64] = np.zeros(0)
+        ring: Array = np.zeros(0)
         if np.ndim(points):
             ring = numbers(points, where, (...,), finite=False)
     except (TypeError, ValueError) as exc:
@@ -78,12 +79,12 @@ def _as_points(points: ArrayLike, where: str, error: type[OrbiflowError]) -> NDA
         raise error(f"{where}: vertices must have shape (N, 2), got {ring.shape}")
     if len(ring) > MAX_VERTICES:
         raise error(
-            f"{where}: {len(ring)} vertices, at most {MAX_VERTICES} are read; simplify the outline"
+            f"{where}: {len(ring)} vertices, at most {MAX_VERTICES} can be read; simplify the outline"
         )
     return ring
 
 
-def _check_coordinates(ring: NDArray[np.float64], where: str, error: type[OrbiflowError]) -> None:
+def _check_coordinates(ring: Array, where: str, error: type[OrbiflowError]) -> None:
     bad = np.flatnonzero(~np.isfinite(ring).all(axis=1))
     if bad.size:
         raise error(
@@ -94,11 +95,11 @@ def _check_coordinates(ring: NDArray[np.float64], where: str, error: type[Orbifl
     if far.size:
         raise error(
             f"{where}: vertex {far[0]} (counted from 0) is {_pair(ring[far[0]])}; coordinates "
-            f"beyond {MAX_COORDINATE:g} are not read, rescale the outline"
+            f"beyond {MAX_COORDINATE:g} cannot be read, rescale the outline"
         )
 
 
-def _check_region(ring: NDArray[np.float64], where: str, error: type[OrbiflowError]) -> None:
+def _check_region(ring: Array, where: str, error: type[OrbiflowError]) -> None:
     low, high = ring.min(axis=0), ring.max(axis=0)
     size = float((high - low).max())
     if size < max(MIN_RELATIVE_SIZE * float(np.abs(ring).max()), MIN_SIZE):
@@ -106,8 +107,8 @@ def _check_region(ring: NDArray[np.float64], where: str, error: type[OrbiflowErr
             f"{where}: the polygon has no size: its {len(ring)} vertices all lie within {size:.3g} "
             f"of {_pair(low)}; move it nearer the origin or enlarge it"
         )
-    # In units of the box, so that neither a huge nor a tiny shape strains the predicates.
-    local: NDArray[np.float64] = (ring - low) / size
+    # in units of the box, because the predicates lose accuracy for huge and tiny shapes
+    local: Array = (ring - low) / size
     polygon = Polygon(np.round(local, CLEARANCE_DIGITS))
     if polygon.convex_hull.area < MIN_RELATIVE_AREA:
         raise error(f"{where}: the polygon encloses no area, its vertices all lie on one line")
@@ -122,12 +123,12 @@ def _check_region(ring: NDArray[np.float64], where: str, error: type[OrbiflowErr
         raise error(f"{where}: the polygon encloses no area; check its vertices")
 
 
-def _pair(point: NDArray[np.float64]) -> str:
+def _pair(point: Array) -> str:
     return f"({point[0]:.6g}, {point[1]:.6g})"
 
 
 def percent(share: float) -> str:
-    """`share` (0 to 1) in words, never rounded to none or all of it.
+    """Return `share` (0 to 1) as text, never rounded to 0% or 100%.
 
     >>> percent(0.9213), percent(0.0002), percent(0.9999)
     ('92.1%', 'under 0.1%', 'over 99.9%')
@@ -138,23 +139,23 @@ def percent(share: float) -> str:
 
 
 def filled(polygon: Polygon) -> Polygon:
-    """`polygon` without its holes."""
+    """Return `polygon` without its holes."""
     return Polygon(polygon.exterior)
 
 
 def simplified(polygon: Polygon, tolerance: float) -> Polygon:
-    """`polygon` with fewer vertices, its boundary moved by at most `tolerance`; may be invalid."""
+    """Return `polygon` with fewer vertices, moved by at most `tolerance`; may be invalid."""
     parts = polygons_in(polygon.simplify(tolerance))
     return max(parts, key=lambda part: part.area, default=Polygon())
 
 
-def outer_ring(polygon: Polygon) -> NDArray[np.float64]:
-    """The exterior of `polygon` as a ring (N, 2)."""
+def outer_ring(polygon: Polygon) -> Array:
+    """Return the exterior of `polygon` as a ring (N, 2)."""
     return np.asarray(polygon.exterior.coords, dtype=np.float64)[:-1, :2].copy()
 
 
 def outer_outline(geometry: BaseGeometry) -> tuple[Polygon, list[str]]:
-    """The largest component of `geometry`, its holes filled, with notes of what was left out.
+    """Return the largest component of `geometry`, its holes filled, with notes of what was left out.
 
     Components are compared by their area with holes filled; a component that lies in another's
     hole goes with that hole. `geometry` must be valid and hold at least one polygon.
@@ -181,30 +182,28 @@ def outer_outline(geometry: BaseGeometry) -> tuple[Polygon, list[str]]:
     return shape, notes
 
 
-Array = NDArray[np.float64]
+SHORT_OUTLINE = 8.2
+"""The length of an outline of area 1 that is sampled with the fewest points; a disc has 3.5."""
 
-PLAIN = 8.2
-"""Length of an outline of area 1 up to which it is sampled with the fewest points; a disc has 3.5."""
+MIN_POINTS, MAX_POINTS = 60, 120
+"""The least and the largest number of points for the search."""
 
-FEW, MOST = 60, 120
-"""Points for the search."""
+CORNER_DEPTH = 0.004
+"""The least height of a corner over the line past it to be kept, in square roots of the area."""
 
-DETAIL = 0.004
-"""What a corner must stand out from the line past it to be kept, in square roots of the area."""
+FINE_MULTIPLES = (4, 6)
+"""The numbers of points of the tile for each point of the search, in order of trial."""
 
-MULTIPLES = (4, 6)
-"""Points of the tile for each point of the search."""
-
-MIDDLE = 2
-"""Points between the two for each point of the search; divides all `MULTIPLES` of use."""
+MIDDLE_MULTIPLE = 2
+"""The number of middle points for each point of the search, a divisor of `FINE_MULTIPLES`."""
 
 
 class Samples(NamedTuple):
-    """An outline (M, 2) of area 1, counter-clockwise, sampled three times.
+    """A counter-clockwise outline of area 1, sampled three times.
 
-    - `coarse`: (n, 2) points, evenly spaced.
-    - `middle`: (2 n, 2) points, most of the outline's corners among them; or `fine` itself.
-    - `fine`: (k n, 2) points; every k-th is near one of `coarse`; the outline's corners are among them.
+    - `coarse`: Points (n, 2), evenly spaced.
+    - `middle`: Points (2 n, 2) that include most of the outline's corners; or `fine` itself.
+    - `fine`: Points (k n, 2) that include the outline's corners; every k-th is near one of `coarse`.
     """
 
     coarse: Array
@@ -212,24 +211,26 @@ class Samples(NamedTuple):
     fine: Array
 
 
-def sampled(ring: Array, phase: float = 0.0, multiples: tuple[int, ...] = MULTIPLES) -> Samples:
-    """Sample an outline, more densely where it is long or rich in corners.
+def sampled(
+    ring: Array, phase: float = 0.0, multiples: tuple[int, ...] = FINE_MULTIPLES
+) -> Samples:
+    """Sample an outline, more densely if it is long or rich in corners.
 
-    Where twice the coarse points make no simple polygon, or do not divide the fine ones, `middle` is
+    If twice the coarse points make no simple polygon, or do not divide the fine ones, `middle` is
     `fine`.
 
     Args:
-        ring: (M, 2) of area about 1, counter-clockwise.
-        phase: of the points, in coarse spacings.
-        multiples: fine points for each coarse one, in the order in which they are tried.
+        ring: A counter-clockwise ring (M, 2) of area about 1.
+        phase: The shift of the points, in coarse spacings.
+        multiples: The numbers of fine points for each coarse one, in order of trial.
 
     Raises:
-        OrbiflowError: if no sampling is free of self-crossings: the silhouette has hairs.
+        OrbiflowError: if all samplings cross themselves because the silhouette has hairs.
     """
-    longer = ring_length(ring) / PLAIN
-    count = int(np.clip(6 * round(FEW * longer / 6), FEW, MOST))
+    longer = ring_length(ring) / SHORT_OUTLINE
+    count = int(np.clip(6 * round(MIN_POINTS * longer / 6), MIN_POINTS, MAX_POINTS))
     coarse = _simple_coarse(ring, count, phase)
-    corners = important_vertices(ring, DETAIL)
+    corners = important_vertices(ring, CORNER_DEPTH)
     fine = None
     for multiple in multiples:
         points = with_corners(ring, corners, multiple * len(coarse), phase * multiple)
@@ -241,14 +242,14 @@ def sampled(ring: Array, phase: float = 0.0, multiples: tuple[int, ...] = MULTIP
         raise OrbiflowError(
             "parts of the silhouette are too thin to be sampled: thicken or remove the hairs"
         )
-    middle = with_corners(ring, corners, MIDDLE * len(coarse), phase * MIDDLE)
+    middle = with_corners(ring, corners, MIDDLE_MULTIPLE * len(coarse), phase * MIDDLE_MULTIPLE)
     if len(fine) % len(middle) or not shapely.Polygon(middle).is_valid:
         middle = fine
     return Samples(coarse, middle, fine)
 
 
 def _simple_coarse(ring: Array, count: int, phase: float) -> Array:
-    """As many points as it takes for a polygon that does not cross itself; hairs made thicker."""
+    """Resample with as many points as a simple polygon takes; hairs are thickened."""
     polygon = shapely.Polygon(ring)
     for width in (0.0, 0.01, 0.02, 0.04):
         thick = ring
@@ -258,7 +259,7 @@ def _simple_coarse(ring: Array, count: int, phase: float) -> Array:
             thick = thick[::-1] if not grown.exterior.is_ccw else thick
             start = int(np.argmin(np.linalg.norm(thick - ring[0], axis=1)))
             thick = np.roll(thick, -start, axis=0)
-        for points in dict.fromkeys((count, min(MOST, 3 * count // 2), MOST)):
+        for points in dict.fromkeys((count, min(MAX_POINTS, 3 * count // 2), MAX_POINTS)):
             coarse = resampled(thick, points, phase)
             if shapely.Polygon(coarse).is_valid:
                 return coarse
@@ -266,7 +267,7 @@ def _simple_coarse(ring: Array, count: int, phase: float) -> Array:
 
 
 def important_vertices(ring: Array, tolerance: float) -> list[int]:
-    """Indices of the vertices that Douglas and Peucker's simplification keeps."""
+    """Return indices of the vertices that Douglas and Peucker's simplification keeps."""
     first = int(np.argmax(np.linalg.norm(ring - ring.mean(axis=0), axis=1)))
     turned = np.roll(ring, -first, axis=0)
     half = int(np.argmax(np.linalg.norm(turned - turned[0], axis=1)))
@@ -275,14 +276,14 @@ def important_vertices(ring: Array, tolerance: float) -> list[int]:
         line = shapely.LineString(part)
         points = shapely.get_coordinates(line.simplify(tolerance, preserve_topology=False))
         at = 0
-        for point in points[:-1]:  # vertices are kept bit for bit and in order
+        for point in points[:-1]:  # kept vertices are bit-identical and in order
             at += int(np.flatnonzero((part[at:] == point).all(axis=1))[0])
             kept.append((start + at + first) % len(ring))
     return sorted(kept)
 
 
 def with_corners(ring: Array, corners: list[int], count: int, phase: float = 0.0) -> Array:
-    """`count` points (count, 2) nearly evenly spaced, the nearest point moved to each corner.
+    """Return `count` points (count, 2), nearly evenly spaced, with the nearest one at each corner.
 
     Point i stays within a spacing of where even spacing has it. Of corners that are nearest to the
     same point, the first is kept.

@@ -1,4 +1,4 @@
-"""Pins: parts of a silhouette that must not bend, given by spots or painted on a mask."""
+"""Pins, the parts of a silhouette that must not bend, given as spots or painted on a mask."""
 
 from __future__ import annotations
 
@@ -15,23 +15,21 @@ import shapely
 from numpy.typing import ArrayLike, NDArray
 
 from orbiflow.arguments import instance, numbers
-from orbiflow.arrays import Integers
+from orbiflow.arrays import Array, Integers
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.tiles.geometry import resampled
 from orbiflow.tiles.silhouette.emphasis import Emphasis
 from orbiflow.tiles.silhouette.outlines import percent
 from orbiflow.tiles.silhouette.target import Target
 
-Array = NDArray[np.float64]
+DEFAULT_RADIUS = 0.08
+"""The default radius of a spot, in longer sides of the silhouette's bounding box."""
 
-USUAL = 0.08
-"""Radius of a spot that has none of its own, in the longer side of the silhouette's bounding box."""
+MUCH_PINNED, ALL_PINNED = 0.4, 0.9
+"""The shares of the outline beyond which the tile cannot be similar, and nothing is left to bend."""
 
-MANY, ALL = 0.4, 0.9
-"""Shares of the outline beyond which the tile cannot be like, and nothing is left to bend."""
-
-REACH = 1.5
-"""A spot without a radius of its own reaches this many times as far as the outline is."""
+REACH_PAST_OUTLINE = 1.5
+"""The reach of a spot without a radius, in distances from the outline."""
 
 _NUMBER = r"\s*[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?\s*"
 _SPOT = re.compile(rf"{_NUMBER}(?:,{_NUMBER}){{1,2}}")
@@ -41,13 +39,13 @@ _SPOT = re.compile(rf"{_NUMBER}(?:,{_NUMBER}){{1,2}}")
 class Pins:
     """Parts of a silhouette that keep their shape.
 
-    Make them with `Pins.read` or `Pins.at`.
+    Create them with `Pins.read` or `Pins.at`.
 
-    - `spots`: (K, 3) discs in the target's normal form: x, y and radius.
-    - `masks`: what is more than half emphasised is pinned.
-    - `keep_angle`: whether the parts may turn only with the whole tile.
-    - `sources`: as they were given, for reports.
-    - `notes`: what was decided for the user, in plain words.
+    - `spots`: Discs (K, 3) in the target's normal form: x, y and radius.
+    - `masks`: Masks; what is more than half emphasised is pinned.
+    - `keep_angle`: Whether the parts rotate only with the whole tile.
+    - `sources`: The spots and masks as given, for reports.
+    - `notes`: What was decided for the user, in plain words.
 
     >>> target = Target.from_polygon([[0, 0], [4, 0], [4, 1], [0, 1]])
     >>> pins = Pins.at(target, [(3.5, 0.5, 1.0)])
@@ -63,29 +61,27 @@ class Pins:
 
     @classmethod
     def at(cls, target: Target, spots: Iterable[ArrayLike], *, keep_angle: bool = False) -> Self:
-        """Pins at spots (x, y) or (x, y, radius), all in the input's units.
+        """Return pins at spots (x, y) or (x, y, radius), all in the input's units.
 
-        A spot without a radius has 8% of the longer side of the silhouette's bounding box, or 1.5
-        times its distance from the outline if that is more: a part inside that touches no outline
-        would hold nothing that can be seen.
+        The default radius of a spot is 8% of the longer side of the silhouette's bounding box, or 1.5
+        times its distance from the outline if that is more, so that it holds some of the outline.
 
         Raises:
-            OrbiflowError: for a spot of another kind, a radius that is not positive, a spot that does
-                not reach the silhouette, for none at all, and for spots that hold nine tenths of the
-                outline.
+            OrbiflowError: for an invalid spot, a radius that is not positive, a spot that does not
+                reach the silhouette, no spot, and spots that hold nine tenths of the outline.
         """
-        return cls._made(target, list(spots), (), keep_angle)
+        return cls._create(target, list(spots), (), keep_angle)
 
     @classmethod
     def read(cls, given: Iterable[str | Path], target: Target, *, keep_angle: bool = False) -> Self:
-        """Pins from words: spots "x,y" or "x,y,radius", and paths of masks, white where pinned.
+        """Return pins from text: spots "x,y" or "x,y,radius", or paths of masks, white where pinned.
 
-        A mask covers what one of `Emphasis.read` does: the picture, the drawing's page, or the
-        outline's bounding box.
+        A mask covers the same as in `Emphasis.read`: the picture, the drawing's page, or the outline's
+        bounding box.
 
         Raises:
             InputFileError: for masks that cannot be read or do not touch the silhouette.
-            OrbiflowError: as of `at`.
+            OrbiflowError: as for `at`.
         """
         instance(target, Target, "the target", "Target.read and Target.from_polygon make one")
         words = [str(one) for one in given]
@@ -94,14 +90,14 @@ class Pins:
         for file in files:
             if not Path(file).exists():
                 raise InputFileError(
-                    f"{file}: a pin is x,y or x,y,radius or a mask, and there is no such file"
+                    f"{file}: there is no such file; give a pin as x,y or x,y,radius or a mask's path"
                 )
         masks = tuple(Emphasis.read(file, target) for file in files)
         discs = [[float(part) for part in spot.split(",")] for spot in spots]
-        return cls._made(target, discs, masks, keep_angle)
+        return cls._create(target, discs, masks, keep_angle)
 
     @classmethod
-    def _made(
+    def _create(
         cls,
         target: Target,
         spots: list[ArrayLike] | list[list[float]],
@@ -111,7 +107,7 @@ class Pins:
         instance(target, Target, "the target", "Target.read and Target.from_polygon make one")
         discs = [_disc(spot, target) for spot in spots]
         if not discs and not masks:
-            raise OrbiflowError("no pin was given: a spot x,y or x,y,radius, or a mask")
+            raise OrbiflowError("no pin was given: give a spot x,y or x,y,radius, or a mask")
         scale = np.sqrt(target.area)
         placed = [(*target.to_normal(disc[:2]), disc[2] / scale) for disc in discs]
         sources = [",".join(f"{value:.6g}" for value in disc) for disc in discs]
@@ -125,7 +121,7 @@ class Pins:
         return replace(pins, notes=(*notes, *_warnings(pins, target)))
 
     def holds(self, points: ArrayLike) -> NDArray[np.bool_]:
-        """Which of the points (..., 2) of the normal form are pinned."""
+        """Return which of the points (..., 2) of the normal form are pinned."""
         at = np.asarray(points, dtype=np.float64)
         held = np.zeros(at.shape[:-1], dtype=bool)
         for x, y, radius in self.spots:
@@ -135,11 +131,11 @@ class Pins:
         return held
 
     def parts(self, points: Array, triangles: Integers) -> list[Integers]:
-        """Indices of pinned points (N, 2) in the normal form, a list a connected part.
+        """Return the indices of pinned points, an array per connected part.
 
         Args:
-            points: of a mesh.
-            triangles: (M, 3) of the mesh.
+            points: The points (N, 2) of a mesh, in the normal form.
+            triangles: The triangles (M, 3) of the mesh.
         """
         held = self.holds(points)
         pairs = np.concatenate([triangles[:, [k - 1, k]] for k in range(3)])
@@ -151,7 +147,7 @@ class Pins:
         return [np.flatnonzero((label == k) & held) for k in np.unique(label[held])]
 
     def report(self) -> dict[str, Any]:
-        """What was asked for, ready for JSON."""
+        """Return the pins' settings, ready for JSON."""
         return {
             "sources": list(self.sources),
             "keep_angle": self.keep_angle,
@@ -160,14 +156,14 @@ class Pins:
 
 
 def _warnings(pins: Pins, target: Target) -> list[str]:
-    """Notes of how much of the outline is held; an error where that is all of it."""
+    """Return notes of how much of the outline is held; an error where that is all of it."""
     share = float(pins.holds(resampled(target.normal, 720)).mean())
-    if share >= ALL:
+    if share >= ALL_PINNED:
         raise OrbiflowError(
-            f"the pins hold {percent(share)} of the outline, so that nothing is left to bend; pin a "
-            "head or a hand"
+            f"the pins hold {percent(share)} of the outline, so that nothing is left to bend; pin "
+            "only a head or a hand"
         )
-    if share > MANY:
+    if share > MUCH_PINNED:
         return [f"the pins hold {percent(share)} of the outline: little is left to bend"]
     if not share:
         return ["the pins touch no part of the outline: the tile's shape does not heed them"]
@@ -175,10 +171,10 @@ def _warnings(pins: Pins, target: Target) -> list[str]:
 
 
 def _disc(spot: ArrayLike, target: Target) -> tuple[float, float, float]:
-    """A spot as x, y and radius in input units."""
+    """Return a spot as x, y and radius in input units."""
     values = numbers(spot, "a pin", ("2 or 3",))
     if len(values) not in (2, 3):
-        raise OrbiflowError(f"a pin is x,y or x,y,radius, got {len(values)} numbers")
+        raise OrbiflowError(f"a pin must be x,y or x,y,radius, got {len(values)} numbers")
     x, y = (float(value) for value in values[:2])
     region = shapely.Polygon(target.outline)
     centre = shapely.Point(x, y)
@@ -188,9 +184,12 @@ def _disc(spot: ArrayLike, target: Target) -> tuple[float, float, float]:
             raise OrbiflowError(f"the radius of a pin must be positive, got {radius:g}")
     else:
         sides = np.ptp(target.outline, axis=0)
-        radius = max(USUAL * float(sides.max()), REACH * centre.distance(region.exterior))
+        radius = max(
+            DEFAULT_RADIUS * float(sides.max()),
+            REACH_PAST_OUTLINE * centre.distance(region.exterior),
+        )
         if not region.contains(centre):
-            radius = USUAL * float(sides.max())
+            radius = DEFAULT_RADIUS * float(sides.max())
     if centre.distance(region) > radius:
         (xmin, ymin), (xmax, ymax) = target.outline.min(axis=0), target.outline.max(axis=0)
         raise OrbiflowError(

@@ -1,4 +1,4 @@
-"""A target as a signed-distance image: soft occupancy at any blur, for thousands of points at once."""
+"""A target as an image of signed distances, for the soft occupancy of thousands of points."""
 
 from __future__ import annotations
 
@@ -9,29 +9,24 @@ import torch.nn.functional as F
 from scipy.ndimage import distance_transform_edt
 from torch import Tensor
 
-from orbiflow.arguments import (
-    instance,
-    number,
-    whole,
-)
+from orbiflow.arguments import instance, number, whole
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.silhouette.emphasis import Emphasis
 from orbiflow.tiles.silhouette.target import Target
-from orbiflow.typed_shapely import ufuncs
 
-PIECES = 8
-"""Of each side of a ring, in integrals along it."""
+PIECES_PER_SIDE = 8
+"""The number of pieces of each side of a ring in integrals along it."""
 
 
 class SoftTarget:
     """The signed distance of a target on a square grid, positive inside, in its normal form.
 
     Args:
-        target: the silhouette.
-        resolution: pixels along a side.
-        margin: around the target's bounding box, in units of the square root of its area.
-        emphasis: weights of the plane's points, if some matter more than others.
-        dtype: of the samples.
+        target: The silhouette.
+        resolution: The number of pixels along a side.
+        margin: The margin around the target's bounding box, in square roots of its area.
+        emphasis: The weights of the plane's points, if some matter more than others.
+        dtype: The dtype of the samples.
     """
 
     def __init__(
@@ -52,7 +47,7 @@ class SoftTarget:
         x, y = np.meshgrid(float(center[0]) + axis, float(center[1]) + axis)
         region = shapely.Polygon(target.normal)
         shapely.prepare(region)
-        inside = ufuncs.contains_xy(region, x.ravel(), y.ravel()).reshape(x.shape)
+        inside = shapely.contains_xy(region, x.ravel(), y.ravel()).reshape(x.shape)
         # half a pixel: the boundary runs between pixel centres
         steps = np.where(
             inside,
@@ -69,29 +64,29 @@ class SoftTarget:
         self._integrals: tuple[Tensor, Tensor, float] | None = None
 
     def occupancy(self, points: Tensor, blur: float) -> Tensor:
-        """Soft occupancy in [0, 1] at points (..., 2): a sigmoid of the distance over `blur`."""
+        """Return the soft occupancy, 0 to 1, at points (..., 2): a sigmoid of distance over `blur`."""
         blur = number(blur, "blur", 0, above=True)
         return torch.sigmoid(self._sample(self.image, points) * (1.7 / blur))
 
     def weight(self, points: Tensor) -> Tensor:
-        """How much the plane matters at points (..., 2): 1 without emphasis."""
+        """Return the weights of points (..., 2), 1 without emphasis."""
         if self.weights is None:
             return torch.ones_like(points[..., 0])
         return self._sample(self.weights, points)
 
     def weighted_iou(self, rings: Tensor) -> Tensor:
-        """IoU (S,) of counter-clockwise rings (S, N, 2) with the target, areas weighted by emphasis.
+        """Return the IoU (S,) of counter-clockwise rings (S, N, 2) with the target, weighted.
 
-        By Green's theorem, the integral of the weights along x sampled on the rings: as accurate as
-        a pixel of the image is small.
+        The areas are weighted by the emphasis. By Green's theorem they are integrals over the rings of
+        the weights' integral along x, accurate to a pixel of the image.
         """
         if self._integrals is None:
             self._integrals = self._integrate()
         whole, common, total = self._integrals
         sides = (rings.roll(-1, dims=1) - rings)[:, :, None]
-        shares = (torch.arange(PIECES, dtype=rings.dtype)[:, None] + 0.5) / PIECES
+        shares = (torch.arange(PIECES_PER_SIDE, dtype=rings.dtype)[:, None] + 0.5) / PIECES_PER_SIDE
         middle = rings[:, :, None] + shares * sides
-        rise = sides[..., 1] / PIECES
+        rise = sides[..., 1] / PIECES_PER_SIDE
         area, shared = (
             (self._sample(image, middle) * rise).sum(dim=(1, 2)) for image in (whole, common)
         )
@@ -115,15 +110,15 @@ class SoftTarget:
 
 
 def signed_distance(points: Tensor, vertices: Tensor) -> Tensor:
-    """True distance to the boundary, positive inside (paper, equation of phi).
+    """Return the true distance to the boundary, positive inside (paper, equation of phi).
 
     Args:
-        points: (..., N, 2).
-        vertices: (..., K, 2), a simple polygon, convex or not, either orientation; the leading axes
-            broadcast with those of the points.
+        points: Points (..., N, 2).
+        vertices: Simple polygons (..., K, 2), in either orientation; the leading axes broadcast with
+            those of the points.
 
     Returns:
-        (..., N). The gradient is a unit vector except on the boundary and the medial axis.
+        Distances (..., N), whose gradients are unit vectors except on the boundary and the medial axis.
 
     >>> square = torch.tensor([[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]])
     >>> signed_distance(torch.tensor([[1.0, 0.5], [3.0, 3.0]]), square).tolist()
@@ -148,7 +143,7 @@ def signed_distance(points: Tensor, vertices: Tensor) -> Tensor:
 
 
 def _inside(offset: Tensor, edge: Tensor) -> Tensor:
-    """Even-odd rule: count the edges that a ray to the right crosses."""
+    """Return whether points are inside, by the crossings of a ray to the right (even-odd rule)."""
     y, height = offset[..., 1].detach(), edge[..., 1].detach()
     straddles = (y >= 0) != (y >= height)
     cross = edge[..., 0].detach() * y - height * offset[..., 0].detach()

@@ -1,4 +1,4 @@
-"""The silhouette that a tile is to look like, in the user's coordinates and in normal form."""
+"""The silhouette that a tile should look like, in the user's coordinates and in normal form."""
 
 import os
 from dataclasses import dataclass
@@ -7,20 +7,17 @@ from pathlib import Path
 from typing import IO, Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from orbiflow.arguments import described, is_a
+from orbiflow.arrays import Array
 from orbiflow.errors import InputFileError, OrbiflowError
-from orbiflow.tiles.geometry import (
-    centroid,
-    orient,
-    signed_area,
-)
+from orbiflow.tiles.geometry import centroid, orient, signed_area
 from orbiflow.tiles.silhouette.frame import Frame
 from orbiflow.tiles.silhouette.outlines import clean_ring
 from orbiflow.tiles.silhouette.readers import (
     MAX_BYTES,
-    Held,
+    FileContent,
     Reading,
     read_mask_array,
     read_outline,
@@ -31,16 +28,16 @@ from orbiflow.tiles.silhouette.readers import (
 class Target:
     """A silhouette: one simple closed curve.
 
-    Make one with `Target.read`, `from_bytes`, `from_mask` or `from_polygon`, which check the outline.
+    Create one with `Target.read`, `from_bytes`, `from_mask` or `from_polygon`, which check the outline.
 
-    - `outline`: (N, 2), without a repeated last vertex, in the input's own units. In an image the
-      unit is the pixel and (0, 0) the image's top left corner, so that pixel (row 0, column 0)
-      spans [0, 1] x [0, 1]. Run through so that the normal form is counter-clockwise; read-only.
-    - `y_down`: whether the input's y axis points down (images, SVG and `.dat` files).
-    - `notes`: what was decided for the user, in plain words.
-    - `source`: the file's name, or what stands in for it.
+    - `outline`: The vertices (N, 2), without a repeated last one, in the input's own units. In an image
+      the unit is the pixel and (0, 0) the image's top left corner, so that pixel (row 0, column 0)
+      spans [0, 1] x [0, 1]. The normal form is counter-clockwise. Read-only.
+    - `y_down`: Whether the input's y axis points down (images, SVG and `.dat` files).
+    - `notes`: What was decided for the user, in plain words.
+    - `source`: The file's name, or a name for another source.
     - `kind`: "image", "svg", "dat", "json" or "polygon".
-    - `size`, `corner`: width and height of the picture or drawing, where there is one, and its corner
+    - `size`, `corner`: The width and height of the picture or drawing, if there is one, and its corner
       of least coordinates.
 
     >>> target = Target.from_polygon([[0, 0], [2, 0], [2, 2], [0, 2]])
@@ -50,7 +47,7 @@ class Target:
     array([2., 2.])
     """
 
-    outline: NDArray[np.float64]
+    outline: Array
     y_down: bool
     notes: tuple[str, ...] = ()
     source: str = "polygon"
@@ -72,10 +69,10 @@ class Target:
     ) -> Self:
         """Read a silhouette from an image (PNG, JPEG, WebP), an SVG, a `.json` or a `.dat` file.
 
-        A binary stream, such as an open file or `io.BytesIO`, is read from where it stands. For
-        images, `threshold` (0 to 1) is the level that parts the shape from its background and
-        `invert` says that the shape is the light (or the transparent) part; both are found out from
-        the image where they are not given, and `notes` say what was found.
+        A binary stream, such as an open file or `io.BytesIO`, is read from its present position. For
+        images, `threshold` (0 to 1) is the level that separates the shape from its background, and
+        `invert` says that the shape is the light (or the transparent) part. By default both are
+        detected, and `notes` report the result.
 
         Raises `InputFileError` for a file without a usable silhouette, with what to do about it.
         """
@@ -91,7 +88,7 @@ class Target:
         threshold: float | None = None,
         invert: bool | None = None,
     ) -> Self:
-        """As `read`, of the content of such a file; `name` stands in messages and for its ending.
+        """Read the content of such a file; `name` is used in messages and for its ending.
 
         >>> Target.from_bytes(b"[[0, 0], [2, 0], [2, 2], [0, 2]]").kind
         'json'
@@ -100,7 +97,7 @@ class Target:
             raise OrbiflowError(
                 f"data must be bytes, got {described(data)}; Target.read takes paths"
             )
-        held = Held(bytes(data), str(name))
+        held = FileContent(bytes(data), str(name))
         return cls._of(read_outline(held, threshold=threshold, invert=invert), held.name)
 
     @classmethod
@@ -112,11 +109,11 @@ class Target:
         invert: bool | None = None,
         source: str = "mask",
     ) -> Self:
-        """The largest shape in an array (H, W), a row of pixels at a time, the first on top.
+        """Return the largest shape in an array (H, W), a row of pixels at a time, the first on top.
 
-        Booleans, and integers that are 0 and 1 alone, are true in the shape (`invert`: outside of it).
-        Other integers and floats are gray levels, of 0 to 255, 65535 or 1, and are read as those of
-        images are: `threshold` and `invert` are found out where they are not given.
+        Booleans, and integers that are only 0 and 1, are true in the shape (with `invert`, outside).
+        Other integers and floats are gray levels, from 0 to 255, 65535 or 1, and are read like those of
+        images: by default `threshold` and `invert` are detected.
 
         Raises `OrbiflowError` for another array, and `InputFileError` for one without a shape.
 
@@ -145,7 +142,7 @@ class Target:
     def from_polygon(
         cls, points: ArrayLike, *, y_down: bool = False, source: str = "polygon"
     ) -> Self:
-        """The silhouette bounded by the polygon `points` (N, 2), closed or not, in either sense.
+        """Return the silhouette bounded by the polygon `points` (N, 2), closed or not, in either sense.
 
         Raises `OrbiflowError` for coordinates that are not finite, fewer than 3 vertices, no area,
         or a polygon that crosses or touches itself.
@@ -156,30 +153,30 @@ class Target:
 
     @property
     def area(self) -> float:
-        """Area of the silhouette in square input units."""
+        """The area of the silhouette in square input units."""
         return float(abs(signed_area(self.outline)))
 
     @cached_property
     def frame(self) -> Frame:
-        """Where the normal form lies in the input: a scale, y's flip and a translation."""
+        """The map from the normal form to the input: a scale, a flip of y and a translation."""
         linear = np.sqrt(self.area) * np.diag([1.0, -1.0 if self.y_down else 1.0])
         return Frame(linear, centroid(self.outline), self.kind, self.size, self.corner)
 
     @cached_property
-    def normal(self) -> NDArray[np.float64]:
-        """The outline (N, 2) with y up, area 1, centroid 0 and counter-clockwise, vertex by vertex."""
+    def normal(self) -> Array:
+        """The outline (N, 2), counter-clockwise with y up, area 1 and centroid 0."""
         return _read_only(self.to_normal(self.outline))
 
-    def to_input(self, points: ArrayLike) -> NDArray[np.float64]:
-        """`points` (..., 2) of the normal form in the input's units: `frame.to_input`."""
+    def to_input(self, points: ArrayLike) -> Array:
+        """Return `points` (..., 2) of the normal form in the input's units: `frame.to_input`."""
         return self.frame.to_input(points)
 
-    def to_normal(self, points: ArrayLike) -> NDArray[np.float64]:
-        """`points` (..., 2) in the input's units, in the normal form: `frame.to_normal`."""
+    def to_normal(self, points: ArrayLike) -> Array:
+        """Return `points` (..., 2) in the input's units, in the normal form: `frame.to_normal`."""
         return self.frame.to_normal(points)
 
     def report(self) -> dict[str, Any]:
-        """What was read and decided, ready for JSON."""
+        """Return what was read and decided, ready for JSON."""
         return {
             "source": self.source,
             "kind": self.kind,
@@ -191,8 +188,8 @@ class Target:
         }
 
 
-def _held(stream: Any) -> Held:
-    """What a binary stream holds, up to what is read of any file."""
+def _held(stream: Any) -> FileContent:
+    """Return the content of a binary stream, up to the size limit of files."""
     how = "a path or a binary stream; Target.from_bytes takes bytes, Target.from_mask arrays"
     if not callable(getattr(stream, "read", None)):
         raise OrbiflowError(f"the silhouette's file must be {how}, got {described(stream)}")
@@ -204,9 +201,9 @@ def _held(stream: Any) -> Held:
         raise InputFileError(f"{name}: cannot be read ({error})") from error
     if not isinstance(data, bytes):
         raise OrbiflowError(f'{name} is a stream of text; open it in binary mode, "rb"')
-    return Held(data, name)
+    return FileContent(data, name)
 
 
-def _read_only(array: NDArray[np.float64]) -> NDArray[np.float64]:
+def _read_only(array: Array) -> Array:
     array.setflags(write=False)
     return array

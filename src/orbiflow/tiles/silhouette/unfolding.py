@@ -1,4 +1,4 @@
-"""A map of a triangulated silhouette without folds, its outline given."""
+"""Maps of a triangulated silhouette without folds, for a given outline."""
 
 from __future__ import annotations
 
@@ -10,17 +10,16 @@ import scipy.sparse
 import scipy.sparse.linalg
 from numpy.typing import NDArray
 
+from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.silhouette.mesh import Mesh
 
-Array = NDArray[np.float64]
-
-STAGES = 30
-"""Times that the penalty on folds is sharpened at most."""
+MAX_SHARPENINGS = 30
+"""The largest number of times that the penalty on folds is sharpened."""
 
 
 def folded(mesh: Mesh, points: Array) -> NDArray[np.bool_]:
-    """(M,) which triangles are turned over or flat where `points` (N, 2) are."""
+    """Return which triangles (M,) are flat or turned over with corners at `points` (N, 2)."""
     return _determinants(mesh, points) <= 0
 
 
@@ -28,23 +27,23 @@ def unfolded(mesh: Mesh, points: Array) -> Array:
     """Move the inner points of a map until no triangle is turned over.
 
     Foldover-free maps in few steps (Garanzha, Kaporin, Kudryavtseva, Protais, Ray and Sokolov,
-    SIGGRAPH 2021): the distortion |J|^2 / det J of each triangle, with det J bounded away from 0 by a
-    parameter that shrinks, is minimised by L-BFGS; if that fails, again from points each in the
-    middle of its neighbours. Points on the outline stay where they are.
+    SIGGRAPH 2021): L-BFGS minimises the distortion |J|^2 / det J of each triangle, with det J bounded
+    away from 0 by a shrinking parameter; if that fails, again from points each in the middle of its
+    neighbours. Points on the outline stay in place.
 
     Args:
-        mesh: the triangles at rest.
-        points: (N, 2) images of its points; those of the outline bound a simple polygon.
+        mesh: The triangles at rest.
+        points: The images (N, 2) of its points; those of the outline bound a simple polygon.
 
     Returns:
-        The images (N, 2); as they were if nothing was turned over.
+        The images (N, 2), unchanged if nothing was turned over.
 
     Raises:
         OrbiflowError: if triangles stay turned over.
     """
     if not folded(mesh, points).any():
         return points
-    for start in (points, _spread(mesh, points)):  # where the one is too tangled, the other is not
+    for start in (points, _spread(mesh, points)):  # the second is a start for tangled points
         found = _untangled(_Distortion(mesh, start))
         if found is not None:
             return found
@@ -55,7 +54,7 @@ def unfolded(mesh: Mesh, points: Array) -> Array:
 
 def _untangled(work: _Distortion) -> Array | None:
     x = work.start
-    for _ in range(STAGES):
+    for _ in range(MAX_SHARPENINGS):
         found = scipy.optimize.minimize(
             work.value, x, jac=True, method="L-BFGS-B", options={"maxiter": 60, "maxcor": 20}
         )
@@ -68,7 +67,7 @@ def _untangled(work: _Distortion) -> Array | None:
 
 
 def _spread(mesh: Mesh, points: Array) -> Array:
-    """Inner points in the middle of their neighbours (Tutte, 1963)."""
+    """Return inner points in the middle of their neighbours (Tutte, 1963)."""
     fixed, count = mesh.size + len(mesh.sides), len(points)
     i, j = (np.concatenate([mesh.triangles[:, k] for k in turn]) for turn in ((0, 1, 2), (1, 2, 0)))
     ones = np.ones(2 * len(i))
@@ -84,7 +83,7 @@ def _spread(mesh: Mesh, points: Array) -> Array:
 
 
 class _Distortion:
-    """The energy in the inner points, and its gradient."""
+    """The distortion as a function of the inner points, with its gradient."""
 
     def __init__(self, mesh: Mesh, points: Array) -> None:
         self.mesh, self.images = mesh, points.copy()
@@ -107,7 +106,7 @@ class _Distortion:
         return float(np.linalg.det(self._jacobians(x)).min())
 
     def sharpen(self, smallest: float) -> None:
-        """Bound the determinants less far from 0, but so that the smallest is felt."""
+        """Bound the determinants less far from 0, so that the smallest still has an effect."""
         self.epsilon = min(0.5 * self.epsilon, 0.1 * abs(min(smallest, 0.0)) + 1e-6)
 
     def _jacobians(self, x: Array) -> Array:

@@ -1,14 +1,18 @@
-"""Does a tile tile the plane? A certificate in figures (design point 9)."""
+"""Certificates that a tile tiles the plane (design point 9)."""
+
+# pyright: reportUnknownMemberType=false
+# shapely's stubs leave the keyword arguments of its functions of arrays without types.
 
 from __future__ import annotations
 
 import math
 import re
 from dataclasses import dataclass, fields
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal, TypeAlias, cast
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 
 from orbiflow.arguments import number
 from orbiflow.arrays import Array
@@ -23,12 +27,7 @@ from orbiflow.tiles.tilings.surroundings import (
     surroundings,
     touching,
 )
-from orbiflow.tiles.tilings.tiling import (
-    Tiles,
-    Tiling,
-    as_tiling,
-)
-from orbiflow.typed_shapely import ufuncs
+from orbiflow.tiles.tilings.tiling import Tiles, Tiling, as_tiling
 
 EdgeMatching: TypeAlias = Literal["segments", "curves", "none"]
 
@@ -40,28 +39,30 @@ _MARGIN = 0.05  # width of the ring around the tile that must be covered; any po
 
 @dataclass(frozen=True)
 class Certificate:
-    """What `certify` found. Lengths are in square roots of the expected area, areas relative to it.
+    """The result of `certify`.
 
-    Figures that could not be computed are NaN. Of several prototiles each figure is the worst one,
-    and areas are means over the tiles.
+    Lengths are in square roots of the expected area, areas relative to it. Figures that could not be
+    computed are NaN. With several prototiles each figure is the worst one, and areas are means over the
+    tiles.
 
     Args:
-        simple: whether the polygon does not cross or touch itself.
-        signed_area: of the polygon, in its own units; negative if clockwise.
-        expected_area: |det B| over the number of tiles in a lattice cell, in the same units: over the
-            order of the group for a tile without a symmetry of its own.
+        simple: Whether the polygon does not cross or touch itself.
+        signed_area: The polygon's area in its own units, negative if it is clockwise.
+        expected_area: |det B| over the number of tiles in a lattice cell, in the same units; for a tile
+            without symmetry of its own, over the order of the group.
         area_error: | |signed_area| - expected_area | / expected_area.
-        edge_mismatch: largest distance of a boundary segment from the reversed segment of an
-            image, or unless `edge_matching` is "segments" of a vertex from the images' boundaries;
-            or of a tile with a symmetry from its image, if that is larger.
-        edge_matching: "segments": one to one; "curves": the same curves with other vertices;
-            "none": neither within tolerance.
-        overlap: largest area in common with one image.
-        total_overlap: sum of the areas in common with all images.
-        uncovered: area around the tile that no image covers.
-        neighbours: number of images that share a piece of the boundary; the most of any prototile.
-        tolerance: bound on area_error, edge_mismatch, total_overlap and uncovered.
-        reasons: what failed, in words; empty if and only if the tile is valid.
+        edge_mismatch: The largest distance of a boundary segment from the reversed segment of an
+            image, or of a vertex from the images' boundaries unless `edge_matching` is "segments"; or
+            of a symmetric tile from its image, if that is larger.
+        edge_matching: "segments" if they match one to one, "curves" if the same curves have other
+            vertices, "none" if neither holds within tolerance.
+        overlap: The largest area in common with one image.
+        total_overlap: The sum of the areas in common with all images.
+        uncovered: The area around the tile that no image covers.
+        neighbours: The number of images that share a piece of the boundary, the largest of all
+            prototiles.
+        tolerance: The bound on area_error, edge_mismatch, total_overlap and uncovered.
+        reasons: What failed, in words; empty if and only if the tile is valid.
     """
 
     simple: bool
@@ -83,7 +84,7 @@ class Certificate:
         return not self.reasons
 
     def as_dict(self) -> dict[str, Any]:
-        """The figures as JSON can hold them: NaN and infinity as None, with "valid" added."""
+        """Return the figures as JSON can hold them: NaN and infinity as None, with "valid" added."""
         values: dict[str, Any] = {"valid": self.valid}
         for item in fields(self):
             value = getattr(self, item.name)
@@ -93,10 +94,10 @@ class Certificate:
         return {**values, "reasons": list(self.reasons)}
 
     def require(self) -> None:
-        """Do nothing if the tile is valid.
+        """Raise an error unless the tile is valid.
 
         Raises:
-            CertificationError: with the reasons, if it is not.
+            CertificationError: with the reasons, if the tile is not valid.
         """
         if not self.valid:
             raise CertificationError(
@@ -123,12 +124,15 @@ def certify(tile: Tiles, *, tolerance: float = 1e-9) -> Certificate:
     an independent check, when the segments match.
 
     Args:
-        tile: a tile or a tiling, of any scale and position; coordinates a factor 1e6 larger than the
-            tile leave no room for the default tolerance in double precision.
-        tolerance: relative, see `Certificate`.
+        tile: A tile or a tiling, of any scale and position; double precision cannot hold the default
+            tolerance for coordinates a factor 1e6 larger than the tile.
+        tolerance: The relative tolerance, see `Certificate`.
 
-    Raises nothing for a bad tile: the certificate says what is wrong. `OrbiflowError` for what is
-    neither a `Tile` nor a `Tiling`, and for a tolerance that is not a positive number.
+    Returns:
+        A certificate, also for an invalid tile: it says what is wrong.
+
+    Raises:
+        OrbiflowError: for `tile` of another type, and for a tolerance that is not a positive number.
 
     >>> from orbiflow.symmetry import wallpaper_group
     >>> eighth = Tiling(wallpaper_group("p4m"), [[[0, 0], [0.5, 0], [0.5, 0.5]]])
@@ -154,7 +158,7 @@ def certify(tile: Tiles, *, tolerance: float = 1e-9) -> Certificate:
 
 
 class _Figures:
-    """The figures that are there whatever the tiles, and how a certificate is made of them."""
+    """The figures that can always be computed, and the certificates made from them."""
 
     def __init__(self, tiling: Tiling, tolerance: float) -> None:
         own = tiling.prototiles
@@ -179,7 +183,7 @@ class _Figures:
     def certificate(
         self, mismatch: float, matching: EdgeMatching, areas: Array, count: int
     ) -> Certificate:
-        """Args: areas: (K, 3) overlap, total overlap and uncovered area of each prototile."""
+        """Return the certificate for `areas` (K, 3): overlap, total overlap and uncovered area."""
         overlap, total, uncovered = (float(x) for x in areas.max(axis=0))
         reasons: list[str] = []
         if not self.error <= self.tolerance:
@@ -207,7 +211,7 @@ class _Figures:
 
 
 def _self_crossing(tiling: Tiling, prototile: int, ring: Array) -> str:
-    """Why a ring is not a simple polygon, and where in the tile's coordinates; "" if it is."""
+    """Return why a ring is not a simple polygon, and where in the tile; "" if it is simple."""
     polygon = shapely.Polygon(ring)
     if shapely.is_valid(polygon) and polygon.area > 0:
         return ""
@@ -236,13 +240,13 @@ def _edge_mismatch(
 
 
 def _areas(around: Surroundings) -> tuple[float, float, float]:
-    """Largest and total overlap with the other tiles, and uncovered area in a ring around."""
+    """Return the largest and total overlap with other tiles, and the uncovered area around."""
     polygon = shapely.Polygon(around.ring)
-    images = ufuncs.polygons(around.rings)
+    images = cast(NDArray[np.object_], shapely.polygons(around.rings))
     region = shapely.buffer(polygon, _MARGIN, quad_segs=2)
     shapely.prepare(region)
     images = images[shapely.intersects(region, images)]
-    common = ufuncs.area(shapely.intersection(polygon, images, grid_size=_GRID))
+    common = shapely.area(shapely.intersection(polygon, images, grid_size=_GRID))
     covered = shapely.union_all([polygon, *images], grid_size=_GRID)
-    uncovered = ufuncs.area(shapely.difference(region, covered, grid_size=_GRID))
+    uncovered = shapely.area(shapely.difference(region, covered, grid_size=_GRID))
     return float(common.max(initial=0.0)), float(common.sum()), float(uncovered)

@@ -45,8 +45,8 @@ OperatorRow: TypeAlias = RotationRow | TransflectionRow
 class ClassRow(NamedTuple):
     """A row of the table.
 
-    Operators are in the order in which the paper nests them, outermost first. Edges are pairs that are
-    identified, equal where an edge is its own partner; by which isometry, the group says.
+    Operators are in the order in which the paper nests them, outermost first. Edges are identified in
+    pairs, equal where an edge is its own partner; the group has the isometry.
     """
 
     group: str
@@ -64,11 +64,7 @@ CLASS_TABLE: dict[str, ClassRow] = {
         template="hexagon",
         lattice=(LatticeVector({0: 1, 1: 1}), LatticeVector({1: 1, 2: 1})),
         operators=(),
-        edges=(
-            (0, 3),
-            (1, 4),
-            (2, 5),
-        ),
+        edges=((0, 3), (1, 4), (2, 5)),
     ),
     "IH2": ClassRow(
         group="pg",
@@ -78,11 +74,7 @@ CLASS_TABLE: dict[str, ClassRow] = {
             TransflectionRow({0: 1 / 2, 1: 1 / 2}, {1: 1, 2: 1}, {1: 1 / 2, 2: 1 / 2}),
             TransflectionRow({0: 5 / 2, 2: 1 / 2}, {1: 1, 2: 1}, {1: 1 / 2, 2: 1 / 2}),
         ),
-        edges=(
-            (0, 5),
-            (1, 4),
-            (2, 3),
-        ),
+        edges=((0, 5), (1, 4), (2, 3)),
     ),
     "IH3": ClassRow(
         group="pg",
@@ -92,11 +84,7 @@ CLASS_TABLE: dict[str, ClassRow] = {
             TransflectionRow({0: 1 / 2, 1: 1 / 2}, {0: 1}, {0: 3 / 2}),
             TransflectionRow({1: 3 / 4, 2: 3 / 4}, {0: 1}, {0: 3 / 2}),
         ),
-        edges=(
-            (0, 2),
-            (1, 4),
-            (3, 5),
-        ),
+        edges=((0, 2), (1, 4), (3, 5)),
     ),
     "IH4": ClassRow(
         group="p2",
@@ -108,13 +96,7 @@ CLASS_TABLE: dict[str, ClassRow] = {
             RotationRow({0: 1 / 2, 1: 1 / 2}, 2),
             RotationRow({0: 3 / 2, 1: 1, 2: -1 / 2}, 2),
         ),
-        edges=(
-            (0, 0),
-            (1, 4),
-            (2, 2),
-            (3, 3),
-            (5, 5),
-        ),
+        edges=((0, 0), (1, 4), (2, 2), (3, 3), (5, 5)),
     ),
     "IH5": ClassRow(
         group="pgg",
@@ -126,12 +108,7 @@ CLASS_TABLE: dict[str, ClassRow] = {
             TransflectionRow({1: 1}, {0: 1}, {0: 3}),
             TransflectionRow({0: 7 / 2, 1: 1 / 2}, {1: 1, 2: 1}, {1: 1 / 2, 2: 1 / 2}),
         ),
-        edges=(
-            (0, 5),
-            (1, 4),
-            (2, 2),
-            (3, 3),
-        ),
+        edges=((0, 5), (1, 4), (2, 2), (3, 3)),
     ),
     "IH6": ClassRow(
         group="pgg",
@@ -143,45 +120,28 @@ CLASS_TABLE: dict[str, ClassRow] = {
             TransflectionRow({}, {1: 1, 2: 1}, {1: 1, 2: 1}),
             TransflectionRow({1: 5 / 4, 2: 5 / 4}, {0: 1}, {0: 3 / 2}),
         ),
-        edges=(
-            (0, 2),
-            (1, 4),
-            (3, 3),
-            (5, 5),
-        ),
+        edges=((0, 2), (1, 4), (3, 3), (5, 5)),
     ),
     "IH7": ClassRow(
         group="p3",
         template="hexagon",
         lattice=(LatticeVector({0: 3}), LatticeVector({1: 3})),
         operators=(RotationRow({0: 2, 1: 1}, 3),),
-        edges=(
-            (0, 5),
-            (1, 2),
-            (3, 4),
-        ),
+        edges=((0, 5), (1, 2), (3, 4)),
     ),
     "IH21": ClassRow(
         group="p6",
         template="floret",
         lattice=(LatticeVector({3: 1, 4: 1}), LatticeVector({3: 1, 4: 1}, degrees=60)),
         operators=(RotationRow({2: 1}, 3), RotationRow({0: 1}, 6)),
-        edges=(
-            (0, 4),
-            (1, 2),
-            (3, 3),
-        ),
+        edges=((0, 4), (1, 2), (3, 3)),
     ),
     "IH28": ClassRow(
         group="p4",
         template="cairo",
         lattice=(LatticeVector({2: 2}), LatticeVector({3: 1, 4: 1})),
         operators=(RotationRow({2: 1}, 4), RotationRow({0: 1}, 4)),
-        edges=(
-            (0, 4),
-            (1, 2),
-            (3, 3),
-        ),
+        edges=((0, 4), (1, 2), (3, 3)),
     ),
 }
 """Source: the paper, table "The Symmetrization for the nine isohedral classes"."""

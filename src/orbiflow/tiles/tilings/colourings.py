@@ -7,28 +7,23 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from orbiflow.arrays import Integers
 from orbiflow.symmetry import Isometry
 from orbiflow.tiles.tilings.surroundings import neighbours
 from orbiflow.tiles.tilings.tile_copies import Copies, prototile_of
-from orbiflow.tiles.tilings.tiling import (
-    Cell,
-    Tiles,
-    Tiling,
-    as_tiling,
-)
+from orbiflow.tiles.tilings.tiling import Cell, Tiles, Tiling, as_tiling
 
 Graph: TypeAlias = list[set[int]]
-"""Neighbours of each vertex; symmetric, without loops."""
+"""The neighbours of each vertex, symmetric and without loops."""
 
 
 def colour_graph(graph: Graph, count: int, *, max_steps: int = 4000) -> list[int] | None:
-    """A proper colouring with colours 0 ... count - 1, or None.
+    """Return a proper colouring with colours 0 ... count - 1, or None.
 
     Backtracking in the order of saturation (Brélaz, "New methods to color the vertices of a graph",
-    CACM 22, 1979). None means there is none, or that none was found in `max_steps` assignments;
-    with more colours than the largest degree there always is one, found without going back.
+    CACM 22, 1979). None means that there is none, or that none was found in `max_steps` assignments;
+    with more colours than the largest degree it is always found, without backtracking.
 
     >>> colour_graph([{1, 2}, {0, 2}, {0, 1}], 3)
     [0, 1, 2]
@@ -50,7 +45,7 @@ def colour_graph(graph: Graph, count: int, *, max_steps: int = 4000) -> list[int
 
 
 def _most_constrained(graph: Graph, colours: list[int]) -> int | None:
-    """The uncoloured vertex with most colours around it, ties to the larger degree."""
+    """Return the uncoloured vertex with most colours around it, ties to the larger degree."""
     free = [v for v in range(len(graph)) if colours[v] < 0]
     if not free:
         return None
@@ -66,7 +61,7 @@ def _advance(trail: list[tuple[int, list[int]]], colours: list[int]) -> bool:
             return True
         colours[vertex] = -1
         trail.pop()
-        # the next vertex back gets its next option in the next round of this loop
+        # the next iteration tries the next option of the vertex before
     return False
 
 
@@ -81,19 +76,19 @@ class Colouring:
     """A colour for each tile, the same for tiles that differ by a vector of a sublattice.
 
     Args:
-        tiling: whose tiles they are.
-        count: number of colours.
-        sublattice: in Hermite normal form, over the basis of the group's lattice.
-        table: (A, a, c) colour by aspect and by cell modulo the sublattice.
+        tiling: The tiling.
+        count: The number of colours.
+        sublattice: The sublattice in Hermite normal form, in the basis of the group's lattice.
+        table: The colour (A, a, c) by aspect and by cell modulo the sublattice.
     """
 
     tiling: Tiling
     count: int
     sublattice: Sublattice
-    table: NDArray[np.int64]
+    table: Integers
 
     def colour(self, element: Isometry) -> int:
-        """Colour, 0 ... count - 1, of the tile that `element` makes of its prototile.
+        """Return the colour, 0 ... count - 1, of the tile that `element` makes of its prototile.
 
         Raises:
             OrbiflowError: for an isometry that is not in the tile's group.
@@ -103,11 +98,11 @@ class Colouring:
         first, second = reduce_cell(cell, self.sublattice)
         return int(self.table[aspect, first, second])
 
-    def colours(self, copies: Copies) -> NDArray[np.int64]:
-        """(M,) colour of each copy, all at once.
+    def colours(self, copies: Copies) -> Integers:
+        """Return the colour (M,) of each copy.
 
         Args:
-            copies: of `tiling`, or of one with the same group and aspects.
+            copies: Copies in `tiling`, or in one with the same group and aspects.
         """
         a, b, c = self.sublattice
         wraps, second = np.divmod(copies.cells[:, 1], c)
@@ -115,15 +110,15 @@ class Colouring:
 
 
 def colouring(tile: Tiles) -> Colouring:
-    """A proper colouring with the fewest colours that a small sublattice allows; deterministic.
+    """Return a proper colouring with the fewest colours that a small sublattice allows.
 
-    Exact search on the quotient of the tiling by each sublattice of index up to 9, for 1, 2, 3 ...
-    colours in turn; among equals the smallest index, so that colours follow the aspects where they
-    can. Colour 0 is the most frequent, and so on down. Never fails: extremely skew lattices, whose
-    tiles meet their own translates modulo all those sublattices, get a larger one.
+    The search is exact on the quotient of the tiling by each sublattice of index up to 9, for 1, 2,
+    3 ... colours in turn. It is deterministic: of equals the smallest index wins, so that colours
+    follow the aspects where possible. Colour 0 is the most frequent, and so on. Extremely skew
+    lattices, whose tiles meet their own translates modulo all those sublattices, get a larger one.
 
     Args:
-        tile: a tile or a tiling.
+        tile: A tile or a tiling.
 
     Raises:
         OrbiflowError: if polygon and group are of very different size.
@@ -148,7 +143,7 @@ def colouring(tile: Tiles) -> Colouring:
 
 
 def reduce_cell(cell: Cell, sublattice: Sublattice) -> Cell:
-    """Representative (0 <= m < a, 0 <= n < c) of lattice coordinates modulo the sublattice."""
+    """Return the representative (0 <= m < a, 0 <= n < c) of a cell modulo the sublattice."""
     a, b, c = sublattice
     wraps, second = divmod(cell[1], c)
     return (cell[0] - wraps * b) % a, second
@@ -158,7 +153,7 @@ _Links: TypeAlias = list[list[tuple[int, Cell]]]
 
 
 def _links(tiling: Tiling) -> _Links:
-    """Per aspect: (aspect, offset) of the neighbours of its tile in cell (0, 0)."""
+    """Return, for each aspect, (aspect, offset) of the neighbours of its tile in cell (0, 0)."""
     table, group = tiling.aspects, tiling.group
     shared = [neighbours(tiling, k).edge for k in range(len(tiling.prototiles))]
     links: _Links = []
@@ -190,7 +185,7 @@ def _sublattices(index: int) -> Iterator[Sublattice]:
 
 
 def _quotient(links: _Links, sublattice: Sublattice) -> Graph:
-    """Adjacency of tiles modulo the sublattice; node (i, m, n) is number (i a + m) c + n."""
+    """Return adjacency of tiles modulo the sublattice; node (i, m, n) is number (i a + m) c + n."""
     a, _, c = sublattice
     graph: Graph = []
     for near in links:
@@ -201,7 +196,7 @@ def _quotient(links: _Links, sublattice: Sublattice) -> Graph:
     return graph
 
 
-def _most_frequent_first(colours: NDArray[np.int64]) -> NDArray[np.int64]:
+def _most_frequent_first(colours: Integers) -> Integers:
     order: Sequence[int] = np.argsort(-np.bincount(colours), kind="stable").tolist()
     rank = np.empty(len(order), dtype=np.int64)
     rank[order] = np.arange(len(order))

@@ -14,22 +14,22 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import CrystallographicGroup, reduced_basis
 from orbiflow.tiles.tilings.tiling import Tile, Tiling
 
-_SAME = 1e-7
-"""Points nearer than this, in square roots of |det B|, are one."""
+_SAME_DISTANCE = 1e-7
+"""The distance, in square roots of |det B|, below which points count as one."""
 
 
 def dirichlet_tile(group: CrystallographicGroup, point: ArrayLike) -> Tile:
-    """The points nearer to `point` than to any other of its images, as a tile.
+    """Return the points nearer to `point` than to any other of its images, as a tile.
 
-    Convex, and it tiles edge to edge. Its stabiliser is that of the point: about a rotation centre or
-    on a mirror the cell has that symmetry.
+    The tile is convex and tiles edge to edge. Its stabiliser is that of the point: about a rotation
+    centre or on a mirror the cell has that symmetry.
 
     Args:
-        group: of the plane.
-        point: (2,), in the group's units.
+        group: A group of the plane.
+        point: A point (2,), in the group's units.
 
     Raises:
-        OrbiflowError: for what is no point, or a group that is not of the plane.
+        OrbiflowError: if `point` is not a point, or the group is not of the plane.
 
     >>> from orbiflow.symmetry import wallpaper_group
     >>> hexagon = dirichlet_tile(wallpaper_group("p6m"), (0.0, 0.0))
@@ -41,15 +41,15 @@ def dirichlet_tile(group: CrystallographicGroup, point: ArrayLike) -> Tile:
 
 
 def dirichlet_tiling(group: CrystallographicGroup, points: Sequence[ArrayLike]) -> Tiling:
-    """The Dirichlet cells of several points among all their images: a prototile for each.
+    """Return the Dirichlet cells of several points among all their images: a prototile for each.
 
     Args:
-        group: of the plane.
-        points: (K, 2), none an image of another.
+        group: A group of the plane.
+        points: Points (K, 2), none an image of another.
 
     Raises:
-        OrbiflowError: for what are no points, points that are images of each other, or a group that
-            is not of the plane.
+        OrbiflowError: if `points` are not points or are images of each other, or if the group is not
+            of the plane.
 
     >>> from orbiflow.symmetry import wallpaper_group
     >>> squares = dirichlet_tiling(wallpaper_group("p4m"), [(0, 0), (0.5, 0.5)])
@@ -61,13 +61,13 @@ def dirichlet_tiling(group: CrystallographicGroup, points: Sequence[ArrayLike]) 
         raise OrbiflowError(f"a tile needs a group of the plane, got dimension {group.dim}")
     given = numbers(points, "the points of Dirichlet cells", ("K", 2))
     if not len(given):
-        raise OrbiflowError("a Dirichlet tiling needs a point at least")
-    same = _SAME * float(np.sqrt(group.cell_volume))
+        raise OrbiflowError("a Dirichlet tiling needs at least one point")
+    same = _SAME_DISTANCE * float(np.sqrt(group.cell_volume))
     return Tiling(group, [_cell(group, given, k, same) for k in range(len(given))])
 
 
 def _cell(group: CrystallographicGroup, points: Array, k: int, same: float) -> Array:
-    """(N, 2) the cell of point k, counter-clockwise."""
+    """Return (N, 2) the cell of point k, counter-clockwise."""
     site = points[k]
     # no point of the cell is further from the site than half the two shortest lattice vectors
     # together, and what bounds the cell no further than twice that

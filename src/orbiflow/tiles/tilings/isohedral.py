@@ -1,4 +1,4 @@
-"""The nine isohedral classes: template, group, paper's operators, lattice freedom."""
+"""The nine isohedral classes, with their templates, groups, operators and lattice freedom."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ PENTAGONS: dict[str, PentagonGauge] = {
 
 
 def hexagon() -> torch.Tensor:
-    """(6, 2) vertices p_k = (cos 60k, sin 60k), float64, counter-clockwise."""
+    """Return (6, 2) vertices p_k = (cos 60k, sin 60k), float64, counter-clockwise."""
     half, high = 0.5, math.sqrt(3.0) / 2
     return torch.tensor(
         [(1.0, 0.0), (half, high), (-half, high), (-1.0, 0.0), (-half, -high), (half, -high)],
@@ -82,7 +82,7 @@ def hexagon() -> torch.Tensor:
 
 
 def pentagon(gauge: PentagonGauge, shape: torch.Tensor) -> torch.Tensor:
-    """Vertices (..., 5, 2) of the pentagon whose p1 is moved by `shape` (..., 2) from its default.
+    """Return vertices (..., 5, 2) of the pentagon whose p1 is moved by `shape` (..., 2).
 
     Counter-clockwise for small shapes. Differentiable in `shape`.
 
@@ -104,25 +104,25 @@ def pentagon(gauge: PentagonGauge, shape: torch.Tensor) -> torch.Tensor:
 
 
 def template_vertices(kind: TemplateKind, shape: torch.Tensor) -> torch.Tensor:
-    """Vertices (..., K, 2) for shape parameters (..., 2) of a pentagon or (..., 0) of the hexagon."""
+    """Return vertices (..., K, 2) for shape parameters, (..., 2) of a pentagon or (..., 0)."""
     if kind == "hexagon":
         vertices = hexagon().to(dtype=shape.dtype, device=shape.device)
         return vertices.expand(*shape.shape[:-1], 6, 2)
     return pentagon(PENTAGONS[kind], shape)
 
 
-_ROUNDING = 1e-9
+_ROUNDING_ERROR = 1e-9
 
 
 def commutant(linear_parts: Array) -> Array:
-    """Orthonormal basis (m, 2) of the (a, b) whose [[a, b], [b, -a]] commutes with a point group.
+    """Return an orthonormal basis (m, 2) of the (a, b) whose [[a, b], [b, -a]] commutes with a group.
 
     The mean over the group projects on them: R X R^T turns (a, b) as R turns directions, twice as far.
-    The basis is made by Gram-Schmidt in the order a, b, so that it depends on nothing but the group;
-    saved parameters are coordinates in it.
+    The basis is made by Gram-Schmidt in the order a, b, so that it depends only on the group; saved
+    parameters are coordinates in it.
 
     Args:
-        linear_parts: (n, 2, 2), of every coset.
+        linear_parts: The linear parts (n, 2, 2) of all cosets.
 
     >>> commutant(np.array([np.eye(2), np.diag([1.0, -1.0])])).tolist()
     [[1.0, 0.0]]
@@ -134,16 +134,16 @@ def commutant(linear_parts: Array) -> Array:
         rest = np.array([a, b])
         for known in basis:
             rest = rest - (rest @ known) * known
-        if np.linalg.norm(rest) > _ROUNDING:
+        if np.linalg.norm(rest) > _ROUNDING_ERROR:
             rest = rest / np.linalg.norm(rest)
-            # a group in the frame of its axes has just these: not a rounding beside them
+            # exact for a group in the frame of its axes
             near = np.round(rest)
-            basis.append(near if np.abs(rest - near).max() < _ROUNDING else rest)
+            basis.append(near if np.abs(rest - near).max() < _ROUNDING_ERROR else rest)
     return np.array(basis).reshape(-1, 2)
 
 
 def stretch_matrix(basis: Array, parameters: torch.Tensor) -> torch.Tensor:
-    """Unimodular symmetric maps (..., 2, 2) for parameters (..., m) over a basis of `commutant`.
+    """Return unimodular symmetric maps (..., 2, 2) for parameters (..., m) over a basis of `commutant`.
 
     exp [[a, b], [b, -a]], where (a, b) = parameters @ basis. Differentiable, at zero too.
     """
@@ -154,7 +154,7 @@ def stretch_matrix(basis: Array, parameters: torch.Tensor) -> torch.Tensor:
 
 
 def _cosh_sinhc(square: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-    """cosh r and sinh(r) / r as functions of r^2, by their series where the root would hurt."""
+    """Return cosh r and sinh(r) / r as functions of r^2, by their series near zero."""
     small = square < 1e-2
     root = torch.sqrt(torch.where(small, torch.ones_like(square), square))
     s = torch.where(small, square, torch.zeros_like(square))
@@ -220,11 +220,11 @@ class IsohedralClass:
     @overload
     def template(self, shape: Points) -> Points: ...
     def template(self, shape: Any = None) -> Any:
-        """Vertices (..., K, 2) of the template, counter-clockwise.
+        """Return vertices (..., K, 2) of the template, counter-clockwise.
 
         Args:
-            shape: (..., shape_dim), NumPy or torch (then differentiable); for the pentagons the
-                displacement of p1 from its default. None means the default, as a NumPy array.
+            shape: Parameters (..., shape_dim), NumPy or torch (then differentiable); for the pentagons
+                the displacement of p1 from its default. None means the default, as a NumPy array.
 
         Raises:
             OrbiflowError: if the last axis of `shape` is not `shape_dim` long.
@@ -235,10 +235,10 @@ class IsohedralClass:
         return _same_kind(template_vertices(self.row.template, tensor), shape)
 
     def stretch(self, parameters: Points) -> Points:
-        """Unimodular maps L (..., 2, 2) that commute with the point group.
+        """Return unimodular maps L (..., 2, 2) that commute with the point group.
 
         Args:
-            parameters: (..., stretch_dim), NumPy or torch (then differentiable).
+            parameters: Parameters (..., stretch_dim), NumPy or torch (then differentiable).
 
         Raises:
             OrbiflowError: if the last axis of `parameters` is not `stretch_dim` long.
@@ -247,19 +247,19 @@ class IsohedralClass:
         return _same_kind(stretch_matrix(self._freedom, tensor), parameters)
 
     def group(self) -> CrystallographicGroup:
-        """The group of the template; the same for all shape parameters."""
+        """Return the group of the template; the same for all shape parameters."""
         return self._group
 
     def generators(self) -> tuple[Isometry, ...]:
-        """The paper's rotations and transflections, in the table's order."""
+        """Return the paper's rotations and transflections, in the table's order."""
         return tuple(operator.isometry for operator in self.paper_operators())
 
     def paper_operators(self) -> tuple[PaperOperator, ...]:
-        """The paper's symmetrization operators, outermost first: V = O_1(O_2(...(F)))."""
+        """Return the paper's symmetrization operators, outermost first: V = O_1(O_2(...(F)))."""
         return tuple(self._operator(row) for row in self.row.operators)
 
     def _edge_isometry(self, first: int, second: int) -> Isometry:
-        """The element that takes an edge onto another, and the tile to its other side."""
+        """Return the element that takes an edge onto another, and the tile to its other side."""
         vertices = self._default
         start, end = vertices[first], vertices[(first + 1) % len(vertices)]
         ends = vertices[second], vertices[(second + 1) % len(vertices)]
@@ -329,7 +329,9 @@ CLASSES: dict[str, IsohedralClass] = {
 
 
 def isohedral_class(name: str | int | IsohedralClass) -> IsohedralClass:
-    """The class called `name`: "IH4", "ih4", "IH04", "4" and 4 are the same; a class is itself.
+    """Return the class called `name`.
+
+    "IH4", "ih4", "IH04", "4" and 4 are the same; a class is returned as it is.
 
     Raises:
         OrbiflowError: for anything but the nine.

@@ -1,4 +1,7 @@
-"""A prototile: a polygon whose images make up a tiling, alone or together with others."""
+"""Prototiles, the polygons whose images make up a tiling, and their symmetries."""
+
+# pyright: reportUnknownMemberType=false
+# shapely's stubs leave the keyword arguments of its functions of arrays without types.
 
 from __future__ import annotations
 
@@ -9,30 +12,28 @@ from typing import NamedTuple
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
 from orbiflow.arguments import numbers, whole
-from orbiflow.arrays import Array
+from orbiflow.arrays import Array, Integers
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import CrystallographicGroup, Isometry
 from orbiflow.tiles.geometry import signed_area
-from orbiflow.typed_shapely import ufuncs
 
-_REPEATED = 1e-12
-"""Vertices nearer than this to the next, in radii of the tile, are one with it."""
+_REPEATED_DISTANCE = 1e-12
+"""The distance, in radii of the tile, below which consecutive vertices count as one."""
 
 
 @dataclass(frozen=True, eq=False)
 class Prototile:
-    """A closed polygon.
+    """A closed polygon whose images are tiles.
 
     Args:
-        polygon: (N, 2) vertices in order, without repeating the first, either orientation.
-        corners: indices into `polygon` of vertices that matter to the caller, such as the tiling
-            vertices of an isohedral class, in order.
+        polygon: The vertices (N, 2) in order, in either orientation, without repeating the first.
+        corners: The indices of vertices that matter to the caller, in order, such as the tiling
+            vertices of an isohedral class.
 
     Raises:
-        OrbiflowError: if the polygon is not (N >= 3, 2) finite numbers, or a corner no vertex.
+        OrbiflowError: if the polygon is not (N >= 3, 2) finite numbers, or a corner is not a vertex.
     """
 
     polygon: Array
@@ -41,7 +42,7 @@ class Prototile:
     def __post_init__(self) -> None:
         polygon = numbers(self.polygon, "the tile's polygon", ("N", 2))
         if len(polygon) < 3:
-            raise OrbiflowError(f"the tile's polygon needs 3 vertices at least, got {len(polygon)}")
+            raise OrbiflowError(f"the tile's polygon needs at least 3 vertices, got {len(polygon)}")
         corners = tuple(
             whole(k, "a tile's corner, an index of its vertices,", 0, len(polygon) - 1)
             for k in self.corners
@@ -57,12 +58,12 @@ class Prototile:
 
     @cached_property
     def box(self) -> Array:
-        """(2, 2) lower left and upper right corner of the bounding box."""
+        """The lower left and upper right corner (2, 2) of the bounding box."""
         return np.stack([self.polygon.min(axis=0), self.polygon.max(axis=0)])
 
     @cached_property
     def center(self) -> Array:
-        """(2,) centre of the bounding box."""
+        """The centre (2,) of the bounding box."""
         return (self.box[0] + self.box[1]) / 2
 
     @cached_property
@@ -71,46 +72,46 @@ class Prototile:
         return float(np.linalg.norm(self.polygon - self.center, axis=1).max())
 
     @cached_property
-    def kept(self) -> NDArray[np.int64]:
-        """Indices of the vertices that are not the same as the next."""
+    def kept(self) -> Integers:
+        """The indices of the vertices that differ from the next one."""
         steps = np.linalg.norm(self.polygon - np.roll(self.polygon, -1, axis=0), axis=1)
-        return np.flatnonzero(steps > _REPEATED * self.radius)
+        return np.flatnonzero(steps > _REPEATED_DISTANCE * self.radius)
 
     @cached_property
     def ring(self) -> Array:
-        """(M, 2) the polygon without repeated vertices."""
+        """The polygon (M, 2) without repeated vertices."""
         return self.polygon[self.kept]
 
 
-TOLERANCE = 1e-5
-"""How far a polygon may be from symmetric and still be meant so, in square roots of |det B| / |G|.
+SYMMETRY_TOLERANCE = 1e-5
+"""The largest deviation of a symmetric polygon from symmetry, in square roots of |det B| / |G|.
 
-That is no claim: `certify` measures the error. And it cannot be too generous for a tile: an element
-that takes a tile nearly onto itself, not onto itself, would make two tiles overlap.
+`certify` measures the actual error. The tolerance cannot be too generous for a tile: an element that
+takes it only nearly onto itself would make two tiles overlap.
 """
 
 
 class Stabiliser(NamedTuple):
     """The finite group of a polygon's symmetries within a crystallographic group.
 
-    - `elements`: the identity first.
-    - `orders`: of each element, (N,) vertex `orders[i]` is the image of vertex i; None where the
-      curve is symmetric, but not vertex by vertex.
-    - `error`: how far images lie from the polygon at most, in its units.
+    - `elements`: The elements, the identity first.
+    - `orders`: For each element the indices (N,) of the images: vertex `orders[i]` is the image of
+      vertex i. None where the curve is symmetric, but not vertex by vertex.
+    - `error`: The largest distance of an image from the polygon, in its units.
     """
 
     elements: tuple[Isometry, ...]
-    orders: tuple[NDArray[np.int64] | None, ...]
+    orders: tuple[Integers | None, ...]
     error: float
 
     @property
     def order(self) -> int:
-        """Number of elements."""
+        """The number of elements."""
         return len(self.elements)
 
 
 def stabiliser(group: CrystallographicGroup, ring: Array) -> Stabiliser:
-    """All elements of `group` that take the polygon `ring` (N, 2) onto itself.
+    """Return all elements of `group` that take the polygon `ring` (N, 2) onto itself.
 
     >>> from orbiflow.symmetry import wallpaper_group
     >>> cell = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
@@ -118,14 +119,14 @@ def stabiliser(group: CrystallographicGroup, ring: Array) -> Stabiliser:
     8
     """
     size = math.sqrt(group.cell_volume / group.order)
-    candidates = _near_center(group, ring, TOLERANCE * size) if len(ring) > 2 else []
+    candidates = _near_center(group, ring, SYMMETRY_TOLERANCE * size) if len(ring) > 2 else []
     still = np.arange(len(ring))
-    found: list[tuple[Isometry, NDArray[np.int64] | None, float]] = []
+    found: list[tuple[Isometry, Integers | None, float]] = []
     for element in candidates:
         order, error = _image_order(element, ring)
-        if error <= TOLERANCE * size:
+        if error <= SYMMETRY_TOLERANCE * size:
             found.append((element, order, error))
-    # of a polygon that is symmetric within the tolerance only: until it is a group
+    # a polygon may be symmetric only within the tolerance: drop the worst until they form a group
     while not _closed([element for element, _, _ in found]):
         worst = max(error for _, _, error in found)
         found = [item for item in found if item[2] < worst]
@@ -135,7 +136,10 @@ def stabiliser(group: CrystallographicGroup, ring: Array) -> Stabiliser:
 
 
 def _near_center(group: CrystallographicGroup, ring: Array, reach: float) -> list[Isometry]:
-    """Elements, not the identity, that move the boundary's centre of mass by less than `reach`."""
+    """Return the elements that move the boundary's centre of mass by less than `reach`.
+
+    The identity is left out.
+    """
     if group.order == 1:
         return []
     ahead = np.roll(ring, -1, axis=0)
@@ -151,24 +155,26 @@ def _near_center(group: CrystallographicGroup, ring: Array, reach: float) -> lis
     ]
 
 
-def _image_order(element: Isometry, ring: Array) -> tuple[NDArray[np.int64] | None, float]:
-    """Which vertex each is taken to, and the largest distance from there."""
+def _image_order(element: Isometry, ring: Array) -> tuple[Integers | None, float]:
+    """Return the vertex that each vertex is taken to, and the largest error."""
     image, count = element(ring), len(ring)
     step = 1 if element.determinant > 0 else -1
     first = int(np.linalg.norm(ring - image[0], axis=1).argmin())
     order = (first + step * np.arange(count)) % count
     error = float(np.linalg.norm(image - ring[order], axis=1).max())
     curve = shapely.linearrings(ring)
-    there = ufuncs.distance(curve, shapely.points(np.concatenate([image, element.inverse()(ring)])))
+    there = shapely.distance(
+        curve, shapely.points(np.concatenate([image, element.inverse()(ring)]))
+    )
     as_curve = float(there.max())
-    # where vertices are no nearer to vertices than to the curve, they correspond
+    # vertices correspond if they are about as near to vertices as to the curve
     return (
         (order, error) if error <= 4 * as_curve + 1e-9 * float(np.ptp(ring)) else (None, as_curve)
     )
 
 
 def _closed(elements: list[Isometry]) -> bool:
-    # elements that fix one point are told apart by their linear parts
+    # elements that fix one point are determined by their linear parts
     parts = [np.eye(2), *(element.linear for element in elements)]
     products = (g @ h for g in parts for h in parts)
     return all(any(np.abs(gh - k).max() < 1e-6 for k in parts) for gh in products)

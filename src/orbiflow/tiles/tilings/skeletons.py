@@ -1,4 +1,4 @@
-"""The skeleton of a tiling: the edges of a set of tiles, each that two of them share only once."""
+"""The skeleton of a tiling: the edges of a set of tiles, shared edges only once."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from orbiflow.arrays import Integers
-from orbiflow.tiles.tilings.tile_copies import Beyond, Copies
+from orbiflow.tiles.tilings.tile_copies import Copies, CopiesAcross
 from orbiflow.tiles.tilings.tile_edges import Edges
 
 
@@ -17,11 +17,11 @@ from orbiflow.tiles.tilings.tile_edges import Edges
 class Skeleton:
     """S edges of copies of prototiles.
 
-    - `edges`, `copies`: of the tiling, and which copies.
-    - `copy`, `edge`: (S,) edge `edge` of copy `copy`, run as that copy's boundary runs.
-    - `other`: (S,) the copy beyond it, -1 where none of the set is.
-    - `ends`: (S, 2) start and end as numbers of vertices: edges that meet within the set have the
-      same. A vertex where copies only touch may have several numbers.
+    - `edges`, `copies`: The tiling's edges, and the copies.
+    - `copy`, `edge`: Edge `edge` of copy `copy`, (S,), in the direction of that copy's boundary.
+    - `other`: The copy (S,) across it, -1 if it is not in the set.
+    - `ends`: The numbers (S, 2) of its first and last vertex: edges that meet within the set share
+      them. A vertex where copies only touch may have several numbers.
     """
 
     edges: Edges
@@ -36,14 +36,16 @@ class Skeleton:
 
 
 def skeleton(own: Edges, copies: Copies) -> Skeleton:
-    """Each edge of each copy, once: edge k of the copy g is edge partner(k) of g @ across(k).
+    """Return each edge of each copy once.
 
-    That is arithmetic of aspects and cells; no places are compared, so that nothing is drawn twice or
-    lost however close edges come to each other.
+    Edge k of the copy g is edge partner(k) of g @ across(k).
+
+    The search uses only aspects and cells, no positions, so that no edge is drawn twice or lost,
+    however close edges come to each other.
 
     Args:
-        own: edges of the copies' tiling.
-        copies: any of its tiles.
+        own: The edges of the copies' tiling.
+        copies: Any of its tiles.
 
     >>> from orbiflow.tiles import CLASSES, Tile, copies_inside, edges
     >>> tile = Tile(CLASSES["IH1"].template(), CLASSES["IH1"].group())
@@ -60,8 +62,8 @@ def skeleton(own: Edges, copies: Copies) -> Skeleton:
     return Skeleton(own, copies, copy, edge, beyond.copy[copy, edge], ends)
 
 
-def _vertices(own: Edges, beyond: Beyond) -> Integers:
-    """(M, E) number of the vertex in which edge k of each copy starts."""
+def _vertices(own: Edges, beyond: CopiesAcross) -> Integers:
+    """Return (M, E) number of the vertex in which edge k of each copy starts."""
     count, sides = beyond.copy.shape
     following = np.array(own.following)
     links: list[Integers] = []

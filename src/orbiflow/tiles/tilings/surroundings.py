@@ -1,4 +1,4 @@
-"""The tiles around a prototile, in coordinates where a tile has area one."""
+"""The tiles around a prototile: how they match its boundary, and which of them touch it."""
 
 from __future__ import annotations
 
@@ -14,11 +14,7 @@ from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from orbiflow.arguments import number, whole
-from orbiflow.arrays import (
-    Array,
-    Integers,
-    checked_window,
-)
+from orbiflow.arrays import Array, Integers, checked_window
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import Isometry
 from orbiflow.tiles.geometry import subdivided
@@ -29,23 +25,19 @@ from orbiflow.tiles.tilings.tile_copies import (
     copies_near,
     prototile_of,
 )
-from orbiflow.tiles.tilings.tiling import (
-    Tiles,
-    Tiling,
-    as_tiling,
-)
+from orbiflow.tiles.tilings.tiling import Tiles, Tiling, as_tiling
 
 MAX_SPAN = 12.0
-"""Largest radius of a tile, in square roots of its group's area, whose images are listed."""
+"""The largest radius, in square roots of the expected area, of a tile whose images are listed."""
 
 
 def expected_area(tile: Tiles) -> float:
-    """|det B| over the number of tiles in a lattice cell: the area of a tile of this group."""
+    """Return |det B| over the number of tiles in a lattice cell: the area of a tile of this group."""
     return as_tiling(tile).tile_area
 
 
 def span(tile: Tiles) -> float:
-    """Radius of the tile over the square root of the expected area: about 0.6 for a hexagon."""
+    """Return the tile's radius over the square root of the expected area: 0.6 for a hexagon."""
     tiling = as_tiling(tile)
     return tiling.radius / math.sqrt(tiling.tile_area)
 
@@ -54,12 +46,12 @@ def span(tile: Tiles) -> float:
 class Surroundings:
     """A prototile and the tiles nearby, moved and scaled so that the expected area is one.
 
-    - `prototile`: its number.
-    - `ring`: (N, 2) the prototile without repeated vertices, centred at zero.
-    - `copies`: the M tiles nearby, not the prototile itself, in the tiling's own coordinates.
-    - `points`: (P, 2) their vertices, one tile after the other, each as its prototile has them.
-    - `counts`: (M,) how many each has.
-    - `mirrored`: (M,) whether the tile's element reverses orientation.
+    - `prototile`: The number of the prototile.
+    - `ring`: The prototile (N, 2) without repeated vertices, centred at zero.
+    - `copies`: The M other tiles nearby, in the tiling's own coordinates.
+    - `points`: Their vertices (P, 2), tile by tile, in the order of their prototile.
+    - `counts`: The number of vertices of each tile, (M,).
+    - `mirrored`: Whether each tile's element reverses orientation, (M,).
     """
 
     prototile: int
@@ -74,18 +66,18 @@ class Surroundings:
 
     @cached_property
     def owner(self) -> Integers:
-        """(P,) which tile each of the points is a vertex of."""
+        """The tile (P,) that each point is a vertex of."""
         return np.repeat(np.arange(len(self.counts)), self.counts)
 
     @cached_property
     def place(self) -> Integers:
-        """(P,) which vertex of its prototile each of the points is."""
+        """The vertex (P,) of its prototile that each point is."""
         first = np.cumsum(self.counts) - self.counts
         return np.arange(len(self.points)) - np.repeat(first, self.counts)
 
     @cached_property
     def ahead(self) -> Array:
-        """(P, 2) the next vertex of the same tile."""
+        """The next vertex (P, 2) of the same tile."""
         following = np.arange(1, len(self.points) + 1)
         last = np.cumsum(self.counts) - 1
         following[last] = last + 1 - self.counts
@@ -93,15 +85,15 @@ class Surroundings:
 
     @cached_property
     def rings(self) -> Any:
-        """(M,) the tiles' boundaries, as shapely's rings."""
+        """The tiles' boundaries (M,) as shapely rings."""
         return np.asarray(shapely.linearrings(self.points, indices=self.owner))
 
     def elements(self) -> tuple[Placed, ...]:
-        """The tiles as elements of the group."""
+        """Return the tiles as elements of the group."""
         return tuple(self.copies.isometry(k) for k in range(len(self)))
 
     def select(self, keep: NDArray[np.bool_]) -> Surroundings:
-        """The tiles where `keep`, (M,), is true."""
+        """Return the tiles where `keep`, (M,), is true."""
         return Surroundings(
             self.prototile,
             self.ring,
@@ -113,9 +105,9 @@ class Surroundings:
 
 
 def surroundings(tiling: Tiling, prototile: int, margin: float) -> Surroundings:
-    """The tiles whose bounding box comes within `margin` (unit: a tile's area is 1) of a prototile's.
+    """Return the tiles whose bounding box comes within `margin` of a prototile's, nearest first.
 
-    Nearest first.
+    The unit is the side of a square of a tile's area.
 
     Raises:
         OrbiflowError: for a tile of span over `MAX_SPAN`, or with fewer than three vertices.
@@ -123,8 +115,8 @@ def surroundings(tiling: Tiling, prototile: int, margin: float) -> Surroundings:
     scale = math.sqrt(tiling.tile_area)
     if span(tiling) > MAX_SPAN:
         raise OrbiflowError(
-            f"the tile reaches {span(tiling):.0f} times the size that its group allows for; "
-            "polygon and group do not belong together (are their units the same?)"
+            f"the tile's radius is {span(tiling):.0f} times the size that its group allows for: "
+            "check that polygon and group belong together and have the same units"
         )
     own = tiling.prototiles[prototile]
     if any(len(p.ring) < 3 for p in tiling.prototiles):
@@ -162,11 +154,11 @@ def _flushed(points: Array) -> Array:
 
 
 class SegmentMatch(NamedTuple):
-    """Nearest reversed segment, of the tiles around, of each segment of a prototile.
+    """The nearest reversed segment, in the tiles around, of each segment of a prototile.
 
-    - `distance`: (N,) distance in R^4 of (a, b) to the nearest (b', a').
-    - `tile`: (N,) whose segment that is, as an index of the surroundings; -1 where there is none.
-    - `partner`: (N,) which segment of that tile's prototile it is.
+    - `distance`: The distance (N,) in R^4 of (a, b) to the nearest (b', a').
+    - `tile`: The index (N,) of its tile in the surroundings, -1 where there is none.
+    - `partner`: The index (N,) of the segment in that tile's prototile.
     """
 
     distance: Array
@@ -175,7 +167,7 @@ class SegmentMatch(NamedTuple):
 
 
 def match_segments(around: Surroundings, tolerance: float) -> SegmentMatch:
-    """For each segment (a, b) of a prototile the nearest segment that runs from b to a.
+    """Return, for each segment (a, b) of a prototile, the nearest segment from b to a.
 
     All prototiles run the same way around, and so do their images: those of elements that reverse
     orientation are read backwards.
@@ -201,10 +193,11 @@ def match_segments(around: Surroundings, tolerance: float) -> SegmentMatch:
 def boundaries_cancel(
     tiling: Tiling, around: Sequence[Surroundings], matches: Sequence[SegmentMatch]
 ) -> bool:
-    """Whether the matched segments of all prototiles, with their signs, add up to nothing.
+    """Return whether the matched segments of all prototiles, with their signs, add up to zero.
 
     Args:
-        around, matches: of each prototile.
+        tiling: The tiling.
+        around, matches: The surroundings and the match of each prototile.
 
     The boundary of all tiles together is, per orbit of the group, the sum of [e] / |S_k| over the
     segments e of each T_k. If e is the reverse of an image of its partner, it is also minus the sum
@@ -230,7 +223,7 @@ def boundaries_cancel(
 
 
 def _orbits(tiling: Tiling, first: Integers) -> Integers | None:
-    """The first segment that each is an image of under its prototile's stabiliser.
+    """Return the first segment that each is an image of under its prototile's stabiliser.
 
     None where vertices are not taken to vertices.
     """
@@ -247,7 +240,7 @@ def _orbits(tiling: Tiling, first: Integers) -> Integers | None:
 
 
 def curve_distance(around: Surroundings) -> float:
-    """Largest distance of a vertex of the prototile to the boundaries of the tiles around it.
+    """Return the largest distance of a prototile's vertex to the boundaries of the tiles around.
 
     With the tiles' vertices seen from the prototile being its vertices seen from them, over all
     prototiles this is the Hausdorff distance between a boundary and the union of the others near it.
@@ -262,20 +255,22 @@ def curve_distance(around: Surroundings) -> float:
 
 
 def segment_tree(around: Surroundings) -> shapely.STRtree:
-    """Tree of the segments of all tiles around; segment p begins at the p-th of their points."""
+    """Return a tree of the segments of all tiles around; segment p begins at their p-th point."""
     ends = np.stack([around.points, around.ahead], axis=1)
     return shapely.STRtree(np.asarray(shapely.linestrings(ends)))
 
 
-_SAMPLES = 200  # points on the boundary at least, so that coarse polygons are seen as curves
+_BOUNDARY_SAMPLES = (
+    200  # points on the boundary at least, so that coarse polygons are seen as curves
+)
 
 
 class Neighbours(NamedTuple):
-    """The other tiles that touch a prototile, each as one group element, nearest first.
+    """The other tiles that touch a prototile, as group elements, nearest first.
 
     Args:
-        edge: those that share a piece of boundary of positive length.
-        point: those that only touch at points.
+        edge: The tiles that share a piece of boundary of positive length.
+        point: The tiles that touch only at points.
     """
 
     edge: tuple[Placed, ...]
@@ -283,12 +278,12 @@ class Neighbours(NamedTuple):
 
 
 def neighbours(tile: Tiles, prototile: int = 0, *, tolerance: float = 1e-7) -> Neighbours:
-    """The tiles that touch a prototile.
+    """Return the tiles that touch a prototile.
 
     Args:
-        tile: a tile or a tiling, certified or not.
-        prototile: whose neighbours; each of them says of which prototile it is a copy.
-        tolerance: what counts as touching, in square roots of the tile's area.
+        tile: A tile or a tiling, which need not be certified.
+        prototile: The number of the prototile; each neighbour names the prototile that it is a copy of.
+        tolerance: The distance that counts as touching, in square roots of the tile's area.
 
     Raises:
         OrbiflowError: if polygon and group are of very different size.
@@ -309,7 +304,7 @@ def neighbours(tile: Tiles, prototile: int = 0, *, tolerance: float = 1e-7) -> N
 
 
 def touching(around: Surroundings, tolerance: float) -> tuple[Surroundings, NDArray[np.bool_]]:
-    """Those of the tiles around that touch the prototile, and which of them share boundary."""
+    """Return the tiles that touch the prototile, and which of them share boundary with it."""
     if not len(around):
         return around, np.zeros(0, dtype=bool)
     outline = shapely.linearrings(around.ring)
@@ -324,17 +319,21 @@ def touching(around: Surroundings, tolerance: float) -> tuple[Surroundings, NDAr
 
 
 def _boundary_samples(ring: Array) -> Array:
-    """Interior points of the segments, midpoints among them: never the corners."""
-    per_segment = 2 * math.ceil(_SAMPLES / (2 * len(ring))) + 1 if len(ring) < _SAMPLES else 1
+    """Return interior points of the segments, midpoints among them: never the corners."""
+    per_segment = (
+        2 * math.ceil(_BOUNDARY_SAMPLES / (2 * len(ring))) + 1
+        if len(ring) < _BOUNDARY_SAMPLES
+        else 1
+    )
     return subdivided(ring, per_segment, phase=0.5)
 
 
 def patch(tile: Tiles, window: Sequence[float]) -> list[Placed]:
-    """The tiles that meet the rectangle, as elements of the group, nearest the middle first.
+    """Return the tiles that meet the rectangle, as elements of the group, nearest the middle first.
 
     Args:
-        tile: a tile or a tiling, certified or not.
-        window: (xmin, ymin, xmax, ymax) in the tile's units.
+        tile: A tile or a tiling, which need not be certified.
+        window: A rectangle (xmin, ymin, xmax, ymax) in the tile's units.
 
     Raises:
         OrbiflowError: for an empty window, or one of more than `MAX_TILES` tiles.
@@ -353,11 +352,11 @@ def patch(tile: Tiles, window: Sequence[float]) -> list[Placed]:
 
 
 def aspects(tile: Tiles, elements: Sequence[Isometry]) -> list[int]:
-    """For each element the aspect of its tile: tiles of one aspect are translates of each other.
+    """Return the aspect of each element's tile: tiles of one aspect are translates.
 
     Args:
-        tile: a tile or a tiling.
-        elements: a plain isometry carries prototile 0.
+        tile: A tile or a tiling.
+        elements: The elements; a plain isometry moves prototile 0.
 
     Raises:
         OrbiflowError: for an isometry that is not in the tile's group.

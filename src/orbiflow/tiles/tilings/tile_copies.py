@@ -1,4 +1,4 @@
-"""Tiles of a tiling as integers: in which aspect, in which lattice cell."""
+"""Tiles of a tiling, each by its aspect and its lattice cell."""
 
 from __future__ import annotations
 
@@ -11,27 +11,17 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from orbiflow.arrays import (
-    Array,
-    Integers,
-    Window,
-    checked_window,
-)
+from orbiflow.arrays import Array, Integers, Window, checked_window
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import CrystallographicGroup, Isometry
-from orbiflow.tiles.tilings.tiling import (
-    Tiles,
-    Tiling,
-    as_tiling,
-)
+from orbiflow.tiles.tilings.tiling import Tiles, Tiling, as_tiling
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Placed(Isometry):
-    """An isometry, and the number of the prototile that it carries.
+    """An isometry with the number of the prototile that it moves.
 
-    What is carried stays the same whatever else is done to it: `g @ placed` is where g takes that
-    tile.
+    A product keeps the prototile: `g @ placed` is where g takes that tile.
 
     >>> import numpy as np
     >>> from orbiflow.symmetry import translation
@@ -43,7 +33,7 @@ class Placed(Isometry):
     prototile: int = 0
 
     def __matmul__(self, other: Isometry) -> Isometry:
-        """As of isometries; of what `other` carries, if that carries anything."""
+        """Compose two isometries; the product moves the prototile of `other`, if it has one."""
         product = Isometry.__matmul__(self, other)
         if isinstance(other, Placed) and product is not NotImplemented:
             return Placed(product.linear, product.translation, other.prototile)
@@ -60,19 +50,19 @@ class Placed(Isometry):
 
 
 def prototile_of(element: Isometry) -> int:
-    """The number of the prototile that an isometry carries: 0 unless it says."""
+    """Return the number of the prototile that an isometry moves, by default 0."""
     return element.prototile if isinstance(element, Placed) else 0
 
 
 MAX_TILES = 20_000
-"""Largest number of tiles in a patch."""
+"""The largest number of tiles in a patch."""
 
 
-class Beyond(NamedTuple):
-    """What lies across given elements from each of M copies.
+class CopiesAcross(NamedTuple):
+    """The copies that E elements lead to from each of M copies.
 
-    - `copy`: (M, E) its index among the copies, -1 if it is not one of them.
-    - `turn`: (M, E) which element of its prototile's stabiliser comes before it: copy m followed by
+    - `copy`: The index (M, E) of the copy, -1 if it is not among the copies.
+    - `turn`: The element (M, E) of its prototile's stabiliser that is applied first: copy m followed by
       element e is that copy after `turn`.
     """
 
@@ -84,9 +74,9 @@ class Beyond(NamedTuple):
 class Copies:
     """M tiles of a tiling.
 
-    - `tiling`: the first prototile is the copy of aspect 0 in cell (0, 0).
-    - `aspects`: (M,) indices into the tiling's aspects.
-    - `cells`: (M, 2) coordinates over the lattice basis.
+    - `tiling`: The tiling; its first prototile is the copy of aspect 0 in cell (0, 0).
+    - `aspects`: The indices (M,) of the tiling's aspects.
+    - `cells`: The coordinates (M, 2) in the lattice basis.
     """
 
     tiling: Tiling
@@ -103,31 +93,31 @@ class Copies:
 
     @cached_property
     def cosets(self) -> Integers:
-        """(M,) indices of coset representatives; with one prototile of no symmetry the aspects."""
+        """The indices (M,) of coset representatives."""
         return self.tiling.aspects.cosets[self.aspects]
 
     @cached_property
     def prototiles(self) -> Integers:
-        """(M,) of which prototile each is a copy."""
+        """The prototile (M,) of each copy."""
         return self.tiling.aspects.prototiles[self.aspects]
 
     @cached_property
     def translations(self) -> Array:
-        """(M, 2) translation of each copy's isometry."""
+        """The translation (M, 2) of each copy's isometry."""
         return self.group.translations[self.cosets] + self.cells @ self.group.lattice.T
 
     def isometry(self, index: int) -> Placed:
-        """The group element of a copy."""
+        """Return the group element of a copy."""
         linear = self.group.linear_parts[self.cosets[index]]
         return Placed(linear, self.translations[index], int(self.prototiles[index]))
 
     def images(self, points: Array) -> Array:
-        """(M, N, 2) images of points (N, 2), one set a copy."""
+        """Return (M, N, 2) images of points (N, 2), one set a copy."""
         turned = np.einsum("gij,nj->gni", self.group.linear_parts, points)
         return turned[self.cosets] + self.translations[:, None, :]
 
     def rings(self) -> list[Array]:
-        """Each copy's polygon."""
+        """Return each copy's polygon."""
         found: list[Array] = [np.empty((0, 2))] * len(self)
         for k, prototile in enumerate(self.tiling.prototiles):
             own = np.flatnonzero(self.prototiles == k)
@@ -136,40 +126,39 @@ class Copies:
         return found
 
     def centers(self) -> Array:
-        """(M, 2) where the centre of each copy's prototile comes to lie."""
+        """Return (M, 2) where the centre of each copy's prototile comes to lie."""
         own = np.stack([p.center for p in self.tiling.prototiles])
         turned = np.einsum("mij,mj->mi", self.group.linear_parts[self.cosets], own[self.prototiles])
         return turned + self.translations
 
     def boxes(self) -> tuple[Array, Array]:
-        """(M, 2) lower left and upper right corners of the copies' bounding boxes."""
+        """Return (M, 2) lower left and upper right corners of the copies' bounding boxes."""
         low, high = aspect_boxes(self.tiling)
         shifts = self.cells @ self.group.lattice.T
         return low[self.aspects] + shifts, high[self.aspects] + shifts
 
     def select(self, keep: NDArray[np.bool_] | Integers) -> Copies:
-        """The copies where `keep` is true, or of these indices."""
+        """Return the copies where `keep` is true, or of these indices."""
         return Copies(self.tiling, self.aspects[keep], self.cells[keep])
 
     def neighbours(self, elements: Sequence[Isometry], of: Sequence[int] | None = None) -> Integers:
-        """(M, E) index of the copy beyond each copy g, g @ element; -1 if it is not among them.
+        """Return the index (M, E) of the copy across each element, -1 if it is not among them.
+
+        The copy across an element of the copy g is g @ element.
 
         Args:
-            elements: a plain isometry carries prototile 0.
-            of: (E,) from the copies of which prototile each element leads, default all of 0; there is
-                nothing beyond the others.
+            elements: The elements; a plain isometry moves prototile 0.
+            of: The prototile (E,) from whose copies each element leads. Default: 0 for all. Other
+                copies have no neighbour.
         """
         return self.beyond(elements, of).copy
 
-    def beyond(self, elements: Sequence[Isometry], of: Sequence[int] | None = None) -> Beyond:
-        """As `neighbours`, and how the copies found lie.
-
-        Integer arithmetic on aspects and cells: nothing is compared by its place.
-        """
+    def beyond(self, elements: Sequence[Isometry], of: Sequence[int] | None = None) -> CopiesAcross:
+        """Return the `neighbours` and how those copies lie, by arithmetic of aspects and cells."""
         table = self.tiling.aspects
         copy = np.full((len(self), len(elements)), -1, dtype=np.int64)
         turn = np.zeros_like(copy)
-        codes = _Codes(self)
+        codes = _CopyIndex(self)
         for number, element in enumerate(elements):
             source = 0 if of is None else of[number]
             mine = np.flatnonzero(self.prototiles == source)
@@ -183,11 +172,11 @@ class Copies:
             steps = np.array([cell for _, cell, _ in found])[place]
             copy[mine, number] = codes.find(aspects, self.cells[mine] + steps)
             turn[mine, number] = np.array([by for _, _, by in found])[place]
-        return Beyond(copy, turn)
+        return CopiesAcross(copy, turn)
 
 
-class _Codes:
-    """Finds copies by aspect and cell."""
+class _CopyIndex:
+    """An index of copies by aspect and cell."""
 
     def __init__(self, copies: Copies) -> None:
         self.low = copies.cells.min(axis=0, initial=0)
@@ -211,11 +200,11 @@ class _Codes:
 
 
 def copies_inside(tile: Tiles, window: Sequence[float]) -> Copies:
-    """The tiles that lie in a rectangle whole, row by row.
+    """Return the tiles that lie wholly in a rectangle, row by row.
 
     Args:
-        tile: a tile or a tiling, certified or not.
-        window: (xmin, ymin, xmax, ymax) in the tile's units.
+        tile: A tile or a tiling, which need not be certified.
+        window: A rectangle (xmin, ymin, xmax, ymax) in the tile's units.
 
     Raises:
         OrbiflowError: for an empty window, or one of more than `MAX_TILES` tiles.
@@ -226,7 +215,7 @@ def copies_inside(tile: Tiles, window: Sequence[float]) -> Copies:
 
 
 def copies_meeting(tile: Tiles, window: Sequence[float]) -> Copies:
-    """The tiles that meet a rectangle, as `copies_inside`.
+    """Return the tiles that meet a rectangle; arguments and errors are those of `copies_inside`.
 
     >>> from orbiflow.symmetry import wallpaper_group
     >>> eighth = Tiling(wallpaper_group("p4m"), [[[0, 0], [0.5, 0], [0.5, 0.5]]])
@@ -244,14 +233,14 @@ def copies_meeting(tile: Tiles, window: Sequence[float]) -> Copies:
     for k, prototile in enumerate(tiling.prototiles):
         unsure = np.flatnonzero(~meets & (found.prototiles == k))
         rings = found.select(unsure).images(prototile.polygon)
-        # rings, not polygons: a tile that crosses itself must not stop the picture that shows it
+        # rings, not polygons: a tile that crosses itself can still be drawn
         touched = shapely.intersects(page, shapely.linearrings(rings))
         meets[unsure] = touched | shapely.contains_xy(shapely.polygons(rings), *middle)
     return _by_rows(found.select(meets))
 
 
 def copies_near(tiling: Tiling, window: Window, *, whole: bool) -> Copies:
-    """The tiles whose bounding box lies in the window, or meets it, in no order that matters."""
+    """Return the tiles whose bounding box lies in the window, or meets it, in any order."""
     low, high = aspect_boxes(tiling)
     least, most = window[:2] - (low if whole else high), window[2:] - (high if whole else low)
     aspects, cells = _cells_within(tiling.group.lattice, least, most)
@@ -259,7 +248,7 @@ def copies_near(tiling: Tiling, window: Window, *, whole: bool) -> Copies:
 
 
 def aspect_boxes(tiling: Tiling) -> tuple[Array, Array]:
-    """(A, 2) lower left and upper right corners of the bounding boxes of the tiles of a cell."""
+    """Return the lower left and upper right corners (A, 2) of the boxes of the tiles of a cell."""
     table, group = tiling.aspects, tiling.group
     low, high = np.empty((len(table), 2)), np.empty((len(table), 2))
     for k, prototile in enumerate(tiling.prototiles):
@@ -270,13 +259,13 @@ def aspect_boxes(tiling: Tiling) -> tuple[Array, Array]:
 
 
 def _cells_within(lattice: Array, least: Array, most: Array) -> tuple[Integers, Integers]:
-    """All integer n with least <= lattice @ n <= most, for A boxes at once.
+    """Return all integer n with least <= lattice @ n <= most, for A boxes at once.
 
     Args:
-        least, most: (A, 2).
+        least, most: The corners (A, 2) of the boxes.
 
     Returns:
-        (M,) the number of the box, and (M, 2) n.
+        The number (M,) of the box, and n (M, 2).
     """
     inverse = np.linalg.inv(lattice)[1]
     # the range of the second coordinate over a box; its rows; and the range of the first in a row
@@ -301,10 +290,10 @@ def _cells_within(lattice: Array, least: Array, most: Array) -> tuple[Integers, 
 
 
 def _ranges(low: Array, high: Array) -> tuple[Integers, Array]:
-    """All whole numbers in some intervals, one more at either end than rounding may leave out.
+    """Return all whole numbers in some intervals, and one more at either end for rounding.
 
     Returns:
-        (M,) the number of the interval, and (M,) the whole number.
+        The number (M,) of the interval, and the whole number (M,).
     """
     first = np.ceil(low - 1e-9)
     counts = np.maximum(np.floor(high + 1e-9) + 1 - first, 0).astype(np.int64)
@@ -324,6 +313,6 @@ def _refuse_too_many(tiling: Tiling, window: Window) -> None:
     if expected > 2 * MAX_TILES or width * height / size > MAX_TILES:
         raise OrbiflowError(
             f"the window of {width:.4g} by {height:.4g} would hold about "
-            f"{width * height / size:.0f} tiles; the most is {MAX_TILES}: choose larger tiles or a "
-            "smaller window"
+            f"{width * height / size:.0f} tiles; the most is {MAX_TILES}: choose larger tiles "
+            "or a smaller window"
         )

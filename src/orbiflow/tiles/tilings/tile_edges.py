@@ -1,4 +1,7 @@
-"""The edges of a tiling and the isometries that identify them, found from polygons and group alone."""
+"""The edges of a tiling and the isometries that identify them, from polygons and group alone."""
+
+# pyright: reportUnknownMemberType=false
+# shapely's stubs leave the keyword arguments of its functions of arrays without types.
 
 from __future__ import annotations
 
@@ -23,12 +26,7 @@ from orbiflow.tiles.tilings.surroundings import (
     surroundings,
 )
 from orbiflow.tiles.tilings.tile_copies import Placed
-from orbiflow.tiles.tilings.tiling import (
-    Tiles,
-    Tiling,
-    as_tiling,
-)
-from orbiflow.typed_shapely import ufuncs
+from orbiflow.tiles.tilings.tiling import Tiles, Tiling, as_tiling
 
 EdgeKind: TypeAlias = Literal["translation", "rotation", "glide", "mirror"]
 
@@ -36,9 +34,8 @@ EdgeKind: TypeAlias = Literal["translation", "rotation", "glide", "mirror"]
 class EdgeIdentification(NamedTuple):
     """`isometry` takes edge `first` onto edge `second`, and its tile to the other side of it.
 
-    So across its edge `second` a tile T meets the copy isometry(T'), along that copy's `first`. The
-    isometry says the rest. An edge may be its own partner: turned over about its middle, or on a
-    mirror, which leaves it as it is.
+    So across its edge `second` a tile T meets the copy isometry(T'), along that copy's `first`. An edge
+    may be its own partner: turned about its middle, or on a mirror that leaves it in place.
     """
 
     first: int
@@ -52,15 +49,15 @@ class EdgeIdentification(NamedTuple):
 
     @property
     def reversed(self) -> bool:
-        """Whether the start of `first` goes to the end of `second`: unless orientation is reversed.
+        """Whether the start of `first` goes to the end of `second`.
 
-        All tiles run the same way around, so edges that two share run opposite ways.
+        All tiles have the same orientation, so this holds unless the isometry reverses orientation.
         """
         return self.isometry.determinant > 0
 
     @property
     def kind(self) -> EdgeKind:
-        """What the isometry is."""
+        """The kind of the isometry."""
         linear, shift = self.isometry.linear, self.isometry.translation
         if self.isometry.determinant > 0:
             return "translation" if np.abs(linear - np.eye(2)).max() < 1e-6 else "rotation"
@@ -70,7 +67,7 @@ class EdgeIdentification(NamedTuple):
 
     @property
     def brief(self) -> str:
-        """In brief: = translation, ~ glide, > rotation, | mirror, o turned over about its middle.
+        """A short form: = translation, ~ glide, > rotation, | mirror, o half-turn about its middle.
 
         >>> from orbiflow.symmetry import rotation, translation
         >>> across = EdgeIdentification(0, 3, translation([1.0, 0.0]))
@@ -84,23 +81,23 @@ class EdgeIdentification(NamedTuple):
         return f"{self.first}{sign}{self.second}"
 
 
-TOLERANCE = 1e-7
-"""How far vertices of two copies may lie apart that count as one, in square roots of the area."""
+VERTEX_TOLERANCE = 1e-7
+"""The largest distance of equal vertices of two copies, in square roots of the area."""
 
 
 @dataclass(frozen=True, eq=False)
 class Edges:
-    """How the boundaries of the prototiles fall into edges, each shared with one neighbour.
+    """The edges of the prototiles, each shared with one neighbour.
 
-    Edges are numbered through, those of the first prototile first; each runs as its polygon does.
+    Edges are numbered through all prototiles in order, in the direction of their polygon.
 
-    - `tiling`: whose edges they are.
-    - `owners`: for each edge, of which prototile it is.
-    - `starts`: index into that prototile's polygon of the vertex in which it begins, increasing.
-    - `across`: for each edge the group element whose tile lies beyond it, and of which prototile.
-    - `partners`: for each edge, which edge of that tile it is.
-    - `turned`: per prototile, (|S|, E) where each element of its stabiliser takes its edges; the other
-      edges stay.
+    - `tiling`: The tiling.
+    - `owners`: The prototile of each edge.
+    - `starts`: The index in that prototile's polygon of the vertex where each edge begins, increasing.
+    - `across`: The group element of the tile across each edge, with its prototile.
+    - `partners`: The edge of that tile that each edge is.
+    - `turned`: For each prototile, where each element of its stabiliser takes its edges, (|S|, E);
+      other edges stay.
     """
 
     tiling: Tiling
@@ -115,13 +112,13 @@ class Edges:
 
     @cached_property
     def following(self) -> tuple[int, ...]:
-        """For each edge the next one around its prototile."""
+        """The next edge around the same prototile, for each edge."""
         first = [self.owners.index(k) for k in range(len(self.tiling.prototiles))]
         last = [*first[1:], len(self)]
         return tuple(e + 1 if e + 1 < last[k] else first[k] for e, k in enumerate(self.owners))
 
     def points(self, edge: int) -> Array:
-        """(M, 2) vertices of an edge, both ends included."""
+        """Return (M, 2) vertices of an edge, both ends included."""
         polygon = self.tiling.prototiles[self.owners[edge]].polygon
         first, last = self.starts[edge], self.starts[self.following[edge]]
         length = (last - first - 1) % len(polygon) + 2
@@ -129,7 +126,7 @@ class Edges:
 
     @property
     def identifications(self) -> tuple[EdgeIdentification, ...]:
-        """Each edge with its partner; where they are each other's, once, the lesser one first."""
+        """Each edge with its partner; mutual partners once, the smaller number first."""
         return tuple(
             EdgeIdentification(partner, edge, self.across[edge])
             for edge, partner in enumerate(self.partners)
@@ -138,14 +135,14 @@ class Edges:
 
 
 def edges(tile: Tiles) -> Edges:
-    """The edges of a tile or tiling: the longest runs of boundary along one neighbour.
+    """Return the edges of a tile or tiling: the longest runs of boundary along one neighbour.
 
     Args:
-        tile: whose images match vertex by vertex, as those of every tile that orbiflow finds do;
-            `edge_to_edge` makes others so.
+        tile: A tile or tiling whose images match vertex by vertex, as for every tile that orbiflow
+            finds; `edge_to_edge` adds the vertices that others lack.
 
     Raises:
-        OrbiflowError: for a tile whose boundary does not match that of its images so.
+        OrbiflowError: if the images do not match vertex by vertex.
 
     >>> from orbiflow.tiles import Tile
     >>> from orbiflow.tiles import isohedral_class
@@ -155,8 +152,8 @@ def edges(tile: Tiles) -> Edges:
     """
     tiling = as_tiling(tile)
     numbers = range(len(tiling.prototiles))
-    around = [surroundings(tiling, k, TOLERANCE) for k in numbers]
-    matches = [match_segments(a, TOLERANCE) for a in around]
+    around = [surroundings(tiling, k, VERTEX_TOLERANCE) for k in numbers]
+    matches = [match_segments(a, VERTEX_TOLERANCE) for a in around]
     _require_match(tiling, matches)
     begins = [_begins(tiling, a, match) for a, match in zip(around, matches, strict=True)]
     first = np.cumsum([0] + [len(b) for b in begins])
@@ -175,26 +172,26 @@ def edges(tile: Tiles) -> Edges:
             partner = _edge_of(begins[there], int(match.partner[segment]))
             partners.append(int(first[there]) + partner)
     turned = tuple(_turned(tiling, k, begins[k], first) for k in numbers)
-    # each other's partners where that can be, and then by isometries that are each other's inverses
+    # make partners mutual where possible, with isometries that are inverses of each other
     own = Edges(tiling, tuple(owners), tuple(starts), tuple(across), tuple(partners), turned)
     return _mutual(own)
 
 
 def _require_match(tiling: Tiling, matches: Sequence[SegmentMatch]) -> None:
-    missing = sum(int((match.distance > TOLERANCE).sum()) for match in matches)
+    missing = sum(int((match.distance > VERTEX_TOLERANCE).sum()) for match in matches)
     if missing or any(order is None for own in tiling.stabilisers for order in own.orders):
         count = sum(len(match.distance) for match in matches)
-        what = f"{missing} of the tile's {count} sides are no side of a neighbour"
+        what = f"{missing} of the tile's {count} sides are not sides of a neighbour"
         if not missing:
             what = "the tile's vertices are not as symmetric as its outline"
         raise OrbiflowError(
-            f"{what}, so its edges are not known; certify(tile) says how its edges match, and "
-            "edge_to_edge(tile) gives it the vertices that it lacks"
+            f"{what}, so its edges are unknown; certify(tile) reports how its edges match, and "
+            "edge_to_edge(tile) adds the missing vertices"
         )
 
 
 def _begins(tiling: Tiling, around: Surroundings, match: SegmentMatch) -> Integers:
-    """The segments of a prototile with which an edge begins."""
+    """Return the segments of a prototile with which an edge begins."""
     sizes = np.array([len(p.ring) for p in tiling.prototiles])
     step = np.where(around.mirrored[match.tile], 1, -1)
     size = sizes[around.copies.prototiles[match.tile]]
@@ -207,7 +204,7 @@ def _begins(tiling: Tiling, around: Surroundings, match: SegmentMatch) -> Intege
 
 
 def _edge_of(begins: Integers, segment: int) -> int:
-    """The edge to which a segment belongs, by the segments with which edges begin."""
+    """Return the edge to which a segment belongs, by the segments with which edges begin."""
     return int(np.searchsorted(begins, segment, side="right") - 1) % len(begins)
 
 
@@ -224,7 +221,7 @@ def _turned(tiling: Tiling, k: int, begins: Integers, first: Integers) -> Intege
 
 
 def _mutual(own: Edges) -> Edges:
-    """With partners chosen where a stabiliser leaves a choice: an edge itself, or each other."""
+    """Choose partners where a stabiliser leaves a choice: an edge itself, or each other."""
     across, partners = list(own.across), list(own.partners)
     done: NDArray[np.bool_] = np.zeros(len(own), dtype=bool)
     for edge in range(len(own)):
@@ -234,7 +231,7 @@ def _mutual(own: Edges) -> Edges:
         images = own.turned[there][:, partners[edge]]
         signs = [s.determinant for s in own.tiling.stabilisers[there].elements]
         choice = np.flatnonzero(images == edge)
-        # a mirror rather than a half-turn: it says that the edge is straight
+        # prefer a mirror to a half-turn: it shows that the edge is straight
         choice = choice[
             np.argsort(np.array(signs)[choice] * across[edge].determinant, kind="stable")
         ]
@@ -256,7 +253,7 @@ def _mutual(own: Edges) -> Edges:
 
 
 class EdgeImage(NamedTuple):
-    """An edge as an image of another: by which isometry, and whether its start is the other's end."""
+    """An edge as the image of another under an isometry; `reversed` if its start is the other's end."""
 
     edge: int
     isometry: Isometry
@@ -264,12 +261,13 @@ class EdgeImage(NamedTuple):
 
 
 class EdgeClass(NamedTuple):
-    """An edge, and all that follows from it.
+    """An edge and all edges that are its images.
 
-    - `edge`: the first of the class.
-    - `folds`: how it is its own image, other than by the identity: at most a half-turn about its
-      middle, the mirror along it (not reversed: then it is straight), and the mirror across it.
-    - `images`: the other edges of the class.
+    - `edge`: The first edge of the class.
+    - `folds`: The isometries other than the identity under which it is its own image: at most a
+      half-turn about its middle, the mirror along it (not reversed: then it is straight), and the
+      mirror across it.
+    - `images`: The other edges of the class.
     """
 
     edge: int
@@ -283,7 +281,7 @@ class EdgeClass(NamedTuple):
 
 
 def edge_classes(own: Edges) -> tuple[EdgeClass, ...]:
-    """The classes of a tiling's edges: whoever draws or fits one edge of each draws them all.
+    """Return the classes of a tiling's edges; one edge of each class determines all others.
 
     >>> from orbiflow.symmetry import wallpaper_group
     >>> from orbiflow.tiles import Tiling, edges
@@ -324,7 +322,7 @@ def edge_classes(own: Edges) -> tuple[EdgeClass, ...]:
 
 
 def _links(own: Edges) -> list[list[EdgeImage]]:
-    """For each edge its images next to it: beyond it, and in its own tile."""
+    """Return, for each edge, its images next to it: beyond it, and in its own tile."""
     links: list[list[EdgeImage]] = [[] for _ in range(len(own))]
     for edge, (partner, element) in enumerate(zip(own.partners, own.across, strict=True)):
         plain = Isometry(element.linear, element.translation)
@@ -339,7 +337,7 @@ def _links(own: Edges) -> list[list[EdgeImage]]:
 
 
 def _closed(edge: int, folds: dict[tuple[int, bool], EdgeImage]) -> list[EdgeImage]:
-    """With the third of two."""
+    """Return the folds, with the third one where there are two."""
     if len(folds) == 2:
         one, other = folds.values()
         third = EdgeImage(edge, one.isometry @ other.isometry, one.reversed != other.reversed)
@@ -348,13 +346,13 @@ def _closed(edge: int, folds: dict[tuple[int, bool], EdgeImage]) -> list[EdgeIma
 
 
 def edge_to_edge(tile: Tiles) -> Tiling:
-    """The same tiling, with a vertex wherever a neighbour, or the tile's own image, has one.
+    """Return the same tiling, with a vertex wherever a neighbour, or the tile's own image, has one.
 
-    After that the vertices on a boundary are all those of the tiling that lie there, so shared sides
-    agree. One that is edge to edge already comes back with the same vertices.
+    Then neighbours have the same vertices on their common boundary. A tiling that is edge to edge keeps
+    its vertices.
 
     Args:
-        tile: a tile or a tiling.
+        tile: A tile or a tiling.
 
     Raises:
         OrbiflowError: if polygon and group are of very different size.
@@ -369,19 +367,18 @@ def edge_to_edge(tile: Tiles) -> Tiling:
 
 
 def _with_vertices(tiling: Tiling, k: int) -> Prototile:
-    own, around = tiling.prototiles[k], surroundings(tiling, k, TOLERANCE)
+    own, around = tiling.prototiles[k], surroundings(tiling, k, VERTEX_TOLERANCE)
     ring = own.ring
-    points = np.concatenate(
-        [_back(around, own, tiling), *(s(ring) for s in _symmetries(tiling, k))]
-    )
-    reach = TOLERANCE * float(np.sqrt(tiling.tile_area))
+    nearby = around.points * np.sqrt(tiling.tile_area) + own.center
+    points = np.concatenate([nearby, *(s(ring) for s in tiling.stabilisers[k].elements[1:])])
+    reach = VERTEX_TOLERANCE * float(np.sqrt(tiling.tile_area))
     line = shapely.LinearRing(ring)
     points = points[shapely.dwithin(line, shapely.points(points), reach)]
     near = np.linalg.norm(points[:, None] - ring, axis=2).min(axis=1, initial=np.inf)
     points = points[near > 2 * reach]
     if not len(points):
         return own
-    along = ufuncs.line_locate_point(line, ufuncs.points(points))
+    along: Array = np.asarray(shapely.line_locate_point(line, shapely.points(points)))
     order = np.argsort(along)
     fresh = np.diff(along[order], prepend=-np.inf) > 2 * reach
     points, along = points[order][fresh], along[order][fresh]
@@ -390,12 +387,3 @@ def _with_vertices(tiling: Tiling, k: int) -> Prototile:
     corners = np.searchsorted(own.kept, own.corners, side="left")
     moved = corners + np.searchsorted(at, corners, side="right")
     return Prototile(np.insert(ring, at, points, axis=0), tuple(int(c) for c in moved))
-
-
-def _back(around: Surroundings, own: Prototile, tiling: Tiling) -> Array:
-    """The vertices of the tiles around, in the tiling's own coordinates."""
-    return around.points * np.sqrt(tiling.tile_area) + own.center
-
-
-def _symmetries(tiling: Tiling, k: int) -> list[Isometry]:
-    return list(tiling.stabilisers[k].elements[1:])

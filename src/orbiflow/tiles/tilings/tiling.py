@@ -1,4 +1,4 @@
-"""Tilings: a crystallographic group, and prototiles whose images are to cover the plane."""
+"""Tilings: a crystallographic group, and prototiles whose images should cover the plane."""
 
 from __future__ import annotations
 
@@ -10,22 +10,14 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from orbiflow.arguments import (
-    described,
-    instance,
-    is_a,
-)
+from orbiflow.arguments import described, instance, is_a
 from orbiflow.arrays import Array, Integers
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import CrystallographicGroup, Isometry
-from orbiflow.tiles.tilings.prototile import (
-    Prototile,
-    Stabiliser,
-    stabiliser,
-)
+from orbiflow.tiles.tilings.prototile import Prototile, Stabiliser, stabiliser
 
 Cell: TypeAlias = tuple[int, int]
-"""Coordinates of a lattice vector over the basis of the group's lattice."""
+"""The coordinates of a lattice vector in the basis of the group's lattice."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,13 +25,12 @@ class Aspects:
     """The A tiles of a tiling up to translations: pairs of a prototile and a coset of the lattice.
 
     Elements that differ by an element of a prototile's stabiliser make the same tile of it; the coset
-    of an aspect is the first of those that do. With trivial stabilisers and one prototile aspects are
-    cosets.
+    of an aspect is the first of them. With one prototile of no symmetry, aspects are cosets.
 
-    - `prototiles`, `cosets`: (A,).
-    - `table`: (K, |G|) the aspect of coset i's image of prototile k.
-    - `steps`: (K, |G|, 2) and the lattice cell in which that aspect is.
-    - `turns`: (K, |G|) which element s of the stabiliser comes before: coset i is the aspect's
+    - `prototiles`, `cosets`: The pairs, (A,) each.
+    - `table`: The aspect (K, |G|) of coset i's image of prototile k.
+    - `steps`: The lattice cell (K, |G|, 2) of that aspect.
+    - `turns`: The element s (K, |G|) of the stabiliser that is applied first: coset i is the aspect's
       representative, in that cell, after s.
     """
 
@@ -54,7 +45,7 @@ class Aspects:
 
     @classmethod
     def of(cls, group: CrystallographicGroup, stabilisers: Sequence[Stabiliser]) -> Aspects:
-        """Of prototiles with these stabilisers."""
+        """Return the aspects of prototiles with these stabilisers."""
         count, order = len(stabilisers), group.order
         if all(own.order == 1 for own in stabilisers):
             return cls._of_all(count, order)
@@ -75,7 +66,7 @@ class Aspects:
 
     @classmethod
     def _of_all(cls, count: int, order: int) -> Aspects:
-        """Of prototiles without symmetry: every pair."""
+        """Return the aspects of prototiles without symmetry: every pair."""
         none = np.zeros((count, order), dtype=np.int64)
         table = np.arange(count * order).reshape(count, order)
         prototiles, cosets = np.divmod(table.ravel(), order)
@@ -84,7 +75,7 @@ class Aspects:
     def find(
         self, group: CrystallographicGroup, element: Isometry, prototile: int
     ) -> tuple[int, Cell, int]:
-        """(aspect, cell, turn) of the tile that `element` makes of a prototile.
+        """Return (aspect, cell, turn) of the tile that `element` makes of a prototile.
 
         Raises:
             OrbiflowError: for an isometry that is not in the group.
@@ -98,7 +89,7 @@ class Aspects:
 def _first_cosets(
     group: CrystallographicGroup, own: Stabiliser
 ) -> tuple[Integers, Integers, Integers]:
-    """Per coset: the first that makes the same tile, in which cell, after which element."""
+    """Return for each coset the first that makes the same tile, its cell, and the element before."""
     first = np.arange(group.order)
     steps = np.zeros((group.order, 2), dtype=np.int64)
     turns = np.zeros(group.order, dtype=np.int64)
@@ -116,7 +107,7 @@ def _inverse(elements: tuple[Isometry, ...], s: Isometry) -> int:
 
 
 def coset_and_cell(group: CrystallographicGroup, element: Isometry) -> tuple[int, Cell]:
-    """(i, n) with element = translation by B n after the i-th coset representative.
+    """Return (i, n) with element = translation by B n after the i-th coset representative.
 
     Raises:
         OrbiflowError: for an isometry that is not in the group.
@@ -137,19 +128,18 @@ def coset_and_cell(group: CrystallographicGroup, element: Isometry) -> tuple[int
 class Tiling:
     """Prototiles T_k and a group G in the same coordinates; the tiles are all g(T_k) (design point 16).
 
-    The elements that take T_k onto itself, its stabiliser S_k, are found from the polygon: tiles that
-    are mirror images of themselves, or turn about their middle, need not be announced. Being a
-    `Tiling` proves nothing: `certify` does. Its tiles cover the plane once if
+    The stabiliser S_k, the elements that take T_k onto itself, is found from the polygon. A `Tiling`
+    need not tile the plane: `certify` checks that. Its tiles cover the plane once if
     sum_k area(T_k) |G| / |S_k| = |det B| and their boundaries pair off.
 
     Args:
-        group: of the plane.
-        prototiles: at least one, none an image of another; each a `Prototile` or its polygon
-            (N, 2). All run the same way around.
+        group: A group of the plane.
+        prototiles: At least one `Prototile` or polygon (N, 2), none an image of another. All must
+            have the same orientation.
 
     Raises:
-        OrbiflowError: if the group is not planar, there is no prototile, a polygon is none, or
-            polygons run different ways around.
+        OrbiflowError: if the group is not planar, there is no prototile, a polygon is invalid, or
+            orientations differ.
 
     >>> from orbiflow.symmetry import wallpaper_group
     >>> eighth = Tiling(wallpaper_group("p4m"), [[[0, 0], [0.5, 0], [0.5, 0.5]]])
@@ -173,24 +163,24 @@ class Tiling:
         except TypeError:
             given = []
         if given and not isinstance(given[0], Prototile | str) and np.ndim(given[0]) == 1:
-            given = []  # a polygon by itself
+            given = []  # a single polygon instead of a sequence
         own = tuple(p if isinstance(p, Prototile) else Prototile(np.asarray(p)) for p in given)
         if not own:
             raise OrbiflowError(
-                "a tiling needs a sequence of prototiles, one at least: Tiling(group, [polygon])"
+                "a tiling needs a sequence of at least one prototile: Tiling(group, [polygon])"
             )
         for number, prototile in enumerate(own):
             if prototile.signed_area * own[0].signed_area < 0:
                 raise OrbiflowError(
-                    f"prototile {number} runs the other way around than prototile 0: reverse its "
-                    "vertices"
+                    f"prototile {number} and prototile 0 have opposite orientations: reverse the "
+                    "vertices of one"
                 )
         object.__setattr__(self, "group", group)
         object.__setattr__(self, "prototiles", own)
 
     @cached_property
     def stabilisers(self) -> tuple[Stabiliser, ...]:
-        """Of each prototile: which elements of the group take it onto itself."""
+        """The stabiliser of each prototile."""
         return tuple(stabiliser(self.group, p.ring) for p in self.prototiles)
 
     @cached_property
@@ -200,27 +190,27 @@ class Tiling:
 
     @cached_property
     def tile_area(self) -> float:
-        """|det B| over the tiles of a cell: the area of a tile, the mean one of several prototiles."""
+        """The mean area of a tile: |det B| over the number of tiles in a cell."""
         return self.group.cell_volume / len(self.aspects)
 
     @cached_property
     def box(self) -> Array:
-        """(2, 2) lower left and upper right corner of the prototiles' bounding box."""
+        """The lower left and upper right corner (2, 2) of the prototiles' bounding box."""
         boxes = np.stack([p.box for p in self.prototiles])
         return np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
 
     @property
     def center(self) -> Array:
-        """(2,) centre of `box`."""
+        """The centre (2,) of `box`."""
         return (self.box[0] + self.box[1]) / 2
 
     @property
     def radius(self) -> float:
-        """Radius of the largest prototile."""
+        """The radius of the largest prototile."""
         return max(p.radius for p in self.prototiles)
 
     def transformed(self, linear: Array, offset: Array) -> Tiling:
-        """Prototiles and group under the affine map p -> linear p + offset (a similarity)."""
+        """Return the image under the affine map p -> linear p + offset, a similarity."""
         by, to = np.asarray(linear), np.asarray(offset)
         moved = [Prototile(p.polygon @ by.T + to, p.corners) for p in self.prototiles]
         return Tiling(self.group.conjugate(by, to), moved)
@@ -235,14 +225,14 @@ class Tiling:
 class Tile:
     """A closed polygon with a crystallographic group acting in the same coordinates.
 
-    A `Tiling` by one prototile, `tiling`, with what is known of where it comes from. Being a `Tile`
-    proves nothing: `certify` does.
+    This is a `Tiling` by one prototile, `tiling`, with its isohedral class. A `Tile` need not tile the
+    plane: `certify` checks that.
 
     Args:
-        polygon: (N, 2) vertices in order, without repeating the first, either orientation.
-        group: whose images of the polygon are the tiles.
-        isohedral_class: such as "IH4", or "" when unknown.
-        corners: indices into `polygon` of the tiling vertices of the class, in order.
+        polygon: The vertices (N, 2) in order, in either orientation, without repeating the first.
+        group: The group whose images of the polygon are the tiles.
+        isohedral_class: The class, such as "IH4", or "" if it is unknown.
+        corners: The indices in `polygon` of the tiling vertices of the class, in order.
 
     Raises:
         OrbiflowError: if the polygon is not (N >= 3, 2) finite numbers or the group not planar.
@@ -268,7 +258,7 @@ class Tile:
 
     @property
     def center(self) -> Array:
-        """(2,) centre of the bounding box."""
+        """The centre (2,) of the bounding box."""
         return self.tiling.prototiles[0].center
 
     @property
@@ -277,21 +267,21 @@ class Tile:
         return self.tiling.prototiles[0].radius
 
     def transformed(self, linear: Array, offset: Array) -> Tile:
-        """The tile and its group under the affine map p -> linear p + offset (a similarity)."""
+        """Return the image under the affine map p -> linear p + offset, a similarity."""
         moved = self.polygon @ np.asarray(linear).T + np.asarray(offset)
         group = self.group.conjugate(linear, offset)
         return Tile(moved, group, self.isohedral_class, self.corners)
 
 
 Tiles: TypeAlias = Tile | Tiling
-"""What the functions of this room take."""
+"""A tile or a tiling, which most functions of tilings take."""
 
 
 def as_tiling(tiles: Tiles) -> Tiling:
-    """The tiling that is meant.
+    """Return a tile or a tiling as a tiling.
 
     Raises:
-        OrbiflowError: for what is neither a `Tile` nor a `Tiling`.
+        OrbiflowError: for anything else.
     """
     if isinstance(tiles, Tiling):
         return tiles

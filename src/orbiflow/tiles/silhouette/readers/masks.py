@@ -1,11 +1,11 @@
-"""Masks: pictures whose light, or opaque, part is what is meant."""
+"""Masks, pictures whose light or opaque part is selected."""
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from PIL import Image
 
+from orbiflow.arrays import Array
 from orbiflow.errors import InputFileError
 from orbiflow.tiles.silhouette.readers.pictures import (
     MIN_CONTRAST,
@@ -23,12 +23,12 @@ _PAINT = "paint what must survive white and the rest black"
 class MaskReading:
     """A mask as found in a file.
 
-    - `levels`: (H, W), 0 to 1, each an average of `reduced` x `reduced` pixels of the file.
-    - `size`: width and height in pixels of the file.
-    - `notes`: what was decided for the user, in plain words.
+    - `levels`: Levels (H, W), 0 to 1, each a mean of `reduced` x `reduced` pixels of the file.
+    - `size`: The width and height in pixels of the file.
+    - `notes`: What was decided for the user, in plain words.
     """
 
-    levels: NDArray[np.float64]
+    levels: Array
     size: tuple[int, int]
     reduced: int
     notes: tuple[str, ...]
@@ -60,7 +60,7 @@ def _decode(path: Source, image: Image.Image) -> MaskReading:
 
 
 def _channel(path: Source, image: Image.Image) -> tuple[Image.Image, list[str]]:
-    """The channel that emphasises: mode "L" (0 to 255) or "F" (0 to 1)."""
+    """Return the channel that emphasises: mode "L" (0 to 255) or "F" (0 to 1)."""
     if image.mode.startswith(("I", "F")):
         return deep_channel(path, image), []
     if not image.has_transparency_data:

@@ -1,4 +1,4 @@
-"""Readers of silhouettes. What a file is, is decided by its content first, its name second."""
+"""The reader of all silhouette files, which finds out a file's kind from its content or name."""
 
 import re
 from pathlib import Path
@@ -10,7 +10,7 @@ from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.tiles.silhouette.readers.pictures import read_image
 from orbiflow.tiles.silhouette.readers.polygon_files import read_dat, read_json
 from orbiflow.tiles.silhouette.readers.reading import (
-    Held,
+    FileContent,
     Reading,
     Source,
     check_file,
@@ -40,15 +40,15 @@ _READABLE = "a PNG, JPEG or WebP image, an SVG drawing, a .json polygon or a .da
 
 
 def read_outline(
-    path: str | Path | Held, *, threshold: float | None = None, invert: bool | None = None
+    path: str | Path | FileContent, *, threshold: float | None = None, invert: bool | None = None
 ) -> Reading:
-    """Read the outline of the silhouette in the file at `path`, or in bytes that are `Held`.
+    """Read the outline of the silhouette in the file at `path`, or in a `FileContent`.
 
     `threshold` and `invert` are for images (see `read_image`). Raises `InputFileError` for a file
-    that is missing, of no kind that is read, damaged, too large, or without a usable shape, and
+    that is missing, of an unknown kind, damaged, too large, or without a usable shape, and
     `OrbiflowError` for a setting that cannot be used.
     """
-    path = path if isinstance(path, Held) else as_path(path, "the silhouette's file")
+    path = path if isinstance(path, FileContent) else as_path(path, "the silhouette's file")
     check_file(path)
     kind = _kind(path, read_head(path, _HEAD_BYTES))
     if kind == "image":
@@ -58,7 +58,7 @@ def read_outline(
             raise OrbiflowError(
                 f"{name} applies to images only and {path} is a polygon or drawing; leave it out"
             )
-    # Extreme coordinates overflow inside the geometry, and are refused for what comes of it.
+    # extreme coordinates overflow in the geometry, whose result is then refused
     with np.errstate(all="ignore"):
         return {"svg": read_svg, "json": read_json, "dat": read_dat}[kind](path)
 
@@ -74,14 +74,14 @@ def _kind(path: Source, head: bytes) -> str:
             return "json"
         if _COUNT_LINE.match(text):
             return "dat"
-        # A text file under a name that fits: its reader knows best what is wrong with it.
+        # the reader that fits the name of a text file gives the best message
         if path.suffix.lower() in _BY_NAME:
             return _BY_NAME[path.suffix.lower()]
     raise InputFileError(f"{path}: {_what(path, head, text)}; give {_READABLE}")
 
 
 def _text(head: bytes) -> str | None:
-    """`head` as text without leading blanks, or None where it is binary."""
+    """Return `head` as text without leading blanks, or None where it is binary."""
     utf16 = head.startswith((b"\xff\xfe", b"\xfe\xff"))
     if not utf16 and b"\0" in head:
         return None
@@ -94,4 +94,4 @@ def _what(path: Source, head: bytes, text: str | None) -> str:
         if head.startswith(magic):
             return what
     suffix = f" although its name ends in {path.suffix}" if path.suffix else ""
-    return f"holds {'text' if text is not None else 'data'} of no kind that is read{suffix}"
+    return f"holds {'text' if text is not None else 'data'} of an unknown kind{suffix}"

@@ -14,9 +14,10 @@ from PIL import Image, ImageOps, UnidentifiedImageError
 from skimage.filters import threshold_otsu
 
 from orbiflow.arguments import described
+from orbiflow.arrays import Array
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.tiles.silhouette.readers.reading import (
-    Held,
+    FileContent,
     Reading,
     Source,
     check_file,
@@ -49,7 +50,7 @@ class Picture:
     - `name`: "luminance"; or "alpha" or "mask", whose high part is the shape.
     """
 
-    channel: NDArray[np.float64]
+    channel: Array
     name: str
     size: tuple[int, int]
     reduced: int
@@ -84,7 +85,7 @@ def checked_threshold(threshold: float | None) -> None:
 
 
 def open_image(path: Source, decode: Callable[[Any, Image.Image], _Decoded]) -> _Decoded:
-    """What `decode` makes of the image at `path`, which is opened within bounds.
+    """Return what `decode` makes of the image at `path`, which is opened within bounds.
 
     Raises `InputFileError` for a file over 64 MB, an image over 40 megapixels (before a pixel of it
     is decoded), and one that is no image or that `decode` finds damaged.
@@ -135,7 +136,7 @@ def _too_large(path: Source, size: str) -> str:
 
 
 def upright(image: Image.Image) -> tuple[Image.Image, list[str]]:
-    """The first frame of `image`, turned as its EXIF orientation asks, with notes."""
+    """Return the first frame of `image`, turned as its EXIF orientation asks, with notes."""
     notes: list[str] = []
     if getattr(image, "n_frames", 1) > 1:
         notes.append("took the first frame of several")
@@ -145,8 +146,8 @@ def upright(image: Image.Image) -> tuple[Image.Image, list[str]]:
     return turned, notes
 
 
-def averaged(band: Image.Image) -> tuple[NDArray[np.float64], int]:
-    """Levels of `band` ("L" or "F"), 0 to 1, with at most 1500 pixels along a side.
+def averaged(band: Image.Image) -> tuple[Array, int]:
+    """Return levels of `band` ("L" or "F"), 0 to 1, with at most 1500 pixels along a side.
 
     Also how many pixels of `band`, along each axis, were averaged into one.
     """
@@ -165,7 +166,7 @@ def _decode(path: Source, image: Image.Image) -> Picture:
 
 
 def _channel(path: Source, image: Image.Image) -> tuple[Image.Image, str, list[str]]:
-    """The channel that shows the shape: mode "L" (0 to 255) or "F" (0 to 1)."""
+    """Return the channel that shows the shape: mode "L" (0 to 255) or "F" (0 to 1)."""
     if image.mode.startswith(("I", "F")):
         return deep_channel(path, image), "luminance", []
     if not image.has_transparency_data:
@@ -186,7 +187,7 @@ def _channel(path: Source, image: Image.Image) -> tuple[Image.Image, str, list[s
 
 
 def deep_channel(path: Source, image: Image.Image) -> Image.Image:
-    """A channel of more than 8 bits as mode "F", 0 to 1."""
+    """Return a channel of more than 8 bits as mode "F", 0 to 1."""
     values = np.asarray(image, dtype=np.float32)
     if not np.isfinite(values).all():
         raise InputFileError(f"{path}: holds pixels that are not finite numbers; export it as PNG")
@@ -202,7 +203,7 @@ def deep_channel(path: Source, image: Image.Image) -> Image.Image:
 def choose_shape(
     path: Source, picture: Picture, threshold: float | None, invert: bool | None
 ) -> tuple[Level, list[str]]:
-    """The level turned so that the shape is high, and notes of how it was told apart."""
+    """Return the level turned so that the shape is high, and notes of how it was told apart."""
     channel = picture.channel
     if channel.min() == channel.max():
         raise InputFileError(
@@ -232,7 +233,7 @@ def choose_shape(
 
 
 def _cut(path: Source, picture: Picture) -> float:
-    """Level midway between the usual levels of the two classes that Otsu's method finds."""
+    """Return level midway between the usual levels of the two classes that Otsu's method finds."""
     if picture.name in _PARTS:
         return 0.5
     channel = picture.channel
@@ -249,7 +250,7 @@ def _cut(path: Source, picture: Picture) -> float:
 def _polarity(
     above: NDArray[np.bool_], invert: bool | None, threshold: str
 ) -> tuple[bool, list[str]]:
-    """Whether the shape is the light part."""
+    """Return whether the shape is the light part."""
     border = np.concatenate([above[0], above[-1], above[1:-1, 0], above[1:-1, -1]])
     light = float(border.mean())
     shape_is_light = light < 0.5 if invert is None else invert
@@ -265,13 +266,9 @@ def _polarity(
 
 
 def read_mask_array(
-    values: Any,
-    name: str = "mask",
-    *,
-    threshold: float | None = None,
-    invert: bool | None = None,
+    values: Any, name: str = "mask", *, threshold: float | None = None, invert: bool | None = None
 ) -> Reading:
-    """The outline of the shape in an array (H, W), in pixels with y down, the first row on top.
+    """Return the outline of the shape in an array (H, W), in pixels with y down.
 
     Booleans, and integers that are 0 and 1 alone, say where the shape is; with `invert`, where it is
     not. Other integers of 8 or 16 bits are gray levels of that full scale, floats of full scale 1:
@@ -282,7 +279,7 @@ def read_mask_array(
         InputFileError: for over 40 megapixels, and an array without a shape of its own.
     """
     checked_threshold(threshold)
-    source = Held(b"", name)
+    source = FileContent(b"", name)
     array = _array(values, name)
     check_size(source, (array.shape[1], array.shape[0]))
     levels, is_mask = _levels(array, name)
@@ -301,7 +298,7 @@ def read_mask_array(
     return Reading(outline, True, "image", size, (*picture.notes, *chosen, *traced))
 
 
-def _array(values: Any, name: str) -> NDArray[Any]:
+def _array(values: Any, name: str) -> Array:
     if isinstance(values, torch.Tensor):
         values = values.detach().cpu().numpy()
     try:
@@ -320,8 +317,8 @@ def _array(values: Any, name: str) -> NDArray[Any]:
     return array
 
 
-def _levels(array: NDArray[Any], name: str) -> tuple[NDArray[np.float32], bool]:
-    """Levels 0 to 1, and whether they say where the shape is."""
+def _levels(array: Array, name: str) -> tuple[NDArray[np.float32], bool]:
+    """Return levels 0 to 1, and whether they say where the shape is."""
     low, high = (array.min(), array.max()) if array.size else (0, 0)
     if array.dtype.kind == "b" or (array.dtype.kind in "iu" and low >= 0 and high <= 1):
         return array.astype(np.float32), True

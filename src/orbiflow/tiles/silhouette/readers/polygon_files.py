@@ -8,11 +8,7 @@ import numpy as np
 from orbiflow.errors import InputFileError
 from orbiflow.runtime import is_list, is_object
 from orbiflow.tiles.silhouette.outlines import MAX_VERTICES, clean_ring
-from orbiflow.tiles.silhouette.readers.reading import (
-    Reading,
-    Source,
-    read_bytes,
-)
+from orbiflow.tiles.silhouette.readers.reading import Reading, Source, read_bytes
 
 MAX_BYTES = 16 * 2**20
 POLYGON_KEYS = ("polygon", "tile", "outline")
@@ -109,7 +105,7 @@ def read_json(path: Source) -> Reading:
 
 
 def _find_polygon(path: Source, content: object) -> tuple[list[Any], bool, list[str]]:
-    """The list of vertices in `content`, whether y points down, and notes."""
+    """Return the list of vertices in `content`, whether y points down, and notes."""
     if is_list(content):
         return content, False, []
     if not is_object(content):
@@ -171,6 +167,6 @@ def _is_number(value: object) -> bool:
 
 
 def _quote(text: str) -> str:
-    """`text` for a message: short, and on one line."""
+    """Return `text` for a message: short, and on one line."""
     text = text.strip()
     return ascii(text if len(text) <= 40 else text[:37] + "...")

@@ -1,53 +1,51 @@
-"""What every reader of silhouettes hands back, and how a file's bytes are fetched."""
+"""The result of every reader of silhouettes, and reading a file's bytes."""
 
 import io
 import stat
 from dataclasses import dataclass
 from pathlib import Path, PurePath
 
-import numpy as np
-from numpy.typing import NDArray
-
+from orbiflow.arrays import Array
 from orbiflow.errors import InputFileError
 
 
 @dataclass(frozen=True)
-class Held:
-    """The content of a file, in memory, under a name: what messages call it, and its ending."""
+class FileContent:
+    """The content of a file in memory, with the name that messages and its kind are taken from."""
 
     data: bytes
     name: str
 
     @property
     def suffix(self) -> str:
-        """Ending of the name, such as ".svg"."""
+        """The ending of the name, such as ".svg"."""
         return PurePath(self.name).suffix
 
     def __str__(self) -> str:
         return self.name
 
 
-Source = Path | Held
+Source = Path | FileContent
 
 
 def opened(source: Source) -> Path | io.BytesIO:
-    """What libraries open: the path, or a stream of the bytes."""
-    return io.BytesIO(source.data) if isinstance(source, Held) else source
+    """Return what libraries open: the path, or a stream of the bytes."""
+    return io.BytesIO(source.data) if isinstance(source, FileContent) else source
 
 
 @dataclass(frozen=True)
 class Reading:
     """A silhouette as found in a file.
 
-    - `outline`: (N, 2), simple closed ring without a repeated last vertex, in the file's own units.
-    - `y_down`: whether the file's y axis points down.
-    - `kind`: "image", "svg", "dat", "json".
-    - `size`: width and height of the picture or drawing, where the file states one.
-    - `notes`: what was decided for the user, in plain words.
-    - `corner`: of least coordinates, of that picture or drawing.
+    - `outline`: A simple ring (N, 2) without a repeated last vertex, in the file's own units.
+    - `y_down`: Whether the file's y axis points down.
+    - `kind`: "image", "svg", "dat" or "json".
+    - `size`: The width and height of the picture or drawing, if the file states them.
+    - `notes`: What was decided for the user, in plain words.
+    - `corner`: The corner of least coordinates of that picture or drawing.
     """
 
-    outline: NDArray[np.float64]
+    outline: Array
     y_down: bool
     kind: str
     size: tuple[float, float] | None
@@ -56,8 +54,8 @@ class Reading:
 
 
 def check_file(path: Source) -> int:
-    """Size of the regular file at `path` in bytes; `InputFileError` where there is none to read."""
-    if isinstance(path, Held):
+    """Return the size in bytes of the regular file at `path`, or raise `InputFileError`."""
+    if isinstance(path, FileContent):
         if not path.data:
             raise InputFileError(f"{path}: there are no bytes in it; give the content of a file")
         return len(path.data)
@@ -77,19 +75,19 @@ def check_file(path: Source) -> int:
 
 
 def read_bytes(path: Source, limit: int) -> bytes:
-    """Content of the file at `path`; refused when it is larger than `limit` bytes."""
+    """Return content of the file at `path`; refused when it is larger than `limit` bytes."""
     data = read_head(path, limit + 1)
     if len(data) > limit:
         raise InputFileError(
-            f"{path}: larger than {limit / 2**20:.0f} MB, the most that is read of this kind of "
-            "file; simplify or downscale it"
+            f"{path}: larger than {limit / 2**20:.0f} MB, the limit for this kind of file; "
+            "simplify or downscale it"
         )
     return data
 
 
 def read_head(path: Source, n: int) -> bytes:
-    """First `n` bytes of the file at `path`, or all of a shorter one."""
-    if isinstance(path, Held):
+    """Return first `n` bytes of the file at `path`, or all of a shorter one."""
+    if isinstance(path, FileContent):
         return path.data[:n]
     try:
         with path.open("rb") as file:

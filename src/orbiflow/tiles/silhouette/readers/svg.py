@@ -1,11 +1,14 @@
 """SVG drawings: the outline of the largest closed shape, in the drawing's own user units."""
 
+# pyright: reportUnknownMemberType=false
+# shapely's stubs leave the keyword arguments of its functions of arrays without types.
+
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from shapely.errors import GEOSException
 from shapely.geometry.base import BaseGeometry
 
+from orbiflow.arrays import Array, Window
 from orbiflow.errors import InputFileError
 from orbiflow.tiles.silhouette.outlines import (
     MAX_COORDINATE,
@@ -15,11 +18,7 @@ from orbiflow.tiles.silhouette.outlines import (
     outer_ring,
     simplified,
 )
-from orbiflow.tiles.silhouette.readers.reading import (
-    Reading,
-    Source,
-    read_bytes,
-)
+from orbiflow.tiles.silhouette.readers.reading import Reading, Source, read_bytes
 from orbiflow.tiles.silhouette.readers.svg_paths import (
     MAX_POINTS,
     SubPath,
@@ -28,16 +27,17 @@ from orbiflow.tiles.silhouette.readers.svg_paths import (
     fill,
 )
 from orbiflow.tiles.silhouette.readers.svg_shapes import Drawing, parse_xml
-from orbiflow.typed_shapely import ufuncs
 
 MAX_BYTES = 16 * 2**20
 # Flattening error, of the size of each shape, and its floor, of the size of the drawing.
 FLATNESS = 1 / 2000
 FLATNESS_FLOOR = 1 / 20_000
 CLOSING_GAP = 1e-6  # of the size of the drawing: ends nearer than this are one point
-GRID = 1e-9  # of the size of the drawing: the grid that the united outline is snapped to
-GRID_FLOOR = 1e-12  # of the largest coordinate
-COLLINEAR = 1e-6  # of the size of the drawing: vertices nearer their chord than this are dropped
+OVERLAY_GRID = 1e-9  # of the size of the drawing: the grid that the united outline is snapped to
+OVERLAY_GRID_FLOOR = 1e-12  # of the largest coordinate
+COLLINEAR_TOLERANCE = (
+    1e-6  # of the size of the drawing: vertices nearer their chord than this are dropped
+)
 
 
 def read_svg(path: Source) -> Reading:
@@ -82,7 +82,7 @@ def _drawing_size(drawing: Drawing) -> float:
 
 
 def _regions(drawing: Drawing, size: float) -> tuple[list[BaseGeometry], int]:
-    """Regions filled by the elements' closed sub-paths, and how many sub-paths were left open."""
+    """Return the regions filled by closed sub-paths, and the number of open sub-paths."""
     regions: list[BaseGeometry] = []
     n_open, n_points = 0, 0
     for shape in drawing.shapes:
@@ -112,7 +112,7 @@ def _is_closed(path: SubPath, size: float) -> bool:
     return path.closed or gap <= CLOSING_GAP * size
 
 
-def _flatten(paths: list[SubPath], size: float) -> list[NDArray[np.float64]]:
+def _flatten(paths: list[SubPath], size: float) -> list[Array]:
     if not paths:
         return []
     own = float(np.ptp(np.concatenate([path.reach() for path in paths]), axis=0).max())
@@ -123,10 +123,10 @@ def _flatten(paths: list[SubPath], size: float) -> list[NDArray[np.float64]]:
 
 
 def _drop_backgrounds(
-    regions: list[BaseGeometry], box: tuple[float, float, float, float] | None
+    regions: list[BaseGeometry], box: Window | None
 ) -> tuple[list[BaseGeometry], list[str]]:
-    """`regions` without rectangles that cover the page, as long as something else is there."""
-    xmin, ymin, xmax, ymax = ufuncs.total_bounds(regions) if box is None else box
+    """Return `regions` without rectangles that cover the page, as long as something else is there."""
+    xmin, ymin, xmax, ymax = shapely.total_bounds(regions) if box is None else box
     page = shapely.box(xmin, ymin, xmax, ymax)
     rest = [region for region in regions if not _covers(region, page)]
     n = len(regions) - len(rest)
@@ -139,16 +139,16 @@ def _drop_backgrounds(
 
 
 def _covers(region: BaseGeometry, page: BaseGeometry) -> bool:
-    """Whether `region` is a rectangle that covers `page`, but for 0.1% of it."""
+    """Return whether `region` is a rectangle that covers `page`, but for 0.1% of it."""
     is_box = region.area >= 0.999 * region.envelope.area
     return is_box and region.envelope.intersection(page).area >= 0.999 * page.area
 
 
 def _overlay(path: Source, regions: list[BaseGeometry]) -> BaseGeometry:
     # Snapped to a grid: neighbours that all but share an edge would leave cracks between them.
-    bounds = ufuncs.total_bounds(regions)
+    bounds = shapely.total_bounds(regions)
     size = max(bounds[2] - bounds[0], bounds[3] - bounds[1])
-    grid = max(GRID * size, GRID_FLOOR * float(np.abs(bounds).max()))
+    grid = max(OVERLAY_GRID * size, OVERLAY_GRID_FLOOR * float(np.abs(bounds).max()))
     try:
         union = shapely.union_all(regions, grid_size=grid)
     except GEOSException as exc:
@@ -160,8 +160,8 @@ def _overlay(path: Source, regions: list[BaseGeometry]) -> BaseGeometry:
     return union
 
 
-def _thinned(shape: shapely.Polygon, size: float) -> NDArray[np.float64]:
-    tolerance = COLLINEAR * size
+def _thinned(shape: shapely.Polygon, size: float) -> Array:
+    tolerance = COLLINEAR_TOLERANCE * size
     thin = simplified(shape, tolerance)
     while len(thin.exterior.coords) > MAX_VERTICES:
         tolerance *= 2

@@ -7,9 +7,10 @@ from itertools import pairwise
 import numpy as np
 import shapely
 import svgelements
-from numpy.typing import NDArray
 from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
+
+from orbiflow.arrays import Array, Integers
 
 MAX_POINTS = 200_000
 
@@ -22,18 +23,18 @@ class TooManyPoints(Exception):
 class Bezier:
     """A line, quadratic or cubic: its control points after the first, (1, 2, or 3; 2)."""
 
-    control: NDArray[np.float64]
+    control: Array
 
     @property
-    def end(self) -> NDArray[np.float64]:
+    def end(self) -> Array:
         return self.control[-1]
 
-    def reach(self) -> NDArray[np.float64]:
-        """Control points: they span as much as the curve, but for a small factor."""
+    def reach(self) -> Array:
+        """Return control points: they span as much as the curve, but for a small factor."""
         return self.control
 
-    def flatten(self, start: NDArray[np.float64], tolerance: float) -> NDArray[np.float64]:
-        """Points after `start`, on the curve, whose polyline is within `tolerance` of it."""
+    def flatten(self, start: Array, tolerance: float) -> Array:
+        """Return points after `start`, on the curve, whose polyline is within `tolerance` of it."""
         if len(self.control) == 1:
             return self.control
         points = np.vstack([start, self.control])
@@ -43,7 +44,7 @@ class Bezier:
         bend = float(np.hypot(*np.diff(points, n=2, axis=0).T).max())
         steps = _steps(math.sqrt(degree * (degree - 1) / 8 * bend / tolerance))
         t = np.arange(1, steps + 1)[:, None] / steps
-        level: list[NDArray[np.float64]] = list(points)
+        level: list[Array] = list(points)
         while len(level) > 1:  # de Casteljau, at all parameters at once
             level = [(1 - t) * a + t * b for a, b in pairwise(level)]
         return level[0]
@@ -53,20 +54,20 @@ class Bezier:
 class EllipticArc:
     """Points `centre + cos(t) u + sin(t) v`, t from `t0` over `sweep` radians, up to `end`."""
 
-    centre: NDArray[np.float64]
-    u: NDArray[np.float64]
-    v: NDArray[np.float64]
+    centre: Array
+    u: Array
+    v: Array
     t0: float
     sweep: float
-    end: NDArray[np.float64]
+    end: Array
 
-    def reach(self) -> NDArray[np.float64]:
-        """The middle and the end of the arc."""
+    def reach(self) -> Array:
+        """Return the middle and the end of the arc."""
         t = self.t0 + self.sweep / 2
         return np.stack([self.centre + np.cos(t) * self.u + np.sin(t) * self.v, self.end])
 
-    def flatten(self, start: NDArray[np.float64], tolerance: float) -> NDArray[np.float64]:  # noqa: ARG002
-        """Points after the first, on the arc, whose polyline is within `tolerance` of it."""
+    def flatten(self, start: Array, tolerance: float) -> Array:  # noqa: ARG002
+        """Return points after the first, on the arc, whose polyline is within `tolerance` of it."""
         radius = math.hypot(*self.u, *self.v)
         half_step = math.acos(max(1 - tolerance / radius, 0.0)) if radius > 0 else math.pi
         steps = _steps(abs(self.sweep) / max(2 * half_step, 1e-9))
@@ -86,16 +87,16 @@ def _steps(needed: float) -> int:
 class SubPath:
     """A connected run of curves from `start`."""
 
-    start: NDArray[np.float64]
+    start: Array
     curves: list[Bezier | EllipticArc] = field(default_factory=list[Bezier | EllipticArc])
     closed: bool = False
 
-    def reach(self) -> NDArray[np.float64]:
-        """Points (M, 2) that span about as much as its curves do."""
+    def reach(self) -> Array:
+        """Return points (M, 2) that span about as much as its curves do."""
         return np.vstack([self.start, *(curve.reach() for curve in self.curves)])
 
-    def flatten(self, tolerance: float) -> NDArray[np.float64]:
-        """Polyline (N, 2) within `tolerance` of the curves. Raises `TooManyPoints`."""
+    def flatten(self, tolerance: float) -> Array:
+        """Return the polyline (N, 2) within `tolerance` of the curves. Raises `TooManyPoints`."""
         parts, last, count = [self.start[None]], self.start, 1
         for curve in self.curves:
             parts.append(curve.flatten(last, tolerance))
@@ -106,10 +107,10 @@ class SubPath:
         return np.concatenate(parts)
 
 
-def sub_paths(path: svgelements.Path, matrix: NDArray[np.float64]) -> list[SubPath]:
-    """The sub-paths of `path`, mapped by the affine `matrix` (2, 3)."""
+def sub_paths(path: svgelements.Path, matrix: Array) -> list[SubPath]:
+    """Return the sub-paths of `path`, mapped by the affine `matrix` (2, 3)."""
 
-    def mapped(*points: svgelements.Point) -> NDArray[np.float64]:
+    def mapped(*points: svgelements.Point) -> Array:
         xy = np.array([(point.x, point.y) for point in points], dtype=np.float64)
         return xy @ matrix[:, :2].T + matrix[:, 2]
 
@@ -136,7 +137,7 @@ def sub_paths(path: svgelements.Path, matrix: NDArray[np.float64]) -> list[SubPa
     return [path for path in found if path.curves]
 
 
-def _arc(arc: svgelements.Arc, points: NDArray[np.float64]) -> Bezier | EllipticArc:
+def _arc(arc: svgelements.Arc, points: Array) -> Bezier | EllipticArc:
     centre, u_end, v_end, end = points
     if arc.center == arc.prx or arc.center == arc.pry:
         return Bezier(end[None])  # an arc of no radius is a line
@@ -156,8 +157,8 @@ class TooTangled(Exception):
     """The curves cross each other too often to be resolved."""
 
 
-def fill(rings: list[NDArray[np.float64]], rule: str = "nonzero") -> BaseGeometry:
-    """Region filled by closed `rings`, each (N, 2), under `rule` "nonzero" or "evenodd".
+def fill(rings: list[Array], rule: str = "nonzero") -> BaseGeometry:
+    """Return the region filled by closed `rings`, each (N, 2), under `rule` "nonzero" or "evenodd".
 
     Raises `TooTangled` for curves with more crossings than can be resolved.
 
@@ -186,7 +187,7 @@ def fill(rings: list[NDArray[np.float64]], rule: str = "nonzero") -> BaseGeometr
     return shapely.union_all(faces[kept])
 
 
-def _check_tangle(rings: list[NDArray[np.float64]]) -> None:
+def _check_tangle(rings: list[Array]) -> None:
     """Estimate from a sample how many pairs of segments must be tested for a crossing."""
     ends = np.concatenate([np.stack([ring, np.roll(ring, -1, axis=0)], axis=1) for ring in rings])
     low, high = ends.min(axis=1), ends.max(axis=1)
@@ -198,8 +199,8 @@ def _check_tangle(rings: list[NDArray[np.float64]]) -> None:
         raise TooTangled
 
 
-def _winding(points: NDArray[np.float64], ring: NDArray[np.float64]) -> NDArray[np.int64]:
-    """How often `ring` (N, 2) winds around each of `points` (P, 2)."""
+def _winding(points: Array, ring: Array) -> Integers:
+    """Return how often `ring` (N, 2) winds around each of `points` (P, 2)."""
     winding = np.zeros(len(points), dtype=np.int64)
     low, high = ring.min(axis=0), ring.max(axis=0)
     near = np.flatnonzero(((points >= low) & (points <= high)).all(axis=1))

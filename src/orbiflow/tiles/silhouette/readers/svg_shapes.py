@@ -8,8 +8,8 @@ from xml.parsers import expat
 
 import numpy as np
 import svgelements
-from numpy.typing import NDArray
 
+from orbiflow.arrays import Array, Window
 from orbiflow.errors import InputFileError
 from orbiflow.tiles.silhouette.readers.reading import Source
 from orbiflow.tiles.silhouette.readers.svg_paths import SubPath, sub_paths
@@ -22,7 +22,7 @@ _SELECTOR = re.compile(r"\*|[\w-]*(?:[.#][\w-]+)?")
 
 
 def parse_xml(path: Source, data: bytes) -> Element:
-    """Root element of the SVG document `data`, all names without their namespaces.
+    """Return the root element of the SVG document `data`, all names without their namespaces.
 
     Raises `InputFileError` when it is not well formed, declares entities (which can blow up to any
     size), nests too deeply or holds too many elements.
@@ -106,7 +106,7 @@ class StyleSheet:
                     self.rules.setdefault(selector, {}).update(declarations)
 
     def properties(self, element: Element) -> dict[str, str]:
-        """Attributes of `element` overridden by the rules that match it and by its own style."""
+        """Return attributes of `element` overridden by the rules that match it and by its own style."""
         properties = dict(element.attrib)
         tag, names = element.tag, element.get("class", "").split()
         selectors = [
@@ -156,15 +156,7 @@ _TOKEN = re.compile(r"[A-Za-z]|\.?\d+")
 _LENGTH = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)(e[-+]?\d+)?(px|pt|pc|mm|cm|in|%)?", re.IGNORECASE)
 
 
-PAINT = (
-    "fill",
-    "stroke",
-    "stroke-width",
-    "fill-opacity",
-    "stroke-opacity",
-    "color",
-    "visibility",
-)
+PAINT = ("fill", "stroke", "stroke-width", "fill-opacity", "stroke-opacity", "color", "visibility")
 """Properties of paint that elements have from those around them."""
 
 
@@ -188,7 +180,7 @@ class DrawnShape:
 class _Place:
     """Where in the drawing an element stands: what it inherits."""
 
-    matrix: NDArray[np.float64]  # (3, 3), to the drawing's user units
+    matrix: Array  # (3, 3), to the drawing's user units
     viewport: tuple[float, float]  # what percentages refer to
     fill_rule: str = "nonzero"
     depth: int = 0
@@ -219,8 +211,8 @@ class Drawing:
         for child in self.root:
             self._visit(child, place)
 
-    def _box(self) -> tuple[float, float, float, float] | None:
-        """The visible part (xmin, ymin, xmax, ymax) in user units: the viewBox, or the size."""
+    def _box(self) -> Window | None:
+        """Return the visible part (xmin, ymin, xmax, ymax) in user units: the viewBox, or the size."""
         box = self._view_box(self.root)
         if box is not None:
             return box[0], box[1], box[0] + box[2], box[1] + box[3]
@@ -229,8 +221,8 @@ class Drawing:
             return None
         return 0.0, 0.0, width, height
 
-    def _view_box(self, element: Element) -> tuple[float, float, float, float] | None:
-        """The viewBox (x, y, width, height) of `element`."""
+    def _view_box(self, element: Element) -> Window | None:
+        """Return the viewBox (x, y, width, height) of `element`."""
         text = element.get("viewBox")
         if text is None:
             return None
@@ -292,7 +284,7 @@ class Drawing:
         self._visit(target, replace(place, matrix=place.matrix @ shift))
 
     def _viewport(self, element: Element, sized_by: Element, place: _Place) -> _Place:
-        """The place inside a nested viewport: an inner <svg>, or a <symbol> that is used."""
+        """Return the place inside a nested viewport: an inner <svg>, or a <symbol> that is used."""
         x, y = (self._length(sized_by, key, place) or 0.0 for key in ("x", "y"))
         width = self._length(sized_by, "width", place) or place.viewport[0]
         height = self._length(sized_by, "height", place) or place.viewport[1]
@@ -327,9 +319,7 @@ class Drawing:
         scale = float(abs(np.linalg.det(place.matrix[:2, :2])) ** 0.5)
         self.shapes.append(DrawnShape(paths, place.fill_rule, place.paint, place.opacity, scale))
 
-    def _transform(
-        self, element: Element, properties: dict[str, str], place: _Place
-    ) -> NDArray[np.float64]:
+    def _transform(self, element: Element, properties: dict[str, str], place: _Place) -> Array:
         text = properties.get("transform")
         if not text or text == "none":
             return np.eye(3)
@@ -344,7 +334,7 @@ class Drawing:
             raise self._refuse(element, f"transform {text[:60]!a} cannot be read") from exc
 
     def _length(self, element: Element, key: str, place: _Place | None = None) -> float | None:
-        """A length attribute in user units; None where it is absent, or relative to no place."""
+        """Return a length attribute in user units, or None if it is absent or cannot be resolved."""
         text = element.get(key)
         if text is None:
             return None
@@ -366,7 +356,7 @@ class Drawing:
 
 
 def _share(text: str | None) -> float:
-    """An opacity, 0 to 1; what cannot be read is opaque."""
+    """Return an opacity, 0 to 1; what cannot be read is opaque."""
     try:
         value = float(text.strip().removesuffix("%")) if text else 1.0
     except ValueError:
@@ -375,7 +365,7 @@ def _share(text: str | None) -> float:
     return min(max(value, 0.0), 1.0) if value == value else 1.0
 
 
-def _as_array(matrix: svgelements.Matrix) -> NDArray[np.float64]:
+def _as_array(matrix: svgelements.Matrix) -> Array:
     return np.array(
         [[matrix.a, matrix.c, matrix.e], [matrix.b, matrix.d, matrix.f], [0, 0, 1]],
         dtype=np.float64,

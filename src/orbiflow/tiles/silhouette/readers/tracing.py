@@ -1,4 +1,4 @@
-"""From a picture's level to the outline of its largest shape, to a fraction of a pixel."""
+"""The outline of the largest shape in a picture, to a fraction of a pixel."""
 
 from dataclasses import dataclass
 
@@ -8,20 +8,17 @@ from scipy import ndimage
 from shapely.geometry import Polygon, box
 from skimage.measure import find_contours
 
+from orbiflow.arrays import Array
 from orbiflow.errors import InputFileError
 from orbiflow.tiles.geometry import polygons_in
-from orbiflow.tiles.silhouette.outlines import (
-    outer_ring,
-    percent,
-    simplified,
-)
+from orbiflow.tiles.silhouette.outlines import outer_ring, percent, simplified
 from orbiflow.tiles.silhouette.readers.reading import Source
 
 MIN_AREA = 30.0  # square pixels
 MAX_OUTLINE_VERTICES = 4000
 SIMPLIFY_TOLERANCE = 0.15  # pixels
-# The steps of a picture of two levels are within this of the line they stand for, and are no detail
-# of the shape. Small shapes are held to the finer tolerance for their size.
+# The steps in a picture of two levels are within this distance of the line that they represent, so they
+# are not details of the shape. Small shapes have the finer tolerance for their size.
 STEP_TOLERANCE = 0.7  # pixels
 STEP_TOLERANCE_OF_SIZE = 0.005  # of the square root of the area
 
@@ -30,15 +27,15 @@ STEP_TOLERANCE_OF_SIZE = 0.005  # of the square root of the area
 class Level:
     """A picture (H, W) whose shape is where `values` exceed `cut`; `inside` is its usual level."""
 
-    values: NDArray[np.float64]
+    values: Array
     cut: float
     inside: float
 
 
 def trace(
     path: Source, level: Level, *, scale: int, size: tuple[int, int]
-) -> tuple[NDArray[np.float64], list[str]]:
-    """Outline (N, 2) of the largest shape in image pixels, with notes.
+) -> tuple[Array, list[str]]:
+    """Return the outline (N, 2) of the largest shape in image pixels, with notes.
 
     A pixel of `level` is `scale` pixels of the image wide, and the image is `size` (width, height).
     Pixels of a shape hold together along their sides, not their corners.
@@ -71,7 +68,7 @@ def trace(
 
 
 def _largest(mask: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], list[str]]:
-    """The component that is largest with its holes filled."""
+    """Return the component that is largest with its holes filled."""
     # Background holds together across corners where the shape does not: hence the full structure.
     filled = ndimage.binary_fill_holes(mask, structure=np.ones((3, 3), dtype=int))
     labels, n = ndimage.label(filled)
@@ -94,16 +91,14 @@ def _touches_border(shape: NDArray[np.bool_]) -> bool:
     return bool(shape[[0, -1]].any() or shape[:, [0, -1]].any())
 
 
-def _isolate(
-    level: Level, mask: NDArray[np.bool_], shape: NDArray[np.bool_]
-) -> NDArray[np.float64]:
-    """The level with the shape's holes filled and all other components taken out."""
+def _isolate(level: Level, mask: NDArray[np.bool_], shape: NDArray[np.bool_]) -> Array:
+    """Return the level with the shape's holes filled and all other components taken out."""
     values = np.where(shape & ~mask, level.inside, level.values)
     return np.where(mask & ~shape, 2 * level.cut - level.inside, values)
 
 
-def _polygon(values: NDArray[np.float64], cut: float, inside: float) -> tuple[Polygon, bool]:
-    """The region where `values` exceed `cut`, pixel (0, 0) spanning [0, 1] x [0, 1].
+def _polygon(values: Array, cut: float, inside: float) -> tuple[Polygon, bool]:
+    """Return the region where `values` exceed `cut`, pixel (0, 0) spanning [0, 1] x [0, 1].
 
     Also whether its outline is stepped: drawn in two levels, without anti-aliasing.
     """
@@ -120,15 +115,16 @@ def _polygon(values: NDArray[np.float64], cut: float, inside: float) -> tuple[Po
     return max(parts, key=lambda part: part.area), _is_stepped(outer_ring(largest))
 
 
-def _is_stepped(ring: NDArray[np.float64]) -> bool:
-    """Whether nearly every vertex cuts its grid line at the same fraction."""
+def _is_stepped(ring: Array) -> bool:
+    """Return whether nearly every vertex cuts its grid line at the same fraction."""
     # Each vertex lies on one line of pixel centres and anywhere between two of them.
-    fraction: NDArray[np.float64] = np.mod(ring - 0.5, 1.0).sum(axis=1)
-    return bool(np.mean(np.abs(fraction - np.median(fraction)) < 0.05) > 0.95)
+    fraction: Array = np.mod(ring - 0.5, 1.0).sum(axis=1)
+    usual: float = np.median(fraction)
+    return float(np.mean(abs(fraction - usual) < 0.05)) > 0.95
 
 
 def _simplify(polygon: Polygon, tolerance: float) -> tuple[Polygon, list[str]]:
-    """Fewer vertices, the boundary moved by at most the tolerance, and still simple."""
+    """Return fewer vertices, the boundary moved by at most the tolerance, and still simple."""
     simple = simplified(polygon, tolerance)
     while len(simple.exterior.coords) > MAX_OUTLINE_VERTICES:
         tolerance *= 1.5

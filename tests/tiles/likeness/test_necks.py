@@ -21,7 +21,7 @@ from orbiflow.tiles import (
     slit_share,
 )
 from orbiflow.tiles.likeness import least_neck
-from orbiflow.tiles.likeness.thinnest import APART, STEP
+from orbiflow.tiles.likeness.necks import MIN_OUTLINE, POINT_SPACING
 from outlines import ANIMALS, SHAPES, animal, bar, comb, disc, dumbbell, slit_square, star
 
 widths = st.floats(0.005, 0.2)
@@ -78,8 +78,8 @@ def test_a_spike_is_measured_where_it_is_long_enough() -> None:
     edges = np.diff(np.vstack([ring[-1:], ring[:2]]), axis=0)
     cosine = -(edges[0] @ edges[1]) / np.prod(np.linalg.norm(edges, axis=1))
     opening = np.arccos(cosine)
-    exact = APART * np.sin(opening / 2)
-    assert exact <= narrowest_neck(ring).share <= (1 + 2 * STEP / APART) * exact
+    exact = MIN_OUTLINE * np.sin(opening / 2)
+    assert exact <= narrowest_neck(ring).share <= (1 + 2 * POINT_SPACING / MIN_OUTLINE) * exact
 
 
 @pytest.mark.parametrize("name", [*SHAPES, *ANIMALS])

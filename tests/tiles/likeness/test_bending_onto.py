@@ -9,8 +9,8 @@ from orbiflow.tiles import (
     plane_points,
     resampled,
 )
-from orbiflow.tiles.likeness import Elastic, Pinned, laid_on, mutual_iou
-from orbiflow.tiles.likeness.laid import _parted, corresponding
+from orbiflow.tiles.likeness import Elastic, Pinned, bent_onto, mutual_iou
+from orbiflow.tiles.likeness.bending_onto import _separated, corresponding
 from outlines import animal
 
 RING = resampled(animal("squirrel.dat").normal, 120)
@@ -42,7 +42,7 @@ def test_places_are_in_order(weights: tuple[float, float]) -> None:
 
 def test_points_lie_on_the_ring_in_order() -> None:
     ring = resampled(waved(0.1), 90)
-    z = laid_on(BODY, ring)
+    z = bent_onto(BODY, ring)
     outline = plane_points(z[:120])
     scale = np.sqrt(shapely.Polygon(outline).area / shapely.Polygon(ring).area)
     line = shapely.LinearRing(ring * scale)
@@ -55,7 +55,7 @@ def test_it_costs_no_more_than_the_known_way_and_less_for_less() -> None:
     for amount in (0.02, 0.05, 0.1):
         ring = waved(amount)
         known = BODY.pulled(BODY.rest[:, None], (ring @ [1, 1j])[:, None], 1e6, 60)
-        laid = laid_on(BODY, ring)[:, None]
+        laid = bent_onto(BODY, ring)[:, None]
         costs.append(float(BODY.forgiving_energy(laid)[0]))
         assert costs[-1] < 1.05 * BODY.forgiving_energy(known)[0]
     assert costs == sorted(costs)
@@ -63,14 +63,14 @@ def test_it_costs_no_more_than_the_known_way_and_less_for_less() -> None:
 
 def test_a_pinned_body_can_be_laid() -> None:
     part = np.flatnonzero(abs(BODY.rest - BODY.rest[3]) < 0.3)
-    z = laid_on(Pinned(RING, [part]), waved(0.05))
+    z = bent_onto(Pinned(RING, [part]), waved(0.05))
     assert np.isfinite(z).all()
 
 
 def test_places_moved_apart_keep_their_order_and_stay_where_they_are_if_they_can() -> None:
     at = np.array([0.0, 1.0, 2.0, 3.0])
-    assert _parted(at, 4.0) == pytest.approx(at)
-    mixed = _parted(np.array([0.0, 2.5, 1.5, 5.0]), 4.0)
+    assert _separated(at, 4.0) == pytest.approx(at)
+    mixed = _separated(np.array([0.0, 2.5, 1.5, 5.0]), 4.0)
     assert (np.diff(np.append(mixed, mixed[0] + 4.0)) > 0).all()
 
 

@@ -1,17 +1,20 @@
-"""Where a polygon is thin: its narrowest neck and slit, and how much of its outline is hair.
+"""The narrowest neck and slit of a polygon, and the share of its outline that is hair.
 
-Two points of the outline face each other across a neck if the segment between them runs inside, and
-both ways along the outline from one to the other are long: at least `FAR` times the segment, and at
-least `APART`; it is at most `WIDE`. So the tip of a corner is no neck unless it is sharper than 23
-degrees, and then its width is taken where the outline beyond is `APART` long. A slit is the same with
-the segment outside.
+Two points of the outline face each other across a neck if the segment between them is inside and at
+most `MAX_NECK_WIDTH` long, and both ways along the outline between them are long: at least
+`OUTLINE_PER_WIDTH` times the segment and at least `MIN_OUTLINE`. So the tip of a corner is a neck only
+if it is sharper than 23 degrees; its width is then taken where the outline beyond is `MIN_OUTLINE`
+long. A slit is the same with the segment outside.
 """
+
+# pyright: reportUnknownMemberType=false
+# shapely's stubs leave the keyword arguments of its functions of arrays without types.
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 import shapely
@@ -19,52 +22,44 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import KDTree
 
 from orbiflow.arguments import number, numbers
-from orbiflow.arrays import Integers
+from orbiflow.arrays import Array, Integers
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles.geometry import (
-    arc_lengths,
-    orient,
-    polygons_in,
-    ring_length,
-)
-from orbiflow.typed_shapely import ufuncs
+from orbiflow.tiles.geometry import arc_lengths, orient, polygons_in, ring_length
 
-Array = NDArray[np.float64]
+OUTLINE_PER_WIDTH = 5.0
+"""The least length of the outline beyond a neck, in its widths: 1 / sin(11.5 degrees)."""
 
-FAR = 5.0
-"""Length of the outline beyond a neck, in its widths: 1 / sin(11.5 degrees)."""
+MIN_OUTLINE = 0.1
+"""The least length of the outline beyond a neck, in square roots of the area."""
 
-APART = 0.1
-"""Length of the outline beyond a neck, in square roots of the area."""
+MAX_NECK_WIDTH = 0.5
+"""The largest width of a neck, in square roots of the area."""
 
-WIDE = 0.5
-"""Width beyond which nothing is a neck, in square roots of the area."""
+PINCHED_SHARE = 0.25
+"""The share of the silhouette's narrowest neck below which a tile looks cut through."""
 
-PINCHED = 0.25
-"""Part of the silhouette's narrowest neck below which a tile's looks cut through."""
+SIMPLIFICATION = 0.003
+"""The tolerance, in that unit, for simplifying a silhouette before necks are searched."""
 
-COARSE = 0.003
-"""How far a silhouette's outline may be moved before its necks are looked for, in the same unit."""
+SOUND_NECK_WIDTH = 0.05
+"""The width, in square roots of the area, above which no neck looks cut through."""
 
-SOUND = 0.05
-"""Width above which no neck does, in square roots of the area."""
+POINT_SPACING = 0.0125
+"""The distance of points on the outline, in square roots of the area: the error for tapering parts."""
 
-STEP = 0.0125
-"""Distance of points on the outline, in square roots of the area: how exact tapering parts are."""
+QUARTER_SEGMENTS = 16
+"""The number of sides of a quarter of a disc."""
 
-ROUND = 16
-"""Sides of a quarter of a disc."""
-
-SLACK = 0.005
-"""What discs of `ROUND` reach beyond themselves, in radii."""
+DISC_OVERREACH = 0.005
+"""What discs of `QUARTER_SEGMENTS` reach beyond themselves, in radii."""
 
 
 class Thinnest(NamedTuple):
     """The narrowest place of a polygon.
 
-    - `width`: in the polygon's own units.
-    - `share`: the width in square roots of the polygon's area.
-    - `ends`: (2, 2), the two points of the outline that are as far apart.
+    - `width`: The width in the polygon's own units.
+    - `share`: The width in square roots of the polygon's area.
+    - `ends`: The two points (2, 2) of the outline at this distance.
     """
 
     width: float
@@ -73,12 +68,12 @@ class Thinnest(NamedTuple):
 
     @property
     def place(self) -> Array:
-        """(2,) the middle."""
+        """The middle (2,) of the narrowest place."""
         return self.ends.mean(axis=0)
 
 
 def neck_factor(share: float, min_neck: float) -> float:
-    """What a score is multiplied by where the narrowest neck, in square roots of the area, is `share`.
+    """Return the factor of a score for a narrowest neck of `share` square roots of the area.
 
     >>> neck_factor(0.02, 0.01), neck_factor(0.002, 0.01)
     (1.0, 0.2)
@@ -87,10 +82,10 @@ def neck_factor(share: float, min_neck: float) -> float:
 
 
 def least_neck(silhouette: ArrayLike, min_neck: float) -> float:
-    """How wide the necks of a silhouette's tiles should be, in square roots of the area.
+    """Return how wide the necks of a silhouette's tiles should be, in square roots of the area.
 
-    `min_neck`, or `PINCHED` times the silhouette's own narrowest but at most `SOUND`, if that is more;
-    0 if `min_neck` is 0.
+    It is the larger of `min_neck` and `PINCHED_SHARE` times the silhouette's own narrowest neck, the
+    latter at most `SOUND_NECK_WIDTH`; 0 if `min_neck` is 0.
 
     >>> bar = [[0.0, 0.0], [20.0, 0.0], [20.0, 0.2], [0.0, 0.2]]
     >>> least_neck(bar, 0.01), least_neck(bar, 0.1), least_neck(bar, 0.0)
@@ -100,19 +95,19 @@ def least_neck(silhouette: ArrayLike, min_neck: float) -> float:
         return 0.0
     _, polygon = _checked(silhouette)
     # a photo's outline may have 20,000 vertices, whose pairs fill gigabytes
-    plain = shapely.simplify(polygon, COARSE * math.sqrt(polygon.area))
+    plain = shapely.simplify(polygon, SIMPLIFICATION * math.sqrt(polygon.area))
     ring = shapely.get_coordinates(plain.exterior)[:-1]
-    return max(min_neck, min(PINCHED * narrowest_neck(ring).share, SOUND))
+    return max(min_neck, min(PINCHED_SHARE * narrowest_neck(ring).share, SOUND_NECK_WIDTH))
 
 
 def narrowest_neck(ring: ArrayLike) -> Thinnest:
-    """The narrowest neck of a polygon; without a neck, the diameter of its largest disc.
+    """Return the narrowest neck of a polygon; without a neck, the diameter of its largest disc.
 
-    Exact where the sides of the neck are parallel or a vertex is at its narrowest; where it tapers, the
-    place is found to two `STEP`s along the outline, never too narrow.
+    The result is exact if the sides of the neck are parallel or a vertex is at its narrowest place; if
+    it tapers, the place is found to two `POINT_SPACING`s along the outline, and never too narrow.
 
     Args:
-        ring: (n, 2) vertices of a simple polygon, in either sense.
+        ring: The vertices (n, 2) of a simple polygon, in either orientation.
 
     Raises:
         OrbiflowError: for a polygon that crosses itself or has no area.
@@ -124,7 +119,7 @@ def narrowest_neck(ring: ArrayLike) -> Thinnest:
     points, polygon = _checked(ring)
     size = math.sqrt(polygon.area)
     shapely.prepare(polygon)
-    found = _facing(orient(points), size, lambda lines: ufuncs.contains_properly(polygon, lines))
+    found = _facing(orient(points), size, lambda lines: cast(Any, polygon.contains_properly(lines)))
     if found is not None:
         return found
     radius = shapely.maximum_inscribed_circle(polygon, tolerance=1e-4 * size)
@@ -134,30 +129,30 @@ def narrowest_neck(ring: ArrayLike) -> Thinnest:
 
 
 def narrowest_slit(ring: ArrayLike) -> Thinnest | None:
-    """The narrowest gap between parts of a polygon, outside of it; None if there is none.
+    """Return the narrowest gap between parts of a polygon, outside of it; None if there is none.
 
-    As `narrowest_neck`.
+    Arguments, accuracy and errors are those of `narrowest_neck`.
     """
     points, polygon = _checked(ring)
     shapely.prepare(polygon)
     outside = orient(points, counter_clockwise=False)
     size = math.sqrt(polygon.area)
-    return _facing(outside, size, lambda lines: ~ufuncs.intersects(polygon, lines))
+    return _facing(outside, size, lambda lines: ~cast(Any, polygon.intersects(lines)))
 
 
 def hair_share(ring: ArrayLike, width: float) -> float:
-    """Share of a polygon's outline that bounds parts thinner than `width`.
+    """Return the share of a polygon's outline that bounds parts thinner than `width`.
 
-    Thin is what no disc of that diameter inside the polygon covers (the residue of a morphological
-    opening); a part counts if it has more than `FAR` widths of the outline, so that corners do not
-    count unless they are sharper than 23 degrees.
+    A part is thin if no disc of that diameter inside the polygon covers it (the residue of a
+    morphological opening). It counts if it has more than `OUTLINE_PER_WIDTH` widths of the outline, so
+    corners count only if they are sharper than 23 degrees.
 
     Args:
-        ring: (n, 2) vertices of a simple polygon, in either sense.
-        width: in the polygon's own units.
+        ring: The vertices (n, 2) of a simple polygon, in either orientation.
+        width: The width, in the polygon's own units.
 
     Returns:
-        From 0 to 1.
+        The share, 0 to 1.
 
     Raises:
         OrbiflowError: for a polygon that crosses itself or has no area, or a width of 0 or less.
@@ -171,7 +166,7 @@ def hair_share(ring: ArrayLike, width: float) -> float:
 
 
 def slit_share(ring: ArrayLike, width: float) -> float:
-    """Share of a polygon's outline that bounds gaps thinner than `width`, as `hair_share`."""
+    """Return the share of a polygon's outline that bounds gaps thinner than `width`."""
     _, polygon = _checked(ring)
     width = number(width, "width", 0, above=True)
     around = shapely.box(*polygon.buffer(2 * width).bounds)
@@ -182,18 +177,18 @@ def _checked(ring: ArrayLike) -> tuple[Array, shapely.Polygon]:
     points = numbers(ring, "the polygon", ("N", 2))
     polygon = shapely.Polygon(points) if len(points) > 2 else shapely.Polygon()
     if not polygon.is_valid or not polygon.area > 0:
-        raise OrbiflowError("a polygon that crosses itself or has no area has no thinnest place")
+        raise OrbiflowError("the polygon crosses itself or has no area: give a simple polygon")
     return points, polygon
 
 
 def _facing(ring: Array, size: float, runs_well: Callable[[Any], Any]) -> Thinnest | None:
-    """The nearest two points that face each other on the left of the ring, all of the segment well."""
-    points = _dense(ring, STEP * size)
+    """Return the nearest two points that face each other on the left of the ring."""
+    points = _dense(ring, POINT_SPACING * size)
     tree = KDTree(points)
-    widest = min(ring_length(ring) / 2 / FAR, WIDE * size)
-    reach = min(2 * STEP * size, widest)
+    widest = min(ring_length(ring) / 2 / OUTLINE_PER_WIDTH, MAX_NECK_WIDTH * size)
+    reach = min(2 * POINT_SPACING * size, widest)
     while True:
-        found = _nearest_within(points, tree, reach, APART * size, runs_well)
+        found = _nearest_within(points, tree, reach, MIN_OUTLINE * size, runs_well)
         if found is not None:
             width = float(np.linalg.norm(found[1] - found[0]))
             return Thinnest(width, float(width / size), found)
@@ -203,7 +198,7 @@ def _facing(ring: Array, size: float, runs_well: Callable[[Any], Any]) -> Thinne
 
 
 def _dense(ring: Array, step: float) -> Array:
-    """The ring's vertices, and points on its sides so that none are farther apart than `step`."""
+    """Return the ring's vertices, and points on its sides at most `step` apart."""
     after = np.roll(ring, -1, axis=0)
     pieces = np.maximum(np.ceil(np.linalg.norm(after - ring, axis=1) / step), 1).astype(int)
     start = np.repeat(np.cumsum(pieces) - pieces, pieces)
@@ -216,7 +211,7 @@ def _dense(ring: Array, step: float) -> Array:
 def _nearest_within(
     points: Array, tree: KDTree, reach: float, apart: float, runs_well: Callable[[Any], Any]
 ) -> Array | None:
-    """Ends (2, 2) of the shortest segment that counts, of those up to `reach` long."""
+    """Return ends (2, 2) of the shortest segment that counts, of those up to `reach` long."""
     knots = arc_lengths(points)
     steps = np.roll(points, -1, axis=0) - points
     lengths = np.diff(knots)
@@ -232,7 +227,9 @@ def _nearest_within(
     width = np.linalg.norm(points[i] - ends, axis=1)
     way = abs(knots[i] - knots[j] - along * lengths[j])
     way = np.minimum(way, knots[-1] - way)
-    counts = np.flatnonzero((way >= np.maximum(apart, FAR * width)) & (width <= reach))
+    counts = np.flatnonzero(
+        (way >= np.maximum(apart, OUTLINE_PER_WIDTH * width)) & (width <= reach)
+    )
     left = _on_the_left(steps, i[counts], j[counts], along[counts], (ends - points[i])[counts])
     counts = counts[left]
     counts = counts[_local_minima(i[counts], j[counts], width[counts])]
@@ -251,14 +248,14 @@ def _nearest_within(
 def _on_the_left(
     steps: Array, i: Integers, j: Integers, along: Array, segments: Array
 ) -> NDArray[np.bool_]:
-    """Which segments may leave point i, and reach side j, on the left: others need no closer look."""
+    """Return which segments may leave point i, and reach side j, on the left (a quick filter)."""
     leaves = np.maximum(_cross(steps[i], segments), _cross(steps[i - 1], segments)) > 0
     within = (along > 0) & (along < 1)
     return leaves & (~within | (_cross(steps[j], segments) < 0))
 
 
 def _local_minima(i: Integers, j: Integers, width: Array) -> Integers:
-    """Of segments from one point to sides in a row, those that are not longer than the next ones."""
+    """Return the segments from one point to successive sides that are shorter than the next ones."""
     order = np.lexsort((j, i))
     i, j, width = i[order], j[order], width[order]
     row = (i[1:] == i[:-1]) & (j[1:] == j[:-1] + 1)
@@ -275,15 +272,17 @@ def _cross(a: Array, b: Array) -> Array:
 def _thin_share(
     polygon: shapely.Polygon, region: shapely.geometry.base.BaseGeometry, width: float
 ) -> float:
-    """Share of the polygon's outline on parts of the region that no disc in it covers."""
-    eroded = region.buffer(-width / 2, quad_segs=ROUND)
-    opened = eroded.buffer(width / 2 * (1 + SLACK), quad_segs=ROUND)
+    """Return the share of the polygon's outline on parts of the region that no disc in it covers."""
+    eroded = region.buffer(-width / 2, quad_segs=QUARTER_SEGMENTS)
+    opened = eroded.buffer(width / 2 * (1 + DISC_OVERREACH), quad_segs=QUARTER_SEGMENTS)
     parts = polygons_in(region.difference(opened))
     lines = shapely.get_parts(polygon.exterior.difference(opened))
-    lengths = ufuncs.length(lines)
+    lengths = shapely.length(lines)
     lines, lengths = lines[lengths > 0], lengths[lengths > 0]
     if not parts or not len(lines):
         return 0.0
-    own = shapely.STRtree(parts).nearest(ufuncs.line_interpolate_point(lines, 0.5, normalized=True))
+    own = shapely.STRtree(parts).nearest(
+        shapely.line_interpolate_point(lines, 0.5, normalized=True)
+    )
     totals = np.bincount(own, lengths)
-    return float(totals[totals > FAR * width].sum() / polygon.exterior.length)
+    return float(totals[totals > OUTLINE_PER_WIDTH * width].sum() / polygon.exterior.length)

@@ -1,10 +1,10 @@
-"""A silhouette laid onto a given outline: how it bends least, if its outline is to be that one.
+"""The least bending of a silhouette onto a given outline.
 
-For shapes that were not found by bending. Points of the silhouette's outline slide along the other one
-and the energy is minimised: linear equations in how far each slides, and in the size of the other
-outline, in turn with the choice of rotations, as in `escher.co_deformation`. That starts from the
-correspondence of `corresponding`, so the outlines must lie over each other; what it ends with is a
-local minimum, and the energy an upper bound of the least one.
+This is for shapes that were not found by bending. Points of the silhouette's outline slide along the
+other one and the energy is minimised: linear equations in how far each slides, and in the size of the
+other outline, alternate with the choice of rotations. The descent starts from the correspondence of
+`corresponding`, so the outlines must lie over each other. It ends in a local minimum, whose energy is
+an upper bound of the least one.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 import scipy.linalg
 
-from orbiflow.arrays import Complex
+from orbiflow.arrays import Array, Complex
 from orbiflow.tiles.geometry import (
     arc_lengths,
     complex_points,
@@ -22,33 +22,34 @@ from orbiflow.tiles.geometry import (
     points_along,
     resampled,
 )
-from orbiflow.tiles.likeness.elastic import Array, Elastic
+from orbiflow.tiles.likeness.elastic import Elastic
 
-FINER = 6
-"""Places on the second outline for each point of the first."""
+PLACES_PER_POINT = 6
+"""The number of places on the second outline for each point of the first."""
 
-LONGEST = 6
-"""Times its usual length that a step may have."""
+MAX_STEP_RATIO = 6
+"""The largest step between places, in usual steps."""
 
-FIRST = 6
-"""Places that are tried for the first point."""
+FIRST_PLACES = 6
+"""The number of places that are tried for the first point."""
 
 
 def corresponding(
     own: Array, other: Array, near: float = 0.4, stretch: float = 1.0, count: int = 96
 ) -> Array:
-    """Where on another outline the points of one belong.
+    """Return the places on another outline that correspond to the points of one.
 
     Args:
-        own: (n, 2) of area about 1, counter-clockwise.
-        other: (M, 2) laid over it, counter-clockwise.
-        near: distance, in square roots of the area, that costs as much as running at right angles.
-        stretch: what stretching or shrinking a step by a factor of e costs.
-        count: points of `own` that are matched; those between follow in proportion.
+        own: A ring (n, 2) of area about 1, counter-clockwise.
+        other: A counter-clockwise ring (M, 2) that lies over it.
+        near: The distance, in square roots of the area, that costs as much as a right angle between
+            the directions.
+        stretch: The cost of stretching or shrinking a step by a factor of e.
+        count: The number of matched points; points between them follow in proportion.
 
     Returns:
-        (n,) arc lengths along `other` from its first vertex, increasing by less than its length from
-        first to last; they may be beyond its length.
+        Arc lengths (n,) along `other` from its first vertex, increasing by less than its length from
+        first to last; they may be larger than its length.
 
     >>> square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
     >>> corresponding(square, np.roll(square, 1, axis=0)).round(9) % 4
@@ -56,11 +57,11 @@ def corresponding(
     """
     along = arc_lengths(own)
     points = resampled(own, count)
-    places = count * FINER
+    places = count * PLACES_PER_POINT
     cost = _differences(points, resampled(other, places), near)
     first = int(cost.min(axis=1).argmin())
     cost = np.roll(cost, -first, axis=0)
-    steps = _best_of(cost, _begin(cost[0]), stretch)
+    steps = _best_of(cost, _first_places(cost[0]), stretch)
     at = np.append(steps, steps[0] + places) / places * arc_lengths(other)[-1]
     # the k-th matched point lies at (first + k) / count of the own length
     known = (first + np.arange(count + 1)) / count * along[-1]
@@ -70,31 +71,31 @@ def corresponding(
 
 
 def _differences(points: Array, places: Array, near: float) -> Array:
-    """(n, m) what it costs to take a point for a place."""
+    """Return the costs (n, m) of matching a point with a place."""
     x, y = complex_points(points), complex_points(places)
-    own, other = (np.roll(z, -k) - np.roll(z, k) for z, k in ((x, 1), (y, FINER)))
+    own, other = (np.roll(z, -k) - np.roll(z, k) for z, k in ((x, 1), (y, PLACES_PER_POINT)))
     own, other = (step / np.maximum(abs(step), 1e-12) for step in (own, other))
     apart = abs(x[:, None] - y[None]) ** 2 / near**2
     return apart + 1 - (np.conj(own)[:, None] * other[None]).real
 
 
-def _begin(cost: Array) -> list[int]:
-    """Places for the first point, no two of them side by side."""
+def _first_places(cost: Array) -> list[int]:
+    """Return places for the first point, no two of them side by side."""
     chosen: list[int] = []
     for place in np.argsort(cost, kind="stable").tolist():
         gaps = [abs(place - other) for other in chosen]
-        if all(min(gap, len(cost) - gap) > FINER for gap in gaps):
+        if all(min(gap, len(cost) - gap) > PLACES_PER_POINT for gap in gaps):
             chosen.append(place)
-        if len(chosen) == FIRST:
+        if len(chosen) == FIRST_PLACES:
             break
     return chosen
 
 
 def _best_of(cost: Array, begin: list[int], stretch: float) -> Array:
-    """(n,) the best places, increasing, for points whose first is at one of the given places."""
+    """Return the best increasing places (n,), the first of them one of the places in `begin`."""
     n, m = cost.shape
-    length = np.arange(1, LONGEST * FINER + 1)
-    price = stretch * np.log(length / FINER) ** 2
+    length = np.arange(1, MAX_STEP_RATIO * PLACES_PER_POINT + 1)
+    price = stretch * np.log(length / PLACES_PER_POINT) ** 2
     best, least = np.zeros(n), np.inf
     for start in begin:
         turned = np.roll(cost, -start, axis=1)
@@ -119,36 +120,36 @@ def _best_of(cost: Array, begin: list[int], stretch: float) -> Array:
 
 
 STARTS = ((0.15, 0.5), (0.4, 1.0), (0.8, 2.0), (0.4, 4.0))
-"""Correspondences that are tried: `near` and `stretch` of `corresponding`."""
+"""The values of `near` and `stretch` of `corresponding` that are tried."""
 
-TRIED, ROUNDS, SOFTENINGS, SOFT_ROUNDS = 3, 20, 4, 5
-"""Steps of each start, and of the best: with the energy, then with the one that forgives."""
+TRIAL_STEPS, ENERGY_STEPS, SOFTENINGS, STEPS_PER_SOFTENING = 3, 20, 4, 5
+"""The steps of each start, and of the best one: with the energy, then with the forgiving energy."""
 
-FAR = 2.0
-"""Spacings that a point may slide in one step."""
+MAX_SLIDE = 2.0
+"""The largest slide of a point in one step, in spacings."""
 
-CLOSE = 0.02
-"""Least distance along the outline of two points in a row, in spacings."""
+MIN_GAP = 0.02
+"""The least distance along the outline of consecutive points, in spacings."""
 
 
-def laid_on(body: Elastic, ring: Array) -> Complex:
-    """The body bent so that its outline's points lie on a ring, in order.
+def bent_onto(body: Elastic, ring: Array) -> Complex:
+    """Return the body bent so that its outline's points lie on a ring, in order.
 
     Args:
-        body: the silhouette.
-        ring: (M, 2) simple, counter-clockwise, laid over the silhouette as it is.
+        body: The silhouette.
+        ring: A simple counter-clockwise ring (M, 2) that lies over the silhouette.
 
     Returns:
-        (N,) points of the body; the outline's lie on a copy of the ring about the origin whose size
-        suits the body best.
+        The points (N,) of the body; those of the outline lie on a copy of the ring about the origin
+        whose size suits the body best.
     """
-    tried = [_begun(body, ring, near, stretch) for near, stretch in STARTS]
+    tried = [_start(body, ring, near, stretch) for near, stretch in STARTS]
     slide, z = min(tried, key=lambda shape: _objective(body, shape[1]))
-    for _ in range(ROUNDS):
+    for _ in range(ENERGY_STEPS):
         slide, z = _step(body, slide, z)
     for _ in range(SOFTENINGS):
         soft = body.forgiving(z)
-        for _ in range(SOFT_ROUNDS):
+        for _ in range(STEPS_PER_SOFTENING):
             slide, z = _step(soft, slide, z)
     return z[:, 0]
 
@@ -172,11 +173,11 @@ class _Slide(NamedTuple):
         return unit[np.clip(side, 0, len(unit) - 1)]
 
 
-def _begun(body: Elastic, ring: Array, near: float, stretch: float) -> tuple[_Slide, Complex]:
+def _start(body: Elastic, ring: Array, near: float, stretch: float) -> tuple[_Slide, Complex]:
     at = corresponding(plane_points(body.rest[: body.size]), ring, near, stretch)
-    slide = _Slide(ring, _parted(at, arc_lengths(ring)[-1]), 1.0)
+    slide = _Slide(ring, _separated(at, arc_lengths(ring)[-1]), 1.0)
     z = body.pulled(body.rest[:, None], slide.points()[:, None], 600.0, 4)
-    for _ in range(TRIED):
+    for _ in range(TRIAL_STEPS):
         slide, z = _step(body, slide, z)
     return slide, z
 
@@ -201,13 +202,13 @@ def _step(body: Elastic, slide: _Slide, z: Complex) -> tuple[_Slide, Complex]:
     own[np.diag_indices_from(own)] += 1e-8 * np.trace(own) / len(own)
     way = scipy.linalg.solve(own, right, assume_a="pos", check_finite=False)
     size = arc_lengths(slide.ring)[-1]
-    reach = FAR * size / len(p)
+    reach = MAX_SLIDE * size / len(p)
     stay = condensed.whole(p[:, None], forces)
     least = _objective(body, stay)
     for share in (1.0, 0.5, 0.2, 0.05):
         further = _Slide(
             slide.ring,
-            _parted(slide.at + share * np.clip(way[:-1], -reach, reach), size),
+            _separated(slide.at + share * np.clip(way[:-1], -reach, reach), size),
             slide.scale * (1 + share * float(np.clip(way[-1], -0.2, 0.2))),
         )
         moved = condensed.whole(further.points()[:, None], forces)
@@ -217,16 +218,16 @@ def _step(body: Elastic, slide: _Slide, z: Complex) -> tuple[_Slide, Complex]:
 
 
 def _objective(body: Elastic, z: Complex) -> float:
-    """What the steps lower: the energy and the pose's."""
+    """Return the objective of the descent: the energy and that of the pose."""
     copy, _ = body.copies(z)
     return float(body.energy(z)[0] + body.stiffness.pose * (abs(z - copy) ** 2).mean())
 
 
-def _parted(at: Array, size: float) -> Array:
-    """Places (n,) on a closed line, moved as little as it takes to be in order and some way apart."""
+def _separated(at: Array, size: float) -> Array:
+    """Return places (n,) on a closed line, moved as little as order and a least distance require."""
     n = len(at)
-    spaced = np.arange(n) * (CLOSE * size / n)
-    turn = size - n * (CLOSE * size / n)  # what is left of a round
+    spaced = np.arange(n) * (MIN_GAP * size / n)
+    turn = size - n * (MIN_GAP * size / n)  # what is left of a round
     three = np.concatenate([at - spaced - turn, at - spaced, at - spaced + turn])
     up = np.maximum.accumulate(three)
     down = np.minimum.accumulate(three[::-1])[::-1]
