@@ -21,7 +21,7 @@ from orbiflow.tiles import CLASSES, Fit, Target, TileModel, load_model, write_ti
 from orbiflow.tiles.pages.tile_folder import FIGURE_FILES
 from orbiflow.tiles.search import methods
 from orbiflow.tiles.search.boundary import extract_tile
-from orbiflow.tiles.search.result import best_tiles
+from orbiflow.tiles.search.certifying import best_tiles
 
 DOCS = Path(__file__).parents[2] / "docs"
 FILES = {"tile.svg", "tiling.svg", "tiling.png", "overlay.png", "model.safetensors"}
