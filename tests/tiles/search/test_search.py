@@ -27,7 +27,7 @@ from orbiflow.tiles import (
     isohedral_class,
 )
 from orbiflow.tiles.likeness import mutual_iou
-from orbiflow.tiles.search import methods
+from orbiflow.tiles.search import occupancy
 from orbiflow.tiles.search.likeness_search import SKETCH
 from outlines import animal
 
@@ -96,7 +96,7 @@ def test_a_fit_that_runs_away_is_a_failure(force: bool) -> None:
 
 
 def test_a_class_whose_finalists_all_fold(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(methods, "fit_occupancy", crossed)
+    monkeypatch.setattr(occupancy, "fit_occupancy", crossed)
     events: list[Event] = []
     results, failures = escherize(TARGET, ["IH21"], QUICK, watch=events.append)
     assert results == []
