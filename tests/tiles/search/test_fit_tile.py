@@ -83,8 +83,8 @@ def test_arguments_are_checked() -> None:
         fit_tile("boot", "IH4")  # pyright: ignore[reportArgumentType]
     with pytest.raises(OrbiflowError, match="unknown isohedral class 'IH8'"):
         fit_tile(TARGET, "IH8")
-    for wrong in ("fast", BothSearch()):
-        with pytest.raises(OrbiflowError, match="settings must be of one method, got"):
+    for wrong, message in (("fast", "the method must be a search"), (BothSearch(), "fits twice")):
+        with pytest.raises(OrbiflowError, match=message):
             fit_tile(TARGET, "IH4", wrong)  # pyright: ignore[reportArgumentType]
     with pytest.raises(OrbiflowError, match="what was found must be a Fit, got 3"):
         certified_tiles(TARGET, 3)  # pyright: ignore[reportArgumentType]

@@ -241,7 +241,7 @@ def test_arguments_are_checked() -> None:
 
 @pytest.mark.parametrize("wrong", ["fast", 3, {"placements": 5}])
 def test_settings_of_no_method_are_refused(wrong: object) -> None:
-    with pytest.raises(OrbiflowError, match="settings must be of a method, got"):
+    with pytest.raises(OrbiflowError, match=r"the method must be a search such as .*, got"):
         escherize(TARGET, ["IH1"], wrong)  # pyright: ignore[reportArgumentType]
     with pytest.raises(OrbiflowError, match="the target must be a Target"):
         escherize("turtle.png", ["IH1"])  # pyright: ignore[reportArgumentType]

@@ -51,14 +51,14 @@ def simplest_tile(
         CertificationError: if no sampling gives a simple polygon: the candidate has folded. With
             `force`, only if coordinates are not finite.
     """
-    group = kind.group().conjugate(linear, offset)
     tile = None
     for count in DENSE:
         pieces = 2 * -(-count // (2 * len(vertices)))  # even: centres are sampled
         edges = _moved_edges(kind, vertices, corners, pieces, moved)
         placed = [edge @ linear.T + offset for edge in edges]
         for polygon, starts in _polygons(kind, placed):
-            tile = Tile(polygon, group, kind.name, starts)
+            # not before: a fit that ran away has no group, and says so above
+            tile = Tile(polygon, kind.group().conjugate(linear, offset), kind.name, starts)
             if shapely.Polygon(polygon).is_valid:
                 return tile
     if force and tile is not None:
