@@ -20,8 +20,8 @@ from common import DATA, GOALS, goal, needed, published
 
 from orbiflow.tiles import (
     CLASSES,
-    DescentSettings,
     EscherTile,
+    OverlapSearch,
     Target,
     escherize,
 )
@@ -43,7 +43,7 @@ def search(target: Target, effort: str, seed: int) -> tuple[list[EscherTile], fl
     results, failures = escherize(
         target,
         CLASSES,
-        DescentSettings.for_effort(effort, seed=seed),
+        OverlapSearch.for_effort(effort, seed=seed),
         workers=os.cpu_count() or 1,
     )
     assert not failures, failures

@@ -19,8 +19,8 @@ from common import GOALS, Ring
 from likeness_methods import silhouette
 
 from orbiflow.tiles import (
-    BendingSettings,
     Event,
+    LikenessSearch,
     escherize,
     hair_share,
     narrowest_neck,
@@ -58,7 +58,7 @@ def main() -> None:
             if not first and (event.preview is not None or event.outcome is not None):
                 first.append(time.perf_counter() - began)
 
-        settings = BendingSettings.for_effort(options.effort)
+        settings = LikenessSearch.for_effort(options.effort)
         results, _ = escherize(target, settings=settings, workers=options.workers, watch=watch)
         seconds = time.perf_counter() - began
         best = results[0]

@@ -18,7 +18,7 @@ from orbiflow.tiles import (
     CLASSES,
     ClassFailure,
     EscherTile,
-    OccupancySettings,
+    OccupancySearch,
     Target,
     escherize,
 )
@@ -48,7 +48,7 @@ def main() -> None:
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
     options = parser.parse_args()
     images = options.images or IMAGES[: 1 if options.quick else None]
-    settings = OccupancySettings(iterations=60) if options.quick else OccupancySettings()
+    settings = OccupancySearch(iterations=60) if options.quick else OccupancySearch()
     head = "class group    IoU    Dice  Hausd.   mismatch    overlap  uncovered  cert.  starts  dropped"
     for image in images:
         target = Target.read(image)

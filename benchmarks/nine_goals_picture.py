@@ -25,8 +25,8 @@ from orbiflow.drawing import (
 )
 from orbiflow.runtime import write_atomic
 from orbiflow.tiles import (
-    DescentSettings,
     EscherTile,
+    OverlapSearch,
     Target,
     escherize,
 )
@@ -55,7 +55,7 @@ def fitted(file: str, effort: str, seed: int) -> Found:
     """The goal's name, the goal, and its certified tile."""
     name, isohedral = BEST[file]
     target = goal(file)
-    settings = DescentSettings.for_effort(effort, seed=seed)
+    settings = OverlapSearch.for_effort(effort, seed=seed)
     results, failures = escherize(target, [isohedral], settings)
     assert not failures, failures
     assert results[0].certificate.valid

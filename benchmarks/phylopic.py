@@ -18,8 +18,8 @@ from PIL import Image, ImageDraw, ImageFont
 
 from orbiflow.tiles import (
     CLASSES,
-    DescentSettings,
     EscherTile,
+    OverlapSearch,
     Target,
     escherize,
     overlay_png,
@@ -60,7 +60,7 @@ def main() -> None:
     torch.set_num_threads(1)
     folder = needed(DATA / "silhouettes" / "phylopic", "the twenty PhyloPic silhouettes")
     files = sorted(folder.glob("*.png"))[: 2 if options.quick else None]
-    settings = DescentSettings.for_effort("fast" if options.quick else options.effort)
+    settings = OverlapSearch.for_effort("fast" if options.quick else options.effort)
     print("silhouette         vertices class     IoU   Dice  recog  certified  failed seconds")
     found: list[tuple[str, Target, EscherTile]] = []
     for path in files:

@@ -29,13 +29,13 @@ from orbiflow.tiles import (
     CLASSES,
     FIELD_FILES,
     OVERVIEW,
-    BendingSettings,
-    BothSettings,
+    BothSearch,
     ClassFailure,
-    DescentSettings,
     Emphasis,
     EscherTile,
-    OccupancySettings,
+    LikenessSearch,
+    OccupancySearch,
+    OverlapSearch,
     Pins,
     Settings,
     Target,
@@ -163,14 +163,14 @@ def _class_names(classes: tuple[str, ...] | None) -> list[str]:
 def _settings(request: EscherizeRequest) -> Settings:
     asked = given(request, ("max_frequency", "turns", "iterations"))
     if request.method == "occupancy":
-        return OccupancySettings(seed=request.seed, **asked)
+        return OccupancySearch(seed=request.seed, **asked)
     effort, objective = request.effort or "normal", request.objective or "likeness"
-    neck = BendingSettings.min_neck if request.min_neck is None else request.min_neck
-    bending = BendingSettings.for_effort(effort, seed=request.seed, min_neck=neck)
+    neck = LikenessSearch.min_neck if request.min_neck is None else request.min_neck
+    bending = LikenessSearch.for_effort(effort, seed=request.seed, min_neck=neck)
     if objective == "likeness":
         return bending
-    descent = DescentSettings.for_effort(effort, seed=request.seed, min_neck=neck, **asked)
-    return descent if objective == "overlap" else BothSettings(bending, descent)
+    descent = OverlapSearch.for_effort(effort, seed=request.seed, min_neck=neck, **asked)
+    return descent if objective == "overlap" else BothSearch(bending, descent)
 
 
 def _read(request: EscherizeRequest) -> tuple[Target, Emphasis | None, Pins | None]:

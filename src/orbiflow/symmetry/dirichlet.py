@@ -5,9 +5,9 @@ from __future__ import annotations
 from functools import cached_property
 
 import numpy as np
-import torch
 from numpy.typing import ArrayLike
 
+from orbiflow.arguments import is_tensor
 from orbiflow.arrays import Array
 from orbiflow.errors import GroupError
 from orbiflow.symmetry.group import CrystallographicGroup
@@ -53,7 +53,7 @@ class DirichletDomain:
     def locate(self, points: Points) -> tuple[Points, Array]:
         """Return the points wrapped to the lattice cell, and the nearest image of the site."""
         wrapped = self.group.wrap(points)
-        plain = wrapped.detach().cpu().numpy() if isinstance(wrapped, torch.Tensor) else wrapped
+        plain = wrapped.detach().cpu().numpy() if is_tensor(wrapped) else wrapped
         flat = np.asarray(plain, dtype=np.float64).reshape(-1, self.group.dim)
         nearest = np.empty(len(flat), dtype=np.int64)
         for start in range(0, len(flat), 65536):  # bounds the distance table

@@ -7,18 +7,23 @@ stack of rings. Functions with `AnyRing` take tensors as well and are differenti
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
-import torch
 from numpy.typing import ArrayLike
 from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
+from orbiflow.arguments import is_tensor
 from orbiflow.arrays import Array, Complex
 from orbiflow.errors import OrbiflowError
 
-AnyRing = TypeVar("AnyRing", Array, torch.Tensor)
+if TYPE_CHECKING:
+    import torch
+
+    AnyRing = TypeVar("AnyRing", Array, torch.Tensor)
+else:  # torch is imported by those who have tensors
+    AnyRing = TypeVar("AnyRing")
 
 
 def signed_area(ring: AnyRing) -> AnyRing:
@@ -73,7 +78,9 @@ def subdivided(ring: AnyRing, pieces: int, phase: float = 0.0) -> AnyRing:
     [[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]]
     """
     shape = (*ring.shape[:-2], ring.shape[-2] * pieces, 2)
-    if isinstance(ring, torch.Tensor):
+    if is_tensor(ring):
+        import torch
+
         steps = torch.arange(pieces, dtype=ring.dtype, device=ring.device)
         sides = ring.roll(-1, dims=-2) - ring
     else:

@@ -21,9 +21,9 @@ from orbiflow.errors import (
 from orbiflow.tiles import (
     AnimationSettings,
     ArtSettings,
-    BendingSettings,
     EscherTile,
     ExportSettings,
+    LikenessSearch,
     Tile,
     animate,
     artwork,
@@ -38,7 +38,7 @@ from orbiflow.tiles.art.source import covered_area
 from outlines import animal
 
 SMALL = ArtSettings(size=(90, 60), tile_size=40.0)
-BARE = BendingSettings(placements=20, held=4, finalists=1, rounds=4)
+BARE = LikenessSearch(placements=20, held=4, finalists=1, rounds=4)
 
 
 @pytest.fixture(scope="module")

@@ -20,8 +20,8 @@ from orbiflow.drawing import palette
 from orbiflow.errors import CertificationError, OrbiflowError
 from orbiflow.tiles import (
     AnimationSettings,
-    BendingSettings,
     EscherTile,
+    LikenessSearch,
     Target,
     Tile,
     animate,
@@ -46,7 +46,7 @@ SMALL = {"seconds": 1.0, "fps": 10.0, "size": 120}
 
 @pytest.fixture(scope="module", name="bent")
 def bent_fixture() -> EscherTile:
-    small = BendingSettings(placements=20, held=4, finalists=1, rounds=4)
+    small = LikenessSearch(placements=20, held=4, finalists=1, rounds=4)
     found = escherize_class(Target.from_polygon(BOOT, y_down=True), "IH4", small)
     assert isinstance(found, EscherTile)
     return found

@@ -8,10 +8,10 @@ import shapely
 
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles import (
-    BendingSettings,
-    DescentSettings,
     Emphasis,
     EscherTile,
+    LikenessSearch,
+    OverlapSearch,
     Pins,
     escherize,
 )
@@ -19,7 +19,7 @@ from outlines import animal
 
 SQUIRREL = animal("squirrel.dat")
 HEAD = (230, 190, 140)
-QUICK = BendingSettings(placements=80, held=12, starts=4, finalists=2, rounds=12, multiples=(4,))
+QUICK = LikenessSearch(placements=80, held=12, starts=4, finalists=2, rounds=12, multiples=(4,))
 CLASSES = ["IH4", "IH5"]
 
 
@@ -94,7 +94,7 @@ def test_a_head_that_would_turn_does_not(name: str) -> None:
 def test_pins_need_a_search_where_something_bends() -> None:
     pins = Pins.at(SQUIRREL, [HEAD])
     with pytest.raises(OrbiflowError, match="pins belong to the search for likeness"):
-        escherize(SQUIRREL, ["IH4"], DescentSettings.for_effort("fast"), pins=pins)
+        escherize(SQUIRREL, ["IH4"], OverlapSearch.for_effort("fast"), pins=pins)
     with pytest.raises(OrbiflowError, match="pins must be a Pins"):
         escherize(SQUIRREL, ["IH4"], QUICK, pins=HEAD)  # pyright: ignore[reportArgumentType]
 
@@ -113,6 +113,6 @@ def test_emphasis_of_any_strength_can_be_searched_with(
         mask[3:] = 0
     low, high = target.normal.min(axis=0), target.normal.max(axis=0)
     emphasis = Emphasis(mask, (*low.tolist(), *high.tolist()), strength)
-    hasty = BendingSettings(placements=30, held=4, starts=1, finalists=1, rounds=6, multiples=(4,))
+    hasty = LikenessSearch(placements=30, held=4, starts=1, finalists=1, rounds=6, multiples=(4,))
     results, _ = escherize(target, ["IH4"], hasty, emphasis=emphasis)
     assert all(result.certificate.valid for result in results)

@@ -14,7 +14,7 @@ import pytest
 import shapely
 from shapely import affinity
 
-from orbiflow.tiles import ClassFailure, OccupancySettings, Target, escherize, report
+from orbiflow.tiles import ClassFailure, OccupancySearch, Target, escherize, report
 
 DOCS = Path(__file__).parents[3] / "docs"
 SCHEMA = json.loads((DOCS / "result.schema.json").read_text(encoding="utf-8"))
@@ -24,7 +24,7 @@ SNIPPET = re.findall(r"```python\n(.*?)```", (DOCS / "result.md").read_text("utf
 BOOT = 40 * np.array([[0, 0], [3, 0], [3.4, 1.2], [2.2, 1.5], [2, 2.8], [0.8, 2.5], [-0.3, 1.2]])
 BOOT += [700, 300]
 CLASSES = ["IH6", "IH21", "IH1"]
-QUICK = OccupancySettings(
+QUICK = OccupancySearch(
     max_frequency=3, turns=2, finalists=1, iterations=12, affine_iterations=20, points=200, seed=3
 )
 

@@ -13,13 +13,13 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import Cancel, Cancelled
 from orbiflow.tiles import (
     CLASSES,
-    BendingSettings,
-    BothSettings,
+    BothSearch,
     ClassFailure,
-    DescentSettings,
     EscherTile,
     Event,
-    OccupancySettings,
+    LikenessSearch,
+    OccupancySearch,
+    OverlapSearch,
     Target,
     TileModel,
     escherize,
@@ -27,15 +27,15 @@ from orbiflow.tiles import (
     isohedral_class,
 )
 from orbiflow.tiles.likeness import mutual_iou
-from orbiflow.tiles.search import methods
-from orbiflow.tiles.search.steps import SKETCH
+from orbiflow.tiles.search import occupancy
+from orbiflow.tiles.search.likeness_search import SKETCH
 from outlines import animal
 
 BOOT = [[0, 0], [3, 0], [3.4, 1.2], [2.2, 1.5], [2.0, 2.8], [0.8, 2.5], [-0.3, 1.2]]
-QUICK = OccupancySettings(
+QUICK = OccupancySearch(
     max_frequency=3, turns=3, finalists=2, iterations=15, affine_iterations=20, points=200
 )
-BRIEF = DescentSettings.for_effort(
+BRIEF = OverlapSearch.for_effort(
     "fast", stages=((6, 2), (6, 1)), polish=5, projected=100, measured=30
 )
 TARGET = Target.from_polygon(BOOT, y_down=True)
@@ -96,7 +96,7 @@ def test_a_fit_that_runs_away_is_a_failure(force: bool) -> None:
 
 
 def test_a_class_whose_finalists_all_fold(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(methods, "fit_occupancy", crossed)
+    monkeypatch.setattr(occupancy, "fit_occupancy", crossed)
     events: list[Event] = []
     results, failures = escherize(TARGET, ["IH21"], QUICK, watch=events.append)
     assert results == []
@@ -241,7 +241,7 @@ def test_arguments_are_checked() -> None:
 
 @pytest.mark.parametrize("wrong", ["fast", 3, {"placements": 5}])
 def test_settings_of_no_method_are_refused(wrong: object) -> None:
-    with pytest.raises(OrbiflowError, match="settings must be of a method, got"):
+    with pytest.raises(OrbiflowError, match=r"the method must be a search such as .*, got"):
         escherize(TARGET, ["IH1"], wrong)  # pyright: ignore[reportArgumentType]
     with pytest.raises(OrbiflowError, match="the target must be a Target"):
         escherize("turtle.png", ["IH1"])  # pyright: ignore[reportArgumentType]
@@ -249,18 +249,18 @@ def test_settings_of_no_method_are_refused(wrong: object) -> None:
 
 def test_of_both_objectives_one_may_fail() -> None:
     bar = Target.from_polygon([[0, 0], [60, 0], [60, 1], [0, 1]])
-    likeness = BendingSettings(placements=20, held=4, starts=1, finalists=1, rounds=4)
+    likeness = LikenessSearch(placements=20, held=4, starts=1, finalists=1, rounds=4)
     alone = escherize_class(bar, "IH7", likeness)
     assert isinstance(alone, ClassFailure)
-    both = escherize_class(bar, "IH7", BothSettings(likeness, BRIEF))
+    both = escherize_class(bar, "IH7", BothSearch(likeness, BRIEF))
     assert isinstance(both, EscherTile)
     assert {tile.objective for tile in both.family()} == {"overlap"}
     assert all(tile.deformation is not None for tile in both.family())
 
 
 def test_both_objectives_give_a_short_list_likeness_first() -> None:
-    likeness = BendingSettings(placements=40, held=8, starts=4, finalists=3, rounds=6)
-    settings = BothSettings(likeness, BRIEF)
+    likeness = LikenessSearch(placements=40, held=8, starts=4, finalists=3, rounds=6)
+    settings = BothSearch(likeness, BRIEF)
     events: list[Event] = []
     results, failures = escherize(SQUIRREL, ["IH4", "IH6"], settings, watch=events.append)
     assert not failures
@@ -289,12 +289,12 @@ def test_both_objectives_give_a_short_list_likeness_first() -> None:
 @pytest.mark.parametrize(
     "settings",
     [
-        BendingSettings(placements=80, held=20, starts=8, finalists=8, rounds=6, multiples=(4,)),
+        LikenessSearch(placements=80, held=20, starts=8, finalists=8, rounds=6, multiples=(4,)),
         BRIEF,
     ],
     ids=["likeness", "overlap"],
 )
-def test_several_of_a_class_differ(settings: BendingSettings | DescentSettings) -> None:
+def test_several_of_a_class_differ(settings: LikenessSearch | OverlapSearch) -> None:
     results, _ = escherize(SQUIRREL, ["IH4", "IH6"], settings, per_class=4)
     for name in ("IH4", "IH6"):
         own = [r for r in results if r.name == name]
@@ -309,7 +309,7 @@ def test_more_effort_never_scores_less() -> None:
     for per_class in (1, 2):
         scores = []
         for effort in ("fast", "normal"):
-            settings = BendingSettings.for_effort(effort)
+            settings = LikenessSearch.for_effort(effort)
             tile = escherize_class(SQUIRREL, "IH5", settings, per_class=per_class)
             assert isinstance(tile, EscherTile)
             scores.append(tile.score)
@@ -317,6 +317,6 @@ def test_more_effort_never_scores_less() -> None:
 
 
 def test_a_first_look_is_one_small_search() -> None:
-    own = replace(BendingSettings.for_effort("best"), **SKETCH)
+    own = replace(LikenessSearch.for_effort("best"), **SKETCH)
     assert own.searches() == (own,)
     assert own.finalists == own.starts == 1

@@ -28,8 +28,8 @@ from orbiflow.tiles.pages.tile_folder import (
 from orbiflow.tiles.pictures import FrontPoint, front_png
 from orbiflow.tiles.result_file import RESULT, folder_names
 from orbiflow.tiles.search import (
-    BendingSettings,
     ClassFailure,
+    LikenessSearch,
     Settings,
     report,
 )
@@ -171,7 +171,7 @@ def write_run(
         raise OrbiflowError("there is no tile to write; the search's failures say why")
     target = instance(target, Target, "the target", "Target.read(file) gives one")
     folder = ResultFolder(as_path(out, "the folder to write into"), written_files)
-    settings = BendingSettings.for_effort("normal") if settings is None else settings
+    settings = LikenessSearch.for_effort("normal") if settings is None else settings
     seconds = sum(result.seconds for result in results)
     document = report(target, results, failures, settings, seconds=seconds, workers=1)
     with folder.replaced() as staged:

@@ -5,20 +5,16 @@ from __future__ import annotations
 import platform
 from collections.abc import Sequence
 from dataclasses import asdict
-from typing import Any
+from importlib.metadata import version
+from typing import Any, cast
 
 import numpy as np
 import shapely
-import torch
 
 from orbiflow import __version__
 from orbiflow.tiles.result_file import SCHEMA_VERSION, tile_json
-from orbiflow.tiles.search.methods import (
-    Settings,
-    method_name,
-    objective_name,
-)
-from orbiflow.tiles.search.result import ClassFailure
+from orbiflow.tiles.search.certifying import ClassFailure
+from orbiflow.tiles.search.method import SearchMethod
 from orbiflow.tiles.silhouette import (
     Emphasis,
     Pins,
@@ -31,7 +27,7 @@ def report(
     target: Target,
     results: Sequence[EscherTile],
     failures: Sequence[ClassFailure],
-    settings: Settings,
+    method: SearchMethod,
     *,
     seconds: float,
     workers: int,
@@ -48,14 +44,14 @@ def report(
     """
     return {
         "schema_version": SCHEMA_VERSION,
-        "method": method_name(settings),
-        "objective": objective_name(settings),
-        "seed": settings.seed,
-        "settings": asdict(settings),
+        "method": method.method_name,
+        "objective": method.objective,
+        "seed": method.seed,
+        "settings": asdict(cast(Any, method)),
         "versions": {
             "orbiflow": __version__,
             "python": platform.python_version(),
-            "torch": torch.__version__,
+            "torch": version("torch"),
             "numpy": np.__version__,
             "shapely": shapely.__version__,
         },
