@@ -10,16 +10,12 @@ from rich.markup import escape
 
 from orbiflow import __version__
 from orbiflow.cli import commands
-from orbiflow.cli.animate import animate
-from orbiflow.cli.art import art
 from orbiflow.cli.batch import batch
-from orbiflow.cli.classes import classes
 from orbiflow.cli.console import errors
 from orbiflow.cli.density import density
-from orbiflow.cli.escherize import escherize
-from orbiflow.cli.export import export
 from orbiflow.errors import OrbiflowError, SettingError
 from orbiflow.jobs import RecordError
+from orbiflow.operations import OPERATIONS
 
 app = typer.Typer(
     name="orbiflow",
@@ -32,12 +28,7 @@ app = typer.Typer(
     rich_markup_mode="rich",
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-app.command()(escherize)
 app.command()(batch)
-app.command()(export)
-app.command()(art)
-app.command()(animate)
-app.command()(classes)
 app.add_typer(density)
 
 
@@ -55,28 +46,14 @@ def _global(
 
 def _option(field: str) -> str:
     """What a field of a request is called here."""
-    return {
-        "count": "-n",
-        "purpose": "--for",
-        "eyes": "--eye",
-        "animation": "--kind",
-        "models": "--model",
-    }.get(field, "--" + field.replace("_", "-"))
-
-
-DERIVED = (
-    "density fit",
-    "density score",
-    "density sample",
-    "density marginal",
-    "density conditional",
-)
-"""Commands that are derived from their operations already."""
+    return {"count": "-n", "models": "--model"}.get(field, "--" + field.replace("_", "-"))
 
 
 def main() -> None:
     """Run the command line: exit status 0, 1 (no tile found), 2 (a user's mistake) or 130 (Ctrl-C)."""
-    if " ".join(sys.argv[1:3]) in DERIVED:
+    words = sys.argv[1:]
+    asked = {" ".join(words[:count]) for count in (1, 2)}
+    if words in ([], ["--help"], ["-h"]) or asked & set(OPERATIONS):
         commands.main()
     try:
         app()
