@@ -8,7 +8,7 @@ from .art.scene import draw_art as draw_art
 from .art.scene import write_artwork as write_artwork
 from .art.settings import ArtSettings as ArtSettings
 from .art.source import with_map as with_map
-from .exporting.curves import Curve as Curve
+from .exporting.scene import Curve as Curve
 from .exporting.scene import Layer as Layer
 from .exporting.scene import Scene as Scene
 from .exporting.scene import Style as Style
@@ -17,7 +17,7 @@ from .exporting.settings import FORMATS as FORMATS
 from .exporting.settings import ExportSettings as ExportSettings
 from .exporting.svg import tile_svg as tile_svg
 from .exporting.svg import tiling_svg as tiling_svg
-from .exporting.svg_writer import write_svg as write_svg
+from .exporting.svg import write_svg as write_svg
 from .exporting.writers import write_dxf as write_dxf
 from .exporting.writers import write_json as write_json
 from .exporting.writers import write_pdf as write_pdf
