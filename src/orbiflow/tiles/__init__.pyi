@@ -86,12 +86,12 @@ from .pictures.classes import classes_png as classes_png
 from .pictures.classes import draw_template as draw_template
 from .pictures.classes import draw_tiling as draw_tiling
 from .pictures.fields import placed_field as placed_field
-from .pictures.tiling_sheet import tilings_png as tilings_png
+from .pictures.overlays import overlay_picture as overlay_picture
+from .pictures.overlays import overlay_png as overlay_png
 from .pictures.tilings import default_window as default_window
-from .pictures.tilings import overlay_picture as overlay_picture
-from .pictures.tilings import overlay_png as overlay_png
 from .pictures.tilings import tiling_picture as tiling_picture
 from .pictures.tilings import tiling_png as tiling_png
+from .pictures.tilings import tilings_png as tilings_png
 from .result_file import RESULT as RESULT
 from .result_file import TILE_MODEL as TILE_MODEL
 from .result_file import folder_names as folder_names
