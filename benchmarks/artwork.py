@@ -24,9 +24,8 @@ from orbiflow.tiles import (
     render_artwork,
     with_map,
 )
-from orbiflow.tiles.art.pictures import Picture
 from orbiflow.tiles.art.scene import png_of
-from orbiflow.tiles.art.source import covered_area
+from orbiflow.tiles.art.source import Picture, covered_area
 
 
 def main() -> None:

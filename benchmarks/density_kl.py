@@ -32,7 +32,7 @@ from orbiflow.density import (
     make_space,
     midpoints,
 )
-from reproduction.density_targets import (
+from reproduction.density_fits import (
     FIT_SETTINGS,
     TargetMeasure,
     drawn,

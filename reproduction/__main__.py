@@ -15,15 +15,13 @@ import torch
 
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import Cancel, ResultFolder
-from reproduction.exhibit import Exhibit, Shown
-from reproduction.exhibits import EXHIBITS
-from reproduction.extent import FAST, FULL
-from reproduction.folder import write_page, written_files
-from reproduction.reproduction import reproduce
+from reproduction.exhibit import FAST, FULL, Exhibit, Shown
+from reproduction.page import write_page, written_files
+from reproduction.reproduction import EXHIBITS, reproduce
 
 
 def main(words: list[str] | None = None) -> int:
-    """Do the exhibits that are asked for and return the exit status: 0, or 2 for a user's mistake."""
+    """Draw the exhibits that are asked for; return the exit status: 0, or 2 for a user's mistake."""
     options = _parser().parse_args(words)
     torch.set_num_threads(1)  # many small operations; and workers may be forked
     try:

@@ -1,4 +1,4 @@
-"""One animal as tiles of all nine classes: tile, tiling, magnitude of the field, flow lines."""
+"""One animal as tiles of all nine classes, by the paper's method: tile, tiling, field, flow lines."""
 
 from __future__ import annotations
 
@@ -15,34 +15,55 @@ from orbiflow.drawing import (
 )
 from orbiflow.tiles import (
     CLASSES,
+    ClassFailure,
     EscherTile,
+    OccupancySettings,
+    escherize_class,
     placed_field,
 )
-from reproduction.animal_fits import OMEGA, animal_work
-from reproduction.canvas import Canvas
 from reproduction.drawing import (
+    INK,
+    SAMPLES,
+    Box,
+    Canvas,
+    around,
+    caption,
     draw_over,
     draw_tiling,
+    panel,
+    text_size,
+    tiny,
     window_of,
 )
 from reproduction.exhibit import (
     Exhibit,
+    Extent,
     Findings,
     Table,
+    Work,
 )
-from reproduction.extent import Extent
 from reproduction.nested import equivariance_error
-from reproduction.panels import (
-    INK,
-    SAMPLES,
-    Box,
-    around,
-    caption,
-    panel,
-    text_size,
-    tiny,
-)
 from reproduction.published import animal
+
+OMEGA = 5
+"""The paper's maximum frequency for its figure of one animal."""
+
+
+def animal_tile(name: str, omega: int, affine: int, iterations: int) -> EscherTile | ClassFailure:
+    """Search the tile of one class: an affine phase, then the flow of a field, with occupancy loss."""
+    settings = OccupancySettings(
+        max_frequency=omega, affine_iterations=affine, iterations=iterations
+    )
+    return escherize_class(animal(), name, settings)
+
+
+def animal_work(extent: Extent, omega: int) -> list[Work]:
+    """Return the search for tiles of all nine classes at one frequency, as work."""
+    cost = 1 + extent.iterations / 200 * (1.5 + omega / 2)
+    return [
+        Work(animal_tile, (name, omega, extent.affine, extent.iterations), cost) for name in CLASSES
+    ]
+
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -13,22 +13,22 @@ from orbiflow.tiles import (
     draw_template,
     signed_area,
 )
-from reproduction.canvas import Canvas
-from reproduction.exhibit import (
-    Exhibit,
-    Findings,
-    Table,
-)
-from reproduction.extent import Extent
-from reproduction.panels import (
+from reproduction.drawing import (
     FAINT,
     INK,
+    Canvas,
     around,
     caption,
     grid_box,
     panel,
     text_size,
     tiny,
+)
+from reproduction.exhibit import (
+    Exhibit,
+    Extent,
+    Findings,
+    Table,
 )
 from reproduction.published import GROUPS
 
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 
 def identification_error(kind: IsohedralClass) -> float:
-    """How far the template's identified edges are from being images of each other."""
+    """Return how far the template's identified edges are from being images of each other."""
     vertices = kind.template()
     errors = []
     for pair in kind.identified_edges:
@@ -48,7 +48,7 @@ def identification_error(kind: IsohedralClass) -> float:
 
 
 def constrained_angles(kind: IsohedralClass) -> dict[int, int]:
-    """Angles that the class fixes, in degrees, by vertex: identified edges meet there in a turn."""
+    """Return the angles in degrees that the class fixes, by vertex: identified edges meet there."""
     count = len(kind.template())
     found = {}
     for pair in kind.identified_edges:
@@ -61,7 +61,7 @@ def constrained_angles(kind: IsohedralClass) -> dict[int, int]:
 
 
 def symbol(group: CrystallographicGroup) -> str:
-    """The group's symbol, from its rotation centres and lines: of groups without mirrors.
+    """Return the symbol of a group without mirrors, from its rotation centres and lines.
 
     >>> from orbiflow.symmetry import wallpaper_group
     >>> symbol(wallpaper_group("pgg"))

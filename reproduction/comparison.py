@@ -9,25 +9,23 @@ import numpy as np
 from orbiflow.arrays import Array
 from orbiflow.drawing import fill_rings
 from orbiflow.tiles import ShapeMetrics, compare
-from reproduction.canvas import Canvas
 from reproduction.drawing import (
     EDGE,
     GOAL,
+    INK,
+    Canvas,
+    panel,
+    text_size,
     window_of,
 )
 from reproduction.exhibit import (
     Exhibit,
+    Extent,
     Findings,
     Table,
     Work,
 )
-from reproduction.extent import Extent
 from reproduction.goal_fits import GoalTile, goal_work
-from reproduction.panels import (
-    INK,
-    panel,
-    text_size,
-)
 from reproduction.published import Goal, goals
 
 ROWS = (
@@ -57,7 +55,7 @@ _LEFT, _HEAD = 0.075, 0.022
 
 
 def impossible_rows() -> list[str]:
-    """Goals of the printed table whose "IoU" exceeds their pixel accuracy, in either column."""
+    """Return the goals whose printed "IoU" exceeds their pixel accuracy, in either column."""
     return [
         name
         for name, goal in goals().items()

@@ -18,31 +18,32 @@ from orbiflow.density import (
     mean_field,
 )
 from orbiflow.drawing import draw_flow, draw_magnitude
-from reproduction.canvas import Canvas
-from reproduction.density_fits import Fitted, fit_work
-from reproduction.density_targets import (
+from reproduction.density_fits import (
     TARGETS,
+    Fitted,
+    fit_work,
     kl_of_uniform,
     target,
 )
-from reproduction.exhibit import (
-    Exhibit,
-    Findings,
-    Table,
-    Work,
-)
-from reproduction.extent import Extent
-from reproduction.nested import equivariance_error
-from reproduction.panels import (
+from reproduction.drawing import (
     INK,
     SAMPLES,
     Box,
+    Canvas,
     caption,
     grid_box,
     panel,
     text_size,
     tiny,
 )
+from reproduction.exhibit import (
+    Exhibit,
+    Extent,
+    Findings,
+    Table,
+    Work,
+)
+from reproduction.nested import equivariance_error
 from reproduction.published import KL
 from reproduction.spaces import TITLES
 
@@ -59,7 +60,7 @@ _HALF_WINDOW = (-0.5, -0.5, 1.5, 1.5)
 
 
 def square_values(density: Density, count: int) -> Array:
-    """(count, count) density per area of the canonical square at midpoints of an even grid, x first."""
+    """Return the density (count, count) per area of the square at an even grid's midpoints, x first."""
     t = (torch.arange(count, dtype=torch.float64) + 0.5) / count
     return density_on_grid(density, t, t, "square")
 
@@ -72,7 +73,7 @@ def _needs_table(extent: Extent) -> list[Work]:
 
 
 def _table_spaces(extent: Extent) -> tuple[str, ...]:
-    """Those of the paper's table; all four where there is time."""
+    """Return the spaces of the paper's table; all four if there is time."""
     return tuple(KL) if extent.name == "fast" else tuple(SPACES)
 
 

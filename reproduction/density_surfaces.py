@@ -7,24 +7,23 @@ from typing import Any
 import numpy as np
 
 from orbiflow.density import COLOURS, density_page
-from reproduction.canvas import Canvas
 from reproduction.densities import NAMES, square_values
-from reproduction.density_fits import fit_work
-from reproduction.density_targets import TARGETS
-from reproduction.exhibit import (
-    Exhibit,
-    Findings,
-    Work,
-)
-from reproduction.extent import Extent
-from reproduction.panels import (
+from reproduction.density_fits import TARGETS, fit_work
+from reproduction.drawing import (
     INK,
+    Canvas,
     caption,
+    draw_surface,
     grid_box,
     text_size,
 )
+from reproduction.exhibit import (
+    Exhibit,
+    Extent,
+    Findings,
+    Work,
+)
 from reproduction.spaces import TITLES
-from reproduction.surface_picture import draw_surface
 
 EMBEDDED = ("torus", "sphere")
 TORUS_TURN = (3.9, 0.85)

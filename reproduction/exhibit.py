@@ -1,4 +1,4 @@
-"""What an exhibit is: what the paper shows, the work that it needs, and how ours is drawn."""
+"""What an exhibit is: what the paper shows, the work that it needs, and how it is drawn."""
 
 from __future__ import annotations
 
@@ -6,19 +6,77 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal, NamedTuple
 
-from reproduction.canvas import Canvas, Picture
-from reproduction.extent import Extent
+from reproduction.drawing import Canvas, Picture
+
+
+class Extent(NamedTuple):
+    """How much work a reproduction is: all of it, or a preview.
+
+    - `name`: "full" or "fast".
+    - `frequencies`: The values of Omega in the ablation, with the paper's 5.
+    - `affine`, `iterations`: The steps of both phases of the paper's method.
+    - `effort`: The effort of our own searches.
+    - `classes`: The classes that our own searches try for each goal, None for all nine.
+    - `points`: The number of points drawn from each target density.
+    - `evaluations`: The number of evaluations of each density's likelihood and gradient.
+    - `round_measure`: Whether densities are also fitted with respect to the round area.
+    - `grid`: The number of points along a side at which KL divergences are taken.
+    - `resolution`: The number of cells along a side of surfaces in space.
+    """
+
+    name: str
+    frequencies: tuple[int, ...]
+    affine: int
+    iterations: int
+    effort: str
+    classes: tuple[str, ...] | None
+    points: int
+    evaluations: int
+    round_measure: bool
+    grid: int
+    resolution: int
+
+
+FULL = Extent(
+    name="full",
+    frequencies=(0, 1, 2, 3, 5, 10),
+    affine=80,
+    iterations=200,
+    effort="normal",
+    classes=None,
+    points=65_536,
+    evaluations=150,
+    round_measure=True,
+    grid=200,
+    resolution=160,
+)
+"""Everything, in about ten minutes on two cores."""
+
+FAST = Extent(
+    name="fast",
+    frequencies=(0, 2, 5),
+    affine=30,
+    iterations=30,
+    effort="fast",
+    classes=("IH6",),
+    points=2_048,
+    evaluations=24,
+    round_measure=False,
+    grid=100,
+    resolution=100,
+)
+"""A preview of a minute: every exhibit, with less work in each."""
 
 Verdict = Literal["agrees", "agrees in part", "differs"]
-"""Of what the paper states with what we find."""
+"""Whether what the paper states agrees with what we find."""
 
 
 class Work(NamedTuple):
-    """A call that takes long: `function(*arguments)`, of a module and with plain arguments.
+    """A call that takes long: `function(*arguments)`, a module's function with plain arguments.
 
-    Exhibits that need equal work share it. Its value goes from process to process.
+    Exhibits that need equal work share it. Its value is passed between processes.
 
-    - `cost`: seconds or so; the longest begin first.
+    - `cost`: About how many seconds it takes; the longest calls begin first.
     """
 
     function: Callable[..., Any]
@@ -27,12 +85,12 @@ class Work(NamedTuple):
 
     @property
     def key(self) -> tuple[str, tuple[Any, ...]]:
-        """Equal for equal work."""
+        """A key that is equal for equal work."""
         return f"{self.function.__module__}.{self.function.__qualname__}", self.arguments
 
 
 class Table(NamedTuple):
-    """Rows of texts under headings; `caption` says what they are."""
+    """A table of texts; `caption` says what they are."""
 
     caption: str
     headings: tuple[str, ...]
@@ -43,11 +101,11 @@ class Table(NamedTuple):
 class Findings:
     """What drawing an exhibit found.
 
-    - `verdict`: whether it is as the paper states.
-    - `found`: what we see and measure, in words.
-    - `why`: why it differs, "" if it does not.
-    - `numbers`: for `paper.json`, by name.
-    - `tables`: shown below the pictures.
+    - `verdict`: Whether it agrees with the paper.
+    - `found`: What we see and measure, in words.
+    - `why`: Why it differs, or "".
+    - `numbers`: The numbers for `paper.json`, by name.
+    - `tables`: The tables below the pictures.
     """
 
     verdict: Verdict
@@ -58,11 +116,11 @@ class Findings:
 
 
 Draw = Callable[[Canvas, Extent, list[Any]], Findings]
-"""Draws into a canvas, given the values of the work that the exhibit needs, in its order."""
+"""A function that draws into a canvas, given the values of the exhibit's work, in its order."""
 
 
 def no_work(_extent: Extent) -> list[Work]:
-    """For exhibits that are drawn at once."""
+    """Return no work, for exhibits that are quick to draw."""
     return []
 
 
@@ -70,12 +128,12 @@ def no_work(_extent: Extent) -> list[Work]:
 class Exhibit:
     """A figure or table of the paper.
 
-    - `name`: of its files, such as "figure-1".
-    - `label`: as the paper has it, such as "Figure 1".
-    - `title`: what it is about.
-    - `states`: what the paper shows or claims.
-    - `draw`: ours.
-    - `needs`: the work to be done first.
+    - `name`: The name with which its files begin, such as "figure-1".
+    - `label`: The paper's label, such as "Figure 1".
+    - `title`: What it is about.
+    - `states`: What the paper shows or claims.
+    - `draw`: The function that draws it.
+    - `needs`: A function that returns the work to be done first.
     """
 
     name: str
@@ -88,9 +146,9 @@ class Exhibit:
 
 @dataclass(frozen=True)
 class Shown:
-    """An exhibit with what came of it: `findings`, or why there are none.
+    """An exhibit as it was drawn: its pictures and findings, or the `failure`.
 
-    - `seconds`: that its drawing took, without the work that it needed.
+    - `seconds`: The time that its drawing took, without the work that it needed.
     """
 
     exhibit: Exhibit

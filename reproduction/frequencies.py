@@ -12,26 +12,24 @@ import shapely
 from orbiflow.drawing import fill_rings
 from orbiflow.fields import FourierField
 from orbiflow.tiles import CLASSES, EscherTile
-from reproduction.animal_fits import animal_work
-from reproduction.canvas import Canvas
+from reproduction.animal import animal_work
 from reproduction.drawing import (
     EDGE,
     GOAL,
+    INK,
     TILE,
+    Box,
+    Canvas,
+    panel,
+    text_size,
     window_of,
 )
 from reproduction.exhibit import (
     Exhibit,
+    Extent,
     Findings,
     Table,
     Work,
-)
-from reproduction.extent import Extent
-from reproduction.panels import (
-    INK,
-    Box,
-    panel,
-    text_size,
 )
 from reproduction.published import animal
 
@@ -136,7 +134,7 @@ def _length(outcome: Any) -> float:
 
 
 def _straightness(outcome: Any, name: str) -> float:
-    """How far a tile is from the polygon through its corners."""
+    """Return how far a tile is from the polygon through its corners."""
     if not isinstance(outcome, EscherTile):
         return 0.0
     tile = outcome.normal_tile

@@ -14,22 +14,23 @@ from orbiflow.tiles import (
     Target,
     escherize_class,
 )
-from reproduction.exhibit import Work
-from reproduction.extent import Extent
+from reproduction.exhibit import Extent, Work
 from reproduction.published import goals
 
 Objective = Literal["overlap", "squared", "likeness"]
-"""Largest overlap with the goal; with the goal as the paper had it, stretched to a square; likeness."""
+"""Largest overlap with the goal, or with the goal stretched to a square as in the paper; likeness."""
 
-SECOND_LOOK = 2
-"""Classes, the best of a quick search, that are searched again with all effort."""
+SEARCHED_AGAIN = 2
+"""Number of best classes of a quick search that are searched again with full effort."""
 
 
 class GoalTile(NamedTuple):
     """The best tile that was found for a goal.
 
-    - `isohedral_class`: of it. `polygon`: (N, 2) in the goal's coordinates.
-    - `iou`, `dice`, `pixel_accuracy`: with the goal. `certified`: whether it tiles.
+    - `isohedral_class`: The tile's class.
+    - `polygon`: The polygon (N, 2) in the goal's coordinates.
+    - `iou`, `dice`, `pixel_accuracy`: The overlap with the goal.
+    - `certified`: Whether it is proved to tile.
     """
 
     isohedral_class: str
@@ -43,15 +44,15 @@ class GoalTile(NamedTuple):
 def goal_tile(
     name: str, objective: Objective, effort: str, classes: tuple[str, ...] | None
 ) -> GoalTile | None:
-    """The best tile of a goal, None if no class gives a certified one.
+    """Return the best tile for a goal, or None if no class gives a certified one.
 
-    A quick search of all classes; the best two again, if more effort is asked for.
+    A quick search tries all classes; the best two are searched again if more effort is asked for.
     """
     goal = goals()[name]
     target = goal.squared() if objective == "squared" else goal.target()
     found = _tiles(target, objective, "fast", classes or tuple(CLASSES))
     if effort != "fast" and objective != "squared":
-        found += _tiles(target, objective, effort, [one.name for one in found[:SECOND_LOOK]])
+        found += _tiles(target, objective, effort, [one.name for one in found[:SEARCHED_AGAIN]])
         found.sort(key=lambda one: -_rank(one, objective))
     if not found:
         return None
@@ -68,7 +69,7 @@ def goal_tile(
 
 
 def goal_work(extent: Extent, objective: Objective) -> list[Work]:
-    """The best tiles of all nine goals."""
+    """Return the search for the best tiles of all nine goals, as work."""
     costs = {"octopus": 3.0, "spider": 5.0}
     share = 1.0 if extent.effort == "fast" else 4.0
     return [
@@ -84,7 +85,7 @@ def goal_work(extent: Extent, objective: Objective) -> list[Work]:
 def _tiles(
     target: Target, objective: Objective, effort: str, classes: Sequence[str]
 ) -> list[EscherTile]:
-    """Certified tiles, best first."""
+    """Return certified tiles, best first."""
     kind = LikenessSearch if objective == "likeness" else OverlapSearch
     outcomes = [escherize_class(target, name, kind.for_effort(effort)) for name in classes]
     found = [one for one in outcomes if isinstance(one, EscherTile)]

@@ -18,19 +18,20 @@ from orbiflow.tiles import (
     TileModel,
     occupancy_loss,
 )
-from reproduction.animal_fits import OMEGA, animal_work
-from reproduction.canvas import Canvas
-from reproduction.drawing import draw_over, window_of
-from reproduction.exhibit import (
-    Exhibit,
-    Findings,
-    Work,
-)
-from reproduction.extent import Extent
-from reproduction.panels import (
+from reproduction.animal import OMEGA, animal_work
+from reproduction.drawing import (
+    Canvas,
     caption,
+    draw_over,
     grid_box,
     panel,
+    window_of,
+)
+from reproduction.exhibit import (
+    Exhibit,
+    Extent,
+    Findings,
+    Work,
 )
 from reproduction.published import animal
 
@@ -47,10 +48,12 @@ HEIGHT = 0.30
 
 
 class Pulled:
-    """Sample points about the animal, and where a map takes them back to.
+    """Sample points around the animal, and where a map takes them back to.
 
-    - `points`: (N, 2). `inside`: (N,) whether the animal contains each: q and o(q).
-    - `affine`, `full`: (N, 2) in the template's frame, by the affine map alone and by all of D^-1.
+    - `points`: The points q (N, 2).
+    - `inside`: Whether (N,) the animal contains each point, o(q).
+    - `affine`, `full`: The points (N, 2) mapped back to the template's frame, by the affine map alone
+      and by all of D^-1.
     """
 
     def __init__(self, model: TileModel) -> None:
@@ -67,7 +70,7 @@ class Pulled:
             ]
 
     def wrong(self, places: Array) -> Array:
-        """(N,) whether a point is inside the animal and outside the template, or the reverse."""
+        """Return whether (N,) a point is inside the animal and outside the template, or the reverse."""
         region = shapely.Polygon(self.template)
         return shapely.contains_xy(region, *places.T) != self.inside
 

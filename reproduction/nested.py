@@ -22,13 +22,13 @@ from orbiflow.symmetry import (
 )
 
 Operator = tuple[Isometry, int]
-"""A generator g and the number K of its terms: V -> sum over k < K of g^-k o V o g^k."""
+"""A generator g and the number K of terms: V -> sum over k < K of g^-k o V o g^k."""
 
 UNIT_CELL = CrystallographicGroup.generate(np.eye(2))
 
 
 def unit_field(max_frequency: int = 3, seed: int = 0) -> FourierField:
-    """The paper's F: periodic on the unit square, with random coefficients."""
+    """Return the paper's F: periodic on the unit square, with random coefficients."""
     field = FourierField(UNIT_CELL, max_frequency, smoothness=1.0)
     generator = torch.Generator().manual_seed(seed)
     with torch.no_grad():
@@ -38,7 +38,7 @@ def unit_field(max_frequency: int = 3, seed: int = 0) -> FourierField:
 
 
 def nested(field: VectorField, operators: Sequence[Operator]) -> VectorField:
-    """The operators around a field, the first outermost: O_1(O_2(...(V)))."""
+    """Apply operators to a field, the first outermost: O_1(O_2(...(V)))."""
     result = field
     for g, count in reversed(operators):
         result = _summed(result, g, count)
@@ -57,15 +57,15 @@ def _summed(field: VectorField, g: Isometry, count: int) -> VectorField:
 
 
 def terms(operators: Sequence[Operator]) -> int:
-    """Evaluations of the field that the nested sums ask for."""
+    """Return the number of the field's evaluations in the nested sums."""
     return math.prod(count for _, count in operators)
 
 
 @torch.no_grad()
 def nested_error(group: CrystallographicGroup, operators: Sequence[Operator]) -> float:
-    """Largest difference of the nested sums, divided by their terms, from the mean over the group.
+    """Return the largest difference of the nested sums, over their terms, from the group's mean.
 
-    At random points, relative to the field's root mean square.
+    It is taken at random points, relative to the field's root mean square.
     """
     periodic = periodic_operator(unit_field(), group.lattice)
     points = _points()
@@ -76,7 +76,7 @@ def nested_error(group: CrystallographicGroup, operators: Sequence[Operator]) ->
 
 @torch.no_grad()
 def equivariance_error(field: VectorField, group: CrystallographicGroup) -> float:
-    """Largest |V(g p) - R_g V(p)| over the cosets at random points, over V's root mean square."""
+    """Return the largest |V(g p) - R_g V(p)| over cosets and points, over V's root mean square."""
     points = _points()
     values = field(points)
     worst = max(float((field(g(points)) - g.push(values)).norm(dim=-1).max()) for g in group.cosets)

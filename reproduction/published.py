@@ -1,4 +1,4 @@
-"""What ships for the exhibits: nine goals, tiles of EST and ARAP, a silhouette, printed figures."""
+"""Data of the exhibits: nine goals, tiles of EST and ARAP, a silhouette, and printed figures."""
 
 from __future__ import annotations
 
@@ -35,10 +35,11 @@ class PublishedTile(NamedTuple):
 class Goal(NamedTuple):
     """One of the paper's nine goals.
 
-    - `name`: in words. `outline`: (N, 2), y down.
-    - `tiles`: by "est", "arap" (each method's first) and "est_largest", "arap_largest" (of its first
-      twenty the one that overlaps most).
-    - `printed`: the paper's table, by "iou" and "pixel_accuracy", then "paper" and "arap".
+    - `name`: The name in words.
+    - `outline`: The outline (N, 2), y down.
+    - `tiles`: Tiles by "est", "arap" (each method's first) and "est_largest", "arap_largest" (the one
+      of its first twenty that overlaps most).
+    - `printed`: The paper's table, by "iou" and "pixel_accuracy", then "paper" and "arap".
     """
 
     name: str
@@ -47,11 +48,11 @@ class Goal(NamedTuple):
     printed: dict[str, dict[str, float]]
 
     def target(self) -> Target:
-        """The goal at its true aspect."""
+        """Return the goal at its true aspect."""
         return Target.from_polygon(self.outline, y_down=True, source=self.name)
 
     def squared(self) -> Target:
-        """The goal as the paper had it: each axis stretched to the side of a square."""
+        """Return the goal as the paper used it: each axis stretched to the side of a square."""
         low, high = self.outline.min(axis=0), self.outline.max(axis=0)
         outline = 200.0 * (self.outline - low) / (high - low)
         return Target.from_polygon(outline, y_down=True, source=self.name)
@@ -59,13 +60,13 @@ class Goal(NamedTuple):
 
 @cache
 def goals() -> dict[str, Goal]:
-    """The nine, by name, in the order of the paper's table."""
+    """Return the nine goals by name, in the order of the paper's table."""
     document = json.loads(_data("nine_goals.json").read_text("utf-8"))
     return {name: _goal(name, row) for name, row in document["goals"].items()}
 
 
 def animal() -> Target:
-    """The silhouette of the exhibits on one animal: a turtle, read from a picture."""
+    """Return the silhouette of the exhibits on one animal: a turtle, read from a picture."""
     with resources.as_file(_data("turtle.png")) as path:
         target = Target.read(path)
     return Target(

@@ -1,4 +1,4 @@
-"""Doing all exhibits: first the work that they share, then the drawing, each failure kept to itself."""
+"""The reproduction of all exhibits: first the work that they share, then the drawing of each."""
 
 from __future__ import annotations
 
@@ -18,25 +18,60 @@ from orbiflow.runtime import (
     process_context,
     work,
 )
-from reproduction.canvas import Canvas, Picture
+from reproduction import (
+    animal,
+    classes,
+    comparison,
+    densities,
+    density_surfaces,
+    frequencies,
+    method,
+    spaces,
+    square,
+    symmetries,
+    symmetrization,
+    tilings,
+)
+from reproduction.drawing import Canvas, Picture
 from reproduction.exhibit import (
     Draw,
     Exhibit,
+    Extent,
     Findings,
     Shown,
     Work,
 )
-from reproduction.extent import Extent
+
+EXHIBITS: tuple[Exhibit, ...] = (
+    square.EXHIBIT,
+    classes.TEMPLATES,
+    classes.GROUPS_TABLE,
+    spaces.SPACES_FIGURE,
+    symmetries.EXHIBIT,
+    method.EXHIBIT,
+    tilings.EXHIBIT,
+    symmetrization.EXHIBIT,
+    animal.EXHIBIT,
+    frequencies.EXHIBIT,
+    comparison.TILES,
+    comparison.TABLE,
+    spaces.SYMMETRIZATION,
+    densities.TABLE,
+    densities.SIX_GAUSSIANS,
+    density_surfaces.EXHIBIT,
+    densities.CHECKERBOARD,
+)
+"""All exhibits, in the order of the paper."""
 
 Progress = Callable[[float, str], None]
-"""Told the share of all that is done, and what was done last."""
+"""Called with the share of everything that is done, and with what was done last."""
 
-DRAWING = 4.0
-"""Seconds or so that a drawing takes: its share in the progress."""
+DRAWING_COST = 4.0
+"""About how many seconds a drawing takes, for the progress."""
 
 
 class Outcome(NamedTuple):
-    """Of a call: its value, or why there is none; and its seconds."""
+    """The outcome of a call: its value, or why there is none; and its seconds."""
 
     value: Any
     failure: str
@@ -54,28 +89,28 @@ def reproduce(
 ) -> list[Shown]:
     """Draw exhibits into a folder.
 
-    Work that several exhibits need is done once. What fails is shown with its reason; the others are
-    drawn all the same.
+    Work that several exhibits need is done once. An exhibit that fails is shown with the reason, and
+    the others are drawn all the same.
 
     Args:
-        exhibits: in the order in which they are to be shown.
-        extent: how much work each may be.
-        folder: that is there.
-        workers: processes; 1 stays in this one.
-        progress: told in this thread how far it is.
-        cancel: looked at between steps.
+        exhibits: The exhibits, in the order in which they are shown.
+        extent: How much work they are.
+        folder: An existing folder.
+        workers: The number of processes; 1 stays in this one.
+        progress: Called in this thread with how much is done.
+        cancel: Stops the work between steps.
 
     Returns:
-        One for each exhibit, in their order.
+        What came of each exhibit, in their order.
 
     Raises:
-        Cancelled: if it was told to stop.
+        Cancelled: If it was cancelled.
     """
     cancel = cancel or Cancel()
     needs = [exhibit.needs(extent) for exhibit in exhibits]
     chosen = {one.key: one for needed in needs for one in needed}
     jobs = sorted(chosen.values(), key=lambda one: -one.cost)
-    tell = _Share(progress, sum(one.cost for one in jobs) + DRAWING * len(exhibits))
+    tell = _Share(progress, sum(one.cost for one in jobs) + DRAWING_COST * len(exhibits))
     run = functools.partial(_run, workers=workers, cancel=cancel)
     done: dict[Any, Outcome] = {}
     for index, outcome in run(_work_done, jobs):
@@ -89,7 +124,7 @@ def reproduce(
         exhibit = exhibits[index]
         pictures, findings = ((), None) if outcome.failure else outcome.value
         shown[index] = Shown(exhibit, pictures, findings, outcome.failure, outcome.seconds)
-        tell(DRAWING, f"drawn {exhibit.label}")
+        tell(DRAWING_COST, f"drawn {exhibit.label}")
     cancel.check()
     return shown
 
@@ -110,11 +145,11 @@ class _Share:
 def _run(
     function: Callable[[Any], Any], items: Sequence[Any], *, workers: int, cancel: Cancel
 ) -> Iterator[tuple[int, Outcome]]:
-    """Indices and outcomes, as they come; those of processes that die do not."""
+    """Yield indices and outcomes as they come; items whose process dies have none."""
     if min(workers, len(items)) <= 1:
         for index, item in enumerate(items):
             cancel.check()
-            yield index, _outcome(function, item, _deaf, cancel)
+            yield index, _outcome(function, item, _ignore, cancel)
         return
     told = functools.partial(_outcome, function)
     context = process_context(("orbiflow.tiles.search.searching",))
@@ -125,8 +160,8 @@ def _run(
     cancel.check()
 
 
-def _deaf(_news: Any) -> None:
-    """What is told on the way is of no interest."""
+def _ignore(_news: Any) -> None:
+    """Ignore what is reported on the way."""
 
 
 def _outcome(
@@ -139,7 +174,7 @@ def _outcome(
             value = function(item)
         except Cancelled:
             raise
-        except Exception as error:  # whatever it is: the other exhibits go on, and this one says so
+        except Exception as error:  # any error: the other exhibits go on, and this one shows it
             mistake = isinstance(error, OrbiflowError)
             failure = str(error) if mistake else f"{type(error).__name__}: {error}"
     return Outcome(value, failure, time.perf_counter() - begin)

@@ -15,22 +15,22 @@ from orbiflow.density import (
 )
 from orbiflow.drawing import mark_symmetry
 from orbiflow.symmetry import IDENTIFICATION_SPACES, CrystallographicGroup
-from reproduction.canvas import Canvas
-from reproduction.exhibit import (
-    Exhibit,
-    Findings,
-    Table,
-)
-from reproduction.extent import Extent
-from reproduction.nested import nested_error, terms
-from reproduction.panels import (
+from reproduction.drawing import (
+    Canvas,
     around,
     caption,
+    draw_surface,
     grid_box,
     panel,
     tiny,
 )
-from reproduction.surface_picture import draw_surface
+from reproduction.exhibit import (
+    Exhibit,
+    Extent,
+    Findings,
+    Table,
+)
+from reproduction.nested import nested_error, terms
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -59,7 +59,7 @@ TURNS = {
 
 
 def euler_characteristic(group: CrystallographicGroup) -> int:
-    """Vertices minus edges plus one face of the unit square with the edges that the group identifies.
+    """Return vertices minus edges plus one face of the unit square with the group's identified edges.
 
     >>> from orbiflow.symmetry import identification_group
     >>> [euler_characteristic(identification_group(s)) for s in ("torus", "projective-plane")]
@@ -75,7 +75,7 @@ def euler_characteristic(group: CrystallographicGroup) -> int:
 
 
 def orientable(group: CrystallographicGroup) -> bool:
-    """Whether no element of the group turns the plane over."""
+    """Return whether no element of the group reverses orientation."""
     return all(g.determinant > 0 for g in group.cosets)
 
 
@@ -169,7 +169,7 @@ def _draw_cells(axes: Axes, group: CrystallographicGroup) -> None:
 
 
 def _checked(space: Space, n: int) -> Array:
-    """(n, n, 3) a chequered square with its edges in their colours."""
+    """Return a chequered square (n, n, 3) with its edges in their colours."""
     t = (np.arange(n) + 0.5) / n
     x, y = np.meshgrid(t, t, indexing="ij")
     odd = ((8 * x).astype(int) + (8 * y).astype(int)) % 2 == 1

@@ -17,16 +17,15 @@ from orbiflow.fields import (
 )
 from orbiflow.flows import Flow
 from orbiflow.symmetry import CrystallographicGroup, identification_group
-from reproduction.canvas import Canvas
-from reproduction.exhibit import Exhibit, Findings
-from reproduction.extent import Extent
-from reproduction.panels import (
+from reproduction.drawing import (
     INK,
+    Canvas,
     around,
     grid_box,
     panel,
     tiny,
 )
+from reproduction.exhibit import Exhibit, Extent, Findings
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -46,8 +45,8 @@ _LARGER = CrystallographicGroup.generate(np.diag([2.7, 2.7]))
 class Deformed(NamedTuple):
     """The square's sides (4, N, 2) after a flow: bottom, right, top, left, each from its lower end.
 
-    - `mismatch`: largest distance of a side from its partner moved by the lattice vector.
-    - `overlap`, `gap`: areas, in squares, that the sides' copies cover twice, and not at all.
+    - `mismatch`: The largest distance of a side from its partner moved by the lattice vector.
+    - `overlap`, `gap`: The areas, in squares, that the square's copies cover twice, and not at all.
     """
 
     sides: Array
@@ -57,13 +56,13 @@ class Deformed(NamedTuple):
 
     @property
     def ring(self) -> Array:
-        """(M, 2) the boundary, counter-clockwise."""
+        """Return the boundary (M, 2), counter-clockwise."""
         bottom, right, top, left = self.sides
         return np.concatenate([bottom[:-1], right[:-1], top[:0:-1], left[:0:-1]])
 
 
 def unconstrained_field(seed: int = 56) -> FourierField:
-    """A smooth field without any symmetry that the unit square knows: its period is 2.7."""
+    """Return a smooth field of period 2.7, which has no symmetry of the unit square."""
     field = FourierField(_LARGER, 5, smoothness=2.0)
     generator = torch.Generator().manual_seed(seed)
     with torch.no_grad():
@@ -73,7 +72,7 @@ def unconstrained_field(seed: int = 56) -> FourierField:
 
 
 def deformed(field: VectorField) -> Deformed:
-    """The unit square after the time-one flow of a field, and how its sides fit."""
+    """Return the unit square after the time-one flow of a field, and how its sides fit."""
     t = np.linspace(0.0, 1.0, POINTS + 1)
     zero, one = np.zeros_like(t), np.ones_like(t)
     square = np.array([[t, zero], [one, t], [t, one], [zero, t]]).transpose(0, 2, 1)
@@ -162,7 +161,7 @@ def _draw_square(axes: Axes, found: Deformed, *, copies: bool) -> None:
 
 
 def _arrow(axes: Axes, side: Array, colour: str, *, heads: int) -> None:
-    """Heads in the middle of a side, by its length."""
+    """Draw arrowheads in the middle of a side, by its length."""
     steps = np.linalg.norm(np.diff(side, axis=0), axis=1)
     at = np.concatenate([[0], np.cumsum(steps)])
     for k in range(heads):

@@ -25,25 +25,25 @@ from orbiflow.symmetry import (
     transflection,
     translation,
 )
-from reproduction.canvas import Canvas
-from reproduction.exhibit import (
-    Exhibit,
-    Findings,
-    Table,
-)
-from reproduction.extent import Extent
-from reproduction.nested import (
-    Operator,
-    nested,
-    unit_field,
-)
-from reproduction.panels import (
+from reproduction.drawing import (
     INK,
+    Canvas,
     around,
     caption,
     grid_box,
     text_size,
     tiny,
+)
+from reproduction.exhibit import (
+    Exhibit,
+    Extent,
+    Findings,
+    Table,
+)
+from reproduction.nested import (
+    Operator,
+    nested,
+    unit_field,
 )
 
 if TYPE_CHECKING:
@@ -59,9 +59,11 @@ _CELL = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]])
 class Kind(NamedTuple):
     """A type of symmetry.
 
-    - `title`, `equation`: as the paper has them, in words of one line.
-    - `lattice`: of the field. `operators`: that make it symmetric, none for periodicity.
-    - `point`: that is marked. `images`: under which it is marked, the identity first.
+    - `title`, `equation`: The paper's title and equation, in one line each.
+    - `lattice`: The field's lattice.
+    - `operators`: The operators that make the field symmetric, none for periodicity.
+    - `point`: The point that is marked.
+    - `images`: The isometries under which it is marked, the identity first.
     """
 
     title: str
@@ -72,12 +74,12 @@ class Kind(NamedTuple):
     images: tuple[Isometry, ...]
 
     def before(self) -> VectorField:
-        """A periodic field without the symmetry; for periodicity itself on another lattice."""
+        """Return a periodic field without the symmetry; for periodicity itself, on another lattice."""
         lattice = self.lattice if self.operators else np.eye(2)
         return periodic_operator(unit_field(1, seed=7), lattice)
 
     def after(self) -> VectorField:
-        """The field that the paper's operators make."""
+        """Return the field that the paper's operators make."""
         return nested(periodic_operator(unit_field(1, seed=7), self.lattice), self.operators)
 
 
@@ -119,7 +121,7 @@ KINDS = _kinds()
 
 @torch.no_grad()
 def residue(field: VectorField, images: tuple[Isometry, ...]) -> float:
-    """Largest |V(g p) - R_g V(p)| over `images` g and random points, over V's root mean square."""
+    """Return the largest |V(g p) - R_g V(p)| over `images` g and points, over V's root mean square."""
     generator = torch.Generator().manual_seed(2)
     points = 4 * torch.rand(300, 2, generator=generator, dtype=torch.float64) - 2
     values = field(points)

@@ -21,35 +21,34 @@ from orbiflow.tiles import (
     IsohedralClass,
     signed_area,
 )
-from reproduction.canvas import Canvas
+from reproduction.drawing import Canvas, tiny
 from reproduction.exhibit import (
     Exhibit,
+    Extent,
     Findings,
     Table,
 )
-from reproduction.extent import Extent
 from reproduction.nested import (
     equivariance_error,
     nested_error,
     terms,
     unit_field,
 )
-from reproduction.panels import tiny
 
 OMEGA = 5
 TURN = 0.5
-"""Radians by which the affine map A is turned."""
+"""The angle in radians by which the affine map A turns."""
 
 
 def as_printed(kind: IsohedralClass, linear: Array) -> VectorField:
-    """The paper's V(z) = V_sym(A^-1 z), for a map A without translation."""
+    """Return the paper's V(z) = V_sym(A^-1 z), for a map A without translation."""
     field = _symmetric(kind)
     inverse = torch.tensor(np.linalg.inv(linear))
     return lambda points: field(points @ inverse.mT)
 
 
 def pushed(kind: IsohedralClass, linear: Array) -> VectorField:
-    """The same pushed forward by A: A V_sym(A^-1 z)."""
+    """Return the same field pushed forward by A: A V_sym(A^-1 z)."""
     field = as_printed(kind, linear)
     matrix = torch.tensor(linear)
 

@@ -21,20 +21,20 @@ from orbiflow.symmetry import (
     transflection,
 )
 from orbiflow.tiles import CLASSES, draw_tiling
-from reproduction.canvas import Canvas
-from reproduction.exhibit import (
-    Exhibit,
-    Findings,
-    Table,
-)
-from reproduction.extent import Extent
-from reproduction.panels import (
+from reproduction.drawing import (
     INK,
+    Canvas,
     around,
     caption,
     grid_box,
     panel,
     text_size,
+)
+from reproduction.exhibit import (
+    Exhibit,
+    Extent,
+    Findings,
+    Table,
 )
 
 if TYPE_CHECKING:
@@ -42,14 +42,14 @@ if TYPE_CHECKING:
 
 
 def drawn_elements(group: CrystallographicGroup) -> list[Isometry]:
-    """The isometry of every centre and line that is marked in and about a cell."""
+    """Return the isometry of every centre and line that is marked in and around a cell."""
     found = symmetry_elements(group)
     turns = [rotation(center.point, center.order) for center in found.centers]
     return turns + [transflection(line.line, line.shift) for line in found.lines]
 
 
 def center_orbits(group: CrystallographicGroup) -> list[RotationCenter]:
-    """One rotation centre of each orbit, of the highest order first.
+    """Return one rotation centre of each orbit, the highest order first.
 
     >>> from orbiflow.symmetry import wallpaper_group
     >>> [center.order for center in center_orbits(wallpaper_group("p6"))]

@@ -18,24 +18,22 @@ from orbiflow.density.models import Mixture
 from orbiflow.fields import symmetrize
 from orbiflow.symmetry import identification_group, rotation_matrix
 from orbiflow.tiles import CLASSES, EscherTile, Target, compare
-from reproduction.animal_fits import animal_tile
+from reproduction.animal import animal_tile
 from reproduction.classes import (
     constrained_angles,
     identification_error,
     symbol,
 )
 from reproduction.comparison import impossible_rows
-from reproduction.density_fits import fitted
-from reproduction.density_targets import (
+from reproduction.density_fits import (
     TARGETS,
     drawn,
+    fitted,
     kl_of_uniform,
     target,
     weighted,
 )
-from reproduction.exhibit import Findings
-from reproduction.exhibits import EXHIBITS
-from reproduction.extent import FAST, Extent
+from reproduction.exhibit import FAST, Extent, Findings
 from reproduction.goal_fits import goal_tile
 from reproduction.method import Pulled
 from reproduction.nested import equivariance_error, nested_error
@@ -45,7 +43,7 @@ from reproduction.published import (
     animal,
     goals,
 )
-from reproduction.reproduction import reproduce
+from reproduction.reproduction import EXHIBITS, reproduce
 from reproduction.spaces import euler_characteristic, orientable
 from reproduction.square import deformed, unconstrained_field
 from reproduction.symmetries import KINDS, residue

@@ -14,19 +14,18 @@ import pytest
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import Cancel, Cancelled
 from reproduction.__main__ import main
-from reproduction.canvas import Canvas
+from reproduction.drawing import Canvas
 from reproduction.exhibit import (
+    FAST,
     Exhibit,
+    Extent,
     Findings,
     Shown,
     Table,
     Work,
 )
-from reproduction.exhibits import EXHIBITS
-from reproduction.extent import FAST, Extent
-from reproduction.folder import write_page, written_files
-from reproduction.page import paper_page
-from reproduction.reproduction import reproduce
+from reproduction.page import paper_page, write_page, written_files
+from reproduction.reproduction import EXHIBITS, reproduce
 
 QUICK = ("figure-4", "table-1", "table-4")
 """Exhibits that need no work."""

@@ -8,7 +8,7 @@ from .art.scene import draw_art as draw_art
 from .art.scene import write_artwork as write_artwork
 from .art.settings import ArtSettings as ArtSettings
 from .art.source import with_map as with_map
-from .exporting.curves import Curve as Curve
+from .exporting.scene import Curve as Curve
 from .exporting.scene import Layer as Layer
 from .exporting.scene import Scene as Scene
 from .exporting.scene import Style as Style
@@ -16,7 +16,7 @@ from .exporting.scene import Uses as Uses
 from .exporting.settings import ExportSettings as ExportSettings
 from .exporting.svg import tile_svg as tile_svg
 from .exporting.svg import tiling_svg as tiling_svg
-from .exporting.svg_writer import write_svg as write_svg
+from .exporting.svg import write_svg as write_svg
 from .exporting.writers import write_dxf as write_dxf
 from .exporting.writers import write_json as write_json
 from .exporting.writers import write_pdf as write_pdf
@@ -84,12 +84,12 @@ from .pictures.classes import classes_png as classes_png
 from .pictures.classes import draw_template as draw_template
 from .pictures.classes import draw_tiling as draw_tiling
 from .pictures.fields import placed_field as placed_field
-from .pictures.tiling_sheet import tilings_png as tilings_png
+from .pictures.overlays import overlay_picture as overlay_picture
+from .pictures.overlays import overlay_png as overlay_png
 from .pictures.tilings import default_window as default_window
-from .pictures.tilings import overlay_picture as overlay_picture
-from .pictures.tilings import overlay_png as overlay_png
 from .pictures.tilings import tiling_picture as tiling_picture
 from .pictures.tilings import tiling_png as tiling_png
+from .pictures.tilings import tilings_png as tilings_png
 from .result_file import RESULT as RESULT
 from .result_file import TILE_MODEL as TILE_MODEL
 from .result_file import folder_names as folder_names

@@ -170,9 +170,9 @@ def test_a_picture_in_an_svg_is_one_image() -> None:
 
 def test_other_formats_refuse_artwork(tmp_path: Path) -> None:
     scene = art_scene(drawn("IH4", BODY, tmp_path))
-    with pytest.raises(OrbiflowError, match="written as SVG, or rendered as PNG"):
+    with pytest.raises(OrbiflowError, match="hold artwork"):
         write_pdf(scene)
-    with pytest.raises(OrbiflowError, match="written as SVG, or rendered as PNG"):
+    with pytest.raises(OrbiflowError, match="hold artwork"):
         write_dxf(scene, tolerance=0.1)
 
 

@@ -17,8 +17,7 @@ from orbiflow.tiles import (
     render_artwork,
 )
 from orbiflow.tiles.art.making import render_on
-from orbiflow.tiles.art.page import laid
-from orbiflow.tiles.art.repeat import rectangle
+from orbiflow.tiles.art.page import rectangle, spread_page
 
 
 @pytest.mark.parametrize("how", ["aspect", "neighbour", "one"])
@@ -28,7 +27,7 @@ def test_two_by_two_is_the_same_plane(name: str, how) -> None:
     settings = ArtSettings(repeat=True, tile_size=60, colour=how, tolerance=0.05)
     art = artwork(tile, settings, picture=None if how == "one" else checkerboard(tile))
     cell = render_artwork(art)
-    twice = render_on(art, laid(art.page, tile, settings, 2, 2))
+    twice = render_on(art, spread_page(art.page, tile, settings, 2, 2))
     apart = np.abs(np.tile(cell, (2, 2, 1)).astype(int) - twice)
     assert apart.max() <= 1
 

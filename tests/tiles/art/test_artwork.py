@@ -18,13 +18,12 @@ from orbiflow.tiles import (
     render_artwork,
 )
 from orbiflow.tiles.art.making import raster_grid
-from orbiflow.tiles.art.pictures import _places
 from orbiflow.tiles.art.raster import (
     NOWHERE,
     runs,
     triangle_sides,
 )
-from orbiflow.tiles.art.source import covered_area, silhouette_outline
+from orbiflow.tiles.art.source import _places, covered_area, silhouette_outline
 from orbiflow.tiles.silhouette import triangulate
 
 PAGE = ArtSettings(size=(240, 160), tile_size=95, outline=0.0)

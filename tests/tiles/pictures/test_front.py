@@ -59,5 +59,5 @@ def test_equal_points_make_room(count: int) -> None:
 
 
 def test_nothing_to_draw() -> None:
-    with pytest.raises(OrbiflowError, match="needs a tile"):
+    with pytest.raises(OrbiflowError, match="at least one tile"):
         front_png([])

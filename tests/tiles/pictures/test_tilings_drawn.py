@@ -51,9 +51,10 @@ def test_in_print_and_as_drawing() -> None:
     assert tiling_picture(tiling).file().startswith(b"%PDF")
     window = (-1.0, -1.0, 1.0, 1.0)
     text = tiling_svg(tiling, window)
-    paths = re.findall(r' d="([^"]*)"', text)
+    paper, *paths = re.findall(r' d="([^"]*)"', text)
+    assert len(paper.split(" ")) == 3
     assert len(paths) == len(copies_meeting(tiling, window))
-    assert {path.count("L") for path in paths} == {2, 5}  # triangles and hexagons
+    assert {len(path.split(" ")) for path in paths} == {2, 5}  # triangles and hexagons
     ElementTree.fromstring(text)
     assert "A tiling of the plane (p6m)" in text
 

@@ -1,4 +1,4 @@
-"""A drawing over the silhouette, in curves: an SVG read within bounds and carried onto the tile."""
+"""Drawings in curves over the silhouette: an SVG file is read, carried onto the tile and painted."""
 
 from __future__ import annotations
 
@@ -14,9 +14,8 @@ from shapely.errors import GEOSException
 from orbiflow.arguments import path as as_path
 from orbiflow.arrays import Array
 from orbiflow.errors import InputFileError
-from orbiflow.tiles.art.pictures import Picture, read_picture
 from orbiflow.tiles.art.raster import Grid, Paint
-from orbiflow.tiles.art.source import covered_area
+from orbiflow.tiles.art.source import SAME_ASPECT, Picture, covered_area, read_picture
 from orbiflow.tiles.exporting import (
     INK,
     Curve,
@@ -46,36 +45,36 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-SAME_ASPECT = 0.01
 FLATNESS = 1 / 4000
-"""How far flattened curves may be from the drawing's, in sizes of the silhouette."""
+"""Greatest distance of flattened curves from the drawing's, in sizes of the silhouette."""
 
 LONGEST = 1 / 150
-"""Longest straight piece before it is carried, in sizes of the silhouette: lines bend with the tile."""
+"""Longest straight piece that is carried, in sizes of the silhouette: lines bend with the tile."""
 
 MOST_CARRIED = 400_000
-"""Points in all that are carried."""
+"""Greatest number of points that are carried in all."""
 
 FARTHEST = 1e6
-"""How far out a drawing may reach, in sizes of the silhouette."""
+"""Greatest reach of a drawing, in sizes of the silhouette."""
 
 
 class TooFar(Exception):
-    """A path reaches beyond `FARTHEST`."""
+    """An error for a path that reaches beyond `FARTHEST`."""
 
 
 def read_drawing(path: Path, tile: EscherTile) -> tuple[Motif, tuple[str, ...]]:
-    """The drawing in an SVG file, carried onto the tile, in its units; and notes.
+    """Read an SVG file and carry its drawing onto a tile, in the tile's units; return it with notes.
 
-    Fills and strokes are kept, gradients become one colour; texts, pictures and clips are left out.
-    `currentColor`, where no `color` is said, is the ink that shows on each tile.
+    Fills and strokes are kept and gradients become one colour; texts, pictures and clips are left out.
+    `currentColor` without a `color` is the ink that shows on each tile.
 
     Args:
-        tile: with a map.
+        path: The file.
+        tile: A tile with a map.
 
     Raises:
-        InputFileError: for a file over 16 MB, one that is no SVG or cannot be understood, one of
-            another aspect than the silhouette's, and one that draws nothing.
+        InputFileError: If the file is over 16 MB, is no SVG or cannot be understood, has another
+            aspect than the silhouette, or draws nothing.
     """
     check_file(path)
     drawing = Drawing(path, parse_xml(path, read_bytes(path, MAX_BYTES)))
@@ -103,7 +102,7 @@ def read_drawing(path: Path, tile: EscherTile) -> tuple[Motif, tuple[str, ...]]:
 
 
 def _onto(path: Path, drawing: Drawing, tile: EscherTile) -> tuple[Array, Array]:
-    """From the drawing's user units to the silhouette's coordinates."""
+    """Return the map from the drawing's user units to the silhouette's coordinates."""
     covered = covered_area(tile)
     if drawing.box is None:
         return np.eye(2), np.zeros(2)
@@ -122,7 +121,7 @@ def _onto(path: Path, drawing: Drawing, tile: EscherTile) -> tuple[Array, Array]
 
 
 class _Carry:
-    """From the drawing to the tile, point by point."""
+    """The map from the drawing to the tile, point by point."""
 
     def __init__(self, tile: EscherTile, linear: Array, offset: Array, size: float) -> None:
         self.tile, self.linear, self.offset, self.size = tile, linear, offset, size
@@ -131,14 +130,14 @@ class _Carry:
         self.count = 0
 
     def check(self, points: Array) -> None:
-        """Raises `TooFar` for points of the drawing that nobody sees."""
+        """Raise `TooFar` if points of the drawing lie too far out to be seen."""
         if not (np.abs(points) < FARTHEST * self.size / self.scale).all():  # NaN, too
             raise TooFar
 
     def __call__(self, points: Array, *, closed: bool) -> Array:
         here = points @ self.linear.T + self.offset
         line = shapely.LinearRing(here) if closed else shapely.LineString(here)
-        # before any is made
+        # before any point is made
         if line.length / (LONGEST * self.size) > MOST_CARRIED:
             raise TooManyPoints
         fine = shapely.get_coordinates(shapely.segmentize(line, LONGEST * self.size))
@@ -180,7 +179,7 @@ def _parts(shape: DrawnShape, drawing: Drawing, carry: _Carry) -> list[Part]:
 
 def _ring(carry: _Carry, ring: shapely.LinearRing, *, outer: bool) -> Curve:
     points = carry(shapely.get_coordinates(ring)[:-1], closed=True)
-    # holes run the other way: they are holes under every rule
+    # holes run the other way, so that they are holes under every fill rule
     return Curve.polyline(orient(points, counter_clockwise=outer), closed=True)
 
 
@@ -193,13 +192,13 @@ def _line(carry: _Carry, points: Array, path: SubPath) -> Curve:
 
 
 def _colour(text: str, paint: object, drawing: Drawing) -> tuple[str | None, float]:
-    """A paint as #rrggbb or `INK`, None for none; and how opaque it is."""
+    """Return a paint as #rrggbb, `INK` or None, and its opacity."""
     text = text.strip()
     if text.lower() in ("none", "transparent", ""):
         return None, 0.0
     if text.lower() == "currentcolor":
         text = str(paint.get("color", INK)) if isinstance(paint, dict) else INK
-        # no colour is said: the one that shows on the tile
+        # without a colour it is the one that shows on the tile
         if text.lower() == INK.lower():
             return INK, 1.0
     if text.startswith("url("):
@@ -213,7 +212,7 @@ def _colour(text: str, paint: object, drawing: Drawing) -> tuple[str | None, flo
 
 
 def _gradient(text: str, drawing: Drawing) -> tuple[str | None, float]:
-    """The mean of a gradient's stops."""
+    """Return the mean colour of a gradient's stops."""
     element = drawing.by_id.get(text[4:].split(")")[0].strip("'\"# "))
     for _ in range(5):  # gradients may refer to each other for their stops
         if element is None or any(child.tag == "stop" for child in element):
@@ -232,7 +231,7 @@ def _gradient(text: str, drawing: Drawing) -> tuple[str | None, float]:
 
 
 def _number(text: str | None, usual: float) -> float:
-    """A length in user units or a share; what cannot be read is the usual one."""
+    """Read a length in user units or a share; return the usual one if it cannot be read."""
     if text is None:
         return usual
     try:
@@ -243,7 +242,7 @@ def _number(text: str | None, usual: float) -> float:
 
 
 class Over(NamedTuple):
-    """One of the two, and what was decided for the user."""
+    """What lies over the silhouette, a picture or a drawing; and what was decided for the user."""
 
     picture: Picture | None = None
     drawing: Motif | None = None
@@ -251,11 +250,11 @@ class Over(NamedTuple):
 
 
 def read_over(path: str | Path, tile: EscherTile) -> Over:
-    """The picture or drawing in a file, by its content.
+    """Read the picture or drawing in a file, whichever its content is.
 
     Raises:
-        InputFileError: as `read_picture` and `read_drawing`.
-        OrbiflowError: for a tile without a map.
+        InputFileError: As `read_picture` and `read_drawing`.
+        OrbiflowError: If the tile has no map.
     """
     tile.require_map()
     path = as_path(path, "the picture's file")
@@ -272,7 +271,7 @@ DOTS = 100
 
 
 def paint_motif(paint: Paint, motif: Motif) -> None:
-    """Draw it, antialiased, on what is there."""
+    """Draw a motif, antialiased, over a painting."""
     grid = paint.grid
     placed = motif.moved(grid.density * np.eye(2), -grid.density * grid.corner)
     for inked, parts in groupby(placed.parts, key=lambda part: part.inked):
@@ -285,7 +284,7 @@ def paint_motif(paint: Paint, motif: Motif) -> None:
 
 
 def _canvas(parts: list[Part], grid: Grid) -> Array:
-    """(height, width, 4) RGBA, straight, 0 to 1."""
+    """Return parts drawn as RGBA (height, width, 4), straight, 0 to 1."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.collections import PathCollection
 

@@ -1,4 +1,4 @@
-"""Lines inside a tile that has no picture: hatching, echoes of the outline, feathers; and eyes."""
+"""Lines inside a tile, as engraved: hatching, echoes of the outline, feathers; and eyes."""
 
 from __future__ import annotations
 
@@ -31,15 +31,15 @@ from orbiflow.tiles.geometry import (
 )
 from orbiflow.tiles.tile import EscherTile
 
-FINE = 420.0
+GRID_DENSITY = 420.0
 """Cells of the raster along the square root of the area."""
 
 LIGHT = np.array([-0.6, -0.8])
-"""Where it comes from, in units with y down: above, from the left."""
+"""The direction from which light comes, with y down: from above, on the left."""
 
 
 class Along:
-    """Places along the outline: `points`, inward `normals` and half-thickness `half`; (n, ...)."""
+    """Evenly spaced places along the outline: `points`, inward `normals`, half-thickness `half`."""
 
     def __init__(self, body: Body, count: int) -> None:
         ring = body.ring
@@ -53,16 +53,16 @@ class Along:
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """A tile at area 1, y down.
+    """A tile at area 1 with y down, and how deep places in it lie.
 
-    - `ring`: (N, 2).
+    - `ring`: The outline (N, 2).
     """
 
     ring: Array
 
     @cached_property
     def _grid(self) -> Grid:
-        return Grid.over(self.ring, FINE, 1)
+        return Grid.over(self.ring, GRID_DENSITY, 1)
 
     @cached_property
     def _depth(self) -> Array:
@@ -76,16 +76,16 @@ class Body:
         return np.gradient(smooth, axis=1), np.gradient(smooth, axis=0)
 
     def depth(self, points: Array) -> Array:
-        """(...) how far inside points (..., 2) lie; 0 outside."""
+        """Return how far inside the outline points (..., 2) lie; 0 outside."""
         return self._at(self._depth, points)
 
     def inward(self, points: Array) -> Array:
-        """(..., 2) unit vectors away from the nearest part of the outline."""
+        """Return unit vectors (..., 2) away from the nearest part of the outline."""
         vector = np.stack([self._at(part, points) for part in self._slope], axis=-1)
         return vector / np.maximum(np.linalg.norm(vector, axis=-1, keepdims=True), 1e-12)
 
     def half_thickness(self, points: Array, normals: Array) -> Array:
-        """(n,) how far one can go inwards from the outline before it comes nearer again."""
+        """Return how far (n,) inwards the outline stays the nearest part of the outline."""
         steps = np.linspace(0, float(self._depth.max()) * 1.05, 90)
         depth = self.depth(points[:, None] + steps[None, :, None] * normals[:, None])
         ahead = depth >= 0.85 * steps[None] - 0.004
@@ -93,7 +93,7 @@ class Body:
 
     @cached_property
     def axis(self) -> Array:
-        """(2,) its longest direction, to the right or down."""
+        """The longest direction (2,), to the right or down."""
         points = resampled(self.ring, 400)
         _, _, ways = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)
         way = ways[0]
@@ -101,7 +101,7 @@ class Body:
 
     @cached_property
     def thickest(self) -> float:
-        """Greatest depth."""
+        """The greatest depth."""
         return float(self._depth.max())
 
     def _at(self, values: Array, points: Array) -> Array:
@@ -112,13 +112,13 @@ class Body:
 
 
 def shade(normals: Array) -> Array:
-    """(n,) how dark it is where the outline has these inward normals: 0 in the light, 1 away."""
+    """Return how dark (n,) it is at these inward normals: 0 in the light, 1 in the shade."""
     toward = normals @ (LIGHT / np.linalg.norm(LIGHT))
     return np.clip(0.5 + 0.5 * toward, 0, 1)
 
 
 def stroke(points: Array, widths: Array) -> Array:
-    """(2 n, 2) the outline of a line through points (n, 2) as wide as `widths` (n,) at each."""
+    """Return the outline (2 n, 2) of a line through points (n, 2) with a width (n,) at each."""
     step = np.gradient(points, axis=0)
     across = np.stack([-step[:, 1], step[:, 0]], axis=1)
     across /= np.maximum(np.linalg.norm(across, axis=1), 1e-12)[:, None]
@@ -129,15 +129,15 @@ def stroke(points: Array, widths: Array) -> Array:
 USUAL_EYE = 0.032
 """Radius of an eye in square roots of the tile's area."""
 
-CLEAR = 1.7
-"""Radii about an eye that lines keep out of."""
+EYE_CLEARANCE = 1.7
+"""Distance, in radii of an eye, that lines keep from its middle."""
 
-STEP, SHORTEST = 0.008, 12
-"""Of an echo in square roots of the tile's area, and how many steps a piece of it has at least."""
+ECHO_STEP, ECHO_LEAST_STEPS = 0.008, 12
+"""Step of an echo in square roots of the tile's area, and the least number of steps of a piece."""
 
 
 class Eye(NamedTuple):
-    """An eye on the tile: its middle, radius and what is drawn, in the tile's units."""
+    """An eye on the tile: its middle, its radius and its parts, in the tile's units."""
 
     middle: Array
     radius: float
@@ -147,15 +147,15 @@ class Eye(NamedTuple):
 def eyes(
     tile: EscherTile, given: tuple[tuple[float, ...], ...], palette: Palette
 ) -> tuple[Eye, ...]:
-    """Eyes where the silhouette has them, carried onto the tile, round.
+    """Carry eyes from the silhouette onto the tile; they stay round.
 
     Args:
-        tile: with a map, if any are given.
-        given: (x, y) or (x, y, radius) in the silhouette's coordinates.
-        palette: whose paper and outline they are drawn in.
+        tile: The tile, with a map if any eyes are given.
+        given: Each eye as (x, y) or (x, y, radius) in the silhouette's coordinates.
+        palette: The palette whose paper and outline they are drawn in.
 
     Raises:
-        OrbiflowError: for one outside the silhouette.
+        OrbiflowError: If an eye lies outside the silhouette.
     """
     return tuple(_eye(tile, eye, palette) for eye in given)
 
@@ -177,7 +177,7 @@ def _eye(tile: EscherTile, given: tuple[float, ...], palette: Palette) -> Eye:
     reach = 0.5 * USUAL_EYE * size
     around = reach * np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]])
     moved = tile.forward(here + around) - middle
-    # which way it looks, and how much larger things are there
+    # how the map turns and scales the eye's surroundings
     factor = complex(best_similarity(complex_points(around), complex_points(moved)))
     radius = USUAL_EYE * size if len(given) < 3 else given[2] * abs(factor)
     radius = min(radius, room)
@@ -204,7 +204,7 @@ def _circle(middle: Array, radius: float) -> Curve:
 
 
 def engraved(tile: EscherTile, strokes: Strokes, around: tuple[Eye, ...] = ()) -> tuple[Part, ...]:
-    """Lines of one kind in ink, thin where it is deep or light, that keep clear of the eyes."""
+    """Return lines of one kind in ink, thin in the light and deep inside, that keep clear of eyes."""
     polygon = tile.tile.polygon
     size = float(np.sqrt(abs(tile.tile.signed_area)))
     flip = np.array([1.0, 1.0 if tile.y_down else -1.0])
@@ -212,13 +212,13 @@ def engraved(tile: EscherTile, strokes: Strokes, around: tuple[Eye, ...] = ()) -
     rings = {"hatch": _hatch, "echoes": _echoes, "feathers": _feathers}[strokes](body)
     rings = [ring * flip * size for ring in rings]
     for eye in around:
-        far = CLEAR * eye.radius
+        far = EYE_CLEARANCE * eye.radius
         rings = [ring for ring in rings if np.hypot(*(ring - eye.middle).T).min() > far]
     return (Part(tuple(Curve.polyline(ring, closed=True) for ring in rings), Style(INK)),)
 
 
 def _hatch(body: Body, reach: float = 0.32, spacing: float = 0.017) -> list[Array]:
-    """Ticks inwards from the outline as on a woodcut: long in the shade, short in the light.
+    """Return ticks inwards from the outline as on a woodcut: long in the shade, short in the light.
 
     None is longer than `reach`.
     """
@@ -252,7 +252,7 @@ def _hatch(body: Body, reach: float = 0.32, spacing: float = 0.017) -> list[Arra
 
 
 def _echoes(body: Body) -> list[Array]:
-    """The outline again, farther and farther in: thick in the shade, fading in the light."""
+    """Return the outline repeated inwards, thick in the shade and fading in the light."""
     found: list[Array] = []
     shape = shapely.Polygon(body.ring)
     depth, gap = 0.018, 0.017
@@ -269,7 +269,7 @@ def _echo(body: Body, part: shapely.Polygon, depth: float) -> list[Array]:
     total = arc_lengths(ring)[-1] if len(ring) > 2 else 0.0
     if total < 0.12:
         return []
-    count = max(24, int(total / STEP))
+    count = max(24, int(total / ECHO_STEP))
     points = resampled(ring, count)
     fade = 1 - depth / body.thickest
     dark = shade(body.inward(points))
@@ -277,12 +277,12 @@ def _echo(body: Body, part: shapely.Polygon, depth: float) -> list[Array]:
     width = 0.0085 * fade**0.7 * np.clip(1.25 * dark + 1.1 * fade - 0.85, 0, 1)
     width = _smooth(width, 5)
     # shorter ones look like strays
-    arcs = [own for own in _arcs(width > 0.0012) if len(own) >= min(SHORTEST, count)]
+    arcs = [own for own in _arcs(width > 0.0012) if len(own) >= min(ECHO_LEAST_STEPS, count)]
     return [stroke(points[own], width[own]) for own in arcs]
 
 
 def _feathers(body: Body) -> list[Array]:
-    """Rows of scallops that follow the body from one end to the other."""
+    """Return rows of scallops that follow the body from one end to the other."""
     found = []
     axis = body.axis
     across = np.array([-axis[1], axis[0]])
@@ -321,7 +321,7 @@ def _scallop(body: Body, point: Array, size: float) -> list[Array]:
 
 
 def _wobble(count: int, seed: int) -> Array:
-    """(count,) numbers from -1 to 1 that look like a hand's, the same every time."""
+    """Return numbers (count,) from -1 to 1, irregular as by hand but always the same."""
     k = np.arange(count) + 1000.0 * seed
     return 2 * np.modf(np.abs(np.sin(12.9898 * k) * 43758.5453))[0] - 1
 
@@ -333,7 +333,7 @@ def _smooth(values: Array, reach: int) -> Array:
 
 
 def _arcs(kept: np.ndarray) -> list[np.ndarray]:
-    """Indices of each run of true entries round a ring, in order; all of it twice-closed if whole."""
+    """Return the indices of each run of true entries around a ring; a whole ring is closed."""
     count = len(kept)
     if kept.all():
         return [np.append(np.arange(count), 0)]

@@ -1,4 +1,4 @@
-"""Artwork from start to end: what is on the tile, the page, and its pixels."""
+"""Artwork before it is a file: what is on the tile and the page, and the pixels that show it."""
 
 from __future__ import annotations
 
@@ -12,14 +12,13 @@ from orbiflow.runtime import Cancel
 from orbiflow.tiles.art.drawings import paint_motif
 from orbiflow.tiles.art.engraving import engraved, eyes
 from orbiflow.tiles.art.page import ArtPage, art_page
-from orbiflow.tiles.art.pictures import Picture, carried_picture
 from orbiflow.tiles.art.raster import (
     Grid,
     Paint,
     render_page,
 )
 from orbiflow.tiles.art.settings import ArtSettings
-from orbiflow.tiles.art.source import with_map
+from orbiflow.tiles.art.source import Picture, carried_picture, with_map
 from orbiflow.tiles.exporting import (
     Curve,
     Motif,
@@ -28,23 +27,23 @@ from orbiflow.tiles.exporting import (
 )
 from orbiflow.tiles.tile import EscherTile, TileSource
 
-FINER = 1.5
-"""Texels of the tile's raster a pixel."""
+TEXELS_PER_PIXEL = 1.5
+"""Texels of the tile's raster along a pixel of the page."""
 
-OUTLINE = 120
-"""The usual outline is the tile's size through this."""
+TILE_PER_OUTLINE = 120
+"""The tile's size over the outline's usual width."""
 
 
 @dataclass(frozen=True, eq=False)
 class Artwork:
-    """All that a picture is made from.
+    """Everything that a picture is made from.
 
-    - `tile`: with its map.
-    - `settings`: as they were given.
-    - `page`: which copies, where.
-    - `picture`: over the silhouette, or None.
-    - `motif`: drawn over the picture, in the tile's units.
-    - `notes`: what the user should know.
+    - `tile`: The tile with its map.
+    - `settings`: The settings as they were given.
+    - `page`: The copies of the tile and where they are.
+    - `picture`: The picture over the silhouette, or None.
+    - `motif`: What is drawn over the picture, in the tile's units.
+    - `notes`: What the user should know.
     """
 
     tile: EscherTile
@@ -56,12 +55,12 @@ class Artwork:
 
     @property
     def outline(self) -> float:
-        """Width in pixels."""
+        """The outline's width in pixels."""
         width = self.settings.outline
-        return max(1.0, self.page.tile_size / OUTLINE) if width is None else width
+        return max(1.0, self.page.tile_size / TILE_PER_OUTLINE) if width is None else width
 
     def _repr_png_(self) -> bytes:
-        """What a notebook shows."""
+        """Return what a notebook shows."""
         from orbiflow.tiles.art.scene import png_of
 
         return png_of(render_artwork(self), self.settings.dpi)
@@ -78,14 +77,15 @@ def artwork(
     """Prepare a picture of a tiling with something on its tiles.
 
     Args:
-        tile: in memory, or a run's folder; see `with_map`.
-        settings: see `ArtSettings`.
-        picture: colours over the silhouette, see `read_picture`.
-        drawing: carried already; `read_over` gives either, and `notes`.
+        tile: A tile in memory, or a run's folder; see `with_map`.
+        settings: How it is drawn.
+        picture: A picture over the silhouette, as `read_over` returns it.
+        drawing: A drawing that is already carried onto the tile, as `read_over` returns it.
+        notes: What the user should know of picture or drawing.
 
     Raises:
-        OrbiflowError: for a picture or an eye where there is no map of the silhouette, an eye outside
-            it, too many tiles, and where no rectangle repeats.
+        OrbiflowError: If a picture or an eye is given but there is no map of the silhouette, an eye
+            lies outside it, there are too many tiles, or no rectangle repeats.
     """
     settings, tile = settings or ArtSettings(), with_map(tile)
     if picture is not None or drawing is not None or settings.eyes:
@@ -102,16 +102,16 @@ def artwork(
 
 
 def render_artwork(art: Artwork, *, cancel: Cancel | None = None) -> np.ndarray:
-    """The picture (height, width, 3), 8 bits, antialiased.
+    """Render the picture (height, width, 3) in 8 bits, antialiased.
 
     Raises:
-        Cancelled: if it was told to stop.
+        Cancelled: If it was cancelled.
     """
     return render_on(art, art.page, cancel=cancel)
 
 
 def render_on(art: Artwork, page: ArtPage, *, cancel: Cancel | None = None) -> np.ndarray:
-    """As `render_artwork`, of another part of the same plane."""
+    """Render another part of the same plane, as `render_artwork` does."""
     settings, chosen = art.settings, palette(art.settings.palette)
     grid = raster_grid(art)
     coloured = painted(art, grid).coloured(chosen, art.page.count)
@@ -119,12 +119,12 @@ def render_on(art: Artwork, page: ArtPage, *, cancel: Cancel | None = None) -> n
 
 
 def raster_grid(art: Artwork) -> Grid:
-    """The tile's raster, as fine as the page asks for."""
-    return Grid.over(art.page.tile.polygon, FINER * art.page.scale, art.page.count)
+    """Return the grid of the tile's raster, as fine as the page needs."""
+    return Grid.over(art.page.tile.polygon, TEXELS_PER_PIXEL * art.page.scale, art.page.count)
 
 
 def picture_paint(art: Artwork, grid: Grid) -> Paint:
-    """The tile's raster with nothing but the picture."""
+    """Paint the tile's raster with the picture alone."""
     paint = Paint(grid)
     if art.picture is None:
         return paint
@@ -134,7 +134,7 @@ def picture_paint(art: Artwork, grid: Grid) -> Paint:
 
 
 def painted(art: Artwork, grid: Grid) -> Paint:
-    """The tile's raster."""
+    """Paint the tile's raster with all that is on the tile."""
     polygon = art.page.tile.polygon
     paint = picture_paint(art, grid)
     if art.motif.parts:
@@ -146,6 +146,6 @@ def painted(art: Artwork, grid: Grid) -> Paint:
 
 
 def outlined(polygon: Array, width: float, art: Artwork) -> Motif:
-    """The line around a tile, half of its width inside."""
+    """Return the line around a tile, half of its width inside."""
     style = Style(None, palette(art.settings.palette).outline, width)
     return Motif((Part((Curve.polyline(polygon, closed=True),), style),))

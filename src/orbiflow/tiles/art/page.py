@@ -1,15 +1,16 @@
-"""Which copies of the tile a picture shows, where, and in which colours."""
+"""A picture's page: which copies of the tile it shows, in which colours, and the cell that repeats."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles.art.repeat import rectangle
 from orbiflow.tiles.art.settings import ArtSettings, check_size
 from orbiflow.tiles.exporting import longer_side
 from orbiflow.tiles.tile import EscherTile
@@ -20,22 +21,22 @@ from orbiflow.tiles.tilings import (
     copies_meeting,
 )
 
-USUAL = 25
-"""Tiles on a page whose tiles' size is not asked for."""
+USUAL_TILES = 25
+"""Number of tiles on a page if no size of a tile is given."""
 
 
 @dataclass(frozen=True, eq=False)
 class ArtPage:
-    """A picture's tiles.
+    """The tiles of a picture.
 
-    - `width`, `height`: in pixels.
-    - `tile`: in its own units.
-    - `copies`: of it: all that the picture shows, and some beyond.
-    - `linear`, `offset`: from there to pixels, y down.
-    - `colours`: (M,) number of each copy's colour.
-    - `count`: how many colours there are.
-    - `tile_size`: in pixels.
-    - `notes`: what the user should know.
+    - `width`, `height`: The picture's size in pixels.
+    - `tile`: The tile in its own units.
+    - `copies`: All copies that the picture shows, and some beyond.
+    - `linear`, `offset`: The map from the tile's units to pixels, y down.
+    - `colours`: The number (M,) of each copy's colour.
+    - `count`: The number of colours.
+    - `tile_size`: The size of a tile in pixels.
+    - `notes`: What the user should know.
     """
 
     width: int
@@ -51,21 +52,21 @@ class ArtPage:
 
     @property
     def scale(self) -> float:
-        """Pixels a unit."""
+        """Pixels per unit."""
         return float(np.sqrt(abs(np.linalg.det(self.linear))))
 
     @property
     def shown(self) -> float:
-        """How many tiles the picture has room for, by area."""
+        """The number of tiles that the picture has room for, by area."""
         return self.width * self.height / (self.scale**2 * abs(self.tile.signed_area))
 
     def rings(self) -> Array:
-        """(M, N, 2) the copies in pixels."""
+        """Return the copies (M, N, 2) in pixels."""
         return self.copies.images(self.tile.polygon) @ self.linear.T + self.offset
 
 
 class _Colours:
-    """How the copies of a tile are coloured, and which translations keep the colours."""
+    """A way to colour the copies of a tile, and the translations that keep the colours."""
 
     def __init__(self, tile: Tile, how: str) -> None:
         self.how = how
@@ -85,10 +86,10 @@ class _Colours:
 
 
 def art_page(given: EscherTile, settings: ArtSettings) -> ArtPage:
-    """Put the tile on a page of the settings' size, the way up it has; or make the repeating cell.
+    """Put the tile on a page of the settings' size, the same way up; or make the repeating cell.
 
     Raises:
-        OrbiflowError: for more tiles than can be drawn, and where no rectangle repeats.
+        OrbiflowError: If there are more tiles than can be drawn, or no rectangle repeats.
     """
     tile = given.tile
     colours = _Colours(tile, settings.colour)
@@ -106,23 +107,23 @@ def art_page(given: EscherTile, settings: ArtSettings) -> ArtPage:
         raise OrbiflowError(f"the cell that repeats is too large: {error}") from error
     offset = np.array([found.width, found.height]) / 2 - found.linear @ tile.center
     tiles = found.width * found.height / (abs(tile.signed_area) * abs(np.linalg.det(found.linear)))
-    said = f"the cell that repeats is {found.width} x {found.height} pixels and holds {tiles:.0f} tiles"
+    note = f"the cell that repeats is {found.width} x {found.height} pixels and holds {tiles:.0f} tiles"
     if abs(found.turn) > 0.05:
-        said += f"; the tiling is turned by {found.turn:.1f} degrees"
-    said += "; " + _strain_said(found.strain, exact=found.exact)
-    return _page(tile, colours, found.linear, offset, (found.width, found.height), (said,))
+        note += f"; the tiling is turned by {found.turn:.1f} degrees"
+    note += "; " + _strain_in_words(found.strain, exact=found.exact)
+    return _page(tile, colours, found.linear, offset, (found.width, found.height), (note,))
 
 
-def laid(
+def spread_page(
     page: ArtPage, given: EscherTile, settings: ArtSettings, across: int, down: int
 ) -> ArtPage:
-    """A page that shows a repeating cell's plane over `across` x `down` cells, made anew."""
+    """Return a page with the plane of a repeating cell over `across` x `down` cells, computed anew."""
     colours = _Colours(given.tile, settings.colour)
     size = page.width * across, page.height * down
     return _page(given.tile, colours, page.linear, page.offset, size, ())
 
 
-def _strain_said(strain: float, *, exact: bool) -> str:
+def _strain_in_words(strain: float, *, exact: bool) -> str:
     if strain < 1e-9:
         return "nothing is stretched"
     share = f"{100 * strain:.2g} %" if strain >= 5e-5 else "less than 0.01 %"
@@ -133,7 +134,7 @@ def _strain_said(strain: float, *, exact: bool) -> str:
 
 def _scale(tile: Tile, settings: ArtSettings) -> float:
     width, height = settings.size
-    return float(np.sqrt(width * height / USUAL / abs(tile.signed_area)))
+    return float(np.sqrt(width * height / USUAL_TILES / abs(tile.signed_area)))
 
 
 def _page(
@@ -146,7 +147,7 @@ def _page(
 ) -> ArtPage:
     width, height = size
     corners = np.array([[0.0, 0.0], [width, 0.0], [0.0, height], [width, height]])
-    # a margin: outlines of tiles just beyond the edge reach in
+    # a margin, for outlines of tiles just beyond the edge reach in
     corners += np.sign(corners - 1) * 2.0
     there = (corners - offset) @ np.linalg.inv(linear).T
     copies = copies_meeting(tile, (*there.min(axis=0), *there.max(axis=0)))
@@ -163,3 +164,135 @@ def _page(
         scale * longer_side(tile.polygon),
         notes,
     )
+
+
+REACH = 14
+"""Greatest multiple of a basis vector that is tried."""
+
+LARGEST = 60
+"""Greatest number of lattice cells in a rectangle."""
+
+EXACT = 1e-6
+"""Strain up to which a rectangle counts as exact: that of rounding."""
+
+LARGEST_EXACT = 8
+"""Number of lattice cells up to which an exact rectangle is preferred to a smaller inexact one."""
+
+SLENDER = 4.0
+"""Ratio of its sides beyond which a rectangle counts as larger than it is."""
+
+SIZE_TOLERANCE = 0.02
+"""Greatest relative change of the size so that the cell is whole pixels."""
+
+
+class Rectangle(NamedTuple):
+    """A rectangular cell of whole pixels that repeats.
+
+    - `linear`: The map (2, 2) from the lattice's units to pixels: a similarity, but for `strain`.
+    - `width`, `height`: The size in pixels.
+    - `cells`: The number of lattice cells in it.
+    - `strain`: How much longer one direction became than another; 0 for a similarity.
+    - `turn`: The angle in degrees, -45 to 45, by which the lattice is turned.
+    - `exact`: Whether it is a rectangle of the lattice: then only whole pixels strain it.
+    """
+
+    linear: Array
+    width: int
+    height: int
+    cells: int
+    strain: float
+    turn: float
+    exact: bool
+
+
+def rectangle(lattice: Array, scale: float, tolerance: float, *, flipped: bool) -> Rectangle:
+    """Find the smallest rectangle of lattice vectors that repeats, in pixels.
+
+    An exact rectangle is preferred if it is not much larger.
+
+    Args:
+        lattice: The basis vectors as columns (2, 2).
+        scale: The approximate number of pixels per unit.
+        tolerance: The greatest strain by which a parallelogram may be made a rectangle.
+        flipped: Whether y points up in the lattice's units, so that the picture is flipped.
+
+    Raises:
+        OrbiflowError: If there is none.
+
+    >>> found = rectangle(np.array([[1.0, 0.5], [0.0, 0.75**0.5]]), 100, 0.02, flipped=False)
+    >>> found.width, found.height, found.cells, abs(found.turn) < 1e-9, found.strain < 4e-4
+    (101, 175, 2, True, True)
+    """
+    upright = np.diag([1.0, -1.0 if flipped else 1.0]) @ lattice
+    best = _best_pair(upright, tolerance)
+    if best is None:
+        raise OrbiflowError(
+            f"no rectangle of up to {LARGEST} cells repeats within a strain of {tolerance:.3g}; "
+            "allow a larger tolerance"
+        )
+    pair, cells = best
+    along, up = pair[:, 0], pair[:, 1]
+    width, height = _whole(float(np.hypot(*along)), float(np.hypot(*up)), scale)
+    linear = np.diag([float(width), float(height)]) @ np.linalg.inv(pair)
+    exact = _strain(_squared(pair)) <= EXACT
+    turn = math.degrees(math.atan2(along[1], along[0]))
+    flip = np.diag([1.0, -1.0 if flipped else 1.0])
+    return Rectangle(linear @ flip, width, height, cells, _strain(linear), -turn, exact)
+
+
+def _best_pair(lattice: Array, tolerance: float) -> tuple[Array, int] | None:
+    """Return two vectors nearly at a right angle, the first nearest to x, and their number of cells."""
+    steps = np.arange(-REACH, REACH + 1)
+    combos = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
+    combos = combos[np.gcd(combos[:, 0], combos[:, 1]) == 1]
+    vectors = combos @ lattice.T
+    length = np.hypot(*vectors.T)
+    # the first vector within 45 degrees of x
+    first = np.flatnonzero((vectors[:, 0] > 0) & (abs(vectors[:, 1]) <= vectors[:, 0] * (1 + 1e-9)))
+    first = first[np.argsort(length[first], kind="stable")][:200]
+    cross = vectors[first, 0][:, None] * vectors[:, 1] - vectors[first, 1][:, None] * vectors[:, 0]
+    dot = vectors[first] @ vectors.T
+    cells = np.rint(cross / abs(np.linalg.det(lattice))).astype(int)
+    sine = abs(dot) / (length[first][:, None] * length)
+    # a shear by the angle's cotangent stretches one direction by about as much
+    fits = (cells >= 1) & (cells <= LARGEST) & (sine <= min(2 * tolerance + EXACT, 0.5))
+    found = np.argwhere(fits)
+    if not len(found):
+        return None
+    options = []
+    for i, j in found:
+        pair = np.stack([vectors[first[i]], vectors[j]], axis=1)
+        strain = _strain(_squared(pair))
+        if strain <= tolerance + EXACT:
+            exact = strain <= EXACT and cells[i, j] <= LARGEST_EXACT
+            turn = abs(math.atan2(pair[1, 0], pair[0, 0]))
+            long = max(ratio := length[j] / length[first[i]], 1 / ratio) / SLENDER
+            weight = round(float(cells[i, j] * max(1.0, long)), 9)
+            options.append((not exact, weight, round(turn, 9), strain, i, j))
+    if not options:
+        return None
+    *_, i, j = min(options)
+    return np.stack([vectors[first[i]], vectors[j]], axis=1), int(cells[i, j])
+
+
+def _squared(pair: Array) -> Array:
+    """Return the map that makes a pair of vectors a rectangle of their lengths."""
+    return np.diag(np.hypot(*pair)) @ np.linalg.inv(pair)
+
+
+def _strain(linear: Array) -> float:
+    values = np.linalg.svd(linear, compute_uv=False)
+    return float(values[0] / values[1] - 1)
+
+
+def _whole(along: float, up: float, scale: float) -> tuple[int, int]:
+    """Return whole sides near the given size whose ratio is nearest to the true one."""
+    ideal = max(1, round(along * scale))
+    reach = max(1, int(SIZE_TOLERANCE * ideal))
+    widths = np.arange(max(1, ideal - reach), ideal + reach + 1)
+    exact = widths * up / along
+    heights = np.maximum(1, np.rint(exact))
+    # a slightly better ratio is not worth another size
+    error = np.round(abs(heights / exact - 1), 5)
+    best = np.lexsort((abs(widths - ideal), error))[0]
+    return int(widths[best]), int(heights[best])

@@ -1,4 +1,4 @@
-"""A page of copies as pixels: each sample looked up in the tile's raster."""
+"""Pixels of a page: every sample is looked up in a raster of the tile, which is painted once."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from orbiflow.runtime import Cancel
 from orbiflow.tiles.art.page import ArtPage
 
 NOWHERE = -1
-"""Label of samples that lie in no region."""
+"""The label of samples that lie in no region."""
 
 NUDGE = 3.1415926e-7
-"""How far down rows of samples lie from where they should, in samples: vertices that a symmetric
-placement puts exactly on a row would else be decided by rounding."""
+"""Distance, in samples, by which rows of samples are moved down: rounding would otherwise decide about
+vertices that a symmetric placement puts exactly on a row."""
 
 
 class Runs(NamedTuple):
-    """Samples of some rows in one region each, row by row, from left to right.
+    """R runs of samples, each in one region, row by row and from left to right.
 
-    - `label`: (R,) the region, or `NOWHERE`.
-    - `row`: (R,) counted from 0.
-    - `start`: (R,) first column.
-    - `length`: (R,) samples; those of a row come to its width.
+    - `label`: The region (R,), or `NOWHERE`.
+    - `row`: The row (R,), counted from 0.
+    - `start`: The first column (R,).
+    - `length`: The number (R,) of samples; those of a row add up to its width.
     """
 
     label: Integers
@@ -38,15 +38,15 @@ class Runs(NamedTuple):
     length: Integers
 
     def spread(self, values: NDArray) -> NDArray:
-        """One value a sample, (rows x width,), from one a run."""
+        """Return one value for each sample (rows x width,) from one for each run."""
         return np.repeat(values, self.length)
 
 
 class Sides(NamedTuple):
     """Sides of regions, each with the region to its right, at larger x.
 
-    - `start`, `end`: (S, 2) in samples, y down: sample (i, j) lies at (j + 1/2, i + 1/2).
-    - `label`: (S,)
+    - `start`, `end`: The ends (S, 2) in samples, y down: sample (i, j) lies at (j + 1/2, i + 1/2).
+    - `label`: The region (S,).
     """
 
     start: Array
@@ -55,7 +55,7 @@ class Sides(NamedTuple):
 
 
 def ring_sides(rings: Array) -> Sides:
-    """The sides of rings (M, N, 2) that have the inside to their right; ring m has label m."""
+    """Return the sides of rings (M, N, 2) that have the inside to their right; ring m has label m."""
     ahead = np.roll(rings, -1, axis=1)
     area = (rings[..., 0] * ahead[..., 1] - rings[..., 1] * ahead[..., 0]).sum(axis=1)
     entering = (ahead[..., 1] - rings[..., 1]) * np.sign(area)[:, None] < 0
@@ -63,7 +63,7 @@ def ring_sides(rings: Array) -> Sides:
 
 
 def polygon_sides(ring: Array) -> Sides:
-    """All sides of one ring (N, 2): 0 where they enter it, `NOWHERE` where they leave it."""
+    """Return the sides of one ring (N, 2): 0 where they enter it, `NOWHERE` where they leave it."""
     ahead = np.roll(ring, -1, axis=0)
     area = (ring[:, 0] * ahead[:, 1] - ring[:, 1] * ahead[:, 0]).sum()
     entering = (ahead[:, 1] - ring[:, 1]) * np.sign(area) < 0
@@ -71,10 +71,10 @@ def polygon_sides(ring: Array) -> Sides:
 
 
 def triangle_sides(points: Array, triangles: Integers) -> Sides:
-    """The sides of triangles (M, 3) that none of them folds over, and of what lies around them."""
+    """Return the sides of triangles (M, 3) that do not overlap, and of what lies around them."""
     corners = points[triangles]
     inner = ring_sides(corners)
-    # a side of one triangle alone is the border: beyond it is nowhere
+    # a side of a single triangle is the border, and beyond it is nowhere
     pairs = np.concatenate([triangles[:, [k, (k + 1) % 3]] for k in range(3)])
     keys = np.sort(pairs, axis=1) @ np.array([len(points), 1])
     _, first, count = np.unique(keys, return_index=True, return_counts=True)
@@ -92,11 +92,10 @@ def triangle_sides(points: Array, triangles: Integers) -> Sides:
 
 
 def runs(sides: Sides, top: int, rows: int, width: int) -> Runs:
-    """The runs of `rows` rows of `width` samples from row `top`; rows are counted from there.
+    """Return the runs of `rows` rows of `width` samples from row `top`, with rows counted from there.
 
-    Each side is crossed by the rows between its ends, and a sample belongs to the region entered at
-    the last crossing to its left. A side that two regions share enters one of them: so every sample
-    of a partition is in exactly one.
+    A sample belongs to the region entered at the last crossing to its left with a side. A side that
+    two regions share enters one of them, so every sample of a partition is in exactly one region.
 
     >>> square = np.array([[[1.0, 0.0], [3.0, 0.0], [3.0, 2.0], [1.0, 2.0]]])
     >>> left = square - (2.0, 0.0)
@@ -129,22 +128,22 @@ def runs(sides: Sides, top: int, rows: int, width: int) -> Runs:
 
 
 MARGIN = 3
-"""Texels around the tile."""
+"""Width in texels of the margin around the tile."""
 
 MOST_TEXELS = 20_000_000
-"""Of the rasters of all colours together."""
-
+"""Greatest number of texels in the rasters of all colours together."""
 
 _AROUND = ((-1, -1), (-1, 1), (1, -1), (1, 1), (-1, 0), (1, 0), (0, -1), (0, 1))
-"""The neighbours of a texel, those that share a side last: theirs is what counts."""
+"""The neighbours of a texel, those that share a side last, for the last one counts."""
 
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """Texels over a tile: texel (i, j) lies at corner + (j + 1/2, i + 1/2) / density.
+    """A grid of texels over a tile: texel (i, j) lies at corner + (j + 1/2, i + 1/2) / density.
 
-    - `corner`: (2,) in the tile's units. `density`: texels a unit.
-    - `width`, `height`: in texels.
+    - `corner`: The corner (2,) in the tile's units.
+    - `density`: Texels per unit.
+    - `width`, `height`: The size in texels.
     """
 
     corner: Array
@@ -154,7 +153,7 @@ class Grid:
 
     @classmethod
     def over(cls, ring: Array, density: float, colours: int) -> Grid:
-        """Over a ring (N, 2), at most as dense as `MOST_TEXELS` allow for so many colours."""
+        """Return a grid over a ring (N, 2), no denser than `MOST_TEXELS` allow for so many colours."""
         size = np.ptp(ring, axis=0)
         most = float(np.sqrt(MOST_TEXELS / colours / size.prod()))
         density = min(density, most)
@@ -162,20 +161,20 @@ class Grid:
         return cls(ring.min(axis=0) - MARGIN / density, density, int(width), int(height))
 
     def texels(self, points: Array) -> Array:
-        """Where points (..., 2) of the tile's units lie."""
+        """Return points (..., 2) of the tile's units in texels."""
         return (points - self.corner) * self.density
 
     def inside(self, ring: Array) -> NDArray[np.bool_]:
-        """(height, width) which texels have their middle in the ring."""
+        """Return which texels (height, width) have their middle in the ring."""
         found = runs(polygon_sides(self.texels(ring)), 0, self.height, self.width)
         return found.spread(found.label >= 0).reshape(self.height, self.width)
 
 
 class Paint:
-    """Five channels (height, width, 5) of a tile: how each texel's colour is mixed.
+    """The painting of a tile in five channels (height, width, 5), from which colours are mixed.
 
-    Red, green and blue, 0 to 1, already times their share; then the share of the tile's own colour
-    and of its ink: colour = rgb + own * tile + ink * ink's.
+    They are red, green and blue, 0 to 1, already times their share; then the shares of the tile's own
+    colour and of its ink.
     """
 
     def __init__(self, grid: Grid) -> None:
@@ -184,21 +183,21 @@ class Paint:
         self.values[..., 3] = 1.0
 
     def lay(self, rgb: Array, alpha: Array) -> None:
-        """Colours over all: rgb (height, width, 3) times alpha already, alpha (height, width)."""
+        """Lay colours over all: `rgb` (height, width, 3), already times `alpha` (height, width)."""
         self.values *= (1 - alpha)[..., None]
         self.values[..., :3] += rgb
 
     def ink(self, alpha: Array) -> None:
-        """Ink over all, (height, width)."""
+        """Lay ink over all, with this opacity (height, width)."""
         self.values *= (1 - alpha)[..., None]
         self.values[..., 4] += alpha
 
     def line(self, colour: str, alpha: Array) -> None:
-        """One colour over all, (height, width)."""
+        """Lay one colour over all, with this opacity (height, width)."""
         self.lay(alpha[..., None] * rgb_of(colour).astype(np.float32), alpha)
 
     def bleed(self, inside: NDArray[np.bool_]) -> None:
-        """The texels around become what lies next to them inside: all that lookups blend in."""
+        """Copy colours from just inside to the texels around, which lookups blend in."""
         known = inside.copy()
         for _ in range(MARGIN - 1):
             wider = np.asarray(binary_dilation(known, np.ones((3, 3), dtype=int)), dtype=bool)
@@ -211,7 +210,7 @@ class Paint:
             known[rows, columns] = True
 
     def coloured(self, palette: Palette, colours: int) -> Array:
-        """(colours, height, width, 3) the raster in each colour of the palette."""
+        """Return the raster (colours, height, width, 3) in each colour of the palette."""
         rgb, own, ink = self.values[..., :3], self.values[..., 3:4], self.values[..., 4:]
         return np.stack(
             [
@@ -224,12 +223,12 @@ class Paint:
 
 
 def rgb_of(colour: str) -> Array:
-    """(3,) of #rrggbb, 0 to 1."""
+    """Return the colour #rrggbb as three numbers (3,) from 0 to 1."""
     return np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)]) / 255
 
 
 BAND = 2_000_000
-"""Samples that are worked on at a time."""
+"""Number of samples that are computed at a time."""
 
 
 def render_page(
@@ -241,14 +240,17 @@ def render_page(
     samples: int,
     cancel: Cancel | None = None,
 ) -> np.ndarray:
-    """The picture (height, width, 3), 8 bits.
+    """Return the picture of a page (height, width, 3) in 8 bits.
 
     Every sample belongs to exactly one copy of the tile; a pixel is the mean of its samples.
 
     Args:
-        grid, coloured: the tile's raster (colours, height, width, 3), see `Paint.coloured`.
-        paper: colour where there is no tile.
-        samples: along each side of a pixel.
+        page: The copies of the tile.
+        grid: The grid of the tile's raster.
+        coloured: The raster (colours, height, width, 3), as `Paint.coloured` returns it.
+        paper: The colour where there is no tile.
+        samples: The number of samples along each side of a pixel.
+        cancel: Stops the work.
     """
     cancel = cancel or Cancel()
     look = _Lookup(page, grid, coloured, paper, samples)
@@ -270,7 +272,7 @@ def render_page(
 
 
 class _Lookup:
-    """From samples in a copy each to the raster's colours."""
+    """The colours of samples, each in one copy of the tile, from the tile's raster."""
 
     def __init__(
         self, page: ArtPage, grid: Grid, coloured: Array, paper: str, samples: int
@@ -297,7 +299,7 @@ class _Lookup:
         self.offset = np.concatenate([self.offset, [[width / 2, count * height + 4.0]]])
 
     def __call__(self, found: Runs, top: int) -> torch.Tensor:
-        """(3, samples) colours, row by row."""
+        """Return the samples' colours (3, samples), row by row."""
         kept = found.length > 0
         own = Runs(*(part[kept] for part in found))
         linear, offset = self.linear[own.label], self.offset[own.label]

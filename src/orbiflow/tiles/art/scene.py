@@ -1,4 +1,4 @@
-"""Artwork as a scene: the drawing once, a use of it for each copy, a layer a colour."""
+"""Artwork as a file: pixels, or a scene with the drawing once and a use of it for each copy."""
 
 from __future__ import annotations
 
@@ -43,22 +43,22 @@ TILE, MOTIF = "tile", "motif"
 
 
 def art_scene(art: Artwork) -> Scene:
-    """The page in millimetres, as `render_artwork` draws it.
+    """Return the page in millimetres, as `render_artwork` draws it.
 
-    A picture of pixels becomes one inside the drawing, carried already.
+    A picture of pixels becomes part of the drawing, already carried onto the tile.
     """
     page, chosen = art.page, palette(art.settings.palette)
     unit = INCH / art.settings.dpi  # a pixel in mm
     linear, offset = unit * page.linear, unit * page.offset
     tile = page.tile
-    # about the tile's own middle: transforms are then rounded least
+    # relative to the tile's own middle, so that rounding transforms moves points least
     middle = tile.center
     symbol = Curve.polyline(tile.polygon - middle, closed=True)
     motif = Motif(art.motif.parts, _rasters(art), TILE).moved(np.eye(2), -middle)
     copies = page.copies
     turned = linear @ tile.group.linear_parts
     places = copies.translations @ linear.T + offset + (turned @ middle)[copies.cosets]
-    # symbols in mm, so that decimals suit them
+    # symbols in mm, for which the writer's decimals are meant
     scale = unit * page.scale
     turned = turned / scale
     symbols = {TILE: symbol.moved(scale * np.eye(2), np.zeros(2))}
@@ -70,7 +70,7 @@ def art_scene(art: Artwork) -> Scene:
     for colour in sorted(set(page.colours.tolist())):
         own = page.colours == colour
         fill, name = chosen.fill(colour), f"colour {colour + 1}"
-        # a hair of the tile's own colour closes the seams that viewers leave between neighbours
+        # a hairline in the tile's own colour closes the seams that viewers leave between neighbours
         style = Style(fill, fill, 0.3 * unit)
         uses = Uses(TILE, turned, copies.cosets[own], places[own])
         layers.append(Layer(name, "tiles", style, (uses,), clipped=True))
@@ -111,14 +111,15 @@ def _rasters(art: Artwork) -> tuple[Raster, ...]:
 
 
 def write_artwork(art: Artwork, ending: str, *, cancel: Cancel | None = None) -> bytes | str:
-    """The contents of a file.
+    """Return the content of a file.
 
     Args:
-        art: see `artwork`.
-        ending: ".svg", or ".png" for pixels.
+        art: The artwork.
+        ending: The file's ending: ".svg", or ".png" for pixels.
+        cancel: Stops the work.
 
     Raises:
-        Cancelled: if it was told to stop.
+        Cancelled: If it was cancelled.
     """
     if ending.lower() == ".svg":
         return write_svg(art_scene(art))
@@ -176,7 +177,7 @@ def draw_art(
 
 
 def png_of(pixels: np.ndarray, dpi: float) -> bytes:
-    """Pixels (height, width, 3) as a PNG that says how large they are."""
+    """Return pixels (height, width, 3) as a PNG that gives their resolution."""
     buffer = io.BytesIO()
     Image.fromarray(pixels).save(buffer, "PNG", dpi=(dpi, dpi), compress_level=5)
     return buffer.getvalue()

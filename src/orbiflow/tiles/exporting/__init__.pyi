@@ -1,7 +1,7 @@
-from .curves import Curve as Curve
 from .layouts import longer_side as longer_side
 from .scene import INK as INK
 from .scene import Box as Box
+from .scene import Curve as Curve
 from .scene import Layer as Layer
 from .scene import Motif as Motif
 from .scene import Part as Part
@@ -9,11 +9,11 @@ from .scene import Raster as Raster
 from .scene import Scene as Scene
 from .scene import Style as Style
 from .scene import Uses as Uses
+from .scene import rectangle as rectangle
 from .settings import ExportSettings as ExportSettings
 from .svg import tile_svg as tile_svg
 from .svg import tiling_svg as tiling_svg
-from .svg_writer import write_svg as write_svg
-from .tiling_scenes import rectangle as rectangle
+from .svg import write_svg as write_svg
 from .writers import INCH as INCH
 from .writers import curves_path as curves_path
 from .writers import write_dxf as write_dxf

@@ -1,4 +1,4 @@
-"""A tile in millimetres, in its place on the page."""
+"""A tile in millimetres in its place on the page, and the copies of it, each in its colour."""
 
 from __future__ import annotations
 
@@ -8,15 +8,12 @@ import numpy as np
 import shapely
 
 from orbiflow.arrays import Array
+from orbiflow.drawing import palette
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.exporting.outlines import Outline, outline
-from orbiflow.tiles.exporting.scene import Box, PlacedTile
+from orbiflow.tiles.exporting.scene import Box, Layer, PlacedTile, Scene, Style, Uses, rectangle
 from orbiflow.tiles.exporting.settings import ExportSettings
-from orbiflow.tiles.tilings import (
-    Copies,
-    Tile,
-    copies_inside,
-)
+from orbiflow.tiles.tilings import Copies, Tile, colouring, copies_inside, copies_meeting
 
 STRIP = 8.0
 """Height in mm of the strip at the page's foot that the calibration mark has for itself."""
@@ -24,13 +21,13 @@ STRIP = 8.0
 
 @dataclass(frozen=True, eq=False)
 class Layout:
-    """What every kind of export starts from.
+    """A tile's place on the page, from which every kind of export starts.
 
-    - `settings`: as they were given.
-    - `tile`: in mm on the page, y down.
-    - `outline`: its curves.
-    - `box`: the part of the page that tiles may use.
-    - `notes`: what the user should know.
+    - `settings`: The settings as they were given.
+    - `tile`: The tile in mm on the page, y down.
+    - `outline`: The tile's curves.
+    - `box`: The part of the page that tiles may use.
+    - `notes`: What the user should know.
     """
 
     settings: ExportSettings
@@ -40,24 +37,26 @@ class Layout:
     notes: tuple[str, ...]
 
 
-STEPS = 10
+SHIFTS = 10
 """Places along each side of a lattice cell that are tried for a page with most whole tiles."""
 
-MANY = 1000
-"""Tiles on a page beyond which a few more are not worth looking for."""
+MOST_TILES_TO_SHIFT = 1000
+"""Number of tiles on a page beyond which a few more are not worth looking for."""
 
 
 def layout(tile: Tile, settings: ExportSettings, *, y_down: bool) -> Layout:
-    """Scale the tile and put it on the page, the way up it has.
+    """Scale the tile and put it on the page, the same way up.
 
-    In the middle; where tiles are not cut at the page's edge, nearby, so that most are whole.
+    It lies in the middle; where tiles are not cut at the page's edge, it lies nearby, so that as many
+    as possible are whole.
 
     Args:
-        tile: in any units.
-        y_down: whether its y axis points down.
+        tile: The tile, in any units.
+        settings: How it is exported.
+        y_down: Whether its y axis points down.
 
     Raises:
-        OrbiflowError: for a page that is smaller than the tile.
+        OrbiflowError: If the page is smaller than the tile.
     """
     width, height = settings.page
     box = Box(0.0, 0.0, width, height - (STRIP if settings.calibrate else 0.0))
@@ -74,15 +73,15 @@ def layout(tile: Tile, settings: ExportSettings, *, y_down: bool) -> Layout:
 
 
 def longer_side(ring: Array) -> float:
-    """Longer side of a ring's smallest rectangle, turned as it may be."""
+    """Return the longer side of the smallest rectangle, however turned, around a ring."""
     return rectangle_sides(ring)[1]
 
 
 def rectangle_sides(ring: Array) -> tuple[float, float]:
-    """Sides of a ring's smallest rectangle by area, the shorter first.
+    """Return the sides of the smallest rectangle by area around a ring, the shorter first.
 
-    Of rectangles that are as small, as a regular hexagon has, the one with the shortest sides: which
-    of them comes out must not depend on rounding.
+    Among rectangles of the same area, as around a regular hexagon, it is the one with the shortest
+    sides, so that the choice does not depend on rounding.
 
     >>> square = np.array([[0.0, 0.0], [1.0, 1.0], [0.0, 2.0], [-1.0, 1.0]])
     >>> [round(side, 6) for side in rectangle_sides(square)]
@@ -100,22 +99,22 @@ def rectangle_sides(ring: Array) -> tuple[float, float]:
 
 
 def bleed(settings: ExportSettings) -> float:
-    """How far in mm a line may reach beyond its tile's polygon."""
+    """Return how far in mm a line may reach beyond its tile's polygon."""
     return settings.deviation + (settings.stroke_width or 0.25) / 2
 
 
 def inner_box(box: Box, settings: ExportSettings) -> Box:
-    """Where polygons lie whose lines are all in the box."""
+    """Return the box for polygons whose lines are to lie in `box`."""
     margin = bleed(settings)
     return Box(box.left + margin, box.top + margin, box.right - margin, box.bottom - margin)
 
 
 def _with_most_whole(tile: Tile, box: Box) -> Tile:
-    """The tile moved so that most copies lie in the box whole; as it is where none is better."""
-    if box.width * box.height > MANY * abs(tile.signed_area):
+    """Return the tile moved so that as many copies as possible are whole, or as it is."""
+    if box.width * box.height > MOST_TILES_TO_SHIFT * abs(tile.signed_area):
         return tile
     best, shift = len(copies_inside(tile, box)), np.zeros(2)
-    shares = np.arange(STEPS) / STEPS
+    shares = np.arange(SHIFTS) / SHIFTS
     grid = np.stack(np.meshgrid(shares, shares), axis=-1).reshape(-1, 2)
     for step in grid @ tile.group.lattice.T:
         moved = (box.left - step[0], box.top - step[1], box.right - step[0], box.bottom - step[1])
@@ -138,11 +137,14 @@ def _check_room(tile: Tile, settings: ExportSettings, box: Box) -> None:
     )
 
 
-def placed_tiles(copies: Copies, layout: Layout, whole: Array) -> tuple[PlacedTile, ...]:
-    """What the JSON file says of each copy."""
+def placed_tiles(copies: Copies, layout: Layout) -> tuple[PlacedTile, ...]:
+    """Return what the JSON file says about each copy."""
     own = layout.outline.edges
     beyond = np.zeros((len(copies), 0), int) if own is None else copies.neighbours(own.across)
     linear = copies.group.linear_parts
+    rings = copies.images(layout.tile.polygon)
+    low, high = rings.min(axis=1), rings.max(axis=1)
+    whole = ((low >= layout.box[:2]) & (high <= layout.box[2:])).all(axis=1)
     return tuple(
         PlacedTile(
             int(coset),
@@ -155,3 +157,65 @@ def placed_tiles(copies: Copies, layout: Layout, whole: Array) -> tuple[PlacedTi
             copies.cosets, copies.translations, beyond.tolist(), whole, strict=True
         )
     )
+
+
+SYMBOL = "tile"
+
+
+def chosen_copies(layout: Layout) -> Copies:
+    """Return the copies on the page: those that meet it if it clips, else the whole ones."""
+    settings, box = layout.settings, layout.box
+    if settings.clip:
+        return copies_meeting(layout.tile, box)
+    return copies_inside(layout.tile, inner_box(box, settings))
+
+
+def tiling_scene(layout: Layout) -> Scene:
+    """Return a scene with the tile as a symbol, a use of it for each copy, a layer for each colour.
+
+    Raises:
+        OrbiflowError: If the page holds too many tiles.
+    """
+    settings = layout.settings
+    copies = chosen_copies(layout)
+    # relative to the symbol's own middle, so that rounding a transform moves no point by much
+    middle = layout.tile.center
+    symbol = layout.outline.closed.moved(np.eye(2), -middle)
+    turned = np.einsum("aij,j->ai", copies.group.linear_parts, middle)
+    offsets = copies.translations + turned[copies.cosets]
+    chosen = palette(settings.palette)
+    if settings.filled:
+        colours = colouring(layout.tile).colours(copies)
+    else:
+        colours = np.zeros(len(copies), dtype=np.int64)
+    layers = []
+    for colour in range(int(colours.max(initial=0)) + 1):
+        own = colours == colour
+        uses = Uses(SYMBOL, copies.group.linear_parts, copies.cosets[own], offsets[own])
+        name = f"colour {colour + 1}" if settings.filled else "tiles"
+        style = Style(
+            chosen.fill(colour) if settings.filled else None,
+            settings.stroke or (chosen.outline if settings.filled else "#000000"),
+            settings.stroke_width or 0.25,
+        )
+        layers.append(Layer(name, "tiles", style, (uses,), clipped=settings.clip))
+    box = layout.box
+    if settings.filled:
+        layers.insert(0, Layer("paper", "paper", Style(fill=chosen.paper), (rectangle(box),)))
+    return Scene(
+        *settings.page,
+        tuple(layers),
+        {SYMBOL: symbol},
+        window=box,
+        prototile=layout.tile.polygon,
+        tiles=placed_tiles(copies, layout),
+    )
+
+
+RED = "#ff0000"
+
+
+def line_style(layout: Layout) -> Style:
+    """Return the style of lines to cut."""
+    settings = layout.settings
+    return Style(None, settings.stroke or RED, settings.stroke_width or 0.1)

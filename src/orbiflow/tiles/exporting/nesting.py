@@ -1,8 +1,8 @@
-"""The densest of some simple lattice arrangements of a piece, and how many of it a sheet holds.
+"""Dense lattice arrangements of a piece, and the sheets that are filled with them.
 
-Three kinds of start: the tile's own tiling spread apart, which is dense wherever the gap is small; a
-lattice of pieces all one way up; and a lattice of pairs, one of each turned by 180 degrees. Each is
-drawn tight and then bettered by small random changes.
+There are three kinds of start: the tile's own tiling spread apart, which is dense where the gap is
+small; a lattice of pieces all one way up; and a lattice of pairs, one of each turned by 180 degrees.
+Each is made as tight as the gap allows, then improved by small random changes.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from orbiflow.tiles.tilings import Tile
 
 @dataclass(frozen=True, eq=False)
 class Arrangement:
-    """A pieces in each cell of a lattice.
+    """An arrangement of pieces, A of them in each cell of a lattice.
 
-    - `lattice`: (2, 2), basis vectors as columns, in mm.
-    - `linear`: (A, 2, 2) how each piece of a cell is turned or mirrored.
-    - `offsets`: (A, 2) where it is: a point p of the piece goes to linear p + offset.
+    - `lattice`: The basis vectors in mm, as columns (2, 2).
+    - `linear`: How each piece of a cell is turned or mirrored (A, 2, 2).
+    - `offsets`: Where each piece is (A, 2): a point p of the piece goes to linear p + offset.
     """
 
     lattice: Array
@@ -34,7 +34,7 @@ class Arrangement:
     offsets: Array
 
     def scaled(self, stretch: Array, middle: Array) -> Arrangement:
-        """The pieces' middles moved by the linear map `stretch` (2, 2), the pieces kept."""
+        """Return the arrangement with the pieces' middles moved by the linear map `stretch` (2, 2)."""
         centers = self.linear @ middle + self.offsets
         return Arrangement(
             stretch @ self.lattice,
@@ -43,17 +43,17 @@ class Arrangement:
         )
 
     def turned(self, angle: float) -> Arrangement:
-        """All of it turned about the origin by an angle in radians."""
+        """Return the arrangement turned about the origin by an angle in radians."""
         turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
         return Arrangement(turn @ self.lattice, turn @ self.linear, self.offsets @ turn.T)
 
     @cached_property
     def cell_area(self) -> float:
-        """Area of the sheet that one piece takes."""
+        """The area of the sheet that one piece takes."""
         return float(abs(np.linalg.det(self.lattice))) / len(self.linear)
 
     def clear(self, ring: Array, gap: float) -> bool:
-        """Whether no two pieces with the outline `ring` come closer than `gap`."""
+        """Return whether no two pieces with the outline `ring` come closer than `gap`."""
         pieces = self._own(ring)
         reach = float(np.linalg.norm(ring - _middle(ring), axis=1).max())
         centers = self.linear @ _middle(ring) + self.offsets
@@ -77,7 +77,7 @@ class Arrangement:
         ]
 
     def _steps(self, reach: float, centers: Array) -> Array:
-        """Integer coordinates of all lattice vectors that can bring two pieces together."""
+        """Return the integer coordinates of all lattice vectors that can bring two pieces together."""
         far = reach + float(np.ptp(centers, axis=0).max()) * 1.5
         bound = np.ceil(far * np.linalg.norm(np.linalg.inv(self.lattice), axis=1)).astype(int)
         bound = np.minimum(bound, 40)
@@ -92,7 +92,7 @@ class Arrangement:
 
 
 def tightened(start: Arrangement, ring: Array, gap: float, *, most: float = 4.0) -> Arrangement:
-    """The arrangement, its pieces' middles moved apart (or together) evenly until just clear."""
+    """Move the pieces' middles evenly, apart or together, until the pieces are just clear."""
     middle = _middle(ring)
     low, high = 0.0, 1.0
     while not start.scaled(high * np.eye(2), middle).clear(ring, gap):
@@ -122,17 +122,17 @@ CELLS = 48
 """Raster cells along a piece."""
 
 DIRECTIONS = 30
-"""Of a lattice's first vector that are tried."""
+"""Directions of a lattice's first vector that are tried."""
 
 PAIRS = 24
 """Places of the turned piece of a pair that are tried."""
 
 KEPT_LATTICES = 3
-"""Best lattices that are handed on, to be drawn tight exactly."""
+"""Number of best lattices that are then tightened exactly."""
 
 
 def lattice_starts(ring: Array, gap: float) -> list[Arrangement]:
-    """Dense lattices of the piece, roughly."""
+    """Return dense lattices of the piece, to the raster's precision."""
     raster = _Raster(ring, gap)
     found = raster.lattices(raster.same, 1)
     still = np.eye(2)[None]
@@ -140,7 +140,7 @@ def lattice_starts(ring: Array, gap: float) -> list[Arrangement]:
 
 
 def pair_starts(ring: Array, gap: float) -> list[Arrangement]:
-    """Dense lattices of pairs of the piece and the piece turned by 180 degrees, roughly."""
+    """Return dense lattices of pairs, the piece and the piece turned by 180 degrees."""
     raster = _Raster(ring, gap)
     found = []
     for place in raster.edge_of(raster.turned):
@@ -159,7 +159,7 @@ def pair_starts(ring: Array, gap: float) -> list[Arrangement]:
 
 
 class _Raster:
-    """The piece, its no-fit regions with itself and with itself turned, on square cells."""
+    """The no-fit regions of a piece with itself and with itself turned, on square cells."""
 
     def __init__(self, ring: Array, gap: float) -> None:
         self.center = (ring.min(axis=0) + ring.max(axis=0)) / 2
@@ -178,7 +178,7 @@ class _Raster:
         self.half = (len(self.same) - 1) // 2
 
     def edge_of(self, region: Mask) -> list[NDArray[np.int64]]:
-        """Translations (2,) in cells just outside a region, in all directions."""
+        """Return translations (2,) in cells just outside a region, in all directions."""
         found = []
         for angle in np.arange(PAIRS) * 2 * np.pi / PAIRS:
             found.append(self._first_outside(region, angle))
@@ -187,13 +187,14 @@ class _Raster:
     def _first_outside(self, region: Mask, angle: float) -> NDArray[np.int64]:
         way = np.array([np.cos(angle), np.sin(angle)])
         steps = np.round(np.arange(1, self.half + 2)[:, None] * way).astype(int)
-        free = np.logical_not(_looked_up(region, steps))
+        free = np.logical_not(_values_at(region, steps))
         return steps[int(np.argmax(free))]
 
     def lattices(self, region: Mask, pieces: int) -> list[tuple[float, Array]]:
-        """(area, lattice) in mm of lattices whose vectors lie outside a region, densest first.
+        """Return the area and lattice, in mm, of lattices outside a region, the densest first.
 
-        Vectors further on may still lie in it; a cell smaller than so many `pieces` is no lattice.
+        Their basis vectors lie outside it; longer vectors may still lie in it. A cell smaller than so
+        many `pieces` is left out.
         """
         half = (len(region) - 1) // 2
         axis = np.arange(-half, half + 1)
@@ -216,7 +217,7 @@ class _Raster:
         return found
 
 
-def _looked_up(region: Mask, steps: NDArray[np.int64]) -> Mask:
+def _values_at(region: Mask, steps: NDArray[np.int64]) -> Mask:
     half = (np.array(region.shape) - 1) // 2
     index = steps + half
     known = np.asarray(((index >= 0) & (index < region.shape)).all(axis=1))
@@ -225,7 +226,7 @@ def _looked_up(region: Mask, steps: NDArray[np.int64]) -> Mask:
 
 
 def _shifted(region: Mask, step: NDArray[np.int64]) -> Mask:
-    """The region moved by whole cells; what comes from beyond the raster is free."""
+    """Return the region moved by whole cells; what comes from beyond the raster is free."""
     moved = np.zeros_like(region)
     rows, columns = region.shape
     i, j = int(step[0]), int(step[1])
@@ -240,17 +241,17 @@ TRIALS = 400
 """Random changes of each kind of start."""
 
 KEPT = 4
-"""Densest arrangements that are tried on a sheet."""
+"""Number of densest arrangements that are tried on a sheet."""
 
 ANGLES = 36
-"""Turns of an arrangement that are tried on a sheet."""
+"""Angles of an arrangement that are tried on a sheet."""
 
 
 @dataclass(frozen=True, eq=False)
 class Placed:
     """N pieces on a sheet: a point p of the piece goes to linear[n] p + offsets[n].
 
-    - `aspects`: (N,) which piece of the arrangement's cell each is.
+    - `aspects`: The number (N,) of each piece in the arrangement's cell.
     """
 
     linear: Array
@@ -261,22 +262,22 @@ class Placed:
         return len(self.linear)
 
     def rings(self, ring: Array) -> Array:
-        """(N, M, 2) images of a ring."""
+        """Return the images (N, M, 2) of a ring."""
         return np.einsum("nij,mj->nmi", self.linear, ring) + self.offsets[:, None]
 
     def first(self, count: int) -> Placed:
-        """The first `count`."""
+        """Return the first `count` pieces."""
         return Placed(self.linear[:count], self.offsets[:count], self.aspects[:count])
 
 
 def dense_arrangements(tile: Tile, ring: Array, gap: float, *, seed: int = 0) -> list[Arrangement]:
-    """Arrangements of pieces with the outline `ring`, at least `gap` apart; the densest first.
+    """Return arrangements of pieces with the outline `ring`, the densest first.
 
     Args:
-        tile: in the same coordinates.
-        ring: (M, 2) the line that is cut, in mm.
-        gap: above 0, in mm.
-        seed: of the small changes; the same seed gives the same arrangements.
+        tile: The tile, in the same coordinates.
+        ring: The line (M, 2) that is cut, in mm.
+        gap: The least distance in mm between pieces, above 0.
+        seed: The seed of the small changes; the same seed gives the same arrangements.
     """
     rng = np.random.default_rng(seed)
     coarse = _simplified(ring, gap)
@@ -285,8 +286,8 @@ def dense_arrangements(tile: Tile, ring: Array, gap: float, *, seed: int = 0) ->
     starts = [own, *lattice_starts(coarse, gap), *pair_starts(coarse, gap)]
     tight = sorted((tightened(start, coarse, gap) for start in starts), key=_area)
     clear = [found for found in tight if found.clear(ring, gap)]
-    bettered = [_bettered(found, coarse, gap, rng) for found in clear[:3]]
-    best = sorted((*bettered, *clear), key=_area)[:KEPT]
+    improved = [_improved(found, coarse, gap, rng) for found in clear[:3]]
+    best = sorted((*improved, *clear), key=_area)[:KEPT]
     # the coarse ring holds the fine one, so there is a little room left
     exact = (tightened(found, ring, gap) for found in best)
     return sorted((found for found in exact if found.clear(ring, gap)), key=_area)
@@ -297,13 +298,13 @@ def _area(arrangement: Arrangement) -> float:
 
 
 def _simplified(ring: Array, gap: float) -> Array:
-    """A ring with fewer vertices that holds the given one."""
+    """Return a ring with fewer vertices that holds the given one."""
     slack = max(0.05 * gap, 0.002 * float(np.ptp(ring, axis=0).max()))
     polygon = shapely.Polygon(ring).buffer(slack, join_style="mitre", mitre_limit=2)
     return shapely.get_coordinates(shapely.get_exterior_ring(polygon.simplify(0.8 * slack)))[:-1]
 
 
-def _bettered(start: Arrangement, ring: Array, gap: float, rng: np.random.Generator) -> Arrangement:
+def _improved(start: Arrangement, ring: Array, gap: float, rng: np.random.Generator) -> Arrangement:
     best, size = start, 0.04
     extent = float(np.ptp(ring, axis=0).max())
     for _ in range(TRIALS):
@@ -327,10 +328,10 @@ def _bettered(start: Arrangement, ring: Array, gap: float, rng: np.random.Genera
 def on_sheet(
     arrangements: Sequence[Arrangement], ring: Array, width: float, height: float
 ) -> Placed:
-    """As many pieces as fit into a rectangle from the origin, in rows from the top.
+    """Fill a rectangle from the origin with as many pieces as fit, in rows from the top.
 
-    Whichever arrangement, turned and shifted as suits the rectangle best; the first where others are
-    no better. A single piece goes in whichever way it fits.
+    Each arrangement is tried, turned and shifted in several ways; among equally good ones the first is
+    taken. A single piece goes in whichever way it fits.
     """
     best = Placed(np.zeros((0, 2, 2)), np.zeros((0, 2)), np.zeros(0, dtype=np.int64))
     turns = [(found, angle) for found in arrangements for angle in _angles(found, ring)]
@@ -354,8 +355,7 @@ def _angles(arrangement: Arrangement, ring: Array) -> list[float]:
 
 
 def _shifts(low: Array) -> list[Array]:
-    """Those that bring one piece to the left edge and one to the top."""
-    # a hair inside
+    """Return shifts that bring one piece to the left edge and one to the top, a hair inside."""
     return [np.array([1e-6 - x, 1e-6 - y]) for x in low[:, 0] for y in low[:, 1]]
 
 

@@ -1,4 +1,4 @@
-"""A tile's outline in smooth curves: one fit an edge class, its partner's the exact image."""
+"""A tile's outline in smooth curves: an edge of each class is fitted, its partners are images of it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import shapely
 
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles.exporting.curves import Curve
+from orbiflow.tiles.exporting.scene import Curve
 from orbiflow.tiles.tilings import (
     EdgeImage,
     Edges,
@@ -20,20 +20,21 @@ from orbiflow.tiles.tilings import (
 )
 
 CORNER = np.radians(30.0)
-"""A vertex where the polyline turns by more stays a corner."""
+"""The angle in radians by which a polyline turns at a vertex that stays a corner."""
 
 _SAMPLES, _ROUNDS = 48, 4
 
 
 def fitted(points: Array, tolerance: float) -> Curve:
-    """Smooth pieces along the polyline `points` (n, 2), n >= 2.
+    """Fit a curve of smooth pieces to a polyline.
 
     Args:
-        tolerance: no point of the curve is farther from the polyline, nor one of the polyline from the
-            curve, in the points' units. Where no smooth piece keeps it, the sides themselves do.
+        points: The polyline's vertices (n, 2), two or more.
+        tolerance: The greatest distance between curve and polyline, in the points' units. Where no
+            smooth piece is that close, the polyline's sides are taken.
 
     Returns:
-        A curve from the first point to the last; a polyline's corners are ends of its pieces.
+        A curve from the first point to the last; the polyline's corners are ends of its pieces.
 
     >>> turns = np.linspace(0, np.pi, 40)
     >>> arc = fitted(np.stack([np.cos(turns), np.sin(turns)], axis=1), 3e-2)
@@ -50,7 +51,7 @@ def fitted(points: Array, tolerance: float) -> Curve:
 
 
 def turning(points: Array) -> Array:
-    """(n - 2,) angle by which a polyline turns at each inner vertex, in radians."""
+    """Return the angle (n - 2,) in radians by which a polyline turns at each inner vertex."""
     steps = np.diff(points, axis=0)
     before, after = steps[:-1], steps[1:]
     cross = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
@@ -58,7 +59,7 @@ def turning(points: Array) -> Array:
 
 
 def _run(run: Array, tolerance: float) -> list[tuple[Array, bool]]:
-    """Pieces along a polyline without corners, and whether each is straight."""
+    """Return pieces along a polyline without corners, and whether each is straight."""
     tangents = _tangents(run)
     pieces: list[tuple[Array, bool]] = []
     todo = [(0, len(run) - 1)]
@@ -82,7 +83,7 @@ def _line(start: Array, end: Array) -> Array:
 
 
 def _tangents(run: Array) -> Array:
-    """(n, 2) unit tangents at the vertices, of the parabola through each three in a row."""
+    """Return unit tangents (n, 2) at the vertices, of the parabola through each three in a row."""
     steps = np.diff(run, axis=0)
     lengths = np.maximum(np.linalg.norm(steps, axis=1), 1e-300)[:, None]
     slopes = steps / lengths
@@ -96,7 +97,7 @@ def _tangents(run: Array) -> Array:
 
 
 def _cubic(part: Array, start: Array, end: Array, tolerance: float) -> tuple[Array | None, int]:
-    """The cubic along a polyline, or None and the vertex where it had better be parted."""
+    """Return the cubic along a polyline, or None and the vertex at which to divide it."""
     samples = _samples(part)
     share = _arc_shares(samples)
     piece = _least_squares(samples, share, start, end)
@@ -113,7 +114,7 @@ def _cubic(part: Array, start: Array, end: Array, tolerance: float) -> tuple[Arr
         shapely.points(inner), shapely.LineString(_points(piece, np.linspace(0, 1, 40)))
     )
     balance = np.minimum(np.arange(1, len(part) - 1), np.arange(len(part) - 2, 0, -1))
-    # the farthest vertex, but no slivers
+    # the farthest vertex, unless a sliver would be left
     return None, int(np.argmax(off * np.minimum(balance / len(part), 0.2))) + 1
 
 
@@ -123,7 +124,7 @@ def _deviation(piece: Array, part: Array) -> float:
 
 
 def _samples(part: Array) -> Array:
-    """The vertices, and points on long sides: a fit to vertices alone sways between them."""
+    """Return the vertices, and points on long sides: a fit to vertices alone sways between them."""
     lengths = np.linalg.norm(np.diff(part, axis=0), axis=1)
     count = np.maximum(1, np.ceil(lengths / max(lengths.sum() / _SAMPLES, 1e-300))).astype(int)
     own = np.repeat(np.arange(len(count)), count)
@@ -138,7 +139,7 @@ def _arc_shares(samples: Array) -> Array:
 
 
 def _least_squares(samples: Array, share: Array, start: Array, end: Array) -> Array:
-    """The cubic with tangents `start` and `end` nearest to the samples at these parameters."""
+    """Return the cubic with tangents `start` and `end` nearest to samples at these parameters."""
     first, last = samples[0], samples[-1]
     t = share[:, None]
     u = 1 - t
@@ -165,7 +166,7 @@ def _points(piece: Array, share: Array) -> Array:
 
 
 def _closer(piece: Array, samples: Array, share: Array) -> Array:
-    """One step of Newton's method towards the parameters nearest to the samples."""
+    """Return parameters nearer to the samples, by one step of Newton's method."""
     t = share[:, None]
     u = 1 - t
     first = np.diff(piece, axis=0)
@@ -181,17 +182,17 @@ def _closer(piece: Array, samples: Array, share: Array) -> Array:
     return moved if (np.diff(moved) >= 0).all() else share
 
 
-_SHARES = (0.6, 0.15, 0.04)  # of the tolerance; the finer ones where a curve would cross another
+_SHARES = (0.6, 0.15, 0.04)  # of the tolerance; finer where curves would otherwise cross
 
 
 @dataclass(frozen=True, eq=False)
 class Outline:
-    """The curves of a tile.
+    """The outline of a tile in curves.
 
-    - `tile`: whose they are.
-    - `edges`: how it falls into edges; None where that is not known (`note` says why).
-    - `curves`: one an edge, end to end; or a single closed one.
-    - `note`: what is to be said about it, or "".
+    - `tile`: The tile.
+    - `edges`: How its outline falls into edges; None if that is not known (`note` says why).
+    - `curves`: One curve for each edge, end to end; or a single closed curve.
+    - `note`: What the user should know, or "".
     """
 
     tile: Tile
@@ -201,20 +202,21 @@ class Outline:
 
     @property
     def closed(self) -> Curve:
-        """All of it."""
+        """The whole outline as one closed curve."""
         return Curve.joined(self.curves, closed=True)
 
 
 def outline(tile: Tile, tolerance: float) -> Outline:
-    """Smooth curves along the tile's polygon that tile the plane as exactly as it does.
+    """Fit smooth curves to a tile's polygon that tile the plane as exactly as it does.
 
-    One of each class of identified edges is fitted and the others are its images; an edge that is its
-    own image, by a half-turn or a mirror across it, is fitted up to the middle. Where curves would
-    touch each other within the tolerance they are fitted more closely, at worst along the polygon
+    One edge of each class of identified edges is fitted and the others are its images; an edge that is
+    its own image, by a half-turn or a mirror across it, is fitted up to its middle. Where curves would
+    touch each other within the tolerance, they are fitted more closely, at worst along the polygon
     itself.
 
     Args:
-        tolerance: from the polygon, in the tile's units.
+        tile: The tile.
+        tolerance: The greatest distance from the polygon, in the tile's units.
     """
     try:
         own = edges(tile)
@@ -248,7 +250,7 @@ def _curves(own: Edges, tolerance: float) -> tuple[Curve, ...]:
 
 
 def _folded(points: Array, fold: EdgeImage, tolerance: float) -> Curve:
-    """An edge that is its own image, turned or mirrored: half of it, and the half's image."""
+    """Fit half of an edge that is its own image, turned or mirrored, and add the half's image."""
     middle, odd = divmod(len(points) - 1, 2)
     half = points[: middle + 1]
     if odd:  # the centre lies on a side

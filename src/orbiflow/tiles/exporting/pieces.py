@@ -1,4 +1,4 @@
-"""Separate pieces to cut, nested on sheets."""
+"""Separate pieces to cut, nested on sheets, with kerf and clearance allowed for."""
 
 from __future__ import annotations
 
@@ -10,8 +10,7 @@ import shapely
 
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles.exporting.curves import Curve
-from orbiflow.tiles.exporting.layouts import Layout, rectangle_sides
+from orbiflow.tiles.exporting.layouts import Layout, line_style, rectangle_sides
 from orbiflow.tiles.exporting.nesting import (
     Placed,
     dense_arrangements,
@@ -20,11 +19,11 @@ from orbiflow.tiles.exporting.nesting import (
 from orbiflow.tiles.exporting.outlines import fitted, turning
 from orbiflow.tiles.exporting.scene import (
     Box,
+    Curve,
     Layer,
     PlacedTile,
     Scene,
 )
-from orbiflow.tiles.exporting.tiling_scenes import line_style
 from orbiflow.tiles.geometry import polygons_in
 from orbiflow.tiles.likeness import (
     Thinnest,
@@ -33,22 +32,22 @@ from orbiflow.tiles.likeness import (
 )
 
 MITRE = 4.0
-"""How far a sharp corner of a cut reaches at most, in offsets."""
+"""The greatest reach of a sharp corner of a cut, in offsets."""
 
 
 def cut_ring(ring: Array, kerf: float, clearance: float) -> Array:
-    """(M, 2) the line that the middle of the beam follows, for pieces that are to have this outline.
+    """Return the line (M, 2) that the middle of the beam follows to cut a piece with this outline.
 
     The piece that is left is `ring`, less half the clearance all around.
 
     Args:
-        ring: (N, 2) simple, in mm.
-        kerf: width of what is burned away, in mm.
-        clearance: gap between two pieces put together, in mm.
+        ring: The outline (N, 2), a simple polygon in mm.
+        kerf: The width in mm of what is burned away.
+        clearance: The gap in mm between two pieces put together.
 
     Raises:
-        OrbiflowError: where a neck is no wider than kerf or clearance, or a slit so narrow that the
-            beam closes it; the message says where on the piece.
+        OrbiflowError: If a neck is no wider than kerf or clearance, or the beam would close a slit; the
+            message says where on the piece.
 
     >>> bar = np.array([[0.0, 0.0], [20, 0], [20, 4], [0, 4]])
     >>> shapely.Polygon(cut_ring(bar, 0.2, 0.0)).bounds
@@ -67,10 +66,10 @@ def cut_ring(ring: Array, kerf: float, clearance: float) -> Array:
             f"the kerf of {kerf:g} mm is wider than a slit of the piece: it is {slit.width:.2f} mm "
             f"wide {place_on(ring, slit)}, and would be burned away; choose a larger tile size"
         )
-    return _moved(ring, (kerf - clearance) / 2)
+    return _offset_ring(ring, (kerf - clearance) / 2)
 
 
-def _moved(ring: Array, distance: float) -> Array:
+def _offset_ring(ring: Array, distance: float) -> Array:
     if abs(distance) < 1e-9:
         return ring
     moved = shapely.Polygon(ring).buffer(distance, join_style="mitre", mitre_limit=MITRE)
@@ -87,7 +86,7 @@ def _moved(ring: Array, distance: float) -> Array:
 
 
 def place_on(ring: Array, found: Thinnest) -> str:
-    """Where on a piece that is, in words.
+    """Return in words where on a piece a neck or slit is.
 
     >>> ring = np.array([[10.0, 10.0], [30.0, 10.0], [30.0, 14.0], [10.0, 14.0]])
     >>> place_on(ring, narrowest_neck(ring)).split(" from ")[1]
@@ -98,25 +97,26 @@ def place_on(ring: Array, found: Thinnest) -> str:
 
 
 LEAST_GAP = 0.01
-"""Between cuts, in mm: pieces never touch."""
+"""The least distance in mm between cuts: pieces never touch."""
 
 LEAST_EDGE = 0.1
-"""Twice the distance of cuts from the sheet's edge at least, in mm."""
+"""Twice the least distance in mm of cuts from the sheet's edge."""
 
 
 def pieces_scenes(layout: Layout, *, fine: bool = True) -> list[Scene]:
-    """One scene a sheet; a single sheet unless there is a bed and it does not hold all copies.
+    """Return a scene for each sheet; there is one unless a bed is given and does not hold all copies.
 
     Args:
-        fine: smooth curves, or polygons.
+        layout: The tile's place on the page.
+        fine: Whether the cuts are smooth curves, or else polygons.
 
     Raises:
-        OrbiflowError: for a kerf or clearance that the piece is too thin for, a sheet smaller than a
-            piece, and more copies than the page holds where there is no bed.
+        OrbiflowError: If the piece is too thin for kerf or clearance, a sheet is smaller than a piece,
+            or the page does not hold all copies and no bed is given.
     """
     settings, box = layout.settings, layout.box
     flat = settings.deviation / 4
-    # flattening and fitting anew share what the outline's fit left of the tolerance
+    # flattening and fitting again share what the outline's fit left of the tolerance
     ring = cut_ring(layout.outline.closed.flattened(flat / 2), settings.kerf, settings.clearance)
     curve = _closed_fit(ring, flat) if fine else Curve.polyline(ring, closed=True)
     line = curve.flattened(flat / 4)
@@ -169,7 +169,7 @@ def _scene(
 
 
 def _closed_fit(ring: Array, tolerance: float) -> Curve:
-    """Smooth pieces along a closed polygon; the polygon itself where they would cross."""
+    """Fit a smooth curve to a closed polygon; take the polygon where the curve would cross itself."""
     closed = np.concatenate([ring[-1:], ring, ring[:1]])
     first = int(np.argmax(np.abs(turning(closed))))  # a corner, where there is one
     turned = np.roll(ring, -first, axis=0)
@@ -181,7 +181,7 @@ def _closed_fit(ring: Array, tolerance: float) -> Curve:
 
 
 def _require_clear(rings: Array, box: Box, gap: float) -> None:
-    """Nothing, for pieces that keep their distance and lie on the sheet: the arrangement's promise."""
+    """Check that pieces keep their distance and lie on the sheet, as the arrangement promises."""
     polygons = np.asarray(shapely.polygons(rings))
     tree = shapely.STRtree(polygons)
     first, second = tree.query(polygons, predicate="dwithin", distance=0.999 * gap)

@@ -1,30 +1,119 @@
-"""A scene: what is on a page, in millimetres, before it is a file of any format.
+"""A page in millimetres before it is a file of any format: curves, layers, copies of symbols.
 
-Coordinates are mm from the page's upper left corner, y down, as on a screen and in SVG.
+Coordinates are in mm from the page's upper left corner, y down, as on a screen and in SVG.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from shapely.geometry.base import BaseGeometry
 
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles.exporting.curves import Curve
 from orbiflow.tiles.geometry import polygons_in
+
+Booleans = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """A curve of cubic Bézier pieces and straight ones, end to end.
+
+    - `pieces`: The control points (n, 4, 2) of each piece: start, two handles, end.
+    - `straight`: Which pieces (n,) are straight: their handles are on the line.
+    - `closed`: Whether the last piece ends where the first starts.
+
+    >>> square = Curve.polyline([[0, 0], [1, 0], [1, 1], [0, 1]], closed=True)
+    >>> len(square.pieces), square.length
+    (4, 4.0)
+    """
+
+    pieces: Array
+    straight: Booleans
+    closed: bool = False
+
+    @classmethod
+    def polyline(cls, points: ArrayLike, *, closed: bool = False) -> Curve:
+        """Return straight pieces through points (n, 2); a closed curve does not repeat the first."""
+        array = np.asarray(points, dtype=np.float64)
+        ends = np.roll(array, -1, axis=0) if closed else array[1:]
+        starts = array if closed else array[:-1]
+        steps = (ends - starts) / 3
+        pieces = np.stack([starts, starts + steps, ends - steps, ends], axis=1)
+        return cls(pieces, np.ones(len(pieces), dtype=bool), closed)
+
+    @classmethod
+    def joined(cls, curves: Sequence[Curve], *, closed: bool = False) -> Curve:
+        """Join curves that continue each other."""
+        pieces = np.concatenate([curve.pieces for curve in curves])
+        return cls(pieces, np.concatenate([curve.straight for curve in curves]), closed)
+
+    @property
+    def start(self) -> Array:
+        """The first point (2,)."""
+        return self.pieces[0, 0]
+
+    @property
+    def end(self) -> Array:
+        """The last point (2,)."""
+        return self.pieces[-1, 3]
+
+    @property
+    def length(self) -> float:
+        """The length of a polygon through points of each piece; exact for straight pieces."""
+        points = self.flattened(1e-3)
+        if self.closed:
+            points = np.concatenate([points, points[:1]])
+        return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
+
+    def moved(self, linear: Array, offset: ArrayLike) -> Curve:
+        """Return the image under the affine map p -> linear p + offset."""
+        return Curve(self.pieces @ linear.T + np.asarray(offset), self.straight, self.closed)
+
+    def reversed(self) -> Curve:
+        """Return the curve run the other way."""
+        return Curve(self.pieces[::-1, ::-1], self.straight[::-1], self.closed)
+
+    def flattened(self, tolerance: float) -> Array:
+        """Return points (m, 2) on the curve whose polygon stays within `tolerance` of it.
+
+        The ends of the pieces are among them; a closed curve's first point is not repeated.
+        """
+        second = np.diff(self.pieces, n=2, axis=1)
+        bend = 6 * np.linalg.norm(second, axis=2).max(axis=1)
+        count = np.maximum(1, np.ceil(np.sqrt(bend / 8 / tolerance)).astype(int))
+        count[self.straight] = 1
+        own = np.repeat(np.arange(len(count)), count)
+        first = np.cumsum(count) - count
+        share = (np.arange(count.sum()) - first[own]) / count[own]
+        points = _at(self.pieces[own], share)
+        return points if self.closed else np.concatenate([points, self.end[None]])
+
+    def bounds(self) -> Array:
+        """Return the corners (2, 2), lower and upper, of the box around all control points."""
+        points = self.pieces.reshape(-1, 2)
+        return np.stack([points.min(axis=0), points.max(axis=0)])
+
+
+def _at(pieces: Array, share: Array) -> Array:
+    """Return the point of each piece (n, 4, 2) at its parameter `share` (n,)."""
+    t = share[:, None]
+    u = 1 - t
+    weights = np.stack([u**3, 3 * u**2 * t, 3 * u * t**2, t**3], axis=1)
+    return (weights * pieces).sum(axis=1)
+
 
 Role = Literal["paper", "tiles", "cut", "mark"]
 """What a layer is for: a background, filled tiles, lines to cut or draw, marks to measure by."""
 
-
 INK = "currentColor"
-"""A colour in a motif's styles: the one that shows on the copy's own, which its layer says."""
+"""A colour in a motif's styles: the one that its layer gives, which shows on the copy's own colour."""
 
 
 class Box(NamedTuple):
@@ -55,9 +144,9 @@ class Style(NamedTuple):
 class Part(NamedTuple):
     """Curves drawn as one.
 
-    - `curves`: closed ones are filled; holes run the other way.
-    - `style`: fill and stroke; `INK` is a colour that shows on the copy's own.
-    - `opacity`: 0 to 1.
+    - `curves`: The curves; closed ones are filled, holes run the other way.
+    - `style`: Fill and stroke, which may be `INK`.
+    - `opacity`: A number from 0 to 1.
     """
 
     curves: tuple[Curve, ...]
@@ -70,7 +159,7 @@ class Part(NamedTuple):
         return INK in (self.style.fill, self.style.stroke)
 
     def moved(self, linear: Array, offset: Array) -> Part:
-        """Under a map p -> linear p + offset."""
+        """Return the image under a map p -> linear p + offset."""
         scale = float(np.sqrt(abs(np.linalg.det(linear))))
         return Part(
             tuple(curve.moved(linear, offset) for curve in self.curves),
@@ -80,7 +169,7 @@ class Part(NamedTuple):
 
 
 class Raster(NamedTuple):
-    """A picture of pixels: `png` is the file, its pixel (x, y) lies at linear (x, y) + offset."""
+    """A picture of pixels, the file `png`; pixel (x, y) lies at linear (x, y) + offset."""
 
     png: bytes
     size: tuple[int, int]
@@ -88,17 +177,17 @@ class Raster(NamedTuple):
     offset: Array
 
     def moved(self, linear: Array, offset: Array) -> Raster:
-        """Under a map p -> linear p + offset."""
+        """Return the image under a map p -> linear p + offset."""
         return self._replace(linear=linear @ self.linear, offset=linear @ self.offset + offset)
 
 
 @dataclass(frozen=True, eq=False)
 class Motif:
-    """What is drawn on every copy of a tile: a symbol of many parts.
+    """A drawing of many parts that every copy of a tile carries.
 
-    - `parts`: from the bottom up.
-    - `rasters`: under them.
-    - `within`: the symbol that cuts it off, if any.
+    - `parts`: What is drawn, from the bottom up.
+    - `rasters`: Pictures of pixels under the parts.
+    - `within`: The name of the symbol that cuts the drawing off, if any.
     """
 
     parts: tuple[Part, ...] = ()
@@ -106,7 +195,7 @@ class Motif:
     within: str | None = None
 
     def moved(self, linear: Array, offset: Array) -> Motif:
-        """Under a map p -> linear p + offset."""
+        """Return the image under a map p -> linear p + offset."""
         return Motif(
             tuple(part.moved(linear, offset) for part in self.parts),
             tuple(raster.moved(linear, offset) for raster in self.rasters),
@@ -118,10 +207,10 @@ class Motif:
 class Uses:
     """M copies of a symbol: a point p of it goes to linear[which[m]] p + offsets[m].
 
-    - `symbol`: its name in the scene.
-    - `linear`: (A, 2, 2) the aspects' linear parts.
-    - `which`: (M,) aspect of each copy.
-    - `offsets`: (M, 2) in mm.
+    - `symbol`: The symbol's name in the scene.
+    - `linear`: The linear parts (A, 2, 2) of the aspects.
+    - `which`: The aspect (M,) of each copy.
+    - `offsets`: The offset (M, 2) of each copy in mm.
     """
 
     symbol: str
@@ -133,13 +222,13 @@ class Uses:
         return len(self.which)
 
     def images(self, points: Array) -> Array:
-        """(M, ..., 2) images of points (..., 2) of the symbol."""
+        """Return the images (M, ..., 2) of points (..., 2) of the symbol."""
         turned = np.einsum("aij,...j->a...i", self.linear, points)
         shape = (len(self), *[1] * (points.ndim - 1), 2)
         return turned[self.which] + self.offsets.reshape(shape)
 
     def curves(self, curve: Curve) -> Iterator[Curve]:
-        """The images of a curve of the symbol."""
+        """Yield the images of a curve of the symbol."""
         for pieces in self.images(curve.pieces):
             yield Curve(pieces, curve.straight, curve.closed)
 
@@ -148,10 +237,12 @@ class Uses:
 class Layer:
     """Things of one kind, drawn alike, that programs show under one name.
 
-    - `name`: as people read it, such as "colour 1" or "cut".
-    - `items`: curves, and copies of symbols.
-    - `clipped`: whether to show it within the scene's `window` alone.
-    - `ink`: the colour of `INK` in motifs, where it holds copies of them.
+    - `name`: A name for people, such as "colour 1" or "cut".
+    - `role`: What the layer is for.
+    - `style`: Fill and stroke of all items.
+    - `items`: Curves, and copies of symbols.
+    - `clipped`: Whether it is shown within the scene's `window` alone.
+    - `ink`: The colour that `INK` means in the layer's motifs.
     """
 
     name: str
@@ -164,12 +255,12 @@ class Layer:
 
 @dataclass(frozen=True, eq=False)
 class PlacedTile:
-    """What is known of a tile on the page, for programs that read it.
+    """A tile on the page, for programs that read the JSON file.
 
-    - `aspect`: index of its coset representative.
-    - `linear`, `offset`: from the prototile's own place in the scene to this tile's.
-    - `neighbours`: numbers of the tiles in the scene that it shares an edge with.
-    - `whole`: whether all of it is on the page.
+    - `aspect`: The index of its coset representative.
+    - `linear`, `offset`: The map from the prototile's place in the scene to this tile's.
+    - `neighbours`: The numbers of the scene's tiles that share an edge with it.
+    - `whole`: Whether all of it is on the page.
     """
 
     aspect: int
@@ -181,16 +272,17 @@ class PlacedTile:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A page.
+    """A page with everything on it.
 
-    - `width`, `height`: in mm.
-    - `layers`: from the bottom up.
-    - `symbols`: closed curves by name, for `Uses`.
-    - `motifs`: drawings by name, for `Uses`; SVG alone has them.
-    - `window`: where clipped layers show, default all of the page.
-    - `title`, `notes`: in words, for the file's metadata.
-    - `prototile`: (N, 2) polygon of the tile that `tiles` are copies of, in mm.
-    - `facts`: plain data for the JSON file, such as the class.
+    - `width`, `height`: The page's size in mm.
+    - `layers`: The layers from the bottom up.
+    - `symbols`: Closed curves by name, for `Uses`.
+    - `window`: The box within which clipped layers show. Default: the page.
+    - `title`, `notes`: Words for the file's metadata.
+    - `prototile`: The polygon (N, 2) in mm of which `tiles` are copies.
+    - `tiles`: The tiles on the page.
+    - `facts`: Plain data for the JSON file, such as the class.
+    - `motifs`: Drawings by name, for `Uses`; only SVG can hold them.
     """
 
     width: float
@@ -207,23 +299,25 @@ class Scene:
 
     @property
     def clip(self) -> Box:
-        """The window."""
+        """The box within which clipped layers show."""
         return self.window or Box(0.0, 0.0, self.width, self.height)
 
     def require_plain(self) -> None:
-        """Nothing, if symbols are single curves.
+        """Check that all symbols are single curves.
 
         Raises:
-            OrbiflowError: if there are motifs, which SVG alone can hold.
+            OrbiflowError: If there are motifs, which only SVG can hold.
         """
         if self.motifs:
-            raise OrbiflowError("artwork is written as SVG, or rendered as PNG")
+            raise OrbiflowError(
+                "this format cannot hold artwork: write it as SVG, or render it as PNG"
+            )
 
     def curves(self, layer: Layer) -> Iterator[Curve]:
-        """Every curve of a layer, copies of symbols among them.
+        """Yield every curve of a layer, including copies of symbols.
 
         Raises:
-            OrbiflowError: for artwork, as `require_plain`.
+            OrbiflowError: If the scene is artwork, as `require_plain`.
         """
         self.require_plain()
         for item in layer.items:
@@ -233,8 +327,14 @@ class Scene:
                 yield item
 
 
+def rectangle(box: Box) -> Curve:
+    """Return the border of a box, clockwise from the upper left corner."""
+    left, top, right, bottom = box
+    return Curve.polyline([[left, top], [right, top], [right, bottom], [left, bottom]], closed=True)
+
+
 def inside(curve: Curve, box: Box, *, slack: float = 1e-9) -> bool:
-    """Whether the box surely holds the curve: its control points are in it."""
+    """Return whether a box holds a curve with all its control points."""
     (left, top), (right, bottom) = curve.bounds()
     return bool(
         left >= box.left - slack
@@ -245,9 +345,9 @@ def inside(curve: Curve, box: Box, *, slack: float = 1e-9) -> bool:
 
 
 def clipped_region(curve: Curve, box: Box, tolerance: float) -> list[Curve]:
-    """What of the region inside a closed curve is in the box, as closed curves.
+    """Return the part of the region inside a closed curve that is in the box, as closed curves.
 
-    The curve itself if all of it is; else polygons within `tolerance` of it.
+    It is the curve itself if all of it is in the box, else polygons within `tolerance` of it.
     """
     if inside(curve, box):
         return [curve]
@@ -262,7 +362,7 @@ def clipped_region(curve: Curve, box: Box, tolerance: float) -> list[Curve]:
 
 
 def clipped_line(curve: Curve, box: Box, tolerance: float) -> list[Curve]:
-    """What of an open curve is in the box."""
+    """Return the parts of an open curve that are in the box."""
     if inside(curve, box):
         return [curve]
     points = curve.flattened(tolerance)

@@ -1,4 +1,4 @@
-"""What is too large for a machine's bed, on several sheets that overlap, with marks to align them."""
+"""Pages too large for a machine's bed on several sheets that overlap, with marks to align them."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from itertools import pairwise
 import numpy as np
 
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles.exporting.curves import Curve
 from orbiflow.tiles.exporting.layouts import STRIP
 from orbiflow.tiles.exporting.scene import (
     Box,
+    Curve,
     Layer,
     PlacedTile,
     Scene,
@@ -23,7 +23,7 @@ from orbiflow.tiles.exporting.scene import (
 )
 
 OVERLAP = 12.0
-"""Width in mm of the strip that two neighbouring sheets have in common; it holds the crosses."""
+"""Width in mm of the strip that two neighbouring sheets share; the crosses lie in it."""
 
 ARM = 4.0
 """Half the width of a cross, in mm."""
@@ -34,17 +34,19 @@ BLUE = Style(None, "#0000ff", 0.1)
 
 
 def split(scene: Scene, bed: tuple[float, float], tolerance: float) -> list[Scene]:
-    """The scene on sheets of at most the bed's size, row by row; itself if the bed holds it.
+    """Split a scene into sheets no larger than the bed, row by row, unless the bed holds it.
 
-    Neighbouring sheets overlap by `OVERLAP`; what is drawn changes from one to the next in the middle
-    of the strip, where both have the same crosses. No line is on two sheets.
+    Neighbouring sheets overlap by `OVERLAP`. Lines go from one sheet to the next in the middle of the
+    strip, where both sheets have the same crosses; no line is on two sheets.
 
     Args:
-        bed: width and height in mm.
-        tolerance: of what is cut where sheets meet.
+        scene: The page.
+        bed: The bed's width and height in mm.
+        tolerance: The greatest distance in mm between a curve and the polygon that replaces it where
+            sheets meet.
 
     Raises:
-        OrbiflowError: for a bed too small to have overlapping sheets, or too many sheets.
+        OrbiflowError: If the bed is too small for sheets that overlap, or there are too many sheets.
     """
     if scene.width <= bed[0] and scene.height <= bed[1]:
         return [scene]
@@ -70,7 +72,7 @@ def split(scene: Scene, bed: tuple[float, float], tolerance: float) -> list[Scen
 
 
 def _parts(length: float, bed: float) -> list[tuple[float, float]]:
-    """Overlapping intervals of at most `bed`, all of one length, that cover 0 to `length`."""
+    """Return overlapping intervals of one length, `bed` at most, that cover 0 to `length`."""
     if length <= bed:
         return [(0.0, length)]
     if bed < 3 * OVERLAP:
@@ -90,7 +92,7 @@ def _seams(parts: list[tuple[float, float]]) -> list[float]:
 def _crosses(
     columns: list[tuple[float, float]], rows: list[tuple[float, float]]
 ) -> list[tuple[float, float]]:
-    """Two on each stretch of seam that two sheets have in common."""
+    """Return two crosses for each stretch of seam between two sheets."""
     found = [
         (x, top + share * (bottom - top))
         for x in _seams(columns)
@@ -159,7 +161,7 @@ def _sheet(
 def _part(
     layer: Layer, scene: Scene, seams: Box, window: Box, back: np.ndarray, tolerance: float
 ) -> Layer:
-    """What of a layer a sheet shows, in the sheet's own coordinates."""
+    """Return the part of a layer that a sheet shows, in the sheet's own coordinates."""
     still = np.eye(2)
     items: list[Curve | Uses] = []
     for item in layer.items:
@@ -200,10 +202,10 @@ def _line(points: list[list[float]], back: np.ndarray) -> Curve:
 
 
 def calibrated(scene: Scene) -> Scene:
-    """The scene with a mark exactly 100 mm long at its foot, on a layer of its own.
+    """Add a mark exactly 100 mm long at the foot of the scene, on a layer of its own.
 
     Raises:
-        OrbiflowError: for a page narrower than 110 mm.
+        OrbiflowError: If the page is narrower than 110 mm.
     """
     if scene.width < 110:
         raise OrbiflowError(

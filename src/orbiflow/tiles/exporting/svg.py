@@ -1,38 +1,185 @@
-"""SVG of a tile and of a tiling, for Inkscape, Illustrator, browsers and cutters.
+"""Scenes as SVG, for Inkscape, Illustrator, browsers and cutters; and the SVG of a tile or a tiling.
 
-Plain paths in millimetres: no symbols, no transforms, no style sheets, which some programs drop.
+One user unit is one millimetre, and layers are those of Inkscape. A scene's copies are one short line
+each; `tile_svg` and `tiling_svg` write plain paths without symbols, transforms or style sheets, which
+some programs drop.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from xml.sax.saxutils import escape
+import base64
+import math
+from collections.abc import Iterable, Iterator
+from xml.sax.saxutils import escape, quoteattr
 
 import numpy as np
 
 from orbiflow.arrays import Array, Window
-from orbiflow.drawing import (
-    DEFAULT_PALETTE,
-    Palette,
-    palette,
-)
+from orbiflow.drawing import DEFAULT_PALETTE, Palette, palette
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles.pictures import default_window
-from orbiflow.tiles.tilings import (
-    Colouring,
-    Tile,
-    Tiles,
-    as_tiling,
-    colouring,
-    patch,
+from orbiflow.tiles.exporting.scene import (
+    Box,
+    Curve,
+    Layer,
+    Motif,
+    Scene,
+    Style,
+    Uses,
+    rectangle,
 )
+from orbiflow.tiles.pictures import default_window
+from orbiflow.tiles.tilings import Colouring, Tile, Tiles, as_tiling, colouring, patch
 
 _HEADER = """<?xml version="1.0" encoding="UTF-8"?>
-<svg xmlns="http://www.w3.org/2000/svg" version="1.1" width="{width}mm" height="{height}mm" \
-viewBox="0 0 {width} {height}">
-  <title>{title}</title>
-  <desc>{description}</desc>
+<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink" \
+xmlns:inkscape="http://www.inkscape.org/namespaces/inkscape" version="1.1" \
+width="{width}mm" height="{height}mm" viewBox="0 0 {width} {height}">
 """
+
+
+def write_svg(scene: Scene, *, decimals: int = 3) -> str:
+    """Return the scene as an SVG document.
+
+    Args:
+        scene: The page.
+        decimals: The decimals of coordinates in mm. Edges that two tiles share have the same numbers up
+            to the last of them.
+    """
+    number = _Numbers(decimals)
+    parts = [_HEADER.format(width=number(scene.width), height=number(scene.height))]
+    parts.append(f"  <title>{escape(scene.title)}</title>\n")
+    if scene.notes:
+        parts.append(f"  <desc>{escape(' '.join(scene.notes))}</desc>\n")
+    parts.append(_definitions(scene, number))
+    for layer in scene.layers:
+        parts.append(_layer_start(layer))
+        for item in layer.items:
+            if isinstance(item, Uses):
+                parts.extend(_uses(item, _reach(scene, item.symbol), number))
+            else:
+                parts.append(f'    <path d="{path_data(item, number)}"/>\n')
+        parts.append("  </g>\n")
+    parts.append("</svg>\n")
+    return "".join(parts)
+
+
+class _Numbers:
+    """A format for numbers: a fixed number of decimals, without zeros at the end."""
+
+    def __init__(self, decimals: int) -> None:
+        self.decimals = decimals
+
+    def __call__(self, value: float) -> str:
+        text = f"{value:.{self.decimals}f}"
+        text = text.rstrip("0").rstrip(".") if self.decimals else text
+        return "0" if text in ("-0", "") else text
+
+
+def path_data(curve: Curve, number: _Numbers | None = None) -> str:
+    """Return the d attribute of a path, in absolute coordinates.
+
+    >>> path_data(Curve.polyline([[0, 0], [2, 0], [2, 1.5]], closed=True))
+    'M0,0L2,0 2,1.5Z'
+    """
+    number = number or _Numbers(3)
+    (x, y), last = curve.start.tolist(), len(curve.pieces) - 1
+    parts, before = [f"M{number(x)},{number(y)}"], ""
+    for k, (piece, straight) in enumerate(
+        zip(curve.pieces.tolist(), curve.straight.tolist(), strict=True)
+    ):
+        if straight and curve.closed and k == last:
+            break  # Z draws it
+        command = "L" if straight else "C"
+        points = piece[3:] if straight else piece[1:]
+        parts.append(" " if command == before else command)
+        parts.append(" ".join(f"{number(x)},{number(y)}" for x, y in points))
+        before = command
+    return "".join(parts) + ("Z" if curve.closed else "")
+
+
+def _definitions(scene: Scene, number: _Numbers) -> str:
+    parts = []
+    for name, curve in scene.symbols.items():
+        parts.append(f'    <path id="{name}" d="{path_data(curve, number)}"/>\n')
+    for name, motif in scene.motifs.items():
+        parts.append(_motif(name, motif, number))
+    if any(layer.clipped for layer in scene.layers):
+        parts.append(f'    <clipPath id="window">{_rectangle(scene.clip, number)}</clipPath>\n')
+    return "  <defs>\n" + "".join(parts) + "  </defs>\n" if parts else ""
+
+
+def _motif(name: str, motif: Motif, number: _Numbers) -> str:
+    """Return a group that is drawn once and used by every copy."""
+    parts, clip = [], ""
+    if motif.within is not None:
+        clip = f' clip-path="url(#within-{name})"'
+        parts.append(
+            f'    <clipPath id="within-{name}"><use xlink:href="#{motif.within}"/></clipPath>\n'
+        )
+    parts.append(f'    <g id="{name}"{clip}>\n')
+    for raster in motif.rasters:
+        (a, c), (b, d) = raster.linear.tolist()
+        e, f = raster.offset.tolist()
+        place = ",".join(f"{value:.9g}" for value in (a, b, c, d, e, f))
+        data = base64.b64encode(raster.png).decode("ascii")
+        width, height = raster.size
+        parts.append(
+            f'      <image width="{width}" height="{height}" transform="matrix({place})" '
+            f'preserveAspectRatio="none" xlink:href="data:image/png;base64,{data}"/>\n'
+        )
+    for part in motif.parts:
+        path = "".join(path_data(curve, number) for curve in part.curves)
+        opacity = f' opacity="{part.opacity:.3g}"' if part.opacity < 1 else ""
+        parts.append(f'      <path{_style_attributes(part.style)}{opacity} d="{path}"/>\n')
+    return "".join(parts) + "    </g>\n"
+
+
+def _reach(scene: Scene, name: str) -> float:
+    """Return how far a symbol or motif reaches from its origin, in mm."""
+    if name in scene.symbols:
+        curves = [scene.symbols[name]]
+    elif (within := scene.motifs[name].within) is not None:
+        curves = [scene.symbols[within]]
+    else:
+        curves = [curve for part in scene.motifs[name].parts for curve in part.curves]
+    return max((float(np.abs(curve.bounds()).max()) for curve in curves), default=1.0)
+
+
+def _rectangle(box: Box, number: _Numbers) -> str:
+    x, y, width, height = map(number, (box.left, box.top, box.width, box.height))
+    return f'<rect x="{x}" y="{y}" width="{width}" height="{height}"/>'
+
+
+def _layer_start(layer: Layer) -> str:
+    name = quoteattr(layer.name)
+    key = quoteattr(layer.name.replace(" ", "-"))
+    clip = ' clip-path="url(#window)"' if layer.clipped else ""
+    ink = f' color="{layer.ink}"' if layer.ink else ""
+    return (
+        f'  <g id={key} inkscape:groupmode="layer" inkscape:label={name}'
+        f"{clip}{ink}{_style_attributes(layer.style)}>\n"
+    )
+
+
+def _style_attributes(style: Style) -> str:
+    """Return fill and stroke as attributes, with a space before each."""
+    text = f' fill="{style.fill or "none"}"'
+    if style.stroke is None:
+        return text + ' stroke="none"'
+    width = _Numbers(4)(style.width)
+    return text + f' stroke="{style.stroke}" stroke-width="{width}" stroke-linejoin="round"'
+
+
+def _uses(uses: Uses, reach: float, number: _Numbers) -> Iterator[str]:
+    """Yield a line for each copy, its matrix as exact as keeps the symbol's far end in its place."""
+    fine = _Numbers(number.decimals + max(1, math.ceil(math.log10(max(reach, 1.0)))))
+    # columns first, as SVG has them
+    matrices = [",".join(fine(value) for value in linear.T.ravel()) for linear in uses.linear]
+    still = [bool(np.abs(linear - np.eye(2)).max() < 1e-12) for linear in uses.linear]
+    for which, (x, y) in zip(uses.which.tolist(), uses.offsets.tolist(), strict=True):
+        place = f"{number(x)},{number(y)}"
+        how = f"translate({place})" if still[which] else f"matrix({matrices[which]},{place})"
+        yield f'    <use xlink:href="#{uses.symbol}" transform="{how}"/>\n'
 
 
 def tile_svg(
@@ -45,25 +192,28 @@ def tile_svg(
     y_down: bool = False,
     title: str = "",
 ) -> str:
-    """SVG of the tile alone, on a page of `width_mm` with a small margin.
+    """Return the SVG of one tile, on a page with a small margin.
 
     Args:
-        fill: a colour, "none" for cutting, default the palette's second.
-        outline_mm: width of the outline.
-        y_down: whether the tile's y axis points down, as in images.
-        title: for the file's metadata; default the class.
+        tile: The tile.
+        width_mm: The page's width in mm.
+        palette_name: A palette, whose second colour fills the tile.
+        fill: A colour, or "none" for cutting. Default: the palette's.
+        outline_mm: The outline's width in mm.
+        y_down: Whether the tile's y axis points down, as in images.
+        title: The file's title. Default: the class.
 
     Raises:
-        OrbiflowError: for an unknown palette or a page without size.
+        OrbiflowError: If the palette is unknown or the page has no size.
     """
     colours = palette(palette_name)
     low, high = tile.polygon.min(axis=0), tile.polygon.max(axis=0)
     margin = 0.04 * float((high - low).max())
-    window = (*(low - margin), *(high + margin))
-    page = _Page(window, width_mm, y_down)
-    style = f'fill="{fill or colours.fill(1)}"{_stroke(colours.outline, outline_mm)}'
-    path = f'  <path id="tile" {style} d="{page.path(tile.polygon)}"/>\n'
-    return page.document(path, title or _name(tile), "A tile of the plane, made with orbiflow")
+    page = _Page((*(low - margin), *(high + margin)), width_mm, y_down)
+    style = Style(fill or colours.fill(1), colours.outline, outline_mm)
+    layer = Layer("tile", "tiles", style, (page.curve(tile.polygon),))
+    title = title or _name(tile)
+    return page.document([layer], title, "A tile of the plane, made with orbiflow")
 
 
 def tiling_svg(
@@ -77,47 +227,48 @@ def tiling_svg(
     y_down: bool = False,
     title: str = "",
 ) -> str:
-    """SVG of the tiles that meet `window`, clipped to it: one closed path per tile.
+    """Return the SVG of the tiles that meet a window, clipped to it: one closed path per tile.
 
-    Paths are in one group per colour, with the ids "colour-1", "colour-2" ... Every tile has a
-    stroke, so that no paper shines through between neighbours.
+    Each colour's paths are a group, with the ids "colour-1", "colour-2" ... Every tile has a stroke,
+    so that no paper shines through between neighbours.
 
     Args:
-        tile: a tile or a tiling.
-        window: (xmin, ymin, xmax, ymax) in the tile's units, default `default_window`.
-        colours: default `colouring(tile)`.
-        outline_mm: width of the outline; 0 means a hairline in the tile's own colour.
-        y_down: whether the tile's y axis points down, as in images.
-        title: for the file's metadata; default the class.
+        tile: A tile or a tiling.
+        window: The window (xmin, ymin, xmax, ymax) in the tile's units. Default: `default_window`.
+        width_mm: The page's width in mm.
+        palette_name: The palette of paper, fills and outlines.
+        colours: Which tile has which colour. Default: `colouring(tile)`.
+        outline_mm: The outline's width in mm; 0 means a hairline in the tile's own colour.
+        y_down: Whether the tile's y axis points down, as in images.
+        title: The file's title. Default: the class.
 
     Raises:
-        OrbiflowError: for an unknown palette, or a window that is empty or holds too many tiles.
+        OrbiflowError: If the palette is unknown, or the window is empty or holds too many tiles.
     """
-    chosen = palette(palette_name)
-    tiling = as_tiling(tile)
+    chosen, tiling = palette(palette_name), as_tiling(tile)
     colours = colours or colouring(tiling)
     page = _Page(window or default_window(tile), width_mm, y_down)
-    groups: list[list[Array]] = [[] for _ in range(colours.count)]
+    groups: list[list[Curve]] = [[] for _ in range(colours.count)]
     for element in patch(tiling, page.window):
         polygon = tiling.prototiles[element.prototile].polygon
-        groups[colours.colour(element)].append(element(polygon))
-    parts = ['  <defs>\n    <clipPath id="window">' + page.rectangle() + "</clipPath>\n  </defs>\n"]
-    parts.append(f'  <g id="paper" fill="{chosen.paper}">{page.rectangle()}</g>\n')
-    parts.append('  <g id="tiling" clip-path="url(#window)">\n')
-    for number, rings in enumerate(groups):
+        groups[colours.colour(element)].append(page.curve(element(polygon)))
+    border = rectangle(Box(0.0, 0.0, page.width, page.height))
+    layers = [Layer("paper", "paper", Style(chosen.paper), (border,))]
+    for number, curves in enumerate(groups):
         fill = chosen.fill(number)
-        stroke = _stroke(chosen.outline, outline_mm) if outline_mm > 0 else _stroke(fill, 0.1)
-        parts.append(f'    <g id="colour-{number + 1}" fill="{fill}"{stroke}>\n')
-        parts.extend(f'      <path d="{page.path(ring)}"/>\n' for ring in rings)
-        parts.append("    </g>\n")
-    parts.append("  </g>\n")
-    return page.document(
-        "".join(parts), title or f"Tiling {_name(tile)}".strip(), _description(tile)
+        line = (chosen.outline, outline_mm) if outline_mm > 0 else (fill, 0.1)
+        name = f"colour {number + 1}"
+        layers.append(Layer(name, "tiles", Style(fill, *line), tuple(curves), clipped=True))
+    what = "An isohedral tiling" if len(tiling.prototiles) == 1 else "A tiling"
+    note = (
+        f"{what} of the plane ({_name(tile)}), made with orbiflow. "
+        "Each path is one tile; groups collect the tiles of one colour."
     )
+    return page.document(layers, title or f"Tiling {_name(tile)}", note)
 
 
 class _Page:
-    """From the tile's coordinates to millimetres on a page with y pointing down."""
+    """A window of a tile's coordinates on a page in millimetres, with y pointing down."""
 
     def __init__(self, window: Iterable[float], width_mm: float, y_down: bool) -> None:
         xmin, ymin, xmax, ymax = (float(value) for value in window)
@@ -127,46 +278,18 @@ class _Page:
                 f"{width_mm} mm and {(xmin, ymin, xmax, ymax)}"
             )
         self.window: Window = (xmin, ymin, xmax, ymax)
-        self.scale = width_mm / (xmax - xmin)
         self.width, self.height = width_mm, width_mm * (ymax - ymin) / (xmax - xmin)
         self._origin = np.array([xmin, ymin if y_down else ymax])
-        self._signs = np.array([1.0, 1.0 if y_down else -1.0])
+        self._scale = np.array([1.0, 1.0 if y_down else -1.0]) * (width_mm / (xmax - xmin))
 
-    def path(self, ring: Array) -> str:
-        points = (ring - self._origin) * self._signs * self.scale
-        # a tenth of a micrometre
-        return "M" + "L".join(f"{_number(x)},{_number(y)}" for x, y in points) + "Z"
+    def curve(self, ring: Array) -> Curve:
+        return Curve.polyline((ring - self._origin) * self._scale, closed=True)
 
-    def rectangle(self) -> str:
-        return f'<rect x="0" y="0" width="{_number(self.width)}" height="{_number(self.height)}"/>'
-
-    def document(self, body: str, title: str, description: str) -> str:
-        header = _HEADER.format(
-            width=_number(self.width),
-            height=_number(self.height),
-            title=escape(title),
-            description=escape(description),
-        )
-        return header + body + "</svg>\n"
-
-
-def _number(value: float) -> str:
-    text = f"{value:.4f}".rstrip("0").rstrip(".")
-    return "0" if text in ("-0", "") else text
-
-
-def _stroke(colour: str, width: float) -> str:
-    return f' stroke="{colour}" stroke-width="{_number(width)}" stroke-linejoin="round"'
+    def document(self, layers: list[Layer], title: str, note: str) -> str:
+        scene = Scene(self.width, self.height, tuple(layers), title=title, notes=(note,))
+        return write_svg(scene, decimals=4)
 
 
 def _name(tile: Tiles) -> str:
     kind = tile.isohedral_class if isinstance(tile, Tile) else ""
     return " ".join(part for part in (kind, tile.group.name) if part) or "tile"
-
-
-def _description(tile: Tiles) -> str:
-    what = "An isohedral tiling" if len(as_tiling(tile).prototiles) == 1 else "A tiling"
-    return (
-        f"{what} of the plane ({_name(tile)}), made with orbiflow. "
-        "Each path is one tile; groups collect the tiles of one colour."
-    )

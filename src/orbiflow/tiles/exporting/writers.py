@@ -1,4 +1,4 @@
-"""A scene as DXF: closed polylines on named layers, in millimetres."""
+"""Scenes as DXF for machines, JSON for programs, PDF and PNG for people; all in real size."""
 
 from __future__ import annotations
 
@@ -11,8 +11,9 @@ import numpy as np
 
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles.exporting.curves import Booleans, Curve
 from orbiflow.tiles.exporting.scene import (
+    Booleans,
+    Curve,
     Layer,
     PlacedTile,
     Scene,
@@ -27,10 +28,10 @@ if TYPE_CHECKING:
 
 
 def write_dxf(scene: Scene, *, tolerance: float) -> str:
-    """The scene as DXF (R2010), which cutters, CAD and Inkscape read.
+    """Return the scene as DXF (R2010), which cutters, CAD and Inkscape read.
 
-    Curves become polygons within `tolerance` (mm): LWPOLYLINE is what every reader takes. Tiles that
-    the page cuts are cut. DXF has y up: the page's lower left corner is the origin.
+    Curves become polylines within `tolerance` (mm), which every reader takes. Tiles that the page cuts
+    are cut. DXF has y up, and the page's lower left corner is the origin.
     """
     from ezdxf import units
     from ezdxf.colors import RGB
@@ -41,7 +42,7 @@ def write_dxf(scene: Scene, *, tolerance: float) -> str:
     space = document.modelspace()
     extents = (0, 0, 0), (scene.width, scene.height, 0)
     space.reset_extents(*extents)
-    # ezdxf takes a corner at the origin for none
+    # ezdxf takes a corner at the origin for a missing one
     document.header["$EXTMIN"], document.header["$EXTMAX"] = extents
     space.reset_limits((0, 0), (scene.width, scene.height))
     for note in filter(None, (scene.title, *scene.notes)):
@@ -77,11 +78,12 @@ SCHEMA_VERSION = 1
 
 
 def write_json(scene: Scene, *, tolerance: float, decimals: int = 4) -> str:
-    """The scene for programs; all lengths in mm, y down from the page's upper left corner.
+    """Return the scene as JSON; all lengths in mm, y down from the page's upper left corner.
 
     Args:
-        tolerance: how close polygons keep to curves, in mm.
-        decimals: of coordinates.
+        scene: The page.
+        tolerance: The greatest distance in mm between polygons and curves.
+        decimals: The decimals of coordinates.
     """
     prototile = scene.prototile
     document: dict[str, Any] = {
@@ -144,17 +146,18 @@ def _rounded(values: np.ndarray, decimals: int) -> list[Any]:
 
 
 INCH = 25.4
-"""In mm."""
+"""An inch in mm."""
 
 
 def drawn(scene: Scene, *, least_width: float = 0.0) -> Figure:
-    """A figure of the page's size; one inch of it is one inch.
+    """Return a figure of the page in real size.
 
     Args:
-        least_width: of strokes in mm, so that hairlines show on a screen.
+        scene: The page.
+        least_width: The least width of strokes in mm, so that hairlines show on a screen.
 
     Raises:
-        OrbiflowError: for artwork.
+        OrbiflowError: If the scene is artwork.
     """
     from matplotlib.collections import PathCollection
     from matplotlib.figure import Figure
@@ -199,7 +202,7 @@ def _paths(scene: Scene, layer: Layer) -> list[Path]:
 
 
 def curves_path(curves: Iterable[Curve]) -> Path:
-    """Several curves as one path of matplotlib's, filled together."""
+    """Return several curves as one path of matplotlib's, filled together."""
     from matplotlib.path import Path
 
     parts = [_points_and_codes(curve) for curve in curves]
@@ -231,14 +234,14 @@ def _points_and_codes(curve: Curve) -> tuple[Array, Array]:
 
 
 def _kept(straight: Booleans) -> Booleans:
-    """(3 n,) which control points after the first to keep: of straight pieces only the end."""
+    """Return which control points (3 n,) after the first to keep: of straight pieces only the end."""
     keep = np.ones((len(straight), 3), dtype=bool)
     keep[straight, :2] = False
     return keep.ravel()
 
 
 def write_pdf(scene: Scene) -> bytes:
-    """The scene as one page; the same scene gives the same bytes."""
+    """Return the scene as a PDF of one page; the same scene gives the same bytes."""
     buffer = io.BytesIO()
     metadata = {
         "Title": scene.title,
@@ -254,10 +257,10 @@ MOST_PIXELS = 100_000_000
 
 
 def write_png(scene: Scene, *, dpi: float = 300.0) -> bytes:
-    """The scene as PNG that says its resolution, so that it prints in its real size.
+    """Return the scene as a PNG that gives its resolution, so that it prints in real size.
 
     Raises:
-        OrbiflowError: for more than `MOST_PIXELS`.
+        OrbiflowError: If it has more than `MOST_PIXELS`, or none.
     """
     width, height = (side * dpi / INCH for side in (scene.width, scene.height))
     if width * height > MOST_PIXELS or max(width, height) >= 2**16:

@@ -1,4 +1,4 @@
-"""From a tile to files: scenes, then each in the format that was asked for."""
+"""Export of a tile: scenes of the sheets, then a file of each in the format that was asked for."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from orbiflow.arguments import path as as_path
 from orbiflow.drawing import palette
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import Cancel, Progress, Sink, ignore, write_atomic
-from orbiflow.tiles.exporting.layouts import Layout, layout
+from orbiflow.tiles.exporting.layouts import Layout, layout, tiling_scene
 from orbiflow.tiles.exporting.pieces import pieces_scenes, place_on
 from orbiflow.tiles.exporting.scene import Scene
 from orbiflow.tiles.exporting.settings import ExportSettings
 from orbiflow.tiles.exporting.sheets import calibrated, split
-from orbiflow.tiles.exporting.svg_writer import write_svg
-from orbiflow.tiles.exporting.tiling_scenes import skeleton_scene, tiling_scene
+from orbiflow.tiles.exporting.skeletons import skeleton_scene
+from orbiflow.tiles.exporting.svg import write_svg
 from orbiflow.tiles.exporting.writers import (
     write_dxf,
     write_json,
@@ -29,16 +29,16 @@ from orbiflow.tiles.tile import EscherTile, TileSource
 from orbiflow.tiles.tilings import Certificate, colouring
 
 VISIBLE = 0.05
-"""Width in mm of a line that one sees on a screen."""
+"""The least width in mm of a line that shows on a screen."""
 
 
 @dataclass(frozen=True, eq=False)
 class Exported:
-    """What came of an export.
+    """The result of an export.
 
-    - `files`: that were written, one a sheet.
-    - `scenes`: what is on each.
-    - `notes`: what the user should know, in words.
+    - `files`: The files that were written, one for each sheet.
+    - `scenes`: What is on each sheet.
+    - `notes`: What the user should know.
     """
 
     files: tuple[Path, ...]
@@ -47,11 +47,11 @@ class Exported:
 
     @property
     def tiles(self) -> int:
-        """On all sheets; one that is cut where sheets meet counts on each."""
+        """The number of tiles on all sheets; a tile cut where sheets meet counts on each."""
         return sum(len(scene.tiles) for scene in self.scenes)
 
     def _repr_png_(self) -> bytes:
-        """What a notebook shows: the first sheet, some 600 pixels wide."""
+        """Return what a notebook shows: the first sheet, some 600 pixels wide."""
         sheet = self.scenes[0]
         return write_png(sheet, dpi=600 * 25.4 / max(sheet.width, sheet.height))
 
@@ -100,7 +100,7 @@ def export(
 def scenes(
     tile: TileSource, settings: ExportSettings, *, force: bool = False
 ) -> tuple[list[Scene], tuple[str, ...]]:
-    """The sheets, and what the user should know.
+    """Return the sheets, and what the user should know.
 
     Raises:
         As `export`.
@@ -179,10 +179,10 @@ def _neck_notes(placed: Layout) -> list[str]:
 
 
 def write_scene(scene: Scene, settings: ExportSettings) -> str | bytes:
-    """The file's content.
+    """Return the content of a sheet's file.
 
     Raises:
-        OrbiflowError: for a PNG of too many pixels.
+        OrbiflowError: If a PNG would have too many pixels.
     """
     fine = settings.deviation / 4
     match settings.file_format:
@@ -200,7 +200,7 @@ def write_scene(scene: Scene, settings: ExportSettings) -> str | bytes:
 
 
 def sheet_names(out: Path, count: int) -> list[Path]:
-    """One name a sheet: numbered if there are several.
+    """Return a name for each sheet, numbered if there are several.
 
     >>> [path.name for path in sheet_names(Path("cut.svg"), 2)]
     ['cut-1.svg', 'cut-2.svg']

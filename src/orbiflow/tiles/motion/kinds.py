@@ -1,4 +1,4 @@
-"""What moves in an animation, before it is a file of any format."""
+"""The kinds of animation: what moves, and when, before it is a file of any format."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from orbiflow.tiles.tilings import (
 
 
 class Places(NamedTuple):
-    """Where M copies of an outline are: linear[m] p + offset[m]; (M, 2, 2) and (M, 2), in pixels."""
+    """The places of M copies of an outline, in pixels: a point p lies at linear[m] p + offset[m]."""
 
     linear: Array
     offset: Array
@@ -38,16 +38,16 @@ class Places(NamedTuple):
 class Motion:
     """An outline that changes, and M copies of it.
 
-    All in pixels, y down, by the progress of the animation, 0 to 1.
+    All lengths are in pixels, with y down; the progress of the animation runs from 0 to 1.
 
-    - `width`, `height`: of the picture.
-    - `outline`: (N, 2) about a point of its own, always with as many vertices.
-    - `places`: of its copies; the first is the tile itself.
-    - `colours`: (M,) numbers of the palette's fills.
-    - `births`: (M, 2) from which progress to which each copy grows; before 0 for those always there.
-    - `steady`: whether the places stay what they are.
-    - `keys`: values of the progress between which the outline moves along straight lines, near enough.
-    - `what`: in words, for titles.
+    - `width`, `height`: The size of the picture.
+    - `outline`: The outline (N, 2) at a progress, relative to a point of its own; N does not change.
+    - `places`: The places of the copies at a progress; the first is the tile itself.
+    - `colours`: The numbers (M,) of the palette's fills.
+    - `births`: The progress (M, 2) from which to which each copy grows; below 0 if always there.
+    - `steady`: Whether the places do not change.
+    - `keys`: Values of the progress between which the outline moves in nearly straight lines.
+    - `what`: The motion in words, for titles.
     """
 
     width: int
@@ -61,13 +61,13 @@ class Motion:
     what: str
 
     def grown(self, progress: float) -> Array:
-        """(M,) size of each copy, 0 to 1."""
+        """Return the size (M,) of each copy, 0 to 1."""
         start, end = self.births.T
         share = np.clip((progress - start) / (end - start), 0, 1)
         return share * share * (3 - 2 * share)
 
     def rings(self, progress: float) -> Iterator[tuple[Array, int, bool]]:
-        """Every copy (N, 2) that is to be seen, the number of its colour, and whether it is whole."""
+        """Yield every visible copy (N, 2), the number of its colour, and whether it is whole."""
         outline, (linear, offset) = self.outline(progress), self.places(progress)
         size = self.grown(progress)
         for k in np.flatnonzero(size > 0):
@@ -75,20 +75,22 @@ class Motion:
 
 
 ALWAYS = (-1.0, -0.5)
-"""Birth of what is there from the start."""
+"""The birth of copies that are there from the start."""
 
 
 BEND = 0.45
 """Share of the progress of a bending in which the silhouette bends; then the tiling grows."""
 
 LOOKS = (0.0, 0.25, 0.5, 0.75, 1.0)
-"""Where on its way a tiling is looked at for the copies that come into the picture."""
+"""Values of the progress at which the copies that come into the picture are collected."""
 
 
 class Page:
-    """From a tile's coordinates to a picture `width` pixels wide: the tile's default window.
+    """The tile's default window on a picture `width` pixels wide.
 
-    - `center`: of the tile, in its coordinates; `middle`: the same in pixels.
+    - `linear`: The map from the tile's coordinates to pixels.
+    - `center`: The tile's centre in its coordinates.
+    - `middle`: The tile's centre in pixels.
     """
 
     def __init__(self, tile: Tile, width: int, y_down: bool) -> None:
@@ -100,7 +102,7 @@ class Page:
         self.middle = np.array([self.width, self.height]) / 2
 
     def window(self, linear: Array) -> Window:
-        """What of a plane is seen if `linear` takes it to pixels about the picture's middle."""
+        """Return the part of a plane that is seen if `linear` maps it to pixels about the middle."""
         corners = np.array(
             [self.middle, -self.middle, self.middle * (1, -1), self.middle * (-1, 1)]
         )
@@ -108,23 +110,25 @@ class Page:
         return (*own.min(axis=0).tolist(), *own.max(axis=0).tolist())
 
     def sees(self, low: Array, high: Array) -> Array:
-        """(M,) whether boxes with these corners (M, 2), in pixels, come into the picture."""
+        """Return whether (M,) boxes with these corners (M, 2), in pixels, come into the picture."""
         inside = (low <= 2 * self.middle) & (high >= 0)
         return inside[:, 0] & inside[:, 1]
 
 
 def morph(tile: Tile, width: int, *, y_down: bool = False, steady: bool = False) -> Motion:
-    """A tiling by the class's template, with straight edges, becoming the tile's; a tiling throughout.
+    """Return the tiling by the class's template, with straight edges, becoming the tile's.
+
+    It is a tiling throughout.
 
     Args:
-        tile: whose class and corners are known.
-        width: of the picture, in pixels.
-        y_down: whether its y axis points down.
-        steady: keep the tile's lattice from the start: then the template is stretched as the tile's
-            lattice is, and only edges move.
+        tile: A tile whose class and corners are known.
+        width: The picture's width in pixels.
+        y_down: Whether the tile's y axis points down.
+        steady: Whether the tile's lattice is there from the start: then the template is stretched as
+            the lattice is, and only edges move.
 
     Raises:
-        OrbiflowError: for a tile of no known class.
+        OrbiflowError: If the tile has no known class.
     """
     way, page = Morph(OwnFrame.of(tile)), Page(tile, width, y_down)
     end = way.end
@@ -160,7 +164,7 @@ def morph(tile: Tile, width: int, *, y_down: bool = False, steady: bool = False)
 
 
 def grow(tile: Tile, width: int, *, y_down: bool = False) -> Motion:
-    """One tile, and the tiling growing around it, nearest first."""
+    """Return one tile, and the tiling growing around it, nearest first."""
     page = Page(tile, width, y_down)
     outline = (tile.polygon - page.center) @ page.linear.T
     places, colours = _still_places(tile, page)
@@ -173,21 +177,19 @@ def grow(tile: Tile, width: int, *, y_down: bool = False) -> Motion:
         _births(places, 0.0),
         True,
         (0.0, 1.0),
-        f"The tiling of {tile.isohedral_class or 'a tile'} grows around one tile".replace(
-            "  ", " "
-        ),
+        f"The tiling of {tile.isohedral_class or 'a tile'} grows around one tile",
     )
 
 
 def bend(given: EscherTile, width: int) -> Motion:
-    """The silhouette, bending into the tile, and then the tiling growing around it.
+    """Return the silhouette bending into the tile, and then the tiling growing around it.
 
     Args:
-        given: a tile of a search for likeness, with its map.
-        width: of the picture, in pixels.
+        given: A tile of a search for likeness, with its map.
+        width: The picture's width in pixels.
 
     Raises:
-        OrbiflowError: if there is no map: the silhouette did not bend to this tile.
+        OrbiflowError: If there is no map: the silhouette did not bend into this tile.
     """
     tile, bending, frame = given.tile, given.bending, given.frame
     if bending is None or frame is None:
@@ -216,7 +218,7 @@ def bend(given: EscherTile, width: int) -> Motion:
 
 
 def _still_places(tile: Tile, page: Page) -> tuple[Places, Array]:
-    """Of all copies in the picture, the tile itself first and the nearest next; and their colours."""
+    """Return the places of all copies in the picture, the nearest first, and their colours."""
     low, high = page.window(page.linear)[:2], page.window(page.linear)[2:]
     window = (*(page.center + low).tolist(), *(page.center + high).tolist())
     copies = copies_meeting(tile, window)
@@ -229,13 +231,13 @@ def _still_places(tile: Tile, page: Page) -> tuple[Places, Array]:
 
 
 def _first_dark(colours: Array) -> Array:
-    """With two colours exchanged, so that the tile that is alone at first has the palette's second."""
+    """Exchange two colours, so that the tile that is alone at first has the palette's second."""
     own = colours[0]
     return np.where(colours == own, 1, np.where(colours == 1, own, colours))
 
 
 def _births(places: Places, begin: float) -> Array:
-    """(M, 2) of each copy, by how far it is from the first, which is always there."""
+    """Return each copy's birth (M, 2), by its distance from the first, which is always there."""
     far = np.linalg.norm(places.offset - places.offset[0], axis=1)
     start = begin + (1 - begin) * 0.7 * far / max(far.max(), 1e-300)
     births = np.stack([start, start + 0.3 * (1 - begin)], axis=1)
@@ -251,7 +253,7 @@ def _seen(
     places: Callable[[float, Copies], Places],
     page: Page,
 ) -> Copies:
-    """The copies that come into the picture at any time, those nearest to its middle first."""
+    """Return the copies that come into the picture at any time, those nearest to its middle first."""
     boxes = np.array([page.window(linear(look)) for look in LOOKS])
     reach = own.radius
     low, high = center + boxes[:, :2].min(axis=0) - reach, center + boxes[:, 2:].max(axis=0) + reach
@@ -260,7 +262,7 @@ def _seen(
     for look in LOOKS:
         by, offset = places(look, copies)
         rings = np.einsum("mij,nj->mni", by, outline(look)) + offset[:, None]
-        # what comes in between two looks comes near at one of them
+        # copies that come in between two looks are near at one of them
         room = 0.1 * np.ptp(outline(look), axis=0).max()
         seen |= page.sees(rings.min(axis=1) - room, rings.max(axis=1) + room)
     copies = copies.select(seen)
@@ -269,18 +271,18 @@ def _seen(
 
 
 REST, MOVE, SHOW = 0.07, 0.37, 0.19
-"""Shares of the loop: the rest at the start, each way, and the rest at the end, where the tile is."""
+"""Shares of the loop: the rest at the start, each way, and the rest at the end, at the tile."""
 
 
 class Frame(NamedTuple):
-    """A picture of a loop: its `progress`, 0 to 1, and for how many `seconds` it is seen."""
+    """A picture of a loop: its `progress`, 0 to 1, and the `seconds` for which it is seen."""
 
     progress: float
     seconds: float
 
 
 def eased(share: float) -> float:
-    """0 to 1, slow at both ends.
+    """Return a share of a way, 0 to 1, slow at both ends.
 
     >>> [round(eased(share), 3) for share in (0.0, 0.25, 0.5, 1.0)]
     [0.0, 0.156, 0.5, 1.0]
@@ -289,7 +291,7 @@ def eased(share: float) -> float:
 
 
 def progress(time: float) -> float:
-    """How far the loop is at a time, 0 to 1, of it.
+    """Return the progress of a loop at a time, 0 to 1 of the loop.
 
     >>> [round(progress(time), 3) for time in (0.0, 0.255, 0.5, 0.815)]
     [0.0, 0.5, 1.0, 0.5]
@@ -304,9 +306,9 @@ def progress(time: float) -> float:
 
 
 def frames(seconds: float, fps: float) -> list[Frame]:
-    """The pictures of a loop; those that follow each other and are the same are one.
+    """Return the pictures of a loop, there and back; equal ones in a row are one.
 
-    The way back has the pictures of the way there.
+    The way back has the same pictures as the way there.
     """
     way = max(2, round(MOVE * seconds * fps))
     there = [Frame(eased(k / way), MOVE * seconds / way) for k in range(1, way)]

@@ -1,13 +1,14 @@
-"""From one tile of a class to another through tiles: no frame overlaps, however limbs are bent.
+"""The way from a class's template to a tile through tiles: no frame overlaps, however limbs are bent.
 
-Both tiles fall into triangles that correspond. Every vertex of the tiling is a mean of its neighbours,
-with positive weights (mean value coordinates; Floater, 2003); and on a torus any such weights give a
-plane drawing again (Tutte, 1963; Gortler, Gotsman and Thurston, 2006). So the weights are interpolated,
-not the places (Floater and Gotsman, How to morph tilings injectively, 1999), and the places solved for:
-two unknowns an orbit of vertices, for weights that the group leaves as they are give such places.
+Both tiles are divided into triangles that correspond. Every vertex of the tiling is a mean of its
+neighbours with positive weights (mean value coordinates; Floater, 2003), and on a torus any positive
+weights give a plane drawing (Tutte, 1963; Gortler, Gotsman and Thurston, 2006). So the weights are
+interpolated instead of the places (Floater and Gotsman, How to morph tilings injectively, 1999), and
+the places are solved for. Weights that are invariant under the group give places that are, so there are
+two unknowns for each orbit of vertices.
 
-Where the group has no rotation, walks by such weights may drift, and the torus would have to change.
-There weights along the drift are tilted, by an exponential, until it stops: they stay positive.
+If the group has no rotation, walks by such weights may drift, and the torus would have to change. The
+weights along the drift are then tilted by an exponential, which keeps them positive, until it stops.
 """
 
 from __future__ import annotations
@@ -31,11 +32,11 @@ from orbiflow.tiles.silhouette import triangulate
 
 @dataclass(frozen=True, eq=False)
 class Orbits:
-    """Of each of N vertices: vertex i is linear[i] p + shift[i] of p, the vertex `source[i]`.
+    """The orbits of N vertices: vertex i lies at linear[i] p + shift[i], with p vertex `source[i]`.
 
-    - `source`: (N,) a vertex that is its own source.
-    - `linear`, `shift`: (N, 2, 2) and (N, 2), isometries of the own frame's group.
-    - `fixed`: (N,) whether the vertex lies on a centre of rotation and cannot move.
+    - `source`: The number (N,) of a vertex that is its own source.
+    - `linear`, `shift`: The isometries (N, 2, 2) and (N, 2) of the own frame's group.
+    - `fixed`: Whether (N,) the vertex lies on a centre of rotation and cannot move.
     """
 
     source: NDArray[np.int64]
@@ -45,7 +46,7 @@ class Orbits:
 
     @classmethod
     def of(cls, own: OwnFrame) -> Orbits:
-        """Of the vertices of a polygon."""
+        """Return the orbits of a polygon's vertices."""
         links = _links(own)
         count = len(own.points)
         elements: list[Isometry | None] = [None] * count
@@ -70,7 +71,7 @@ class Orbits:
         return cls(source, linear, shift, fixed)
 
     def with_inner(self, count: int) -> Orbits:
-        """And `count` vertices more, each its own source."""
+        """Return the orbits with `count` more vertices, each its own source."""
         n = len(self.source)
         return Orbits(
             np.concatenate([self.source, np.arange(n, n + count)]),
@@ -80,7 +81,7 @@ class Orbits:
         )
 
     def spread(self, points: Array) -> Array:
-        """(N, 2) vertices; those that are sources, or fixed, are taken from `points` (N, 2)."""
+        """Return the vertices (N, 2), with sources and fixed ones taken from `points` (N, 2)."""
         images = np.einsum("nij,nj->ni", self.linear, points[self.source]) + self.shift
         return np.where(self.fixed[:, None], points, images)
 
@@ -90,7 +91,7 @@ def _parts(element: Isometry) -> tuple[Array, Array]:
 
 
 def _links(own: OwnFrame) -> list[list[tuple[int, Isometry]]]:
-    """For each vertex i the vertices j and elements g with p_j = g p_i, one for each edge it is on."""
+    """Return for each vertex i the vertices j and elements g with p_j = g p_i, one for each edge."""
     count = len(own.points)
     links: list[list[tuple[int, Isometry]]] = [[] for _ in range(count)]
     bounds = [*own.starts, count]
@@ -108,31 +109,30 @@ def _links(own: OwnFrame) -> list[list[tuple[int, Isometry]]]:
 
 
 ROUNDS = 12
-"""Times that sides of the outline are halved for the triangulation."""
+"""Number of times that sides of the outline may be halved for the triangulation."""
 
 STIFF = 1e4
-"""How much more the edges pull than the inside where they are to be straight."""
+"""How much more strongly edges pull than the inside where they are to be straight."""
 
 TILTS, BALANCED, TINY = 12, 1e-9, 1e-4
-"""Steps in which weights are tilted until nothing drifts; what counts as that; a step to learn by."""
+"""Greatest number of steps in which weights are tilted, the force that counts as none, and the step
+of the finite differences."""
 
 EVEN = 24
-"""Places at which the other way is measured, so that all moves evenly."""
+"""Number of places at which the way of the weights is measured, so that the outline moves evenly."""
 
 CHECKED = 96
-"""Places between the two tiles at which the straight way is looked at."""
+"""Number of places at which the straight way is checked."""
 
 
 class Morph:
-    """The way from a tile's template to the tile.
-
-    The straight way where that stays simple, and else that of the weights.
+    """The way from a tile's template to the tile: straight if it stays simple, else by weights.
 
     Args:
-        own: the tile.
+        own: The tile.
 
     Raises:
-        OrbiflowError: for a tile that cannot be triangulated.
+        OrbiflowError: If the tile cannot be triangulated.
     """
 
     def __init__(self, own: OwnFrame) -> None:
@@ -147,11 +147,11 @@ class Morph:
 
     @property
     def is_straight(self) -> bool:
-        """Whether every vertex runs along a straight line, in the own frame."""
+        """Whether every vertex moves along a straight line, in the own frame."""
         return self._weights is None
 
     def at(self, share: float) -> OwnFrame:
-        """The tile at 0 (the template) to 1 (the tile)."""
+        """Return the tile at 0 (the template) to 1 (the tile)."""
         if share >= 1:
             return self.end
         if share <= 0:
@@ -170,13 +170,13 @@ class Morph:
 
 @dataclass(frozen=True, eq=False)
 class _Weights:
-    """What the places are solved for from.
+    """The weights of template and tile, from which places between them are solved for.
 
-    - `own`: the tile, with as many vertices as the triangles need; the first n of the points.
-    - `orbits`: of all points.
-    - `sides`: (E, 2) each side of a triangle from either end.
-    - `first`, `last`: (E,) weights of template and tile, those of each orbit adding up to one.
-    - `guess`: (N, 2) points of the tile.
+    - `own`: The tile with as many vertices as the triangles need; they are the first n points.
+    - `orbits`: The orbits of all points.
+    - `sides`: Each side (E, 2) of a triangle, from either end.
+    - `first`, `last`: The weights (E,) of template and tile, which add up to one for each orbit.
+    - `guess`: The points (N, 2) of the tile.
     """
 
     own: OwnFrame
@@ -207,7 +207,7 @@ class _Weights:
         return cls(own, orbits, sides, first, last, mesh.points)
 
     def points(self, share: float) -> Array:
-        """(n, 2) the outline at a share of the way."""
+        """Return the outline (n, 2) at a share of the way."""
         weights = self.first ** (1 - share) * self.last**share
         ways = _open_ways(self.own)
         i, j = self.sides.T
@@ -229,10 +229,10 @@ class _Weights:
         return self.orbits.spread(solution)[: len(self.own.points)]
 
     def _solved(self, weights: Array, ways: Array) -> tuple[Array, Array]:
-        """(N, 2) places in which each orbit is the mean of its neighbours, but for a force.
+        """Return places (N, 2) in which each orbit is the mean of its neighbours, and a force (k,).
 
-        The force (k,), along the ways that the group leaves open, is what such weights lack to keep
-        the whole in its place: walks by them drift. It is the same on all, none where all balances.
+        The force, along the directions that the group leaves open, is what the weights lack to keep
+        the whole in place, for walks by them drift. It is the same on all orbits.
         """
         weights = weights / _sums(weights, self.sides, self.orbits)
         guess, orbits = self.guess, self.orbits
@@ -260,9 +260,9 @@ class _Weights:
 
 
 def _bordered(matrix: csc_array, right: Array, guess: Array, ways: Array) -> tuple[Array, Array]:
-    """The solution whose mean, along the ways (k, 2) that the group leaves open, is the guess's.
+    """Return the solution with the guess's mean along the open ways (k, 2), and the force (k,).
 
-    And the force (k,) on all that this takes.
+    The force on all orbits is what keeps the mean.
     """
     size, border = right.size, np.tile(ways, (1, len(right)))
     whole, value = matrix, right.ravel()
@@ -275,7 +275,7 @@ def _bordered(matrix: csc_array, right: Array, guess: Array, ways: Array) -> tup
 
 
 def _block_matrix(blocks: Array, rows: Array, columns: Array, count: int) -> csc_array:
-    """(2 count, 2 count), of blocks (E, 2, 2) in block rows and columns (E,), those that meet added."""
+    """Return the matrix (2 count, 2 count) of blocks (E, 2, 2); those in the same place are added."""
     r = 2 * rows[:, None] + (0, 0, 1, 1)
     c = 2 * columns[:, None] + (0, 1, 0, 1)
     entries = (blocks.ravel(), (r.ravel(), c.ravel()))
@@ -283,7 +283,7 @@ def _block_matrix(blocks: Array, rows: Array, columns: Array, count: int) -> csc
 
 
 def _open_ways(own: OwnFrame) -> Array:
-    """(k, 2) orthonormal directions in which the whole may be shifted: the group keeps them."""
+    """Return the orthonormal directions (k, 2) of shifts that commute with the group."""
     rows = [np.eye(2) - g.linear for g in own.kind.group().cosets]
     _, sizes, ways = np.linalg.svd(np.concatenate(rows))
     return ways[sizes < 1e-6]
@@ -295,15 +295,15 @@ def _sides(triangles: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def _sums(weights: Array, sides: NDArray[np.int64], orbits: Orbits) -> Array:
-    """(E,) of each side the weights' sum over all sides at the same orbit."""
+    """Return for each side (E,) the sum of the weights over all sides at the same orbit."""
     own = orbits.source[sides[:, 0]]
     return np.bincount(own, weights, minlength=len(orbits.source))[own]
 
 
 def _stiff_edges(own: OwnFrame, sides: NDArray[np.int64]) -> Array:
-    """(E,) weights whose solution is a tile with straight edges, but for a little: `STIFF` times less.
+    """Return weights (E,) whose solution is a tile with edges that are straight up to 1 / `STIFF`.
 
-    An edge pulls alike however many sides it has.
+    An edge pulls with the same force however many sides it has.
     """
     n = len(own.points)
     weights = np.ones(len(sides))
@@ -315,7 +315,7 @@ def _stiff_edges(own: OwnFrame, sides: NDArray[np.int64]) -> Array:
 
 
 def _mean_values(points: Array, triangles: NDArray[np.int64], sides: NDArray[np.int64]) -> Array:
-    """(E,) weights: tangents of half the angles beside a side, over its length."""
+    """Return mean value weights (E,): tangents of half the angles beside a side, over its length."""
     total = np.zeros(len(sides))
     codes = sides[:, 0] * len(points) + sides[:, 1]
     for k in range(3):
@@ -330,7 +330,7 @@ def _mean_values(points: Array, triangles: NDArray[np.int64], sides: NDArray[np.
 
 
 def _evenly(weights: _Weights) -> Array:
-    """How far the outline has moved, 0 to 1, at even shares of the weights' way."""
+    """Return how far the outline has moved, 0 to 1, at even shares of the weights' way."""
     found = [weights.points(float(s)) for s in np.linspace(0, 1, EVEN + 1)]
     steps = [np.sqrt(((b - a) ** 2).sum(axis=1).mean()) for a, b in pairwise(found)]
     far = np.concatenate([[0], np.cumsum(steps)])

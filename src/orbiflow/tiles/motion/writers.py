@@ -1,4 +1,4 @@
-"""An animation in pixels: a GIF by Pillow, an MP4 by ffmpeg where it is installed."""
+"""Animations as files: a GIF by Pillow, an MP4 by ffmpeg if it is installed, an SVG in curves."""
 
 from __future__ import annotations
 
@@ -35,16 +35,17 @@ from orbiflow.tiles.motion.kinds import (
 OUTLINE = 0.0016
 """Width of outlines, as a share of the picture's."""
 
-Told = Callable[[float], None]
+ProgressCall = Callable[[float], None]
+"""Called with the share of the work that is done."""
 
 
 def picture(motion: Motion, palette: Palette, progress: float) -> Raster:
-    """One frame."""
+    """Draw one frame."""
     window = (0.0, 0.0, float(motion.width), float(motion.height))
     raster = Raster(window, motion.width, y_down=True, paper=palette.paper)
     rings = list(motion.rings(progress))
     width = max(1.0, OUTLINE * motion.width)
-    for ring, colour, whole in rings:  # what grows is below what is there
+    for ring, colour, whole in rings:  # growing tiles lie below whole ones
         if not whole:
             raster.fill([ring], palette.fill(colour))
             raster.line(ring, palette.outline, width, closed=True)
@@ -57,16 +58,18 @@ def picture(motion: Motion, palette: Palette, progress: float) -> Raster:
     return raster
 
 
-def write_gif(motion: Motion, palette: Palette, frames: list[Frame], told: Told) -> bytes:
-    """A GIF that repeats for ever; all frames have one palette.
+def write_gif(motion: Motion, palette: Palette, frames: list[Frame], told: ProgressCall) -> bytes:
+    """Return a GIF that repeats for ever, with one palette for all frames.
 
     Args:
-        frames: of the loop.
-        told: told the share of the work done.
+        motion: What moves.
+        palette: The palette of paper, fills and outlines.
+        frames: The frames of the loop.
+        told: Called with the share of the work that is done.
     """
     fills = [palette.fill(k) for k in range(int(motion.colours.max(initial=0)) + 1)]
     colours = (palette.paper, *fills, palette.outline)
-    # few mixtures: each costs bytes in every frame
+    # few mixed colours, each of which costs bytes in every frame
     shown = list(_shown(motion, palette, frames, told, lambda image: limited(image, colours, 3)))
     # a GIF counts in hundredths of a second
     ends = [round(100 * end) for end in accumulate(frame.seconds for frame in frames)]
@@ -86,10 +89,10 @@ def write_gif(motion: Motion, palette: Palette, frames: list[Frame], told: Told)
 
 
 def require_ffmpeg() -> str:
-    """Path of ffmpeg.
+    """Return the path of ffmpeg.
 
     Raises:
-        OrbiflowError: if it is not installed.
+        OrbiflowError: If it is not installed.
     """
     found = shutil.which("ffmpeg")
     if found is None:
@@ -101,12 +104,12 @@ def require_ffmpeg() -> str:
 
 
 def write_mp4(
-    motion: Motion, palette: Palette, frames: list[Frame], fps: float, told: Told
+    motion: Motion, palette: Palette, frames: list[Frame], fps: float, told: ProgressCall
 ) -> bytes:
-    """An MP4 (H.264) of one loop, that every player and browser shows.
+    """Return an MP4 (H.264) of one loop, which every player and browser shows.
 
     Raises:
-        OrbiflowError: if ffmpeg is not installed or fails.
+        OrbiflowError: If ffmpeg is not installed or fails.
     """
     ffmpeg = require_ffmpeg()
     with tempfile.TemporaryDirectory() as folder:
@@ -124,7 +127,7 @@ def write_mp4(
         done = subprocess.run(command, input=content, capture_output=True, check=False)
         if done.returncode or not out.is_file():
             said = done.stderr.decode(errors="replace").strip().splitlines()
-            raise OrbiflowError(f"ffmpeg failed: {said[-1] if said else 'without a word'}")
+            raise OrbiflowError(f"ffmpeg failed: {said[-1] if said else 'without a message'}")
         return out.read_bytes()
 
 
@@ -132,10 +135,10 @@ def _shown(
     motion: Motion,
     palette: Palette,
     frames: list[Frame],
-    told: Told,
+    told: ProgressCall,
     made: Callable[[Image.Image], Image.Image],
 ) -> Iterator[Image.Image]:
-    """The pictures of a loop; none is drawn twice."""
+    """Yield the pictures of a loop, each of which is drawn once."""
     known: dict[float, Image.Image] = {}
     count = len({frame.progress for frame in frames})
     for frame in frames:
@@ -151,23 +154,25 @@ _EASE, _EVEN = "0.42 0 0.58 1", "0 0 1 1"
 def write_motion_svg(
     motion: Motion, palette: Palette, *, seconds: float, name: str, title: str = ""
 ) -> str:
-    """The SVG document.
+    """Return an animated SVG; readers who prefer less motion see the tiling at rest.
 
     Args:
-        motion: a steady one.
-        palette: of the fills.
-        seconds: of the loop.
-        name: in front of all ids and classes, so that several can be in one page.
-        title: in words.
+        motion: What moves; it must be steady.
+        palette: The palette of paper, fills and outlines.
+        seconds: The time that the loop takes.
+        name: The beginning of all ids and classes, so that a page can hold several animations.
+        title: The title in words.
     """
     key = re.sub(r"[^A-Za-z0-9]+", "-", name).strip("-").lower() or "tile"
     width, height = motion.width, motion.height
     still = motion.places(1.0)
-    # what grows is below what is there
-    order = reversed(_all(motion))
+    # growing tiles lie below whole ones
+    order = reversed(range(len(motion.colours)))
     moving = [_copy(motion, still, k, f"{key}-moving", palette, seconds) for k in order]
-    fixed = [_still_copy(still, k, f"{key}-still", palette, motion) for k in _all(motion)]
-    stroke = f'stroke="{palette.outline}" stroke-width="{0.0016 * width:.2f}"'
+    fixed = [
+        _still_copy(still, k, f"{key}-still", palette, motion) for k in range(len(motion.colours))
+    ]
+    stroke = f'stroke="{palette.outline}" stroke-width="{OUTLINE * width:.2f}"'
     return f"""<?xml version="1.0" encoding="UTF-8"?>
 <svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" \
 width="{width}" height="{height}" role="img" class="{key}">
@@ -193,10 +198,6 @@ width="{width}" height="{height}" role="img" class="{key}">
 </g>
 </svg>
 """
-
-
-def _all(motion: Motion) -> range:
-    return range(len(motion.colours))
 
 
 def _path(ring: Array) -> str:
@@ -251,7 +252,7 @@ def _still_copy(places: Places, k: int, symbol: str, palette: Palette, motion: M
 def _animate(
     element: str, what: str, keys: Sequence[float], values: Sequence[str], seconds: float
 ) -> str:
-    """There and back, with rests: `values` at these values of the progress, 0 to 1."""
+    """Return an animation there and back, with rests: `values` at these `keys` of the progress."""
     direct = len(keys) == 2
     there = [REST + MOVE * _time(key) for key in keys]
     back = [REST + 2 * MOVE + SHOW - MOVE * _time(key) for key in reversed(keys)]
@@ -268,7 +269,7 @@ def _animate(
 
 
 def _time(progress: float) -> float:
-    """When, 0 to 1 of a way, the eased progress is reached: the inverse of `eased`.
+    """Return the time, 0 to 1 of a way, at which the eased progress is reached: the inverse of `eased`.
 
     >>> [round(_time(eased(t)), 9) for t in (0.0, 0.2, 0.5, 1.0)]
     [0.0, 0.2, 0.5, 1.0]

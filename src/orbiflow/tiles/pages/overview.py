@@ -1,4 +1,4 @@
-"""`overview.png`: all tiles of a search on one sheet, for a first look."""
+"""`overview.png`: all tiles of a search on one sheet; and what counts of a tile, in words."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from orbiflow.tiles.tilings import Colouring
 
 
 class Measure(NamedTuple):
-    """A number and what it says: its `name`, `value` as text, `words` for it, and its `meaning`."""
+    """A number in words: its `name`, its `value` as text, a judgement (`words`), and its `meaning`."""
 
     name: str
     value: str
@@ -36,7 +36,7 @@ class Measure(NamedTuple):
 
 
 def measures(result: EscherTile) -> list[Measure]:
-    """Of a tile, what counts most first; those that were not taken are left out."""
+    """Return a tile's measures, the most important first, without those that were not taken."""
     found = [_score(result)]
     if result.deformation is not None:
         found.append(
@@ -73,7 +73,7 @@ def measures(result: EscherTile) -> list[Measure]:
             Measure(
                 "Thinnest neck",
                 f"{100 * result.thinnest.share:.1f} %",
-                "thin: mind it when you cut" if thin else "sound",
+                "thin: take care when you cut" if thin else "sound",
                 "Its width, in hundredths of the square root of the tile's area.",
             )
         )
@@ -94,7 +94,7 @@ POOR_MATCH, POOR_LIKENESS = 0.4, 0.2
 
 
 def is_poor(result: EscherTile) -> bool:
-    """Whether nobody would know the silhouette in it."""
+    """Return whether nobody would recognise the silhouette in a tile."""
     return result.score <= (POOR_MATCH if result.fidelity is None else POOR_LIKENESS)
 
 
@@ -121,7 +121,7 @@ def _score(result: EscherTile) -> Measure:
 
 
 def _word(value: float, *scale: tuple[float, str] | str) -> str:
-    """The word of the first bound that the value is below; the last has none."""
+    """Return the word of the first bound that the value is below; the last word has none."""
     for step in scale:
         if isinstance(step, str):
             return step
@@ -152,15 +152,15 @@ def overview_png(
     *,
     failures: Sequence[ClassFailure] = (),
 ) -> bytes:
-    """PNG of all tiles, best first: each one's tiling, large, and beside its name what bent.
+    """Return a PNG of all tiles, best first: each tiling, large, and below it what bent.
 
-    1920 pixels wide (1320 for a single tile), legible at 1440.
+    It is 1920 pixels wide (1320 for a single tile) and legible at 1440.
 
     Args:
-        results: of one search, at least one.
-        target: of the search.
-        colours: of each tiling, if they are at hand.
-        failures: classes without a tile, to be named.
+        results: The tiles of one search, one or more.
+        target: The silhouette that was searched for.
+        colours: The colouring of each tiling, if it is known already.
+        failures: The classes without a tile, which are named.
     """
     columns = {1: 1, 2: 2, 4: 2}.get(len(results), 3)
     width = 1320 if columns == 1 else _WIDTH
@@ -187,9 +187,9 @@ def overview_png(
 
 
 def verdict(result: EscherTile) -> str:
-    """How far a tile is from its silhouette, in a few words.
+    """Return how far a tile is from its silhouette, in a few words.
 
-    After a search for likeness what bending cost; else how well the silhouette is recognised.
+    After a search for likeness this is what bending cost, else how well the silhouette is recognised.
     """
     if result.deformation is None:
         how = f"recognised {result.recognisability.score:.2f}"
@@ -218,7 +218,7 @@ def _header(
 
 
 def _below(place: _Place) -> int:
-    """Where the part below the tiling begins."""
+    """Return where the part below the tiling begins."""
     return place.top + round(place.width / 1.5) + 14
 
 
@@ -238,7 +238,7 @@ def _write_words(pen: ImageDraw.ImageDraw, result: EscherTile, place: _Place, ra
 
 
 def _small(result: EscherTile, target: Target) -> Raster:
-    """A tile and its silhouette, without a legend."""
+    """Draw a tile and its silhouette, without a legend."""
     tile, y_down = result.tile, target.y_down
     if result.bent is None or result.rest is None:
         width = _fitting(window_of([tile.polygon, target.outline]))
@@ -248,7 +248,7 @@ def _small(result: EscherTile, target: Target) -> Raster:
 
 
 def _fitting(window: Window) -> int:
-    """The width in pixels at which a window fits beside its words; more if it is very long."""
+    """Return the width in pixels at which a window fits beside its words; more if it is very long."""
     aspect = (window[2] - window[0]) / (window[3] - window[1])
     return max(16, round(_THUMB * min(1.0, aspect)), round(17 * aspect))
 

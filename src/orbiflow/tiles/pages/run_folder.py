@@ -1,4 +1,4 @@
-"""All files of an escherization: a folder a class, and an overview."""
+"""The folder of a search: a folder for each class, overviews, and `result.json`."""
 
 from __future__ import annotations
 
@@ -42,16 +42,16 @@ def write_gallery(
     """Write each class's folder, `overview.png` and `index.html`.
 
     Args:
-        results: best first, at least one.
-        target: of the search.
-        out: a folder.
-        failures: classes without a tile, to be named in the page.
-        figures: write the figures, too.
-        workers: processes that draw figures; the pictures alone are drawn in less time than it takes to
-            start one.
+        results: The tiles, best first, one or more.
+        target: The silhouette that was searched for.
+        out: The folder.
+        failures: The classes without a tile, which the page names.
+        figures: Write the figures, too.
+        workers: The number of processes that draw figures; without figures, starting one would take
+            longer than drawing.
 
     Raises:
-        OutputError: if a file cannot be written.
+        OutputError: If a file cannot be written.
     """
     names = folder_names([result.isohedral_class for result in results])
     folders = [out / name for name in names]
@@ -73,10 +73,10 @@ def write_gallery(
 def write_front(
     results: Sequence[EscherTile], found: Iterable[EscherTile], target: Target, out: Path
 ) -> None:
-    """Write `front.png`: a list's tiles among all that were found, by deformation and overlap.
+    """Write `front.png`: the listed tiles among all that were found, by deformation and overlap.
 
     Raises:
-        OutputError: if the file cannot be written.
+        OutputError: If the file cannot be written.
     """
     listed = {id(result.tile) for result in results}
     others = [result for result in found if id(result.tile) not in listed]
@@ -106,16 +106,16 @@ def _draw(
     index: int,
     *_: object,
 ) -> None:
-    """The folder of one result; in a worker process, too."""
+    """Write the folder of one tile; this may run in a worker process."""
     write_tile_folder(
         results[index], target, folders[index], colours=colours[index], figures=figures
     )
 
 
 def written_files(folder: Path) -> set[str]:
-    """Paths of the files that an earlier search wrote into `folder`, by its result.json.
+    """Return the paths of the files that an earlier search wrote into a folder, by its result.json.
 
-    Relative, with slashes; none if there is no such run.
+    They are relative, with slashes; there are none if there is no such run.
     """
     try:
         document = json.loads((folder / RESULT).read_text(encoding="utf-8"))

@@ -1,4 +1,4 @@
-"""The files of an escherized class: artwork, pictures and the model."""
+"""The folder of one tile: drawings, pictures and the map."""
 
 from __future__ import annotations
 
@@ -27,16 +27,16 @@ from orbiflow.tiles.tile_map import TileMap
 from orbiflow.tiles.tilings import Colouring, colouring
 
 TILE_FILES = ("tile.svg", "tiling.svg", "tiling.png", "overlay.png", "model.safetensors")
-"""What every class's folder holds."""
+"""The files in every tile's folder."""
 
 FIELD_FILES = ("field.png", "field.pdf")
 FIGURE_FILES = ("tiling.pdf", "overlay.pdf", *FIELD_FILES)
-"""What it holds besides if figures were asked for: for print, as wide as a journal's column, and the
-field of the flow where there is one."""
+"""The further files if figures were asked for: for print, as wide as a journal's column; and the field
+of the flow if there is one."""
 
 
 def overlay(result: EscherTile, target: Target, *, label: str = "", width_px: int = 1200) -> bytes:
-    """PNG of a tile and its silhouette: how it bent, or what is missing and added."""
+    """Return a PNG of a tile and its silhouette: how it bent, or what is missing and added."""
     y_down = target.y_down
     label = label or result.isohedral_class
     if result.bent is None or result.rest is None:
@@ -50,13 +50,13 @@ def overlay(result: EscherTile, target: Target, *, label: str = "", width_px: in
 
 
 def figure_files(result: EscherTile) -> tuple[str, ...]:
-    """Which of the `FIGURE_FILES` there are: no flow moves a tile that the silhouette bent to."""
+    """Return the `FIGURE_FILES` of a tile: there is no flow where the silhouette bent into the tile."""
     likeness = result.objective == "likeness"
     return tuple(file for file in FIGURE_FILES if not (likeness and file in FIELD_FILES))
 
 
 def _overlay_picture(result: EscherTile, target: Target) -> Picture:
-    """The picture of `overlay` for print."""
+    """Return the picture of `overlay` for print."""
     y_down = target.y_down
     if result.bent is None or result.rest is None:
         return overlay_picture(result.tile, target.outline, y_down=y_down)
@@ -80,14 +80,17 @@ def write_tile_folder(
     colours: Colouring | None = None,
     figures: bool = False,
 ) -> list[Path]:
-    """Write the `TILE_FILES`.
+    """Write the `TILE_FILES` of a tile.
 
     Args:
-        colours: of the tiling, default `colouring(result.tile)`.
-        figures: write the `FIGURE_FILES`, too; they take much longer.
+        result: The tile.
+        target: Its silhouette.
+        folder: The folder, which is made if need be.
+        colours: The tiling's colouring. Default: `colouring(result.tile)`.
+        figures: Write the `FIGURE_FILES`, too; they take much longer.
 
     Raises:
-        OutputError: if a file cannot be written.
+        OutputError: If a file cannot be written.
     """
     make_folder(folder)
     y_down = target.y_down

@@ -6,12 +6,12 @@ from .classes import classes_png as classes_png
 from .fields import placed_field as placed_field
 from .front import FrontPoint as FrontPoint
 from .front import front_png as front_png
-from .tiling_sheet import tilings_png as tilings_png
+from .overlays import overlay_picture as overlay_picture
+from .overlays import overlay_png as overlay_png
+from .overlays import overlay_raster as overlay_raster
 from .tilings import ASPECT as ASPECT
 from .tilings import default_window as default_window
-from .tilings import overlay_picture as overlay_picture
-from .tilings import overlay_png as overlay_png
-from .tilings import overlay_raster as overlay_raster
 from .tilings import tiling_picture as tiling_picture
 from .tilings import tiling_png as tiling_png
 from .tilings import tiling_raster as tiling_raster
+from .tilings import tilings_png as tilings_png

@@ -1,4 +1,4 @@
-"""Picture of a silhouette that was bent into a tile: what moved, and where to."""
+"""Pictures of a silhouette that was bent into a tile, and the silhouettes on the way there."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ STILL = 0.06
 """Distance, in square roots of the area, up to which no arrow is drawn."""
 
 FAR = 0.3
-"""Distance at which the outline has the ramp's last colour."""
+"""Distance, in square roots of the area, at which the outline has the ramp's last colour."""
 
 _STEPS = 11
 _LINE, _GHOST = 0.0042, 0.0022  # widths of lines, as shares of the picture's
@@ -46,16 +46,16 @@ def bending_png(
     y_down: bool = False,
     label: str = "",
 ) -> bytes:
-    """PNG of a tile with the bent silhouette's outline, coloured by how far each point went.
+    """Return a PNG of a tile with the bent silhouette's outline, coloured by how far points moved.
 
     The silhouette as it was is a faint dashed line; arrows lead from it to the tile where it bent.
 
     Args:
-        tile: filled, in the input's coordinates.
-        rest, bent: (n, 2) outlines of the silhouette as it was and bent, point by point.
-        width_px: the height follows.
-        y_down: whether the y axis points down, as in images.
-        label: in front of the legend, default the class.
+        tile: The tile in the input's coordinates, which is filled.
+        rest, bent: The outlines (n, 2) of the silhouette as it was and bent, point by point.
+        width_px: The width in pixels; the height follows.
+        y_down: Whether the y axis points down, as in images.
+        label: The words in front of the legend. Default: the class.
     """
     text = label or tile.isohedral_class or " "
     raster = bending_raster(tile, rest, bent, width_px=width_px, y_down=y_down, text=text)
@@ -66,11 +66,11 @@ def bending_png(
 def bending_picture(
     tile: Tile, rest: Array, bent: Array, *, y_down: bool = False, sheet: Sheet | None = None
 ) -> Picture:
-    """The picture of `bending_png` for print, in curves; the caption has its legend.
+    """Return the picture of `bending_png` for print, in curves; the caption has its legend.
 
     Args:
-        rest, bent, y_down: as for `bending_png`.
-        sheet: default a journal's single column, as PDF.
+        tile, rest, bent, y_down: As for `bending_png`.
+        sheet: The sheet it is drawn on. Default: a journal's single column, as PDF.
     """
     raster = bending_raster(tile, rest, bent, width_px=1600, y_down=y_down)
     title = f"Silhouette bent into a tile {tile.isohedral_class}".strip()
@@ -91,9 +91,12 @@ def bending_raster(
     text: str = "",
     thick: float = 1.0,
 ) -> Raster:
-    """The picture of `bending_png` without its legend; and without a strip for an empty `text`.
+    """Return the picture of `bending_png` without its legend, and without a strip if `text` is empty.
 
-    `thick`: factor of all lines' widths, for small pictures.
+    Args:
+        tile, rest, bent, width_px, y_down: As for `bending_png`.
+        text: The words in the strip.
+        thick: A factor of all lines' widths, for small pictures.
     """
     raster = captioned([rest, bent, tile.polygon], width_px, y_down=y_down, text=text)
     raster.fill([tile.polygon], TILE)
@@ -110,7 +113,7 @@ def bending_raster(
 
 
 def _ramp(stops: tuple[str, ...], count: int) -> tuple[str, ...]:
-    """So many colours from the first stop to the last, evenly through all."""
+    """Return so many colours, evenly spaced from the first stop to the last."""
     values = np.array([rgb(stop) for stop in stops], dtype=float)
     places = np.linspace(0, len(stops) - 1, count)
     mixed = [np.interp(places, np.arange(len(stops)), values[:, k]) for k in range(3)]
@@ -121,11 +124,11 @@ def _ramp(stops: tuple[str, ...], count: int) -> tuple[str, ...]:
 
 
 RAMP = _ramp(("#1d4e79", "#d98a2b", ARROW), _STEPS)
-"""Of the outline, from where it stayed to where it moved far."""
+"""Colours of the outline, from where it stayed to where it moved far."""
 
 
 def _runs(ring: Array, steps: Array) -> Iterator[tuple[int, Array]]:
-    """The sides of a ring (n, 2) by their steps (n,) of the ramp: neighbours of one step together."""
+    """Yield the runs of a ring's sides (n, 2) that have the same step (n,) of the ramp."""
     starts = np.flatnonzero(steps != np.roll(steps, 1))
     if not len(starts):
         yield int(steps[0]), np.concatenate([ring, ring[:1]])
@@ -143,7 +146,7 @@ def _ghost(raster: Raster, points: Array, unit: float) -> None:
 def _arrows(
     raster: Raster, rest: Array, bent: Array, moved: Array, size: float, width: float
 ) -> None:
-    """Where the outline went, at points some way apart that went far."""
+    """Draw arrows to where the outline went, at points some way apart that moved far."""
     taken: list[int] = []
     for k in np.argsort(-moved):
         if moved[k] < STILL or len(taken) == 24:
@@ -170,13 +173,13 @@ def _legend(raster: Raster) -> None:
 
 
 class BendingWay:
-    """Silhouettes on the way from the one at rest to the tile.
+    """The silhouettes on the way from the one at rest to the tile.
 
     Args:
-        bending: the map between the two.
+        bending: The map between the two.
 
     Raises:
-        OrbiflowError: if its triangles have no single outline.
+        OrbiflowError: If its triangles have no single outline.
     """
 
     def __init__(self, bending: Bending) -> None:
@@ -204,12 +207,12 @@ class BendingWay:
         columns = np.swapaxes(rows, 1, 2)
         count = len(self.rest)
         matrix = coo_array((blocks.ravel(), (rows.ravel(), columns.ravel())), shape=(count, count))
-        # the whole may be shifted: hold one point, and shift all afterwards
+        # the solution is free up to a shift: hold one point, and shift all afterwards
         anchor = coo_array(([area.mean()], ([0], [0])), shape=(count, count))
         self._solver = splu(csc_array(matrix + anchor))
 
     def at(self, share: float) -> Array:
-        """(n, 2) the outline at 0 (as it is) to 1 (the tile), in the target's normal form."""
+        """Return the outline (n, 2) at 0 (as it is) to 1 (the tile), in the target's normal form."""
         turned = _rotations(share * self._angle)
         linear = turned @ ((1 - share) * np.eye(2) + share * self._stretch)
         pull = self._gradient @ np.swapaxes(linear, 1, 2)
@@ -226,13 +229,13 @@ def _rotations(angles: Array) -> Array:
 
 
 def _continuous(angles: Array) -> Array:
-    """Angles within half a turn of their mean direction: beyond it a limb has turned the other way."""
+    """Return the angles within half a turn of their mean: beyond it a limb has turned the other way."""
     mean = float(np.angle(np.exp(1j * angles).sum()))
     return mean + np.angle(np.exp(1j * (angles - mean)))
 
 
 def _outline(triangles: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Points of the sides that one triangle alone has, in order."""
+    """Return the points of the sides that belong to one triangle alone, in order."""
     ends = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
     known = {(int(a), int(b)) for a, b in ends}
     after = {a: b for a, b in known if (b, a) not in known}

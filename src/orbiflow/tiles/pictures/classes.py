@@ -1,6 +1,6 @@
-"""Picture of the nine isohedral classes: identified edges, tiling and symmetries.
+"""A picture of the nine isohedral classes: identified edges, tiling and symmetries.
 
-Everything is computed from the table of classes and its groups; nothing is placed by hand.
+Everything is computed from the table of classes and their groups; nothing is placed by hand.
 """
 
 from __future__ import annotations
@@ -41,14 +41,14 @@ _PANEL = (0.30, 0.68)  # shares of a panel's width for the template and for the 
 
 
 def classes_png(*, width_px: int = 2400) -> bytes:
-    """PNG of the nine classes, three by three (paper, figures of templates and of symmetries).
+    """Return a PNG of the nine classes, three by three (paper, figures of templates and symmetries).
 
-    Left in each panel the template: identified edges have one colour and the arrows that the group
-    maps onto each other; an arrow with one barb belongs to a glide reflection. Right the tiling:
-    one fill per aspect, the lattice cell, rotation centres and glide lines.
+    On the left of each panel is the template: identified edges have one colour and arrows that the
+    group maps onto each other; an arrow with one barb belongs to a glide reflection. On the right is
+    the tiling: a fill for each aspect, the lattice cell, rotation centres and glide lines.
 
     Raises:
-        OrbiflowError: if the picture would be too large or too small.
+        OrbiflowError: If the picture would be too large or too small.
     """
     height = round(width_px * 0.82)
     figure = blank_figure(width_px, height)
@@ -89,7 +89,7 @@ def _around(middle: Array, half_width: float, half_height: float) -> Window:
 
 
 def draw_template(axes: Axes, kind: IsohedralClass) -> None:
-    """A class's template: identified edges in one colour, with the arrows that are identified."""
+    """Draw a class's template: identified edges in one colour, with the arrows that are identified."""
     vertices = kind.template()
     fill_rings(axes, [vertices], ASPECT_FILLS[0], "none", 0)
     for pair, colour in zip(kind.identified_edges, EDGE_COLOURS, strict=False):
@@ -108,7 +108,7 @@ def draw_template(axes: Axes, kind: IsohedralClass) -> None:
 
 
 def _arrow(kind: IsohedralClass, pair: EdgeIdentification) -> Array:
-    """Arrowhead on the first edge: in its middle, or for a 2-fold centre halfway to its end."""
+    """Return an arrowhead on the first edge: in its middle, or halfway to its end for a half-turn."""
     vertices = kind.template()
     start, end = vertices[pair.first], vertices[(pair.first + 1) % len(vertices)]
     along = (end - start) / np.linalg.norm(end - start)
@@ -121,7 +121,7 @@ def _arrow(kind: IsohedralClass, pair: EdgeIdentification) -> Array:
 
 
 def draw_tiling(axes: Axes, kind: IsohedralClass, window: Window) -> None:
-    """The template's tiling: a fill for each aspect, the lattice cell, all centres and lines."""
+    """Draw the template's tiling: a fill for each aspect, the lattice cell, all centres and lines."""
     tile = Tile(kind.template(), kind.group(), kind.name)
     elements = patch(tile, window)
     for element, aspect in zip(elements, aspects(tile, elements), strict=True):

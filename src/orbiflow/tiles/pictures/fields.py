@@ -11,9 +11,9 @@ from orbiflow.tiles.search import TileModel
 
 
 def placed_field(model: TileModel) -> Callable[[Tensor], Tensor]:
-    """The vector field of a single candidate, pushed forward by A o L to the target's normal form.
+    """Return a single candidate's vector field, pushed forward by A o L to the target's normal form.
 
-    The mean over time, where the flow has several segments.
+    It is the mean over time if the flow has several segments.
     """
     linear = model.linear().detach()[0]
     # fields are linear in their parameters: one evaluation for any number of segments

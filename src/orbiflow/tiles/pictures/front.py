@@ -1,4 +1,4 @@
-"""Picture of a choice between two aims: tiles by their deformation and their overlap."""
+"""A picture of the choice between two aims: tiles by their deformation and their overlap."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ COLOURS = {"likeness": "#1d4e79", "overlap": "#c8702a"}
 NAMES = {"likeness": "found for likeness", "overlap": "found for overlap"}
 
 SIZE, SMALL = 0.075, 0.03
-"""Height of a listed tile's little picture, and of another's, as a share of the width."""
+"""Height of a listed tile's silhouette, and of another tile's, as a share of the width."""
 
 PUSHES = 400
-"""Steps in which the little pictures make room for each other."""
+"""Number of steps in which the silhouettes make room for each other."""
 
 
 class FrontPoint(NamedTuple):
     """A tile in the picture.
 
-    - `deformation`, `iou`: where it stands.
-    - `polygon`: (N, 2), in the input's coordinates.
-    - `label`: beside it, such as its class.
-    - `objective`: "likeness" or "overlap": what it was found for.
-    - `listed`: whether it is in the list; others are pale.
-    - `front`: whether no other beats it in both.
+    - `deformation`, `iou`: Its place in the picture.
+    - `polygon`: The polygon (N, 2) in the input's coordinates.
+    - `label`: The words beside it, such as its class.
+    - `objective`: What it was found for: "likeness" or "overlap".
+    - `listed`: Whether it is in the list; others are pale.
+    - `front`: Whether no other tile beats it in both.
     """
 
     deformation: float
@@ -46,22 +46,22 @@ class FrontPoint(NamedTuple):
 
 
 def front_png(points: Sequence[FrontPoint], *, width_px: int = 1600, y_down: bool = False) -> bytes:
-    """PNG of tiles by deformation (to the right) and overlap (upwards), each a little silhouette.
+    """Return a PNG of tiles by deformation (to the right) and overlap (upwards), as silhouettes.
 
-    Listed tiles are large and coloured by what they were found for, with a line to where they stand
-    if they had to make room; full colour says that no other beats them. Others are pale, and the
-    dashed steps are the border of what is beaten.
+    Listed tiles are large and coloured by what they were found for, with a line to their place if they
+    had to make room; full colour means that no other beats them. Others are pale, and the dashed
+    steps are the border of what is beaten.
 
     Args:
-        points: of all tiles that were found.
-        width_px: the height is seven tenths of it.
-        y_down: whether the y axis of the polygons points down, as in images.
+        points: All tiles that were found.
+        width_px: The width in pixels; the height is seven tenths of it.
+        y_down: Whether the y axis of the polygons points down, as in images.
 
     Raises:
-        OrbiflowError: for no points, and sizes that cannot be made.
+        OrbiflowError: If there are no points or the size is impossible.
     """
     if not points:
-        raise OrbiflowError("a picture of a front needs a tile at least")
+        raise OrbiflowError("a picture of a front needs at least one tile")
     figure = blank_figure(width_px, round(0.7 * width_px))
     axes = _axes(figure, points)
     _steps(axes, points)
@@ -91,7 +91,7 @@ def _axes(figure: object, points: Sequence[FrontPoint]) -> Axes:
 
     axes: Axes = figure.add_axes((0.075, 0.1, 0.9, 0.82))  # pyright: ignore[reportAttributeAccessIssue]
     values = np.array([(p.deformation, p.iou) for p in points])
-    # what is far from all that is listed would press the rest into a corner
+    # points far from all that are listed would press the rest into a corner
     listed = np.array([p.listed for p in points])
     near = values[listed] if listed.any() else values
     low, high = near.min(axis=0), near.max(axis=0)
@@ -129,7 +129,7 @@ def _axes(figure: object, points: Sequence[FrontPoint]) -> Axes:
 
 
 def _steps(axes: Axes, points: Sequence[FrontPoint]) -> None:
-    """The border of what is beaten by others."""
+    """Draw the border of what is beaten by others."""
     x: list[float] = []
     y: list[float] = []
     for point in sorted(points, key=lambda p: (p.deformation, -p.iou)):
@@ -167,13 +167,13 @@ def _silhouette(
 
 
 def _in(axes: Axes, pixels: Sequence[Array]) -> tuple[Array, Array]:
-    """x and y of pixels in the axes' own units."""
+    """Return x and y of pixels in the axes' own units."""
     values = axes.transData.inverted().transform(np.array(pixels))
     return values[:, 0], values[:, 1]
 
 
 def _apart(anchors: Array, gap: float, corner: tuple[Array, Array]) -> Array:
-    """Places (n, 2) near the anchors, no two of them closer than `gap`, inside the corners' box."""
+    """Return places (n, 2) near the anchors, at least `gap` apart, inside the corners' box."""
     turns = 2.4 * np.arange(len(anchors))  # the golden angle: equal ones part in all directions
     places = anchors + np.stack([np.cos(turns), np.sin(turns)], axis=-1)
     low, high = corner[0] + gap / 2, corner[1] - gap / 3

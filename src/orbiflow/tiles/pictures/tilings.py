@@ -1,15 +1,14 @@
-"""PNG pictures: a tiling, and a tile over its target."""
+"""Pictures of tilings, one on its own or several side by side, in pixels or for print."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
-import shapely
-from numpy.typing import ArrayLike
-from shapely.geometry.base import BaseGeometry
+from PIL import Image
 
-from orbiflow.arguments import numbers
+from orbiflow.arguments import whole
 from orbiflow.arrays import Window, checked_window
 from orbiflow.drawing import (
     DEFAULT_PALETTE,
@@ -17,28 +16,20 @@ from orbiflow.drawing import (
     Picture,
     Raster,
     Sheet,
-    caption,
-    captioned,
+    font,
     palette,
-    strip_middle,
+    palette_png,
     vector_picture,
 )
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles.tilings import (
-    Colouring,
-    Tile,
-    Tiles,
-    as_tiling,
-    colouring,
-    copies_meeting,
-)
+from orbiflow.tiles.tilings import Colouring, Tile, Tiles, as_tiling, colouring, copies_meeting
 
 ASPECT = 1.5
 """Width over height of the default window."""
 
 
 def default_window(tile: Tiles) -> Window:
-    """A landscape window around the tile or prototiles, about four to five tiles across."""
+    """Return a landscape window around the tile or prototiles, some four to five tiles across."""
     tiling = as_tiling(tile)
     width, height = tiling.box[1] - tiling.box[0]
     # by area, but so that a long tile with its limbs among its neighbours shows whole
@@ -48,12 +39,8 @@ def default_window(tile: Tiles) -> Window:
     return float(x - half), float(y - high), float(x + half), float(y + high)
 
 
-COMMON, MISSING, ADDED = "#c9d3dc", "#d95f02", "#2b6cb0"
-"""Fills of the overlay: in both, in the target only, in the tile only."""
-
-
-DOTS = 200 / 72
-"""Pixels of a point, where widths are given in points."""
+PIXELS_PER_POINT = 200 / 72
+"""Pixels per point, where widths are given in points."""
 
 
 def tiling_png(
@@ -66,19 +53,20 @@ def tiling_png(
     outline_pt: float = 0.8,
     y_down: bool = False,
 ) -> bytes:
-    """PNG of the tiles that meet `window`, edge to edge.
+    """Return a PNG of the tiles that meet a window, edge to edge.
 
     Args:
-        tile: a tile or a tiling.
-        window: (xmin, ymin, xmax, ymax) in the tile's units, default `default_window`.
-        width_px: the height follows from the window.
-        colours: default `colouring(tile)`.
-        outline_pt: outline in points of 1/72 inch at 200 dots per inch; 0 for none.
-        y_down: whether the tile's y axis points down, as in images.
+        tile: A tile or a tiling.
+        window: The window (xmin, ymin, xmax, ymax) in the tile's units. Default: `default_window`.
+        width_px: The width in pixels; the height follows from the window.
+        palette_name: The palette of paper, fills and outlines.
+        colours: Which tile has which colour. Default: `colouring(tile)`.
+        outline_pt: The outline's width in points of 1/72 inch at 200 dots per inch; 0 for none.
+        y_down: Whether the tile's y axis points down, as in images.
 
     Raises:
-        OrbiflowError: for an unknown palette, a size that cannot be made, or a window that is
-            empty or holds too many tiles.
+        OrbiflowError: If the palette is unknown, the size is impossible, or the window is empty or
+            holds too many tiles.
     """
     return tiling_raster(
         tile,
@@ -86,7 +74,7 @@ def tiling_png(
         width_px=width_px,
         palette_name=palette_name,
         colours=colours,
-        outline_px=outline_pt * DOTS,
+        outline_px=outline_pt * PIXELS_PER_POINT,
         y_down=y_down,
     ).png()
 
@@ -102,10 +90,12 @@ def tiling_raster(
     y_down: bool = False,
     strip_px: int = 0,
 ) -> Raster:
-    """The picture of `tiling_png`, to be drawn on or to be made an image; outline in pixels.
+    """Return the picture of `tiling_png` as a raster that can be drawn on.
 
     Args:
-        strip_px: height of a strip below it, for words.
+        tile, window, width_px, palette_name, colours, y_down: As for `tiling_png`.
+        outline_px: The outline's width in pixels; 0 for none.
+        strip_px: The height in pixels of a strip below it, for words.
     """
     chosen, tiling = palette(palette_name), as_tiling(tile)
     colours = colours or colouring(tiling)
@@ -130,14 +120,14 @@ def tiling_picture(
     y_down: bool = False,
     sheet: Sheet | None = None,
 ) -> Picture:
-    """The picture of `tiling_png` for print, in curves.
+    """Return the picture of `tiling_png` for print, in curves.
 
     Args:
-        window, palette_name, colours, y_down: as for `tiling_png`.
-        sheet: default a journal's single column, as PDF.
+        tile, window, palette_name, colours, y_down: As for `tiling_png`.
+        sheet: The sheet it is drawn on. Default: a journal's single column, as PDF.
 
     Raises:
-        OrbiflowError: as `tiling_png`.
+        OrbiflowError: As `tiling_png`.
     """
     raster = tiling_raster(
         tile, window, width_px=1600, palette_name=palette_name, colours=colours, y_down=y_down,
@@ -150,95 +140,67 @@ def tiling_picture(
     return vector_picture(raster, sheet or Sheet.column(), title=title, caption="")
 
 
-def overlay_png(
-    tile: Tile,
-    target: ArrayLike | BaseGeometry,
+PANEL_ASPECT = 1.25
+"""Width over height of the part of a tiling that a panel of `tilings_png` shows."""
+
+_NAME, _GAP = 0.13, 0.05  # height of a panel's name, and the space around it, in panel widths
+
+
+def tilings_png(
+    tilings: Mapping[str, Tiles],
     *,
-    width_px: int = 1200,
-    y_down: bool = False,
-    label: str = "",
+    columns: int = 6,
+    width_px: int = 1600,
+    tiles: float = 22.0,
+    palette_name: str | Palette = DEFAULT_PALETTE,
 ) -> bytes:
-    """PNG of a tile over its target, with what is missing and what is added in two colours.
+    """Return a PNG of several tilings side by side, in which neighbours have different colours.
 
     Args:
-        target: outline (M, 2), or a shapely polygon, in the tile's coordinates.
-        label: in front of the legend, default the class.
-        y_down: whether the y axis points down, as in images.
+        tilings: The tilings by name, which is written below each.
+        columns: The number of tilings in a row.
+        width_px: The sheet's width in pixels; its height follows.
+        tiles: The number of tiles that fit into a panel, by area.
+        palette_name: The palette of paper, fills and outlines.
 
     Raises:
-        OrbiflowError: if the target is empty or not an outline.
+        OrbiflowError: If there are no tilings, the palette is unknown or the size is impossible.
     """
-    shape, goal = _clean(shapely.Polygon(tile.polygon)), _target(target)
-    common = shapely.intersection(shape, goal)
-    overlap = common.area / shapely.union(shape, goal).area
-    text = f"{label or tile.isohedral_class}  IoU {overlap:.3f}".strip()
-    raster = overlay_raster(tile, goal, width_px=width_px, y_down=y_down, text=text)
-    _legend(raster)
-    return raster.png()
+    columns = whole(columns, "columns", 1, 100)
+    if not tilings:
+        raise OrbiflowError("a sheet of tilings needs one at least")
+    chosen = palette(palette_name)
+    side = width_px / columns
+    gap, name = round(_GAP * side), round(_NAME * side)
+    panel = round(side) - 2 * gap
+    rasters = [
+        _panel(tiling, panel, tiles, label, name, chosen) for label, tiling in tilings.items()
+    ]
+    step = rasters[0].height + gap
+    rows = math.ceil(len(rasters) / columns)
+    sheet = Image.new("RGB", (width_px, rows * step + gap), chosen.paper)
+    for number, raster in enumerate(rasters):
+        row, column = divmod(number, columns)
+        sheet.paste(raster.image(), (round(column * side) + gap, row * step + gap))
+    return palette_png(sheet, list(dict.fromkeys(c for r in rasters for c in r.colours)))
 
 
-def overlay_picture(
-    tile: Tile,
-    target: ArrayLike | BaseGeometry,
-    *,
-    y_down: bool = False,
-    sheet: Sheet | None = None,
-) -> Picture:
-    """The picture of `overlay_png` for print, in curves; the caption has its legend.
-
-    Args:
-        target, y_down: as for `overlay_png`.
-        sheet: default a journal's single column, as PDF.
-
-    Raises:
-        OrbiflowError: as `overlay_png`.
-    """
-    raster = overlay_raster(tile, target, width_px=1600, y_down=y_down)
-    title = f"Tile {tile.isohedral_class} over the silhouette".replace("  ", " ")
-    caption = "Grey: in both. Orange: missing, in the silhouette alone. Blue: added."
-    return vector_picture(raster, sheet or Sheet.column(), title=title, caption=caption)
-
-
-def overlay_raster(
-    tile: Tile,
-    target: ArrayLike | BaseGeometry,
-    *,
-    width_px: int,
-    y_down: bool = False,
-    text: str = "",
+def _panel(
+    tiles: Tiles, width_px: int, count: float, label: str, name_px: int, chosen: Palette
 ) -> Raster:
-    """The picture of `overlay_png` without its legend; and without a strip for an empty `text`."""
-    shape, goal = _clean(shapely.Polygon(tile.polygon)), _target(target)
-    bounds = np.array(goal.bounds).reshape(2, 2)
-    raster = captioned([tile.polygon, bounds], width_px, y_down=y_down, text=text)
-    raster.fill_geometry(shapely.intersection(shape, goal), COMMON)
-    raster.fill_geometry(shapely.difference(goal, shape), MISSING)
-    raster.fill_geometry(shapely.difference(shape, goal), ADDED)
-    raster.line(tile.polygon, "#1a1a1a", max(1.0, 0.0028 * width_px), closed=True)
+    tiling = as_tiling(tiles)
+    half = math.sqrt(count * tiling.tile_area * PANEL_ASPECT) / 2
+    x, y = tiling.center.tolist()
+    window: Window = (x - half, y - half / PANEL_ASPECT, x + half, y + half / PANEL_ASPECT)
+    raster = tiling_raster(
+        tiling, window, width_px=width_px, palette_name=chosen, outline_px=1.0, strip_px=name_px
+    )
+    for prototile in tiling.prototiles:
+        raster.line(prototile.polygon, chosen.outline, max(2.0, 0.013 * width_px), closed=True)
+    low, high = raster.plane_px, raster.height
+    strip = np.array([[0, low], [width_px, low], [width_px, high], [0, high]])
+    raster.fill_pixels(strip, chosen.paper)  # tiles at the window's edge reach into it
+    size = 0.62 * name_px
+    size *= min(1.0, width_px / max(1.0, font(size).getlength(label)))
+    raster.text(width_px / 2, (low + high) / 2, label, size, anchor="mm")
     return raster
-
-
-def _legend(raster: Raster) -> None:
-    entries = [("in both", COMMON, 0.40), ("missing", MISSING, 0.58), ("added", ADDED, 0.76)]
-    y, high = strip_middle(raster), 0.014 * raster.width
-    for name, colour, x in entries:
-        left, right = x * raster.width, (x + 0.03) * raster.width
-        ring = [[left, y - high], [right, y - high], [right, y + high], [left, y + high]]
-        raster.fill_pixels(np.array(ring), colour)
-        caption(raster, x + 0.04, name)
-
-
-def _target(target: ArrayLike | BaseGeometry) -> BaseGeometry:
-    if not isinstance(target, BaseGeometry):
-        outline = numbers(target, "the target's outline", (...,))
-        if outline.ndim != 2 or outline.shape[1] != 2 or len(outline) < 3:
-            raise OrbiflowError(f"a target's outline is (M >= 3, 2) numbers, got {outline.shape}")
-        target = shapely.Polygon(outline)
-    cleaned = _clean(target)
-    if not cleaned.area > 0:
-        raise OrbiflowError("the target has no area")
-    return cleaned
-
-
-def _clean(geometry: BaseGeometry) -> BaseGeometry:
-    return geometry if shapely.is_valid(geometry) else shapely.make_valid(geometry)

@@ -1,0 +1,217 @@
+"""The lines that tiles share, each cut or drawn once, joined into few long ones in a short order."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import KDTree
+
+from orbiflow.arrays import Array
+from orbiflow.errors import OrbiflowError
+from orbiflow.tiles.exporting.layouts import (
+    Layout,
+    chosen_copies,
+    line_style,
+    placed_tiles,
+)
+from orbiflow.tiles.exporting.scene import Curve, Layer, Scene, clipped_line, rectangle
+from orbiflow.tiles.tilings import skeleton
+
+
+def skeleton_scene(layout: Layout) -> Scene:
+    """Return a scene with each edge that tiles share once, in few long lines.
+
+    Raises:
+        OrbiflowError: If the page holds too many tiles, or the tile's edges do not match.
+    """
+    settings, box, own = layout.settings, layout.box, layout.outline.edges
+    if own is None:
+        raise OrbiflowError(
+            "this tile's edges do not match its neighbours', so there are no shared edges to cut "
+            "once; choose cut none or cut pieces"
+        )
+    copies = chosen_copies(layout)
+    lines = skeleton(own, copies)
+    linear, translations = copies.group.linear_parts, copies.translations
+    arcs: list[Curve] = []
+    ends: list[tuple[int, int]] = []
+    free = -1
+    for copy, edge, vertices in zip(
+        lines.copy.tolist(), lines.edge.tolist(), lines.ends.tolist(), strict=True
+    ):
+        curve = layout.outline.curves[edge].moved(linear[copies.cosets[copy]], translations[copy])
+        if not settings.clip:
+            arcs.append(curve)
+            ends.append((vertices[0], vertices[1]))
+            continue
+        for part in clipped_line(curve, box, settings.deviation / 4):
+            # a cut end is a vertex of its own
+            start = vertices[0] if _same(part.start, curve.start) else (free := free - 1)
+            end = vertices[1] if _same(part.end, curve.end) else (free := free - 1)
+            arcs.append(part)
+            ends.append((start, end))
+    style = line_style(layout)
+    layers = [Layer("cut", "cut", style, tuple(joined(arcs, ends)))]
+    if settings.border:
+        layers.append(Layer("border", "cut", style, (rectangle(box),)))
+    return Scene(
+        *settings.page,
+        tuple(layers),
+        prototile=layout.tile.polygon,
+        tiles=placed_tiles(copies, layout),
+    )
+
+
+def joined(arcs: list[Curve], ends: list[tuple[int, int]]) -> list[Curve]:
+    """Join arcs that lead from vertex to vertex into few long curves, in a short order."""
+    if not arcs:
+        return []
+    long = []
+    for trail in trails(np.array(ends)):
+        parts = [arcs[number] if forward else arcs[number].reversed() for number, forward in trail]
+        (first, along), (last, forward) = trail[0], trail[-1]
+        start, end = ends[first][0 if along else 1], ends[last][1 if forward else 0]
+        long.append(Curve.joined(parts, closed=start == end))
+    return in_short_order(long)
+
+
+def _same(point: Array, other: Array) -> bool:
+    return bool(np.abs(point - other).max() < 1e-9)
+
+
+Trail = list[tuple[int, bool]]
+"""Arcs end to end: the number of each, and whether it runs from its start to its end."""
+
+
+def trails(ends: NDArray[np.int64]) -> list[Trail]:
+    """Return the fewest trails that run every arc once, by Hierholzer's method.
+
+    A connected part with 2k odd vertices, where an odd number of arcs meet, falls into k trails; one
+    without odd vertices is a single closed trail (Euler).
+
+    Args:
+        ends: The numbers (S, 2) of the vertices that each arc leads from and to.
+
+    >>> trails(np.array([[0, 1], [1, 2], [2, 0]]))
+    [[(0, True), (1, True), (2, True)]]
+    """
+    # joining the odd vertices in pairs makes all even; the joints are taken out at the end
+    joints = _joints(ends)
+    both = np.concatenate([ends, joints]) if len(joints) else ends
+    arcs: dict[int, list[tuple[int, int, bool]]] = defaultdict(list)
+    for number, (start, end) in reversed(list(enumerate(both.tolist()))):
+        arcs[start].append((number, end, True))
+        arcs[end].append((number, start, False))
+    used = np.zeros(len(both), dtype=bool)
+    found: list[Trail] = []
+    for start in both[:, 0].tolist():
+        circuit = _circuit(start, arcs, used)
+        if circuit:
+            found += _without_joints(circuit, len(ends))
+    return found
+
+
+def _joints(ends: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return pairs (J, 2) of the odd vertices of each connected part."""
+    parent: dict[int, int] = {}
+
+    def root(vertex: int) -> int:
+        while parent.setdefault(vertex, vertex) != vertex:
+            parent[vertex] = parent[parent[vertex]]
+            vertex = parent[vertex]
+        return vertex
+
+    for start, end in ends.tolist():
+        parent[root(start)] = root(end)
+    odd: dict[int, list[int]] = defaultdict(list)
+    vertices, counts = np.unique(ends, return_counts=True)
+    for vertex in vertices[counts % 2 == 1].tolist():
+        odd[root(vertex)].append(vertex)
+    pairs = [part[k : k + 2] for part in odd.values() for k in range(0, len(part), 2)]
+    return np.array(pairs, dtype=np.int64).reshape(-1, 2)
+
+
+def _circuit(
+    start: int, arcs: dict[int, list[tuple[int, int, bool]]], used: NDArray[np.bool_]
+) -> Trail:
+    """Return a closed trail through all unused arcs that are connected with `start`."""
+    path: list[tuple[int, int, bool]] = [(start, -1, True)]
+    circuit: Trail = []
+    while path:
+        vertex, arc, forward = path[-1]
+        near = arcs[vertex]
+        while near and used[near[-1][0]]:
+            near.pop()
+        if near:
+            number, other, along = near.pop()
+            used[number] = True
+            path.append((other, number, along))
+        else:
+            path.pop()
+            if arc >= 0:
+                circuit.append((arc, forward))
+    return circuit[::-1]
+
+
+def _without_joints(circuit: Trail, count: int) -> list[Trail]:
+    """Return the parts of a circuit between the joints, which are numbered from `count` on."""
+    breaks = [k for k, (arc, _) in enumerate(circuit) if arc >= count]
+    if not breaks:
+        return [circuit]
+    turned = circuit[breaks[0] + 1 :] + circuit[: breaks[0] + 1]
+    parts: list[Trail] = [[]]
+    for arc, forward in turned:
+        if arc >= count:
+            parts.append([])
+        else:
+            parts[-1].append((arc, forward))
+    return [part for part in parts if part]
+
+
+def in_short_order(curves: list[Curve]) -> list[Curve]:
+    """Return the curves in an order and in directions that make a tool's way between them short.
+
+    The way leads from the upper left corner to the nearest end, and from each curve's other end to the
+    nearest end of a curve that is left.
+    """
+    if not curves:
+        return []
+    nearest = _Nearest(np.array([[curve.start, curve.end] for curve in curves]))
+    place, ordered = np.zeros(2), []
+    for _ in curves:
+        number, side = nearest.take(place)
+        ordered.append(curves[number].reversed() if side else curves[number])
+        place = nearest.ends[number, 1 - side]
+    return ordered
+
+
+class _Nearest:
+    """The ends (n, 2, 2) of curves, with a tree that finds the nearest of those that are left."""
+
+    def __init__(self, ends: Array) -> None:
+        self.ends = ends
+        self.left = np.ones(len(ends), dtype=bool)
+        self._build_tree()
+
+    def _build_tree(self) -> None:
+        self.numbers = np.flatnonzero(self.left)
+        self.tree = KDTree(self.ends[self.numbers].reshape(-1, 2))
+        self.taken = 0
+
+    def take(self, place: Array) -> tuple[int, int]:
+        """Take the curve with the end nearest to `place`; return its number and which end it is."""
+        if 2 * self.taken > len(self.numbers):
+            self._build_tree()
+        size = 2 * len(self.numbers)
+        count = min(8, size)
+        while True:
+            _, found = self.tree.query(place, k=count)
+            for hit in np.atleast_1d(found).tolist():
+                number, side = int(self.numbers[hit // 2]), hit % 2
+                if self.left[number]:
+                    self.left[number] = False
+                    self.taken += 1
+                    return number, side
+            count = min(4 * count, size)
