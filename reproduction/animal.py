@@ -17,7 +17,7 @@ from orbiflow.tiles import (
     CLASSES,
     ClassFailure,
     EscherTile,
-    OccupancySettings,
+    OccupancySearch,
     escherize_class,
     placed_field,
 )
@@ -51,7 +51,7 @@ OMEGA = 5
 
 def animal_tile(name: str, omega: int, affine: int, iterations: int) -> EscherTile | ClassFailure:
     """Search the tile of one class: an affine phase, then the flow of a field, with occupancy loss."""
-    settings = OccupancySettings(
+    settings = OccupancySearch(
         max_frequency=omega, affine_iterations=affine, iterations=iterations
     )
     return escherize_class(animal(), name, settings)

@@ -31,10 +31,10 @@ TARGETS = ("4-gaussian", "6-gaussian", "checkerboard")
 
 TargetMeasure = Literal["flat", "round"]
 
-_SMOOTH = {"detail": 6, "segments": 8, "roughness": (1e-3, 1e-3)}
-_SHARP = {"detail": 8, "segments": 6, "roughness": (1e-4, 1e-4)}
+_SMOOTH = {"max_frequency": 6, "segments": 8, "roughness": (1e-3, 1e-3)}
+_SHARP = {"max_frequency": 8, "segments": 6, "roughness": (1e-4, 1e-4)}
 FIT_SETTINGS = {"4-gaussian": _SMOOTH, "6-gaussian": _SMOOTH, "checkerboard": _SHARP}
-"""The `FitSettings` that suit each target."""
+"""The `FlowSettings` that suit each target."""
 
 
 def target(name: str, points: Tensor) -> Tensor:
