@@ -14,7 +14,8 @@ from orbiflow.density import (
     MODEL,
     REPORT,
     TABLE,
-    Density,
+    PlotSettings,
+    SymmetricDensity,
     Torus,
     axes_named,
     conditional,
@@ -219,8 +220,9 @@ def _table(density: Density) -> Array:
     return np.column_stack([data, logs.exp().numpy()])
 
 
-def _picture(density: Density, names: list[str]) -> bytes:
+def _picture(density: SymmetricDensity, names: list[str]) -> bytes:
+    settings = PlotSettings(names=names)
     if density.space.dim == 2:
-        return density_picture(density, names=names, scale="auto").file()
+        return density_picture(density, settings=settings).file()
     drawn = density.sample((DRAWN,), torch.Generator().manual_seed(0))
-    return corner_picture(density, None, drawn, names=names).file()
+    return corner_picture(density, None, drawn, settings).file()

@@ -14,7 +14,6 @@ from orbiflow.density import (
     is_one_file,
     known_names,
     plot_density,
-    read_coastlines,
 )
 from orbiflow.drawing import column_width
 from orbiflow.jobs.asked import (
@@ -126,11 +125,10 @@ def _settings(request: DensityPlotRequest, space: Space, columns: list[str] | No
     if request.width is not None:
         asked["width"] = read_as("width", column_width, request.width)
         asked.setdefault("format", "pdf")
-    lines = request.coastlines
     return PlotSettings(
         names=known_names(space, columns),
         center=_center(space, request.center),
-        coastlines=None if lines is None else read_coastlines(lines),
+        coastlines=request.coastlines,
         **asked,
     )
 
