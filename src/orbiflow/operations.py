@@ -4,6 +4,10 @@ OPERATIONS = {
     "escherize": "orbiflow.derived.tiles:escherize",
     "export": "orbiflow.derived.tiles:export",
     "density fit": "orbiflow.derived.density:fit",
+    "density plot": "orbiflow.density.operations:plot",
+    "density compare": "orbiflow.density.compare_operation:compare",
+    "density region": "orbiflow.density.operations:region",
+    "density patches": "orbiflow.density.operations:patches",
 }
 
 RUN_FOLDERS = {

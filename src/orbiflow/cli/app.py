@@ -17,7 +17,7 @@ from orbiflow.cli.console import errors
 from orbiflow.cli.density import density
 from orbiflow.cli.escherize import escherize
 from orbiflow.cli.export import export
-from orbiflow.errors import OrbiflowError
+from orbiflow.errors import OrbiflowError, SettingError
 from orbiflow.jobs import RecordError
 
 app = typer.Typer(
@@ -68,7 +68,8 @@ def main() -> None:
     try:
         app()
     except OrbiflowError as error:
-        text = error.named(_option) if isinstance(error, RecordError) else str(error)
+        known = isinstance(error, RecordError | SettingError)
+        text = error.named(_option) if known else str(error)
         errors.print(f"[bold red]error:[/] {escape(text)}", soft_wrap=True, highlight=False)
         sys.exit(2)
     except KeyboardInterrupt:

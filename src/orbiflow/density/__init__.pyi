@@ -12,6 +12,7 @@ from .comparing.paired import density_of as density_of
 from .comparing.paired import require_one_space as require_one_space
 from .comparing.paired import scores_of as scores_of
 from .comparing.resampling import cross_validation_folds as cross_validation_folds
+from .comparing.settings import ComparisonSettings as ComparisonSettings
 from .comparing.two_samples import TestResult as TestResult
 from .comparing.two_samples import mmd_test as mmd_test
 from .estimator import DensityEstimator as DensityEstimator
@@ -80,12 +81,13 @@ from .pictures.thumbnail import density_thumbnail as density_thumbnail
 from .pictures.values import density_on_grid as density_on_grid
 from .regions.boundaries import Outline as Outline
 from .regions.boundaries import outlines as outlines
-from .regions.boundaries import to_geojson as to_geojson
 from .regions.levels import DensityLevels as DensityLevels
 from .regions.levels import DensityRegion as DensityRegion
 from .regions.levels import highest_density_region as highest_density_region
-from .regions.levels import samples_for as samples_for
-from .regions.levels import told_masses as told_masses
+from .regions.settings import RegionSettings as RegionSettings
+from .regions.settings import resolvable_masses as resolvable_masses
+from .regions.settings import samples_for as samples_for
+from .regions.writing import to_geojson as to_geojson
 from .run_folder import written_files as written_files
 from .spaces.catalogue import SPACES as SPACES
 from .spaces.catalogue import make_space as make_space

@@ -199,16 +199,16 @@ def _plain_texts() -> Iterator[None]:
         yield
 
 
-def column_width(text: str) -> str | float:
-    """Return the width of a printed figure: a word of `orbiflow.units.COLUMNS`, or millimetres.
+def column_width(text: str) -> float:
+    """Return the width in mm of a printed figure, from a word of `orbiflow.units.COLUMNS` or a length.
 
     Raises:
         OrbiflowError: As `orbiflow.units.length`, and for a width that no figure has.
 
     >>> column_width("double"), column_width("8.5cm")
-    ('double', 85.0)
+    (180.0, 85.0)
     """
     word = text.strip().lower()
-    width = word if word in COLUMNS else length(text)
+    width = COLUMNS[word] if word in COLUMNS else length(text)
     Sheet.column(width)
     return width

@@ -1,4 +1,4 @@
-"""Scores, samples and patches: the jobs that write one table."""
+"""Scores and samples: the jobs that write one table."""
 
 from __future__ import annotations
 
@@ -14,19 +14,15 @@ from orbiflow.density import (
     DensityLevels,
     append_columns,
     chart_of_observed,
-    listing,
     log_prob_observed,
     mean_of,
+    resolvable_masses,
     scores_of,
     to_csv,
-    to_klein,
-    told_masses,
     weighed,
 )
-from orbiflow.errors import OrbiflowError
 from orbiflow.jobs.asked import samples_asked
 from orbiflow.jobs.density_data import (
-    read_data,
     read_weighed,
     same_columns,
 )
@@ -34,12 +30,10 @@ from orbiflow.jobs.density_models import check_fits, model_at
 from orbiflow.jobs.density_requests import (
     DensitySampleRequest,
     DensityScoreRequest,
-    PatchesRequest,
 )
 from orbiflow.jobs.density_scores import evaluated
 from orbiflow.jobs.place import check_place
 from orbiflow.jobs.run import Sink
-from orbiflow.jobs.wording import counted
 from orbiflow.runtime import (
     Cancel,
     Finished,
@@ -109,7 +103,7 @@ def density_score(request: DensityScoreRequest, tell: Sink, cancel: Cancel) -> F
 
 def _said_of_regions(samples: int) -> str:
     """How far `hdr` can be trusted."""
-    low, high = told_masses(samples)
+    low, high = resolvable_masses(samples)
     return (
         "hdr: the mass of the smallest highest-density region that holds the row, by "
         f"{samples} samples (--samples): ± {0.5 / math.sqrt(samples):.2g} at most; what is below "
@@ -157,54 +151,3 @@ def density_sample(request: DensitySampleRequest, tell: Sink, cancel: Cancel) ->
     tell(Written(request.out))
     tell(Note(f"{request.count} samples written to {request.out}"))
     return Finished("done", {"file": str(request.out), "rows": request.count})
-
-
-@one_thread()
-def density_patches(request: PatchesRequest, tell: Sink, cancel: Cancel) -> Finished:
-    """Turn patches into angles on the Klein bottle.
-
-    Returns:
-        `summary`: `file`, `rows`, and how many farther ones were `left_out`.
-
-    Raises:
-        OrbiflowError: for anything that the user can mend.
-        Cancelled: if it was told to stop; nothing is written.
-    """
-    check_place(request.out, request.data)
-    table = read_data(
-        request.data,
-        request.columns,
-        None,
-        tell,
-        has_header=request.header,
-        drop_missing=request.drop_missing,
-    )
-    if len(table.columns) not in PATCH_WIDTHS:
-        raise OrbiflowError(
-            f"{request.data}: a patch has 9 pixel values or 8 DCT coordinates, and there "
-            f"{'is' if len(table.columns) == 1 else 'are'} {counted(len(table.columns), 'column')} "
-            f"({listing(table.columns)}): choose with --columns"
-        )
-    angles, distances = to_klein(table.values, unit=request.unit)
-    near = distances <= (np.inf if request.farthest is None else request.farthest)
-    if not near.any():
-        raise OrbiflowError(
-            f"none of {len(near)} patches is within {request.farthest:g} of the Klein bottle; the "
-            f"nearest is {distances.min():.3f} away"
-            if len(near)
-            else f"{request.data}: no patches"
-        )
-    found = np.column_stack([angles, distances])[near]
-    cancel.check()
-    write_atomic(request.out, to_csv(("theta", "phi", "distance"), found))
-    tell(Written(request.out))
-    left_out = int((~near).sum())
-    left = f", {left_out} farther ones left out" if left_out else ""
-    tell(
-        Note(
-            f"{near.sum()} patches, half of them within {np.median(found[:, 2]):.3f} of the Klein "
-            f"bottle{left}; written to {request.out}"
-        )
-    )
-    summary = {"file": str(request.out), "rows": len(found), "left_out": left_out}
-    return Finished("done", summary)

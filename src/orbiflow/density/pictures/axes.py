@@ -13,7 +13,7 @@ from torch import Tensor, tensor
 from orbiflow.arrays import Array
 from orbiflow.density.spaces import Space, whole_turn
 from orbiflow.drawing import Sheet
-from orbiflow.errors import OrbiflowError
+from orbiflow.errors import OrbiflowError, SettingError
 
 INK = "#1a1a1a"
 MAX_NAME = 40
@@ -79,13 +79,17 @@ def view_of(
         raise OrbiflowError(f"expected {len(space.columns)} names of columns, got {list(names)}")
     if not space.is_torus:
         if center is not None:
-            raise OrbiflowError(f"center applies to the torus and to maps, not to the {space.name}")
+            raise SettingError(
+                f"{{center}} applies to the torus and to maps, not to the {space.name}"
+            )
         return View(space, names, np.zeros(space.dim))
     turns = np.zeros(space.dim)
     if center is not None:
         turns = np.array(center, dtype=float) / whole_turn(space.unit or "")
     if turns.shape != (space.dim,) or not np.isfinite(turns).all():
-        raise OrbiflowError(f"center must be {space.dim} finite angles, got {center!r}")
+        raise SettingError(
+            f"{{center}} must be {space.dim} angles, one for each column, got {list(center or ())}"
+        )
     # 3.14 radians are meant as pi: the ticks would be cut off beside the window's edge
     even = np.round(24 * turns) / 24
     turns = np.where(abs(turns - even) < 1e-3, even, turns)

@@ -11,7 +11,7 @@ import torch
 from PIL import Image
 from torch import Tensor
 
-from orbiflow.arguments import whole
+from orbiflow.arguments import as_whole
 from orbiflow.arrays import Array
 from orbiflow.density.models import (
     Density,
@@ -65,7 +65,7 @@ def flow_picture(
     settings, space = settings or PlotSettings(), density.space
     sheet = sheet or settings.sheet
     require_plane(space)
-    whole(cells, "cells", 1, 9)
+    as_whole(cells, "cells", 1, 9)
     view = view_of(space, center=None if space.is_round else settings.center)
     low, high = 0.5 - cells / 2, 0.5 + cells / 2
     window = (low, low, high, high)

@@ -24,7 +24,7 @@ from orbiflow.density.pictures.projections import (
 )
 from orbiflow.density.pictures.settings import PlotSettings
 from orbiflow.density.spaces import RoundSpace, Space, to_latlon, to_vectors
-from orbiflow.errors import OrbiflowError
+from orbiflow.errors import OrbiflowError, SettingError
 
 WORLD: dict[str, type[WorldMap]] = {c.name: c for c in (EqualEarth, Mollweide, PlateCarree)}
 CENTRED: dict[str, type[Azimuthal]] = {c.name: c for c in (Lambert, Stereographic)}
@@ -80,8 +80,8 @@ def chosen_map(
         return _world(WORLD[projection], space, middle, radius)
     if projection in NETS:
         if middle is not None:
-            raise OrbiflowError(
-                f"center does not apply to a {projection} net, which has the vertical in its "
+            raise SettingError(
+                f"{{center}} does not apply to a {projection} net, which has the vertical in its "
                 "middle: give no centre"
             )
         return NETS[projection]((90.0, 0.0), float(radius or 90.0), flipped=True)
@@ -108,13 +108,13 @@ def _world(
     kind: type[WorldMap], space: Space, middle: tuple[float, ...] | None, radius: float | None
 ) -> Projection:
     if space.name == "projective-plane":
-        raise OrbiflowError(
+        raise SettingError(
             "a direction and its opposite are one point of the projective plane, which needs a map "
-            f"of one hemisphere: projection must be {', '.join((*CENTRED, *NETS))}, got {kind.name}"
+            f"of one hemisphere: {{projection}} must be {', '.join((*CENTRED, *NETS))}, got {kind.name}"
         )
     if radius is not None:
-        raise OrbiflowError(
-            f"a map of the whole sphere ({kind.name}) has no radius: leave radius out"
+        raise SettingError(
+            f"a map of the whole sphere ({kind.name}) has no radius: leave {{radius}} out"
         )
     middle = middle or (0.0,)
     return kind(middle if len(middle) == 2 else (0.0, middle[0]))  # pyright: ignore[reportArgumentType]
@@ -139,8 +139,9 @@ def _centred(
 def _checked_center(center: Sequence[float]) -> tuple[float, ...]:
     values = tuple(float(value) for value in center)
     if len(values) not in (1, 2) or not all(map(math.isfinite, values)):
-        raise OrbiflowError(
-            f"center must be a latitude and a longitude, or a longitude, in degrees, got {center!r}"
+        raise SettingError(
+            "{center} must be a latitude and a longitude, or a longitude, in degrees, such as 40,140, "
+            f"got {list(center)}"
         )
     return values
 

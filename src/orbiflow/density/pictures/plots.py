@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
@@ -12,7 +12,7 @@ import torch
 from numpy.typing import ArrayLike
 from torch import Tensor
 
-from orbiflow.arguments import path as as_path
+from orbiflow.arguments import as_path
 from orbiflow.density.estimator import DensityEstimator
 from orbiflow.density.models import BlendedDensity, SymmetricDensity
 from orbiflow.density.pictures.axes import space_title, view_of
@@ -30,7 +30,7 @@ from orbiflow.density.pictures.square import Square
 from orbiflow.density.spaces import Space
 from orbiflow.density.storage import read_density
 from orbiflow.drawing import FORMATS, Picture, Sheet, pdf_pages
-from orbiflow.errors import OrbiflowError, OutputError
+from orbiflow.errors import OrbiflowError, OutputError, SettingError
 from orbiflow.runtime import LITTER, make_folder, one_thread, write_atomic, write_set
 
 MODEL = "density.safetensors"
@@ -150,10 +150,11 @@ def is_one_file(out: Path) -> bool:
     return True
 
 
-def known_names(space: Space, columns: Sequence[str] | None) -> Sequence[str] | None:
+def known_names(space: Space, columns: Sequence[str] | None) -> tuple[str, ...] | None:
     """Return the columns of a table as names of axes, or None if they are not angles."""
-    are_angles = space.unit is not None
-    return columns if are_angles and columns and len(columns) == len(space.columns) else None
+    if space.unit is None or not columns or len(columns) != len(space.columns):
+        return None
+    return tuple(columns)
 
 
 def _content(name: str, picture: Picture) -> bytes:
@@ -195,7 +196,8 @@ class _Plots:
         density, columns = _density_of(given)
         space = density.space
         if settings.names is None:
-            settings = replace(settings, names=known_names(space, columns))
+            names = known_names(space, columns)
+            settings = settings if names is None else settings.replace(names=names)
         coastlines = _all_coastlines(space, settings, coastlines)
         _check_space(space, settings)
         points = None if data is None else space.to_chart(data)
@@ -301,8 +303,9 @@ def _check_space(space: Space, settings: PlotSettings) -> None:
     view_of(space, settings.names, None if space.is_round else settings.center)
     if not space.is_round and (settings.projection != "auto" or settings.radius is not None):
         name = "radius" if settings.projection == "auto" else "projection"
-        raise OrbiflowError(
-            f"{name} applies to maps of the sphere and the projective plane, not to the {space.name}"
+        raise SettingError(
+            f"{{{name}}} applies to maps of the sphere and the projective plane, not to the "
+            f"{space.name}"
         )
 
 
@@ -312,10 +315,10 @@ def _all_coastlines(
     if settings.coastlines is None and not lines:
         return ()
     if space.name != "sphere":
-        raise OrbiflowError(f"coastlines apply to the sphere, not to the {space.name}")
+        raise SettingError(f"{{coastlines}} apply to the sphere, not to the {space.name}")
     if settings.coastlines is None:
         return lines
-    return [*lines, *read_coastlines(as_path(settings.coastlines, "coastlines"))]
+    return [*lines, *read_coastlines(settings.coastlines)]
 
 
 def _density_of(

@@ -13,10 +13,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from orbiflow.arguments import number
+from orbiflow.arguments import as_number
 from orbiflow.arrays import Array
 from orbiflow.density.spaces import to_latlon, to_vectors
-from orbiflow.errors import OrbiflowError
+from orbiflow.errors import SettingError
 
 FINEST = 1.0
 """Degrees between points of lines that are drawn, at most, so that curves look smooth."""
@@ -41,8 +41,8 @@ class Projection(ABC):
     center: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
-        number(self.center[0], "the centre's latitude", -90, 90)
-        number(self.center[1], "the centre's longitude", -360, 360)
+        as_number(self.center[0], "the centre's latitude", -90, 90)
+        as_number(self.center[1], "the centre's longitude", -360, 360)
 
     @abstractmethod
     def forward(self, latlon: Array) -> Array:
@@ -111,7 +111,7 @@ class Azimuthal(Projection):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        number(self.radius, "the map's radius", 0, 90, above=True)
+        as_number(self.radius, "the map's radius", above=0, most=90)
 
     @abstractmethod
     def distance(self, angle: Array) -> Array:
@@ -219,9 +219,9 @@ class WorldMap(Projection):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.center[0]:
-            raise OrbiflowError(
+            raise SettingError(
                 f"a map of the whole sphere ({self.name}) is centred on a meridian, not at latitude "
-                f"{self.center[0]:g}: give center a longitude alone, or choose another projection"
+                f"{self.center[0]:g}: give {{center}} a longitude alone, or choose another projection"
             )
 
     @abstractmethod

@@ -13,7 +13,7 @@ from orbiflow.density.models import SymmetricDensity
 from orbiflow.density.pictures.settings import PlotSettings
 from orbiflow.density.regions import DensityLevels, samples_for
 from orbiflow.drawing import Sheet
-from orbiflow.errors import OrbiflowError
+from orbiflow.errors import SettingError
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -36,19 +36,21 @@ def region_lines(density: SymmetricDensity, settings: PlotSettings) -> tuple[Reg
     """Return the lines for the settings' `regions`, the smallest mass first.
 
     Raises:
-        OrbiflowError: If there are regions and the density is not of two dimensions.
+        SettingError: If there are regions and the density is not of two dimensions.
     """
     if not settings.regions:
         return ()
     space = density.space
     if space.dim != 2:
-        raise OrbiflowError(
-            f"regions are drawn in two dimensions, this {space.name} has {space.dim}"
+        raise SettingError(
+            f"{{regions}} are drawn in two dimensions, this {space.name} has {space.dim}: `orbiflow "
+            "density region` finds their thresholds"
         )
     count = samples_for(settings.regions, settings.region_samples)
     levels = DensityLevels(density, samples=count, seed=settings.seed % 2**63)
-    masses = sorted(map(float, settings.regions))
-    return tuple(RegionLine(mass, levels.highest(mass).log_prob) for mass in masses)
+    return tuple(
+        RegionLine(mass, levels.highest(mass).log_prob) for mass in sorted(settings.regions)
+    )
 
 
 def region_note(lines: Sequence[RegionLine]) -> str:

@@ -7,3 +7,5 @@ from .files import read_table as read_table
 from .files import to_csv as to_csv
 from .table import MissingCellsError as MissingCellsError
 from .table import Table as Table
+from .table import find as find
+from .table import listing as listing
