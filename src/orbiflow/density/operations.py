@@ -228,7 +228,7 @@ def _require_format(out: Path, kind: str, space: Space) -> None:
 def _region_notes(regions: list[DensityRegion], drawn: list[Outline]) -> list[str]:
     """Return what the user should know of regions, whose outlines may not have been drawn."""
     space = regions[0].density.space
-    notes = []
+    notes: list[str] = []
     if not drawn:
         notes.append(
             f"outlines are drawn in two dimensions, this {space.name} has {space.dim}: there are "

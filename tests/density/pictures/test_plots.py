@@ -121,11 +121,11 @@ def test_a_fitted_estimator_is_drawn_and_another_refused(tmp_path: Path) -> None
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
-        ({"format": "eps"}, "format must be one of png, pdf, svg"),
-        ({"width": "wide"}, "width must be single, double"),
-        ({"measure": "flat"}, "measure must be one of"),
-        ({"scale": "square"}, "scale must be one of"),
-        ({"projection": "globe"}, "projection must be one of"),
+        ({"format": "eps"}, "format must be png, pdf or svg"),
+        ({"width": "wide"}, "width: 'wide' is not a length"),
+        ({"measure": "flat"}, "measure must be natural, square or uniform"),
+        ({"scale": "square"}, "scale must be auto, linear or log"),
+        ({"projection": "globe"}, "projection must be auto, equal-earth"),
         ({"samples": 0}, "samples must be from 1 to"),
     ],
 )

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 from orbiflow.density.regions import Mass, SampleCount, samples_for
-from orbiflow.drawing import FigureFormat, Sheet, column_width
+from orbiflow.drawing import NARROWEST, WIDEST, FigureFormat, Sheet, column_width
 from orbiflow.errors import OrbiflowError, SettingError
 from orbiflow.settings import (
     DefaultText,
@@ -55,7 +55,7 @@ class PlotSettings(Settings, group="Figures"):
     width: Annotated[
         float | None,
         Parsed(column_width, "single (85mm), double (180mm) or a length such as 85mm", "LENGTH"),
-        Range(40, 1000),
+        Range(NARROWEST, WIDEST),
         Unit("mm"),
         DefaultText("single for pdf and svg"),
     ] = None
