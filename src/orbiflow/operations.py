@@ -4,10 +4,10 @@ OPERATIONS = {
     "escherize": "orbiflow.derived.tiles:escherize",
     "export": "orbiflow.derived.tiles:export",
     "density fit": "orbiflow.derived.density:fit",
-    "density plot": "orbiflow.density.operations:plot",
-    "density compare": "orbiflow.density.compare_operation:compare",
-    "density region": "orbiflow.density.operations:region",
-    "density patches": "orbiflow.density.operations:patches",
+    "density plot": "orbiflow.density.operations.drawing:plot",
+    "density compare": "orbiflow.density.operations.comparison:compare",
+    "density region": "orbiflow.density.operations.drawing:region",
+    "density patches": "orbiflow.density.operations.drawing:patches",
 }
 
 RUN_FOLDERS = {

@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from importlib import resources
 from typing import Any, cast
 
 import numpy as np
@@ -42,6 +41,7 @@ from orbiflow.density.pictures.surfaces import (
 )
 from orbiflow.density.pictures.values import chosen_scale, density_on_grid, is_sharp
 from orbiflow.density.spaces import RoundSpace, Space, checked_table, to_vectors
+from orbiflow.drawing import rendered
 from orbiflow.errors import OrbiflowError
 
 MAX_BYTES = 3_000_000
@@ -120,7 +120,17 @@ def density_page(
     if is_sharp(density, pixel=_SOFT / cells):
         notes.append(average_note(round(cells / _SOFT)))
     caption = " ".join([drawing.caption(view), *(f"{n[0].upper()}{n[1:]}." for n in notes)])
-    return _rendered(title or f"Density on the {space_title(space)}", caption, data)
+    title = title or f"Density on the {space_title(space)}"
+    page = rendered(
+        "orbiflow.density.pictures", "surface.html", title=title, caption=caption, data=data
+    )
+    size = len(page.encode())
+    if size > MAX_BYTES:
+        raise OrbiflowError(
+            f"the page would have {size / 1e6:.1f} MB, more than {MAX_BYTES / 1e6:g}: lower the "
+            "resolution or give coastlines of fewer points"
+        )
+    return page
 
 
 def _surface(space: Space, points: Tensor, peak: int) -> dict[str, Any]:
@@ -135,22 +145,6 @@ def _surface(space: Space, points: Tensor, peak: int) -> dict[str, Any]:
         "points": _packed(places, "<f4"),
         "normals": _packed(127 * normals(space, points), "i1"),
     }
-
-
-def _rendered(title: str, caption: str, data: dict[str, Any]) -> str:
-    from jinja2 import Environment
-
-    source = resources.files("orbiflow.density.pictures").joinpath("surface.html.j2")
-    environment = Environment(autoescape=True, keep_trailing_newline=True)
-    template = environment.from_string(source.read_text("utf-8"))
-    page = template.render(title=title, caption=caption, data=data)
-    size = len(page.encode())
-    if size > MAX_BYTES:
-        raise OrbiflowError(
-            f"the page would have {size / 1e6:.1f} MB, more than {MAX_BYTES / 1e6:g}: lower the "
-            "resolution or give coastlines of fewer points"
-        )
-    return page
 
 
 def _packed(array: Array, kind: str) -> str:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from orbiflow.density.comparing import ComparisonSettings
-from orbiflow.density.operations import ColumnSettings, require_ending
+from orbiflow.density.operations.drawing import ColumnSettings, require_ending
 from orbiflow.errors import OrbiflowError, SettingError
 from orbiflow.runtime import (
     Cancel,
@@ -68,11 +68,10 @@ def compare(
 
     import json
 
-    from orbiflow.jobs.place import check_place
-    from orbiflow.runtime import one_thread, write_atomic
+    from orbiflow.runtime import check_output_file, one_thread, write_atomic
 
     if out is not None:
-        check_place(out, *models, *data)
+        check_output_file(out, *models, *data)
     read = _Reader(table, group, on_event, cancel)
     with one_thread():
         if models:

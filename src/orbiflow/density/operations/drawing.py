@@ -83,16 +83,16 @@ def plot(
     from orbiflow.density.pictures import is_one_file, known_names, plot_density
     from orbiflow.jobs.density_data import read_data, same_columns
     from orbiflow.jobs.density_models import check_fits, model_at
-    from orbiflow.jobs.place import check_place, keep_apart
+    from orbiflow.runtime import check_output_file, check_outside_runs
 
     single = is_one_file(out)
     if single and settings.format not in (None, "pdf"):
         raise SettingError(f"{{out}} ends in .pdf but {{format}} is {settings.format}")
     reads = (model, data, settings.coastlines)
     if single:
-        check_place(out, *reads)
+        check_output_file(out, *reads)
     else:  # pictures may stand beside their model
-        keep_apart(out, *reads)
+        check_outside_runs(out, *reads)
     density, extra = model_at(model)
     space = density.space
     names = known_names(space, extra.get("columns"))
@@ -165,10 +165,9 @@ def region(
         to_geojson,
     )
     from orbiflow.jobs.density_models import model_at
-    from orbiflow.jobs.place import check_place
-    from orbiflow.runtime import one_thread, write_atomic
+    from orbiflow.runtime import check_output_file, one_thread, write_atomic
 
-    check_place(out, model)
+    check_output_file(out, model)
     density, _ = model_at(model)
     kind, space = out.suffix.lower(), density.space
     _require_format(out, kind, space)
@@ -285,14 +284,13 @@ def patches(
     from orbiflow.density.spaces import to_klein
     from orbiflow.density.tables import listing, to_csv
     from orbiflow.jobs.density_data import read_data
-    from orbiflow.jobs.place import check_place
     from orbiflow.jobs.request import NO_TABLES, TABLES
     from orbiflow.jobs.wording import counted
-    from orbiflow.runtime import one_thread, write_atomic
+    from orbiflow.runtime import check_output_file, one_thread, write_atomic
 
     if out.suffix.lower() in NO_TABLES:
         require_ending(out, TABLES)
-    check_place(out, data)
+    check_output_file(out, data)
     how: dict[str, Any] = {"has_header": table.header, "drop_missing": table.drop_missing}
     found = read_data(data, table.columns, None, on_event, **how)
     width = len(found.columns)

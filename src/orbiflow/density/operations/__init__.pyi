@@ -1,0 +1,1 @@
+from .drawing import ColumnSettings as ColumnSettings
