@@ -19,7 +19,7 @@ from orbiflow.density import (
     resolvable_masses,
     samples_for,
 )
-from orbiflow.density.models import still_flow
+from orbiflow.density.models import identity_flow
 from orbiflow.density.regions.settings import (
     GOOD_EXPECTED,
     MAX_DEFAULT_SAMPLES,

@@ -20,7 +20,6 @@ from orbiflow.density import (
     Density,
     FlowDensity,
     KleinBottle,
-    NeuralFlow,
     PlotSettings,
     ProjectivePlane,
     Sphere,

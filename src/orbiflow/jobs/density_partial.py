@@ -14,8 +14,8 @@ from orbiflow.density import (
     MODEL,
     REPORT,
     TABLE,
+    Density,
     PlotSettings,
-    SymmetricDensity,
     Torus,
     axes_named,
     conditional,
@@ -220,8 +220,8 @@ def _table(density: Density) -> Array:
     return np.column_stack([data, logs.exp().numpy()])
 
 
-def _picture(density: SymmetricDensity, names: list[str]) -> bytes:
-    settings = PlotSettings(names=names)
+def _picture(density: Density, names: list[str]) -> bytes:
+    settings = PlotSettings(names=tuple(names))
     if density.space.dim == 2:
         return density_picture(density, settings=settings).file()
     drawn = density.sample((DRAWN,), torch.Generator().manual_seed(0))

@@ -15,15 +15,15 @@ from PIL import Image
 from density.blends import blended
 from orbiflow.density import (
     AdaptiveKernels,
-    BlendedDensity,
+    Mixture,
     PlotSettings,
-    UniformBase,
+    UniformDensity,
     density_page,
     density_picture,
     make_space,
     map_picture,
 )
-from orbiflow.density.models import still_flow
+from orbiflow.density.models import identity_flow
 from orbiflow.density.pictures.dots import MAX_COVER, uncrowded
 from orbiflow.drawing import Picture, Sheet
 

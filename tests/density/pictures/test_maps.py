@@ -17,7 +17,8 @@ from PIL import Image
 from density.blends import blended
 from orbiflow.density import (
     AdaptiveKernels,
-    BlendedDensity,
+    FlowDensity,
+    Mixture,
     PlotSettings,
     ProjectivePlane,
     RoundSpace,

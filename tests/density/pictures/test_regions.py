@@ -48,7 +48,7 @@ def broad(name: str) -> Mixture:
     return blended(space, identity_flow(space), UniformDensity(space), kernels, shares)
 
 
-def lines_of(density: BlendedDensity, *masses: float) -> list[RegionLine]:
+def lines_of(density: Mixture, *masses: float) -> list[RegionLine]:
     levels = DensityLevels(density, samples=4000)
     return [RegionLine(mass, levels.highest(mass).log_prob) for mass in masses]
 

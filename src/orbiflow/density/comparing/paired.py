@@ -284,9 +284,7 @@ def compare_models(
     return compare_scores(scores, settings, groups=groups)
 
 
-def density_of(
-    model: SymmetricDensity | DensityEstimator, name: str = "the model"
-) -> SymmetricDensity:
+def density_of(model: Density | DensityEstimator, name: str = "the model") -> Density:
     """Return the density of a fitted estimator, or a density as it is.
 
     Raises:

@@ -17,7 +17,7 @@ from orbiflow.density.inference import (
     at_observed,
     check_torus,
 )
-from orbiflow.density.models import AdaptiveKernels, Base
+from orbiflow.density.models import AdaptiveKernels, Density
 from orbiflow.density.spaces import Space, row_count
 from orbiflow.errors import OrbiflowError
 from orbiflow.typed_torch import listed, unique

@@ -24,7 +24,7 @@ from orbiflow.settings import DefaultText, Option, Repeated
 if TYPE_CHECKING:
     from orbiflow.arrays import Array
     from orbiflow.density.comparing import DataComparison, ModelComparison
-    from orbiflow.density.models import SymmetricDensity
+    from orbiflow.density.models import Density
     from orbiflow.density.tables import Table
 
 SpaceName = Literal["torus", "sphere", "klein-bottle", "projective-plane"]
@@ -289,7 +289,7 @@ def _common_columns(data: Sequence[Path], read: _Reader) -> Columns:
 
 
 def _notes_on_known_rows(
-    name: str, density: SymmetricDensity, extra: Mapping[str, Any], values: Array
+    name: str, density: Density, extra: Mapping[str, Any], values: Array
 ) -> list[str]:
     """Return a note if a model was, or may have been, fitted to the rows."""
     from orbiflow.density.comparing import RowSketch

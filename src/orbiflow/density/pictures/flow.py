@@ -27,6 +27,7 @@ from orbiflow.drawing import (
     draw_flow,
     draw_magnitude,
 )
+from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import CrystallographicGroup
 
 if TYPE_CHECKING:
@@ -36,12 +37,9 @@ SPEED = "speed, sides of the square per unit time"
 SCREEN = Room(1.8, 3.8, 10.8, 2.7, 1.7, 1.5)
 """Room on a screen, with a caption below."""
 
-_TIMES = 16
-"""Times at which a field that changes with time is averaged."""
-
 
 def flow_picture(
-    density: SymmetricDensity,
+    density: Density,
     settings: PlotSettings | None = None,
     *,
     cells: int = 3,
@@ -91,7 +89,7 @@ def flow_picture(
     return Picture(frame.figure, sheet, title, f"The {signs}.")
 
 
-def _title(density: SymmetricDensity) -> str:
+def _title(density: Density) -> str:
     name = f"the {space_title(density.space)}"
     weight, flow = flow_of(density)
     if flow is density:
@@ -103,7 +101,7 @@ def flow_of(density: Density) -> tuple[float, FlowDensity]:
     """Return the weight and the density of the flow to draw.
 
     Raises:
-        OrbiflowError: if the density has none.
+        OrbiflowError: If the density has none.
     """
     part = density.flow_part
     if part is None:
@@ -142,14 +140,11 @@ def _palette() -> Array:
 
 
 @torch.no_grad()
-def mean_field(density: SymmetricDensity, points: Tensor) -> Tensor:
+def mean_field(density: Density, points: Tensor) -> Tensor:
     """Return the time mean of the flow's fields (..., d) at chart points (..., d), float64."""
-    flow, like = density.flow, next(iter(density.flow.parameters()), points)
-    if isinstance(flow, NeuralFlow):  # whose field changes with time
-        times = (torch.arange(_TIMES).to(like) + 0.5) / _TIMES
-        vectors = [flow.field(points.to(like), time) for time in times]
-    else:
-        vectors = [field(points.to(like)) for field in flow.segments]
+    flow = flow_of(density)[1].flow
+    like = next(iter(flow.parameters()), points)
+    vectors = [field(points.to(like)) for field in flow.segments]
     return torch.stack(vectors).mean(dim=0).double().cpu()
 
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from torch import Tensor
 
 from orbiflow.arrays import Array
-from orbiflow.density.models import SymmetricDensity
+from orbiflow.density.models import Density
 from orbiflow.density.pictures.axes import space_title
 from orbiflow.density.pictures.dots import MAX_DOTS, dot_scale, draw_dots, draw_dots_over
 from orbiflow.density.pictures.frame import (
@@ -126,7 +126,7 @@ class Ground(ABC):
         """Return where chart points (N, 2) lie on the axes, those on the ground alone."""
 
     @abstractmethod
-    def colouring(self, density: SymmetricDensity, settings: PlotSettings) -> Colouring:
+    def colouring(self, density: Density, settings: PlotSettings) -> Colouring:
         """Return the colours of a density."""
 
     @abstractmethod
@@ -169,7 +169,7 @@ class Ground(ABC):
 
 def draw_density(
     ground: Ground,
-    density: SymmetricDensity,
+    density: Density,
     settings: PlotSettings,
     *,
     dots: Tensor | None = None,
@@ -217,7 +217,7 @@ def draw_density(
 
 def draw_samples(
     ground: Ground,
-    density: SymmetricDensity,
+    density: Density,
     settings: PlotSettings,
     data: Tensor | None,
     samples: Tensor,

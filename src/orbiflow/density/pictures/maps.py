@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from torch import Tensor
 
 from orbiflow.arrays import Array
-from orbiflow.density.models import SymmetricDensity
+from orbiflow.density.models import Density
 from orbiflow.density.pictures.axes import chart_points
 from orbiflow.density.pictures.frame import (
     NARROW,
@@ -95,7 +95,7 @@ def map_picture(
 
 
 def map_samples_picture(
-    density: SymmetricDensity,
+    density: Density,
     data: Tensor | None,
     samples: Tensor,
     settings: PlotSettings | None = None,
@@ -151,7 +151,7 @@ class Map(Ground):
     def places(self, points: Tensor) -> Array:
         return places_on(self.space, self.projection, points)
 
-    def colouring(self, density: SymmetricDensity, settings: PlotSettings) -> Colouring:
+    def colouring(self, density: Density, settings: PlotSettings) -> Colouring:
         pixels = pixels_of(self.projection)
         points = cast(RoundSpace, self.space).vectors_to_chart(to_vectors(pixels.latlon))
         values = density_on_map(density, points, settings.measure, pixels.angle)

@@ -56,7 +56,7 @@ _EVERY_45 = "Lines every 45°, heavier where an angle is 0."
 
 
 def density_page(
-    density: SymmetricDensity,
+    density: Density,
     settings: PlotSettings | None = None,
     *,
     samples: Tensor | None = None,
@@ -87,7 +87,7 @@ def density_page(
             space without latitudes, or the page would be larger than `MAX_BYTES`.
     """
     settings, space = settings or PlotSettings(), density.space
-    cells = resolution or (_FINE_CELLS if isinstance(density, BlendedDensity) else _CELLS)
+    cells = resolution or (_FINE_CELLS if density.has_fine_detail else _CELLS)
     grid, view = mesh(space, cells), view_of(space, settings.names)
     drawing = DRAWINGS[space.name]
     t = torch.linspace(0.0, 1.0, cells + 1, dtype=torch.float64)

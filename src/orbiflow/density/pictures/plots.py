@@ -14,7 +14,7 @@ from torch import Tensor
 
 from orbiflow.arguments import as_path
 from orbiflow.density.estimator import DensityEstimator
-from orbiflow.density.models import BlendedDensity, SymmetricDensity
+from orbiflow.density.models import Density, read_density
 from orbiflow.density.pictures.axes import space_title, view_of
 from orbiflow.density.pictures.coastlines import read_coastlines, simplified
 from orbiflow.density.pictures.corner import MAX_COLUMNS, corner_picture
@@ -28,7 +28,6 @@ from orbiflow.density.pictures.regions import RegionLine, region_lines
 from orbiflow.density.pictures.settings import PlotSettings
 from orbiflow.density.pictures.square import Square
 from orbiflow.density.spaces import Space
-from orbiflow.density.storage import read_density
 from orbiflow.drawing import FORMATS, Picture, Sheet, pdf_pages
 from orbiflow.errors import OrbiflowError, OutputError, SettingError
 from orbiflow.runtime import LITTER, make_folder, one_thread, write_atomic, write_set
@@ -172,7 +171,7 @@ def _captions(pictures: Iterable[Picture]) -> tuple[str, ...]:
 class _Plots:
     """A density and what is drawn with it: chart points, lines around regions, coastlines."""
 
-    density: SymmetricDensity
+    density: Density
     settings: PlotSettings
     samples: Tensor
     data: Tensor | None
@@ -183,7 +182,7 @@ class _Plots:
     @classmethod
     def of(
         cls,
-        given: SymmetricDensity | DensityEstimator | str | Path,
+        given: Density | DensityEstimator | str | Path,
         settings: PlotSettings,
         data: ArrayLike | None,
         coastlines: Sequence[ArrayLike],
@@ -250,8 +249,7 @@ class _Plots:
     @property
     def _has_flow(self) -> bool:
         """Whether a flow has a part in the density."""
-        density = self.density
-        return not (isinstance(density, BlendedDensity) and float(density.shares[0]) == 0)
+        return self.density.flow_part is not None
 
     def _makers(self, sheet: Sheet) -> dict[str, Maker]:
         """Return functions that draw the figures, by name."""
@@ -322,10 +320,10 @@ def _all_coastlines(
 
 
 def _density_of(
-    given: SymmetricDensity | DensityEstimator | str | Path,
-) -> tuple[SymmetricDensity, Sequence[str] | None]:
+    given: Density | DensityEstimator | str | Path,
+) -> tuple[Density, Sequence[str] | None]:
     """Return the density, and the columns that it was fitted to, if they are known."""
-    if isinstance(given, SymmetricDensity):
+    if isinstance(given, Density):
         return given, None
     if isinstance(given, DensityEstimator):
         density = getattr(given, "density_", None)

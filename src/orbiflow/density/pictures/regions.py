@@ -9,7 +9,7 @@ import numpy as np
 from torch import Tensor
 
 from orbiflow.arrays import Array
-from orbiflow.density.models import SymmetricDensity
+from orbiflow.density.models import Density
 from orbiflow.density.pictures.settings import PlotSettings
 from orbiflow.density.regions import DensityLevels, samples_for
 from orbiflow.drawing import Sheet
@@ -32,7 +32,7 @@ class RegionLine(NamedTuple):
     log_prob: float
 
 
-def region_lines(density: SymmetricDensity, settings: PlotSettings) -> tuple[RegionLine, ...]:
+def region_lines(density: Density, settings: PlotSettings) -> tuple[RegionLine, ...]:
     """Return the lines for the settings' `regions`, the smallest mass first.
 
     Raises:
@@ -107,7 +107,7 @@ def draw_regions(
         drawn.set_path_effects([halo, Stroke(linewidth=width, foreground=LINE)])
 
 
-def log_natural(density: SymmetricDensity, values: Array, points: Tensor, measure: str) -> Array:
+def log_natural(density: Density, values: Array, points: Tensor, measure: str) -> Array:
     """Return logarithms (N,) in natural measure of values (N,) in another one at points (N, d)."""
     own = np.log(np.maximum(values, 1e-300))
     if measure == "natural":

@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 
 from orbiflow.arrays import Array
-from orbiflow.density.models import BlendedDensity, SymmetricDensity, midpoints
+from orbiflow.density.models import Density, midpoints
 from orbiflow.density.pictures.axes import (
     ANGLE_AXES,
     INK,
@@ -99,7 +99,7 @@ def density_picture(
 
 
 def samples_picture(
-    density: SymmetricDensity,
+    density: Density,
     data: Tensor | None,
     samples: Tensor,
     settings: PlotSettings | None = None,
@@ -144,8 +144,8 @@ class Square(Ground):
     def places(self, points: Tensor) -> Array:
         return self.view.places(points)
 
-    def colouring(self, density: SymmetricDensity, settings: PlotSettings) -> Colouring:
-        count = _FINE_GRID if isinstance(density, BlendedDensity) else _GRID
+    def colouring(self, density: Density, settings: PlotSettings) -> Colouring:
+        count = _FINE_GRID if density.has_fine_detail else _GRID
         middles = (torch.arange(count, dtype=torch.float64) + 0.5) / count
         x, y = (middles + low for low in self.view.low)
         values = density_on_grid(density, x, y, settings.measure)

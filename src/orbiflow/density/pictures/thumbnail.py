@@ -41,7 +41,7 @@ MARGIN = 6
 
 
 @torch.no_grad()
-def density_thumbnail(density: SymmetricDensity, data: ArrayLike) -> bytes:
+def density_thumbnail(density: Density, data: ArrayLike) -> bytes:
     """Return a PNG of 360 x 240 pixels, the same every time.
 
     Colours are by logarithms where most of the picture would be dark otherwise.
@@ -114,7 +114,7 @@ def _map(density: Density, data: Array) -> Image.Image:
     return paper
 
 
-def _histogram(density: SymmetricDensity, data: Array) -> Image.Image:
+def _histogram(density: Density, data: Array) -> Image.Image:
     """Draw bars of the data under the density's line, from minus half a turn to half a turn."""
     space, view, fine = density.space, view_of(density.space), 4
     width, height = (fine * (side - 2 * MARGIN) for side in SIZE)

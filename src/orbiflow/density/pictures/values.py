@@ -30,7 +30,7 @@ _COARSE = 120
 
 
 @torch.no_grad()
-def density_at(density: SymmetricDensity, points: Tensor, measure: str) -> Array:
+def density_at(density: Density, points: Tensor, measure: str) -> Array:
     """Return the density (N,) at chart points (N, 2), and next to them at cone points.
 
     Raises:
@@ -38,13 +38,8 @@ def density_at(density: SymmetricDensity, points: Tensor, measure: str) -> Array
     """
     if density.space.is_round:
         points = off_cones(points)
-    return (
-        density.log_prob(points.to(device=density.device, dtype=density.dtype), measure=measure)
-        .double()
-        .cpu()
-        .exp()
-        .numpy()
-    )
+    own = points.to(device=density.device, dtype=density.dtype)
+    return density.log_prob(own, measure=measure).double().cpu().exp().numpy()
 
 
 @torch.no_grad()
@@ -72,17 +67,16 @@ def density_on_grid(
     part = density.kernel_part
     if part is None:
         return density_at(density, points, measure).reshape(shape)
-    kernels = density.kernels
-    half = _half_pixels(kernels, pixel or float(x[1] - x[0]))
+    half = _half_pixels(part[1], pixel or float(x[1] - x[0]))
     if density.space.is_round:
         points = off_cones(points)
-        return _averaged(density, points, measure, half, _round_sums).reshape(shape)
+        return _averaged(density, part, points, measure, half, _round_sums).reshape(shape)
     sums = lambda wide, _: _flat_sums(wide, x, y).reshape(-1)  # noqa: E731
-    return _averaged(density, points, measure, half, sums).reshape(shape)
+    return _averaged(density, part, points, measure, half, sums).reshape(shape)
 
 
 @torch.no_grad()
-def density_on_map(density: SymmetricDensity, points: Tensor, measure: str, angle: float) -> Array:
+def density_on_map(density: Density, points: Tensor, measure: str, angle: float) -> Array:
     """Return the density (N,) at chart points (N, 2) of a round space, averaged over pixels.
 
     Args:
@@ -98,7 +92,7 @@ def density_on_map(density: SymmetricDensity, points: Tensor, measure: str, angl
     if part is None:
         return density_at(density, points, measure)
     half = torch.tensor(angle / 2)
-    return _averaged(density, off_cones(points), measure, half, _round_sums)
+    return _averaged(density, part, off_cones(points), measure, half, _round_sums)
 
 
 class ChosenScale(NamedTuple):
@@ -108,7 +102,7 @@ class ChosenScale(NamedTuple):
     reason: str
 
 
-def chosen_scale(density: SymmetricDensity, measure: str, scale: str) -> ChosenScale:
+def chosen_scale(density: Density, measure: str, scale: str) -> ChosenScale:
     """Return the scale of colours, which is the same for all pictures of a density.
 
     Args:
@@ -135,9 +129,7 @@ def chosen_scale(density: SymmetricDensity, measure: str, scale: str) -> ChosenS
 _COLOURS_ARE = {False: "colours are linear", True: "colours are logarithmic"}
 
 
-def is_sharp(
-    density: SymmetricDensity, *, pixel: float | None = None, angle: float | None = None
-) -> bool:
+def is_sharp(density: Density, *, pixel: float | None = None, angle: float | None = None) -> bool:
     """Return whether peaks of a density may be narrower than the pixels of a picture.
 
     Args:
@@ -145,25 +137,29 @@ def is_sharp(
         pixel: Side of a pixel of the square.
         angle: Instead of `pixel`, the side of a pixel on the sphere, in radians.
     """
-    if not isinstance(density, BlendedDensity):
+    part = density.kernel_part
+    if part is None:
         return False
-    half = torch.tensor(angle / 2) if angle else _half_pixels(density.kernels, pixel or 0.0)
-    return bool((density.kernels.concentrations**-0.5 < 2 * half).any())
+    half = torch.tensor(angle / 2) if angle else _half_pixels(part[1], pixel or 0.0)
+    return bool((part[1].concentrations ** -0.5 < 2 * half).any())
 
 
 def _averaged(
-    density: BlendedDensity,
+    density: Density,
+    part: tuple[float, AdaptiveKernels],
     points: Tensor,
     measure: str,
     half: Tensor,
     sums: Callable[[AdaptiveKernels, Tensor], Tensor],
 ) -> Array:
     """Return the density (N,) with kernels whose deviations are at least `half` a pixel."""
-    own = density.kernels
+    weight, own = part
     kappa = 1 / (1 / own.concentrations + half**2)
     widened = AdaptiveKernels(own.space, own.centers, kappa, own.weights)
-    values = density.log_prob_without_kernels(points).exp()
-    values = values + float(density.shares[1]) * sums(widened, points)
+    logs = density.log_density_without_kernels(points)
+    if density.space.is_round:
+        logs = logs + density.space.log_area(points)
+    values = logs.exp() + weight * sums(widened, points)
     return (values * density.space.log_density_factor(points, measure).exp()).numpy()
 
 

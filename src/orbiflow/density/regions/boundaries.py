@@ -166,9 +166,10 @@ def outlines(
     return found
 
 
-def _peaks(density: SymmetricDensity) -> Tensor:
+def _peaks(density: Density) -> Tensor:
     """Return chart points (P, 2) at which narrow islands may be: centres of kernels."""
-    if not isinstance(density, BlendedDensity):
+    part = density.kernel_part
+    if part is None:
         return torch.zeros(0, 2, dtype=torch.float64)
     places = unique((part[1].centers * 1e6).round(), dim=0) / 1e6
     chosen = torch.randperm(len(places), generator=torch.Generator().manual_seed(0))

@@ -15,7 +15,7 @@ from orbiflow.arguments import as_number, as_whole
 from orbiflow.arrays import Array
 from orbiflow.density.comparing import density_of, scores_of
 from orbiflow.density.estimator import DensityEstimator
-from orbiflow.density.models import SymmetricDensity
+from orbiflow.density.models import Density
 from orbiflow.density.regions.settings import MAX_SAMPLES, MIN_SAMPLES, SAMPLES, samples_for
 from orbiflow.runtime import one_thread
 
