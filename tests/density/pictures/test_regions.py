@@ -122,7 +122,7 @@ def test_masses_that_cannot_be_drawn(tmp_path: Any) -> None:
     for masses, said in (
         ((0.5, 0.5), "different masses"),
         ((0.1, 0.2, 0.3, 0.4, 0.5), "at most 4"),
-        ((1.0,), "a region's mass"),
+        ((1.0,), "above 0 and below 1"),
     ):
         with pytest.raises(OrbiflowError, match=said):
             PlotSettings(regions=masses)
