@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from orbiflow.density import COLOURS, density_page
+from orbiflow.density import COLOURS, PlotSettings, density_page
 from reproduction.densities import NAMES, square_values
 from reproduction.density_fits import TARGETS, fit_work
 from reproduction.drawing import (
@@ -65,8 +65,9 @@ def _draw(canvas: Canvas, extent: Extent, values: list[Any]) -> Findings:
                 fontsize=size, weight="bold", color=INK,
             )  # fmt: skip
         title = f"{NAMES[one.target]} on the {TITLES[one.space]}"
+        settings = PlotSettings(measure="square", scale="linear")
         pages[f"{one.space}-{one.target}"] = density_page(
-            density, measure="square", resolution=min(extent.resolution, 120), title=title
+            density, settings, resolution=min(extent.resolution, 120), title=title
         )
     canvas.add(
         figure,

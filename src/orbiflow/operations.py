@@ -11,6 +11,10 @@ OPERATIONS = {
     "density sample": "orbiflow.density.operations.using:sample",
     "density marginal": "orbiflow.density.operations.using:marginal",
     "density conditional": "orbiflow.density.operations.using:conditional",
+    "density plot": "orbiflow.density.operations.drawing:plot",
+    "density compare": "orbiflow.density.operations.comparison:compare",
+    "density region": "orbiflow.density.operations.drawing:region",
+    "density patches": "orbiflow.density.operations.drawing:patches",
 }
 
 RUN_FOLDERS = {

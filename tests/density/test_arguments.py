@@ -68,7 +68,10 @@ WRONG: dict[str, tuple[Callable[[], Any], str]] = {
     "nan": (lambda: a_density().log_prob(torch.full((2, 2), torch.nan)), "points must be finite"),
     "to_base": (lambda: a_density().to_base(torch.rand(5)), r"got .*\(5,\)"),
     "from_base": (lambda: a_density().from_base(torch.rand(5, 4)), r"got .*\(5, 4\)"),
-    "measure": (lambda: a_density().log_prob(POINTS, measure=3), "measure must be one of"),  # type: ignore[arg-type]
+    "measure": (
+        lambda: a_density().log_prob(POINTS, measure=3),
+        "measure must be natural, square or uniform",
+    ),  # type: ignore[arg-type]
     "sample text": (lambda: a_density().sample("five"), "a number or shape of samples"),
     "sample less": (lambda: a_density().sample(-1), "a number or shape of samples"),
     "midpoints": (lambda: midpoints(torus, 2.5), "resolution must be a whole number"),  # type: ignore[arg-type]
@@ -132,8 +135,8 @@ WRONG: dict[str, tuple[Callable[[], Any], str]] = {
     "validation": (lambda: FlowSettings(validation="a"), "validation must be .*below 1"),  # type: ignore[arg-type]
     "base": (lambda: FlowSettings(base=["uniform"]), "base must be"),  # type: ignore[arg-type]
     "dim": (lambda: Torus("2"), "dim must be a whole number from 1 to 64"),  # type: ignore[arg-type]
-    "unit": (lambda: Torus(2, unit=None), "unit must be one of"),  # type: ignore[arg-type]
-    "form": (lambda: Sphere(form=["latlon"]), "form must be one of"),  # type: ignore[arg-type]
+    "unit": (lambda: Torus(2, unit=None), "unit must be radians"),  # type: ignore[arg-type]
+    "form": (lambda: Sphere(form=["latlon"]), "form must be latlon or vector"),  # type: ignore[arg-type]
     "rotation": (lambda: Sphere(rotation="none"), "rotation: expected numbers"),
     "clear_rotation": (lambda: clear_rotation(torus, [[0.0, 0.0]]), "a RoundSpace"),  # type: ignore[arg-type]
     "make_space": (lambda: make_space(torus), "unknown space"),  # type: ignore[arg-type]

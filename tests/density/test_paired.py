@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from orbiflow.density import (
+    ComparisonSettings,
     DensityEstimator,
     ModelComparison,
     compare_models,
@@ -32,7 +33,7 @@ def scores(rng: np.random.Generator, rows: int, *shifts: float) -> dict[str, np.
 @settings(max_examples=30, deadline=None)
 def test_the_standard_error_is_that_of_the_paired_differences(seed: int, rows: int) -> None:
     table = scores(np.random.default_rng(seed), rows, 0.0, 0.3)
-    found = compare_scores(table, resamples=100)
+    found = compare_scores(table, settings=ComparisonSettings(bootstrap=100))
     one = found.differences[0]
     difference = table[one.first] - table[one.second]
     assert one.mean == pytest.approx(difference.mean())
@@ -47,12 +48,11 @@ def test_the_standard_error_is_that_of_the_paired_differences(seed: int, rows: i
 def test_copies_of_rows_in_one_group_add_no_evidence(seed: int, rows: int, copies: int) -> None:
     table = scores(np.random.default_rng(seed), rows, 0.0, 0.3)
     labels = [f"group {k}" for k in range(rows)] * copies
-    alone = compare_scores(table, resamples=200, seed=seed)
+    alone = compare_scores(table, settings=ComparisonSettings(bootstrap=200, seed=seed))
     copied = compare_scores(
         {name: np.tile(value, copies) for name, value in table.items()},
         groups=labels,
-        resamples=200,
-        seed=seed,
+        settings=ComparisonSettings(bootstrap=200, seed=seed),
     )
     assert copied.groups == rows
     one, other = alone.differences[0], copied.differences[0]
@@ -66,7 +66,9 @@ def test_intervals_hold_what_they_promise() -> None:
     held = 0
     for trial in range(300):
         table = {"a": rng.exponential(size=30) ** 1.5, "b": np.zeros(30)}
-        one = compare_scores(table, resamples=200, seed=trial).differences[0]
+        one = compare_scores(
+            table, settings=ComparisonSettings(bootstrap=200, seed=trial)
+        ).differences[0]
         truth = 1.3293403881791372 * (1 if one.first == "a" else -1)  # gamma(2.5)
         held += one.low <= truth <= one.high
     # a skewed density and 30 rows: short of 95 %, as any bootstrap
@@ -77,7 +79,9 @@ def test_all_intervals_hold_at_once() -> None:
     rng = np.random.default_rng(1)
     wrong = 0
     for trial in range(200):
-        found = compare_scores(scores(rng, 40, 0, 0, 0, 0), resamples=200, seed=trial)
+        found = compare_scores(
+            scores(rng, 40, 0, 0, 0, 0), settings=ComparisonSettings(bootstrap=200, seed=trial)
+        )
         wrong += any(d.better for d in found.differences)
     assert 1 <= wrong <= 22  # 10 expected; six intervals of their own would give about 40
 
@@ -89,8 +93,16 @@ def test_groups_keep_chance_from_being_taken_for_a_difference() -> None:
     for trial in range(60):
         shared = 0.5 * rng.normal(size=12)[labels]
         table = {"a": shared + 0.1 * rng.normal(size=240), "b": np.zeros(240)}
-        fooled += compare_scores(table, resamples=100, seed=trial).best is not None
-        kept += compare_scores(table, groups=labels, resamples=100, seed=trial).best is None
+        fooled += (
+            compare_scores(table, settings=ComparisonSettings(bootstrap=100, seed=trial)).best
+            is not None
+        )
+        kept += (
+            compare_scores(
+                table, groups=labels, settings=ComparisonSettings(bootstrap=100, seed=trial)
+            ).best
+            is None
+        )
     assert fooled > 30
     assert kept > 50
 
@@ -127,8 +139,12 @@ def test_equal_models_and_a_single_row_of_difference() -> None:
 
 def test_same_seed_same_result() -> None:
     table = scores(np.random.default_rng(5), 50, 0, 0.1)
-    assert compare_scores(table, seed=3) == compare_scores(table, seed=3)
-    assert compare_scores(table, seed=3) != compare_scores(table, seed=4)
+    assert compare_scores(table, settings=ComparisonSettings(seed=3)) == compare_scores(
+        table, settings=ComparisonSettings(seed=3)
+    )
+    assert compare_scores(table, settings=ComparisonSettings(seed=3)) != compare_scores(
+        table, settings=ComparisonSettings(seed=4)
+    )
 
 
 def test_blocks_of_resamples_are_one(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -148,8 +164,18 @@ def test_blocks_of_resamples_are_one(monkeypatch: pytest.MonkeyPatch) -> None:
         (lambda: compare_scores({"a": [1.0] * 9, "b": [np.nan] * 9}), "scores of b"),
         (lambda: compare_scores({"a": [1.0] * 9, "b": [2.0] * 9}, groups=[1] * 8), "9 rows"),
         (lambda: compare_scores({"a": [1.0] * 9, "b": [2.0] * 9}, groups=[1] * 9), "1 groups"),
-        (lambda: compare_scores({"a": [1.0] * 9, "b": [2.0] * 9}, resamples=10), "resamples"),
-        (lambda: compare_scores({"a": [1.0] * 9, "b": [2.0] * 9}, level=95), "level"),
+        (
+            lambda: compare_scores(
+                {"a": [1.0] * 9, "b": [2.0] * 9}, settings=ComparisonSettings(bootstrap=10)
+            ),
+            "bootstrap",
+        ),
+        (
+            lambda: compare_scores(
+                {"a": [1.0] * 9, "b": [2.0] * 9}, settings=ComparisonSettings(level=95)
+            ),
+            "level",
+        ),
         (
             lambda: compare_models({"a": DensityEstimator(), "b": DensityEstimator()}, []),
             "not fitted",

@@ -16,15 +16,15 @@ from orbiflow.density import (
     UniformDensity,
     highest_density_region,
     make_space,
+    resolvable_masses,
     samples_for,
-    told_masses,
 )
 from orbiflow.density.models import identity_flow
-from orbiflow.density.regions.levels import (
-    GOOD,
-    LEAST,
-    MOST_SAMPLES,
-    MOST_UNASKED,
+from orbiflow.density.regions.settings import (
+    GOOD_EXPECTED,
+    MAX_DEFAULT_SAMPLES,
+    MAX_SAMPLES,
+    MIN_EXPECTED,
     SAMPLES,
 )
 from orbiflow.errors import OrbiflowError
@@ -36,19 +36,21 @@ masses = st.floats(2e-5, 1 - 2e-5)
 @given(st.lists(masses, max_size=4))
 def test_what_suits_the_masses_is_never_too_few(shares: list[float]) -> None:
     count = samples_for(shares)
-    assert SAMPLES <= count <= MOST_UNASKED
+    assert SAMPLES <= count <= MAX_DEFAULT_SAMPLES
     assert samples_for(shares, count) == count
     rarest = min((min(share, 1 - share) for share in shares), default=0.5)
-    assert count in (SAMPLES, MOST_UNASKED) or count == pytest.approx(GOOD / rarest, abs=1)
+    assert count in (SAMPLES, MAX_DEFAULT_SAMPLES) or count == pytest.approx(
+        GOOD_EXPECTED / rarest, abs=1
+    )
 
 
-@given(masses, st.integers(1000, MOST_SAMPLES))
+@given(masses, st.integers(1000, MAX_SAMPLES))
 def test_at_least_ten_are_expected_on_either_side(mass: float, count: int) -> None:
     expected = min(mass, 1 - mass) * count
-    assume(abs(expected - LEAST) > 1e-6)
-    low, high = told_masses(count)
-    assert (low <= mass <= high) == (expected > LEAST)
-    if expected > LEAST:
+    assume(abs(expected - MIN_EXPECTED) > 1e-6)
+    low, high = resolvable_masses(count)
+    assert (low <= mass <= high) == (expected > MIN_EXPECTED)
+    if expected > MIN_EXPECTED:
         assert samples_for([0.5, mass], count) == count
     else:
         with pytest.raises(OrbiflowError, match=f"with {count} samples: samples must be at least"):
@@ -63,7 +65,7 @@ def test_the_number_that_a_message_names_is_enough() -> None:
         samples_for([5e-5], 20_000)
     with pytest.raises(OrbiflowError, match=r"take one from 1e-06 to 0\.999999$"):
         samples_for([1 - 1e-7])
-    assert samples_for([0.999999], MOST_SAMPLES) == MOST_SAMPLES
+    assert samples_for([0.999999], MAX_SAMPLES) == MAX_SAMPLES
 
 
 def test_far_out_the_mass_and_the_interval_are_right() -> None:
@@ -89,4 +91,4 @@ def test_pictures_have_the_same_rule() -> None:
     assert PlotSettings(regions=(0.9995,)).regions == (0.9995,)
     with pytest.raises(OrbiflowError, match="region_samples must be at least 20000"):
         PlotSettings(regions=(0.9995,), region_samples=10_000)
-    assert density_requests.MOST_REGION_SAMPLES == MOST_SAMPLES
+    assert density_requests.MOST_REGION_SAMPLES == MAX_SAMPLES

@@ -235,7 +235,7 @@ TORUS = kernels_about(make_space("torus"), [[0.0, 0.0]], [4.0], [1.0])
     ("call", "message"),
     [
         (lambda: highest_density_region(TORUS, 0.0), "mass must be"),
-        (lambda: highest_density_region(TORUS, 1.0), "the whole space"),
+        (lambda: highest_density_region(TORUS, 1.0), "mass must be"),
         (lambda: highest_density_region(TORUS, 0.999999), "cannot be told from 1"),
         (lambda: highest_density_region(TORUS, "0.5%"), "mass must be"),  # pyright: ignore[reportArgumentType]
         (lambda: highest_density_region(DensityEstimator(), 0.5), "not fitted"),

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from orbiflow.density import compare_scores, cross_validation_folds
+from orbiflow.density import ComparisonSettings, compare_scores, cross_validation_folds
 from orbiflow.errors import OrbiflowError
 
 labels = st.lists(st.integers(0, 30), min_size=2, max_size=200)
@@ -64,12 +64,13 @@ def test_whole_weights_of_scores_are_copies_of_rows(seed: int, rows: int) -> Non
     rng = np.random.default_rng(seed)
     table = {name: rng.normal(size=rows) for name in "ab"}
     weights = rng.integers(1, 4, size=rows)
-    weighed = compare_scores(table, weights=weights, resamples=100, seed=1)
+    weighed = compare_scores(
+        table, weights=weights, settings=ComparisonSettings(bootstrap=100, seed=1)
+    )
     copied = compare_scores(
         {name: np.repeat(value, weights) for name, value in table.items()},
         groups=np.repeat(np.arange(rows), weights),
-        resamples=100,
-        seed=1,
+        settings=ComparisonSettings(bootstrap=100, seed=1),
     )
     for one, other in zip(weighed.scores, copied.scores, strict=True):
         assert one.name == other.name

@@ -57,7 +57,7 @@ def test_lines_and_notes(tmp_path: Path) -> None:
     assert table.notes == (
         "took the columns of numbers: lat, lon",
         "took line 2 as the header: city, lat, lon",
-        "passed over 2 comment lines",
+        "skipped 2 comment lines",
     )
 
 

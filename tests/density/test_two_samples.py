@@ -12,6 +12,7 @@ import torch
 from scipy.stats import vonmises
 
 from orbiflow.density import (
+    ComparisonSettings,
     RowSketch,
     Sphere,
     compare_samples,
@@ -77,7 +78,9 @@ def test_divergences_are_near_those_of_the_densities() -> None:
     kappa, shift, rows = 3.0, 1.2, 700
     one = rng.vonmises([0.0, 0.0], kappa, (rows, 2))
     other = rng.vonmises([0.0, shift], kappa, (rows, 2))
-    found = compare_samples({"a": one, "b": other}, permutations=99, resamples=300).divergence
+    found = compare_samples(
+        {"a": one, "b": other}, settings=ComparisonSettings(permutations=99, bootstrap=300)
+    ).divergence
     assert found is not None
     t = (np.arange(4000) + 0.5) / 4000 * 2 * math.pi - math.pi
     p, q = vonmises.pdf(t, kappa), vonmises.pdf(t, kappa, loc=shift)
@@ -95,7 +98,8 @@ def test_divergences_are_near_those_of_the_densities() -> None:
 def test_data_far_apart_and_few_rows() -> None:
     rng = np.random.default_rng(1)
     far = compare_samples(
-        {"a": rng.vonmises(0, 50, (60, 2)), "b": rng.vonmises(3, 50, (60, 2))}, resamples=100
+        {"a": rng.vonmises(0, 50, (60, 2)), "b": rng.vonmises(3, 50, (60, 2))},
+        settings=ComparisonSettings(bootstrap=100),
     )
     assert far.differ
     assert far.divergence is not None
@@ -106,7 +110,9 @@ def test_data_far_apart_and_few_rows() -> None:
     assert any("not estimated" in note for note in few.notes)
     assert json.loads(json.dumps(few.to_json(), allow_nan=False))["divergence"] is None
     same = rng.vonmises(0, 1, (30, 2))
-    assert not compare_samples({"a": same, "b": same}, permutations=99, resamples=100).differ
+    assert not compare_samples(
+        {"a": same, "b": same}, settings=ComparisonSettings(permutations=99, bootstrap=100)
+    ).differ
 
 
 @pytest.mark.parametrize(
@@ -119,7 +125,12 @@ def test_data_far_apart_and_few_rows() -> None:
         (lambda a: compare_samples({"a": a, "b": a}, "cube"), "unknown space"),
         (lambda a: compare_samples({"a": a, "b": a}, groups={"a": [1]}), "by these names"),
         (lambda a: compare_samples({"a": a, "b": a}, groups={"a": [1], "b": [2]}), "20 rows"),
-        (lambda a: compare_samples({"a": a, "b": a}, permutations=3), "permutations"),
+        (
+            lambda a: compare_samples(
+                {"a": a, "b": a}, settings=ComparisonSettings(permutations=3)
+            ),
+            "permutations",
+        ),
         (
             lambda a: compare_samples({"a": a, "b": a}, groups={"a": [1] * 20, "b": [2] * 20}),
             "2 groups are too few",

@@ -11,7 +11,7 @@ import torch
 from PIL import Image
 
 from orbiflow.arrays import Array
-from orbiflow.drawing import field_png, palette
+from orbiflow.drawing import Sheet, field_picture, palette
 from orbiflow.drawing.fields import flow_lines, symmetric_seeds
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles import (
@@ -89,10 +89,12 @@ def test_absurd_sizes_are_refused(bent_tile: Any) -> None:
 def test_field_picture(bent_tile: Any, equivariant: Any) -> None:
     tile = bent_tile("IH6")
     field = equivariant(tile.group)
-    image = pixels(field_png(lambda p: field(p.numpy()), tile.group, tile, width_px=300))
+    image = pixels(
+        field_picture(lambda p: field(p.numpy()), tile.group, tile, sheet=Sheet.screen(300)).file()
+    )
     assert image.shape[1] == 300
     assert image.std() > 20
-    still = field_png(lambda p: torch.zeros_like(p), tile.group, width_px=300)
+    still = field_picture(lambda p: torch.zeros_like(p), tile.group, sheet=Sheet.screen(300)).file()
     assert pixels(still).shape[1] == 300
 
 
@@ -107,7 +109,9 @@ def test_field_picture_has_the_symmetry_of_the_group() -> None:
         u = 2 * np.pi * (points - torch.as_tensor(center)) @ inverse.T
         return torch.sin(u + u.flip(-1))
 
-    image = pixels(field_png(odd, group, window=window, width_px=400)).astype(int)
+    image = pixels(field_picture(odd, group, window=window, sheet=Sheet.screen(400)).file()).astype(
+        int
+    )
     assert np.abs(image - image[::-1, ::-1]).mean() < 5.0  # the outlined cell has no such symmetry
     assert np.abs(image - image[::-1]).mean() > 15.0
 
@@ -115,9 +119,9 @@ def test_field_picture_has_the_symmetry_of_the_group() -> None:
 def test_field_must_return_vectors() -> None:
     group = isohedral_class("IH4").group()
     with pytest.raises(OrbiflowError, match="finite vectors of shape"):
-        field_png(lambda p: p[..., 0], group, width_px=100)
+        field_picture(lambda p: p[..., 0], group, sheet=Sheet.screen(100)).file()
     with pytest.raises(OrbiflowError, match="finite vectors of shape"):
-        field_png(lambda p: p * np.nan, group, width_px=100)
+        field_picture(lambda p: p * np.nan, group, sheet=Sheet.screen(100)).file()
 
 
 @pytest.mark.parametrize("name", ["IH1", "IH5", "IH21"])

@@ -49,7 +49,7 @@ def test_bands_make_no_difference(monkeypatch: pytest.MonkeyPatch) -> None:
         return np.asarray(raster.image()).astype(int)
 
     whole = drawn()
-    monkeypatch.setattr(module, "MOST_FINE_PIXELS", 150 * 9 * 7)
+    monkeypatch.setattr(module, "MAX_FINE_PIXELS", 150 * 9 * 7)
     # lines end on whole fine pixels, of which there are nine in one
     assert np.abs(drawn() - whole).max() < 80
     assert (drawn() != whole).mean() < 0.01

@@ -20,6 +20,7 @@ from orbiflow.density import (
     Density,
     FlowDensity,
     KleinBottle,
+    PlotSettings,
     ProjectivePlane,
     Sphere,
     Torus,
@@ -72,18 +73,16 @@ def points(count: int, dim: int = 2) -> torch.Tensor:
 def corner(dim: int, sheet: Sheet) -> Picture:
     density = UniformDensity(Torus(dim))
     names = [f"a long name {k}" for k in range(dim)]
-    return corner_picture(density, points(40, dim), points(30, dim), names=names, sheet=sheet)
+    settings = PlotSettings(names=names)
+    return corner_picture(density, points(40, dim), points(30, dim), settings, sheet=sheet)
 
 
 def test_the_narrowest_figure_has_room() -> None:
     names = ["a rather long name of an angle", "ψ"]
     for measure, scale in (("uniform", "linear"), ("natural", "log")):
-        check_inside(
-            density_picture(
-                example(SPACES[0]), names=names, measure=measure, scale=scale,
-                sheet=Sheet.column(NARROWEST),
-            )
-        )  # fmt: skip
+        settings = PlotSettings(names=names, measure=measure, scale=scale)  # pyright: ignore
+        sheet = Sheet.column(NARROWEST)
+        check_inside(density_picture(example(SPACES[0]), settings=settings, sheet=sheet))
 
 
 @every_space
@@ -92,8 +91,10 @@ def test_density_figures_have_room_and_letters_of_7_to_8_points(space: Any, widt
     density, sheet = example(space), Sheet.column(width)
     names = ["a rather long name of an angle", "ψ"] if space.unit else None
     made = [
-        density_picture(density, points(50), measure="uniform", names=names, sheet=sheet),
-        density_picture(density, scale="log", sheet=sheet),
+        density_picture(
+            density, points(50), PlotSettings(measure="uniform", names=names), sheet=sheet
+        ),
+        density_picture(density, settings=PlotSettings(scale="log"), sheet=sheet),
         flow_picture(density, cells=2, sheet=sheet),
         samples_picture(density, points(60), points(40), sheet=sheet),
     ]

@@ -13,7 +13,6 @@ from .fields import draw_flow as draw_flow
 from .fields import draw_magnitude as draw_magnitude
 from .fields import evaluate as evaluate
 from .fields import field_picture as field_picture
-from .fields import field_png as field_png
 from .palettes import DEFAULT_PALETTE as DEFAULT_PALETTE
 from .palettes import PALETTES as PALETTES
 from .palettes import Palette as Palette
@@ -33,6 +32,8 @@ from .raster import vector_picture as vector_picture
 from .raster import window_of as window_of
 from .sheet import COLUMNS as COLUMNS
 from .sheet import FORMATS as FORMATS
+from .sheet import NARROWEST as NARROWEST
+from .sheet import WIDEST as WIDEST
 from .sheet import FigureFormat as FigureFormat
 from .sheet import Picture as Picture
 from .sheet import Sheet as Sheet

@@ -1,4 +1,4 @@
-"""A matplotlib figure without axes, margins or global state, and its PNG bytes."""
+"""Matplotlib figures without margins or global state, and the marks of symmetry on them."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ if TYPE_CHECKING:
 
 DPI = 200
 MAX_PIXELS = 20_000
-"""Largest width or height of a picture."""
+"""Largest width or height of a picture in pixels."""
 
 
 def check_size(width_px: int, height_px: int) -> None:
-    """Nothing, if a picture can have this size.
+    """Check that a picture can have this size.
 
     Raises:
-        OrbiflowError: if a side is below 16 or above `MAX_PIXELS` pixels.
+        OrbiflowError: If a side is below 16 or above `MAX_PIXELS` pixels.
     """
     if not (16 <= width_px <= MAX_PIXELS and 16 <= height_px <= MAX_PIXELS):
         raise OrbiflowError(
@@ -39,10 +39,10 @@ def check_size(width_px: int, height_px: int) -> None:
 
 
 def blank_figure(width_px: int, height_px: int, paper: str = "#ffffff") -> Figure:
-    """A figure of that size in pixels.
+    """Return an empty figure of this size in pixels.
 
     Raises:
-        OrbiflowError: if a side is below 16 or above `MAX_PIXELS` pixels.
+        OrbiflowError: If a side is below 16 or above `MAX_PIXELS` pixels.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -56,7 +56,7 @@ def blank_figure(width_px: int, height_px: int, paper: str = "#ffffff") -> Figur
 def plane_axes(
     figure: Figure, window: Window, *, y_down: bool = False, box: Any = (0.0, 0.0, 1.0, 1.0)
 ) -> Axes:
-    """Invisible axes that show `window` in the figure's `box`, undistorted."""
+    """Add invisible axes that show a window in the figure's `box`, undistorted."""
     axes = figure.add_axes(box)
     axes.set_axis_off()
     axes.set_xlim(window[0], window[2])
@@ -66,7 +66,7 @@ def plane_axes(
 
 
 def fill_rings(axes: Axes, rings: list[Array], fill: str, outline: str, width: float) -> None:
-    """Filled closed polygons; `width` of the outline in points."""
+    """Fill closed polygons, with an outline of `width` points."""
     from matplotlib.collections import PolyCollection
 
     axes.add_collection(
@@ -78,7 +78,7 @@ def fill_rings(axes: Axes, rings: list[Array], fill: str, outline: str, width: f
 
 
 def png_bytes(figure: Figure) -> bytes:
-    """The figure as PNG, at exactly its size."""
+    """Return the figure as PNG, at exactly its size."""
     buffer = io.BytesIO()
     figure.savefig(
         buffer,
@@ -95,7 +95,7 @@ LINE_COLOUR = "#b91c1c"
 
 
 def center_sign(order: int, size: float) -> Array:
-    """(N, 2) outline of the sign of an n-fold centre at the origin, about `size` in radius."""
+    """Return the outline (N, 2) of the sign of an n-fold centre, about `size` in radius."""
     if order != 2:
         angles = np.pi / 2 + 2 * np.pi * np.arange(order) / order
         if order == 4:
@@ -116,12 +116,15 @@ def mark_symmetry(
     halo: str = "#ffffff",
     pen: Callable[[float], float] = float,
 ) -> None:
-    """Mark all rotation centres and lines of `group` in `window`.
+    """Mark all rotation centres and lines of a group in a window.
 
     Args:
-        size: radius of the signs, in the group's units.
-        halo: colour of the thin rim that sets the marks off the picture.
-        pen: from widths of lines on a screen to those here, in points.
+        axes: The axes.
+        group: The group.
+        window: The window.
+        size: Radius of the signs, in the group's units.
+        halo: Colour of the thin rim that separates the marks from the picture.
+        pen: A function from widths of lines on a screen to those here, in points.
     """
     low, high = np.array(window[:2]), np.array(window[2:])
     middle, reach = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
@@ -147,7 +150,7 @@ def outline_cell(
     colour: str = "#111111",
     pen: Callable[[float], float] = float,
 ) -> None:
-    """Outline the lattice cell `cell_ring(group, middle)`; `pen` as in `mark_symmetry`."""
+    """Outline the lattice cell `cell_ring(group, middle)`, with a pen as in `mark_symmetry`."""
     ring = cell_ring(group, middle)
     for ink, width, alpha in (("#ffffff", 3.2, 0.7), (colour, 1.7, 1.0)):
         axes.plot(
@@ -156,8 +159,9 @@ def outline_cell(
 
 
 def cell_ring(group: CrystallographicGroup, middle: Array) -> Array:
-    """(5, 2) closed ring: the reduced cell near `middle`, rotation centres of highest order at its
-    corners.
+    """Return the closed ring (5, 2) of the reduced cell near `middle`.
+
+    Its corners are rotation centres of the highest order.
     """
     basis = reduced_basis(group.lattice)
     reach = 2 * float(np.linalg.norm(basis, axis=0).max())

@@ -1,9 +1,9 @@
-"""Picture of a symmetric vector field: magnitude, flow lines, cell and symmetries."""
+"""Pictures of symmetric vector fields: magnitude, flow lines, cell and symmetries."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, Protocol, TypedDict, Unpack
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 import torch
@@ -25,9 +25,9 @@ _STEPS = 12
 
 
 def symmetric_seeds(group: CrystallographicGroup, spacing: float, *, tries: int = 600) -> Array:
-    """(N, 2) points in the cell, whole orbits, all about `spacing` apart; deterministic.
+    """Return points (N, 2) in the cell, whole orbits, all about `spacing` apart, always the same.
 
-    Dart throwing: a random orbit is kept if all its points stay `spacing` away from those kept.
+    A random orbit is kept if all its points are `spacing` away from those kept before.
     """
     darts = np.random.default_rng(0).random((tries, 2)) @ group.lattice.T
     shifts = np.stack(np.meshgrid([-1, 0, 1], [-1, 0, 1]), axis=-1).reshape(-1, 2) @ group.lattice.T
@@ -42,10 +42,10 @@ def symmetric_seeds(group: CrystallographicGroup, spacing: float, *, tries: int 
 
 
 def flow_lines(velocity: Callable[[Array], Array], seeds: Array, length: float) -> Array:
-    """(M, 13, 2) flow lines of at most that length, with the seed in the middle.
+    """Return flow lines (M, 13, 2) of at most this length, with the seed in the middle.
 
-    Integrated (midpoint rule) at a speed that is near one where the field is strong and goes to
-    zero with the field, so that lines end in a sink and do not jitter about it. Seeds where the
+    They are integrated (midpoint rule) at a speed that is near one where the field is strong and goes
+    to zero with the field, so that lines end in a sink and do not jitter around it. Seeds where the
     field vanishes are left out.
     """
     speeds = np.linalg.norm(velocity(seeds), axis=-1)
@@ -69,7 +69,8 @@ def flow_lines(velocity: Callable[[Array], Array], seeds: Array, length: float) 
     return lines[speeds > 1e-9 * strongest]
 
 
-_SAMPLES = 400  # along the longer side
+_SAMPLES = 400
+"""Points along the longer side at which a magnitude is evaluated."""
 
 
 class HasPolygon(Protocol):
@@ -77,37 +78,13 @@ class HasPolygon(Protocol):
 
     @property
     def polygon(self) -> Array:
-        """Vertices (n, 2)."""
+        """Its vertices (n, 2)."""
         ...
 
     @property
     def center(self) -> Array:
-        """A point (2,) in the middle."""
+        """A point (2,) in its middle."""
         ...
-
-
-def field_png(
-    velocity: Callable[[Any], Any],
-    group: CrystallographicGroup,
-    tile: HasPolygon | None = None,
-    *,
-    width_px: int = 1200,
-    **options: Unpack[FieldOptions],
-) -> bytes:
-    """PNG of `field_picture` for a screen; the height follows from the window.
-
-    Raises:
-        OrbiflowError: as `field_picture`, and for a size that cannot be made.
-    """
-    return field_picture(velocity, group, tile, sheet=Sheet.screen(width_px), **options).file()
-
-
-class FieldOptions(TypedDict, total=False):
-    """Of `field_picture`."""
-
-    window: Window | None
-    y_down: bool
-    signs: bool
 
 
 def field_picture(
@@ -120,23 +97,24 @@ def field_picture(
     signs: bool = True,
     sheet: Sheet | None = None,
 ) -> Picture:
-    """A vector field: magnitude as colour, short flow lines over it.
+    """Draw a vector field: its magnitude as colour, short flow lines over it.
 
-    After the paper's figure of results. The lines start at an orbit of the group, so the picture has
-    the symmetry that the field has, and shows it where the field has not.
+    This is the paper's figure of results. The lines start at orbits of the group, so the picture has
+    the symmetry that the field has, and shows where the field lacks it.
 
     Args:
-        velocity: from points (..., 2) to vectors (..., 2); called with a torch tensor, float64 or of
-            the module's dtype. For a NumPy field f give `lambda points: f(points.numpy())`.
-        group: whose lattice cell is outlined, and whose rotation centres and lines are marked.
-        tile: drawn on top, if given.
-        window: default about four cells around the tile or the origin.
-        y_down: whether the y axis points down, as in images.
-        signs: whether to mark rotation centres and lines.
-        sheet: default a screen of 1200 pixels.
+        velocity: A function from points (..., 2) to vectors (..., 2), called with a torch tensor of
+            float64 or of the module's dtype. For a NumPy field f give
+            `lambda points: f(points.numpy())`.
+        group: The group whose lattice cell is outlined, and whose centres and lines are marked.
+        tile: A tile to draw on top.
+        window: The window. Default: about four cells around the tile or the origin.
+        y_down: Whether the y axis points down, as in images.
+        signs: Whether to mark rotation centres and lines.
+        sheet: The sheet. Default: a screen of 1200 pixels.
 
     Raises:
-        OrbiflowError: if the field does not return finite vectors of the points' shape.
+        OrbiflowError: If the field does not return finite vectors of the points' shape.
     """
     sheet = sheet or Sheet.screen(1200)
     middle = np.zeros(2) if tile is None else tile.center
@@ -159,7 +137,7 @@ def field_picture(
 def draw_magnitude(
     axes: Axes, velocity: Callable[[Any], Any], window: Window, *, samples: int | None = None
 ) -> None:
-    """Colour a window by a field's magnitude, at so many points along its longer side (default 400)."""
+    """Colour a window by a field's magnitude, at 400 points along its longer side or `samples`."""
     longer = max(window[2] - window[0], window[3] - window[1])
     counts = [
         max(2, round((samples or _SAMPLES) * (window[i + 2] - window[i]) / longer)) for i in (0, 1)
@@ -186,8 +164,14 @@ def draw_flow(
     *,
     pen: Callable[[float], float] = float,
 ) -> None:
-    """Lines with heads and fading tails; `pen` gives the width in points of a line as wide as its
-    argument on a screen.
+    """Draw lines with heads and fading tails.
+
+    Args:
+        axes: The axes.
+        velocity: The field, as for `field_picture`.
+        group: The group whose orbits the lines start at.
+        window: The window.
+        pen: A function from widths of lines on a screen to those here, in points.
     """
     from matplotlib.collections import LineCollection, PolyCollection
 
@@ -204,7 +188,7 @@ def draw_flow(
     axes.add_collection(
         LineCollection(list(segments), colors=colours, linewidths=pen(0.9), zorder=2)
     )
-    # heads at the seeds, which keep their distance; at the ends they would pile up in every sink
+    # heads are at the seeds, which keep their distance; at the ends they would pile up in sinks
     middle = lines.shape[1] // 2
     along = lines[:, middle + 1] - lines[:, middle - 1]
     along = 0.009 * scale * along / np.maximum(np.linalg.norm(along, axis=1), 1e-300)[:, None]
@@ -217,7 +201,7 @@ def draw_flow(
 
 
 def _in_window(seeds: Array, group: CrystallographicGroup, window: Window, margin: float) -> Array:
-    """All translates of the seeds by lattice vectors that lie in the window or near it."""
+    """Return all translates of the seeds by lattice vectors that lie in the window or near it."""
     low, high = np.array(window[:2]) - margin, np.array(window[2:]) + margin
     corners = np.array([low, high, (low[0], high[1]), (high[0], low[1])]) @ group.inverse_lattice.T
     ranges = [np.arange(np.floor(c.min()) - 1, np.ceil(c.max()) + 1) for c in corners.T]
@@ -227,10 +211,10 @@ def _in_window(seeds: Array, group: CrystallographicGroup, window: Window, margi
 
 
 def evaluate(velocity: Callable[[Any], Any], points: Array) -> Array:
-    """The field, written in torch, at NumPy points (..., 2).
+    """Return a field that is written in torch at NumPy points (..., 2).
 
     Raises:
-        OrbiflowError: if it does not return finite vectors of the points' shape.
+        OrbiflowError: If it does not return finite vectors of the points' shape.
     """
     dtype = torch.float64
     if isinstance(velocity, torch.nn.Module):
@@ -246,7 +230,7 @@ def evaluate(velocity: Callable[[Any], Any], points: Array) -> Array:
 
 
 def _about_four_cells(group: CrystallographicGroup, middle: Array) -> Window:
-    """A window of the area of some four cells, in the proportions of the cell within reason."""
+    """Return a window with the area of four cells or so, and roughly their proportions."""
     sides = np.abs(reduced_basis(group.lattice)).sum(axis=1)
     aspect = float(np.clip(sides[0] / sides[1], 2 / 3, 3 / 2))
     area = 4.6 * group.cell_volume

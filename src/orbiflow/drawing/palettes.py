@@ -10,19 +10,19 @@ from orbiflow.kinds import Parsed
 
 
 class Palette(NamedTuple):
-    """Fill colours in order of use, the outline between tiles and the paper, as #rrggbb."""
+    """Fill colours in order of use, the outline between tiles, and the paper, as #rrggbb."""
 
     colours: tuple[str, ...]
     outline: str
     paper: str
 
     def fill(self, index: int) -> str:
-        """Colour number `index`; past the end they start again, mixed half with the paper."""
+        """Return colour number `index`; after the last they start again, mixed with the paper."""
         turn, place = divmod(index, len(self.colours))
         return _mixed(self.colours[place], self.paper, 0.5**turn)
 
     def shortage(self, count: int) -> tuple[str, ...]:
-        """What to tell whoever asks for more colours than there are; nothing where there are enough.
+        """Return notes for a user who needs more colours than there are.
 
         >>> palette("e76f51").shortage(3)
         ('3 colours are needed and the palette has 1: the others are paler shades of it',)
@@ -37,7 +37,7 @@ class Palette(NamedTuple):
         )
 
     def ink(self, index: int) -> str:
-        """What lines on colour number `index` are drawn in: of outline and paper the one that shows.
+        """Return the colour of lines on colour number `index`: outline or paper, whichever shows.
 
         >>> PALETTES["delft"].ink(0), PALETTES["delft"].ink(1)
         ('#14263a', '#ffffff')
@@ -69,28 +69,29 @@ PALETTES: dict[str, Palette] = {
     "clay": Palette(("#f4e0d0", "#54261f", "#d58559", "#8aa9b8"), "#2c1410", "#fff8f2"),
     "print": Palette(("#f7f5ef", "#26241f", "#9a968b", "#5f5b52"), "#151310", "#fbfaf6"),
 }
-"""By name. The first four of each differ by at least 0.1 in OKLab under every dichromacy (tested).
+"""The palettes by name. The first four colours of each differ by at least 0.1 in OKLab under every
+dichromacy (tested).
 
 "okabe-ito" is after M. Okabe and K. Ito, "Color universal design", 2008.
 """
 
 DEFAULT_PALETTE = "delft"
-MOST_COLOURS = 24
-"""Of a palette that is spelt out."""
+MAX_COLOURS = 24
+"""Colours of a palette that the user writes out, at most."""
 
 
 _HEX = re.compile(r"#?([0-9a-fA-F]{6})")
 
 
 def palette(name: str | Palette) -> Palette:
-    """The palette called `name`, or one spelt out; a `Palette` is returned as it is.
+    """Return the palette of a name, or one that is written out; a `Palette` is returned as it is.
 
     Args:
-        name: one of `PALETTES`; or colours rrggbb with commas between, and perhaps `outline=rrggbb`
-            (else a dark shade of the darkest) and `paper=rrggbb` (else white) among them.
+        name: One of `PALETTES`; or colours rrggbb with commas between them, and perhaps
+            `outline=rrggbb` (default: a dark shade of the darkest) and `paper=rrggbb` (default: white).
 
     Raises:
-        OrbiflowError: for an unknown name, and what is no colour.
+        OrbiflowError: If the name is unknown, or a colour is none.
 
     >>> palette("ink").fill(1)
     '#2b2b2b'
@@ -105,7 +106,7 @@ def palette(name: str | Palette) -> Palette:
     if name in PALETTES:
         return PALETTES[name]
     if "," in name or "=" in name or _HEX.fullmatch(name):
-        return _spelt(name)
+        return _written_out(name)
     raise OrbiflowError(
         f"unknown palette {name[:60]!r}; there are {', '.join(PALETTES)}, and your own: colours such "
         "as e76f51,2a9d8f,outline=1b2f38,paper=fffdf8"
@@ -130,7 +131,7 @@ PaletteName = Annotated[
 """A palette, for settings classes: its name, or its colours."""
 
 
-def _spelt(text: str) -> Palette:
+def _written_out(text: str) -> Palette:
     colours: list[str] = []
     named: dict[str, str] = {}
     for part in text.split(","):
@@ -146,8 +147,8 @@ def _spelt(text: str) -> Palette:
             named[name] = colour
         else:
             colours.append(colour)
-    if not 1 <= len(colours) <= MOST_COLOURS:
-        raise OrbiflowError(f"a palette has 1 to {MOST_COLOURS} colours, got {len(colours)}")
+    if not 1 <= len(colours) <= MAX_COLOURS:
+        raise OrbiflowError(f"a palette has 1 to {MAX_COLOURS} colours, got {len(colours)}")
     dark = _mixed(min(colours, key=_lightness), "#000000", 0.4)
     return Palette(tuple(colours), named.get("outline", dark), named.get("paper", "#ffffff"))
 
@@ -158,7 +159,7 @@ def _mixed(colour: str, paper: str, share: float) -> str:
 
 
 def _lightness(colour: str) -> float:
-    """About as light as it looks, 0 to 1."""
+    """Return about how light a colour looks, 0 to 1."""
     weights = (0.2126, 0.7152, 0.0722)
     parts = (int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5))
     return sum(w * part**2.2 for w, part in zip(weights, parts, strict=True)) ** (1 / 2.2)

@@ -1,7 +1,7 @@
-"""Pictures of polygons and lines in few colours: drawn several times finer by Pillow, then averaged.
+"""Pictures of polygons and lines in few colours, drawn several times finer by Pillow, then averaged.
 
-Ten times as fast as a matplotlib figure of the same things, and its PNG a quarter of the size: it has
-a palette, of the colours that were used and what lies between any two of them.
+They are drawn ten times as fast as matplotlib figures of the same things, and their PNGs are a quarter
+of the size, since they have a palette: the colours that were used, and mixtures of any two of them.
 """
 
 from __future__ import annotations
@@ -24,20 +24,20 @@ if TYPE_CHECKING:
     from matplotlib.path import Path
 
 FINER = 3
-"""Times by which each side of a pixel is drawn finer."""
+"""Factor by which each side of a pixel is drawn finer."""
 
-MOST_FINE_PIXELS = 2**22
-"""Of a band that is drawn at once: what bounds the memory, and the fastest of the powers of two."""
+MAX_FINE_PIXELS = 2**22
+"""Pixels of a band that is drawn at once, which bounds the memory; the fastest power of two."""
 
-APART = 16
-"""Least difference, of 255, of a mixture in a palette from the colours that were used."""
+MIN_DIFFERENCE = 16
+"""Least difference, out of 255, of a mixture in a palette from the colours that were used."""
 
-SHARP = 0.3
+SHARP_TURN = 0.3
 """Turn in radians beyond which a line's joint is rounded: flatter ones show no notch."""
 
 
 class Filled(NamedTuple):
-    """A polygon, in pixels, in the colour of that number."""
+    """A polygon in pixels, in the colour with this number."""
 
     points: Array
     holes: tuple[Array, ...]
@@ -45,7 +45,7 @@ class Filled(NamedTuple):
 
 
 class Drawn(NamedTuple):
-    """A line, in pixels, in the colour of that number."""
+    """A line in pixels, in the colour with this number."""
 
     points: Array
     width: float
@@ -63,20 +63,20 @@ class Words(NamedTuple):
 
 
 class Raster:
-    """A window of the plane, and below it a strip for a legend.
+    """A picture of a window of the plane, and below it a strip for a legend.
 
     Things are drawn in the order in which they are added, and only when `image` is called; until then
-    they are `shapes` and `texts`, which `orbiflow.figures.vector` draws as curves.
+    they are `shapes` and `texts`, which `vector_picture` draws as curves.
 
     Args:
-        window: (xmin, ymin, xmax, ymax), in the units of all points.
-        width_px: the height follows from the window.
-        y_down: whether the y axis of the points points down, as in images.
-        paper: the background, as #rrggbb.
-        strip_px: height of the strip.
+        window: The window (xmin, ymin, xmax, ymax), in the units of all points.
+        width_px: Width in pixels; the height follows from the window.
+        y_down: Whether the y axis points down, as in images.
+        paper: The background, as #rrggbb.
+        strip_px: Height of the strip.
 
     Raises:
-        OrbiflowError: for a size that cannot be made.
+        OrbiflowError: If there cannot be a picture of this size.
 
     >>> raster = Raster((0.0, 0.0, 2.0, 1.0), 40)
     >>> raster.fill([np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])], "#ff0000")
@@ -106,16 +106,16 @@ class Raster:
         self.texts: list[Words] = []
 
     def to_pixels(self, points: Array) -> Array:
-        """(..., 2) points of the plane in pixels from the upper left corner."""
+        """Return points (..., 2) of the plane in pixels from the upper left corner."""
         return (points - self._origin) * self._signs * self.scale
 
     def fill(self, rings: Sequence[Array], colour: str) -> None:
-        """Fill closed polygons (N, 2), their border included."""
+        """Fill closed polygons (N, 2), with their border."""
         number = self._number(colour)
         self.shapes += [Filled(self.to_pixels(ring), (), number) for ring in rings]
 
     def fill_geometry(self, geometry: Any, colour: str) -> None:
-        """Fill a shapely geometry, holes left as they are; lines and points in it are ignored."""
+        """Fill a shapely geometry except its holes; lines and points in it are ignored."""
         for part in getattr(geometry, "geoms", [geometry]):
             if hasattr(part, "geoms"):
                 self.fill_geometry(part, colour)
@@ -129,7 +129,7 @@ class Raster:
     def line(
         self, points: Array, colour: str, width_px: float, *, closed: bool = False, pixels=False
     ) -> None:
-        """A line along (N, 2) points of the plane, or of the picture if `pixels`; ends are round."""
+        """Draw a line with round ends along points (N, 2) of the plane, or of the picture."""
         path = points if pixels else self.to_pixels(points)
         path = np.concatenate([path, path[:1]]) if closed else path
         self.shapes.append(Drawn(path, width_px, self._number(colour)))
@@ -148,14 +148,14 @@ class Raster:
         anchor: str = "lm",
         colour: str = "#1a1a1a",
     ) -> None:
-        """Words at a place of the picture in pixels, `size` pixels high; Pillow's `anchor`."""
+        """Write text at a place in pixels, `size` pixels high, with Pillow's `anchor`."""
         self._number(colour)
         self.texts.append(Words((x, y), text, size, anchor, colour))
 
     def image(self) -> Image.Image:
-        """The picture, RGB."""
+        """Return the picture in RGB."""
         picture = Image.new("RGB", (self.width, self.height))
-        rows = max(1, MOST_FINE_PIXELS // (self.width * FINER**2))
+        rows = max(1, MAX_FINE_PIXELS // (self.width * FINER**2))
         for top in range(0, self.height, rows):
             picture.paste(self._band(top, min(rows, self.height - top)), (0, top))
         pen = ImageDraw.Draw(picture)
@@ -164,7 +164,7 @@ class Raster:
         return picture
 
     def png(self) -> bytes:
-        """The picture as PNG."""
+        """Return the picture as PNG."""
         return palette_png(self.image(), self.colours)
 
     def _number(self, colour: str) -> int:
@@ -191,7 +191,7 @@ class Raster:
 
 
 def _fine(points: Array, top: int) -> Array:
-    # Pillow's whole numbers are the middles of pixels
+    # whole numbers are the middles of pixels for Pillow
     return (points - (0.0, top)) * FINER - 0.5
 
 
@@ -207,7 +207,7 @@ def _draw_line(pen: ImageDraw.ImageDraw, path: Array, width: float, colour: int)
     steps = np.diff(path, axis=0)
     cross = steps[:-1, 0] * steps[1:, 1] - steps[:-1, 1] * steps[1:, 0]
     turn = np.abs(np.arctan2(cross, (steps[:-1] * steps[1:]).sum(axis=1)))
-    for point in (*path[1:-1][turn > SHARP], path[0], path[-1]):
+    for point in (*path[1:-1][turn > SHARP_TURN], path[0], path[-1]):
         pen.circle(tuple(point.tolist()), (whole - 1) / 2, fill=colour)
 
 
@@ -221,11 +221,11 @@ def _draw_with_holes(band: Image.Image, shape: Filled, top: int) -> None:
 
 
 def palette_png(picture: Image.Image, colours: Sequence[str]) -> bytes:
-    """An RGB picture as a PNG whose palette is these colours, and steps between any two of them.
+    """Return a picture as PNG whose palette is these colours, and steps between any two of them.
 
     Args:
-        picture: of these colours and their mixtures; others become the nearest.
-        colours: 1 to 256 of them, as #rrggbb.
+        picture: RGB picture of these colours and their mixtures; others become the nearest.
+        colours: The colours, 1 to 256 of them, as #rrggbb.
     """
     buffer = io.BytesIO()
     limited(picture, colours).save(buffer, "PNG", compress_level=6)
@@ -233,7 +233,7 @@ def palette_png(picture: Image.Image, colours: Sequence[str]) -> bytes:
 
 
 def limited(picture: Image.Image, colours: Sequence[str], steps: int = 7) -> Image.Image:
-    """An RGB picture with a palette: these colours, and so many steps between any two of them.
+    """Return an RGB picture with a palette of these colours, and steps between any two of them.
 
     Pictures of the same colours have the same palette.
     """
@@ -250,8 +250,8 @@ def _chart(colours: tuple[str, ...], most: int) -> Image.Image:
     share = np.arange(1, steps + 1)[:, None] / (steps + 1)
     mixed = [base[a] + share * (base[b] - base[a]) for a, b in pairs if steps]
     between = np.concatenate([np.zeros((0, 3)), *mixed])
-    # Pillow looks colours up in boxes: what comes too near to a colour itself would be taken for it
-    near = np.abs(between[:, None] - base).max(axis=2).min(axis=1, initial=255) < APART
+    # Pillow looks colours up in boxes: a mixture too near to a colour would be taken for it
+    near = np.abs(between[:, None] - base).max(axis=2).min(axis=1, initial=255) < MIN_DIFFERENCE
     table: NDArray[np.int64] = np.rint(np.concatenate([base, between[~near]])).astype(np.int64)
     chart = Image.new("P", (1, 1))
     chart.putpalette(table.ravel().tolist())
@@ -259,7 +259,7 @@ def _chart(colours: tuple[str, ...], most: int) -> Image.Image:
 
 
 def rgb(colour: str) -> tuple[int, int, int]:
-    """Red, green and blue, 0 to 255, of #rrggbb.
+    """Return red, green and blue, 0 to 255, of #rrggbb.
 
     >>> rgb("#ff8000")
     (255, 128, 0)
@@ -270,20 +270,23 @@ def rgb(colour: str) -> tuple[int, int, int]:
 
 @lru_cache(maxsize=32)
 def font(size: float) -> Any:
-    """Pillow's own font, `size` pixels high."""
+    """Return Pillow's own font, `size` pixels high."""
     return ImageFont.load_default(size=size)
 
 
-LEAST = 0.25
+MIN_WIDTH = 0.25
 """Width in points below which lines fade in print."""
 
 
 def vector_picture(raster: Raster, sheet: Sheet, *, title: str, caption: str) -> Picture:
-    """The picture as wide as the sheet; lines as wide in proportion.
+    """Draw a raster as curves, as wide as the sheet, with lines in proportion.
 
     Args:
-        raster: without a strip: its words would be as small as the sheet is narrow, and the caption
+        raster: A raster without a strip, whose words would be too small on a narrow sheet; the caption
             has them.
+        sheet: The sheet.
+        title: The title of the picture.
+        caption: Its caption.
     """
     from matplotlib.collections import LineCollection, PathCollection
 
@@ -297,12 +300,12 @@ def vector_picture(raster: Raster, sheet: Sheet, *, title: str, caption: str) ->
         colour = raster.colours[shape.colour]
         if isinstance(shape, Filled):
             path = _path([shape.points, *shape.holes])
-            # a hairline of its own colour: else the paper shows where two fills meet
+            # a hairline in its own colour, or the paper would show where two fills meet
             made = PathCollection(
                 [path], facecolors=colour, edgecolors=colour, linewidths=0.1, joinstyle="round"
             )
         else:
-            width = max(point * shape.width, LEAST)
+            width = max(point * shape.width, MIN_WIDTH)
             made = LineCollection(
                 [shape.points], colors=colour, linewidths=width, capstyle="round",
                 joinstyle="round",
@@ -320,20 +323,20 @@ def _path(rings: list[Array]) -> Path:
 
 
 STRIP = 0.075
-"""Height of the strip, as a share of the width."""
+"""Height of the strip as a share of the width."""
 
 TEXT = 0.018
-"""Size of its text, as a share of the width."""
+"""Size of its text as a share of the width."""
 
 
 def captioned(rings: Sequence[Array], width_px: int, *, y_down: bool, text: str) -> Raster:
-    """A raster that shows all of `rings` (N, 2) with a margin, `text` in its strip.
+    """Return a raster that shows all of `rings` (N, 2) with a margin, and a text in its strip.
 
     Args:
-        rings: in the plane's units.
-        width_px: the height follows.
-        y_down: whether the y axis points down, as in images.
-        text: None of it, and no strip, if it is empty.
+        rings: Rings in the plane's units.
+        width_px: Width in pixels; the height follows.
+        y_down: Whether the y axis points down, as in images.
+        text: The text. If it is empty there is no strip.
     """
     strip = round(STRIP * width_px) if text else 0
     raster = Raster(window_of(rings), width_px, y_down=y_down, strip_px=strip)
@@ -343,7 +346,7 @@ def captioned(rings: Sequence[Array], width_px: int, *, y_down: bool, text: str)
 
 
 def window_of(rings: Sequence[Array], margin: float = 0.03) -> Window:
-    """The rectangle around all of `rings` (N, 2), with a margin in shares of its longer side."""
+    """Return the rectangle around `rings` (N, 2), with a margin as a share of its longer side."""
     low = np.min([ring.min(axis=0) for ring in rings], axis=0)
     high = np.max([ring.max(axis=0) for ring in rings], axis=0)
     room = margin * float((high - low).max())
@@ -351,17 +354,17 @@ def window_of(rings: Sequence[Array], margin: float = 0.03) -> Window:
 
 
 def caption(raster: Raster, x: float, text: str) -> None:
-    """Words in a raster's strip, from a share x of its width on."""
+    """Write a text in a raster's strip, beginning at a share x of its width."""
     raster.text(x * raster.width, strip_middle(raster), text, TEXT * raster.width)
 
 
 def strip_middle(raster: Raster) -> float:
-    """Where the strip's middle is, in pixels from the top."""
+    """Return the middle of a raster's strip, in pixels from the top."""
     return (raster.plane_px + raster.height) / 2
 
 
 def dashes(points: Array, on: float, off: float) -> list[Array]:
-    """A polyline (N, 2) in pieces of length `on`, `off` apart.
+    """Return a polyline (N, 2) in pieces of length `on` that are `off` apart.
 
     >>> [piece[:, 0].tolist() for piece in dashes(np.array([[0.0, 0.0], [5.0, 0.0]]), 2, 1)]
     [[0.0, 2.0], [3.0, 5.0]]
@@ -377,7 +380,7 @@ def dashes(points: Array, on: float, off: float) -> list[Array]:
 
 
 def arrow(raster: Raster, start: Array, end: Array, colour: str, width_px: float) -> None:
-    """An arrow from a point of the plane (2,) to another, its head at the end."""
+    """Draw an arrow from a point (2,) of the plane to another, with its head at the end."""
     tail, tip = raster.to_pixels(start), raster.to_pixels(end)
     length = float(np.hypot(*(tip - tail)))
     if length < 1e-9:

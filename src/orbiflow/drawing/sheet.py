@@ -1,4 +1,4 @@
-"""What a figure is made for: a screen, or a column of a journal; and the figure as a file."""
+"""Sheets that figures are made for, a screen or a journal's column, and figures as files."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ FigureFormat = Literal["png", "pdf", "svg"]
 FORMATS: tuple[FigureFormat, ...] = get_args(FigureFormat)
 
 NARROWEST, WIDEST = 40.0, 1000.0
-"""Of a figure in print, in mm: texts of a given size need room."""
+"""Widths in mm between which a printed figure has room for texts of its size."""
 
 TEXT = 8.0
-"""Points of a printed figure's texts; those at ticks are `SMALL` of it, 7.2 points."""
+"""Size in points of a printed figure's texts; that of texts at ticks is `SMALL` of it, 7.2 points."""
 
 SMALL = 0.9
 
@@ -30,20 +30,20 @@ _INCH = 25.4
 _SCREEN_DPI = 200
 _NOTEBOOK_DPI = 144
 _FULL = 8.0
-"""Inches of the figure that widths of lines are meant for."""
+"""Width in inches of the figure that widths of lines are meant for."""
 
 _LOCK = Lock()
 
 
 @dataclass(frozen=True)
 class Sheet:
-    """How wide a figure is, how large its texts are, and which kind of file it becomes.
+    """The width of a figure, the size of its texts, and the format of its file.
 
-    - `width`: in inches.
-    - `text`: in points.
-    - `format`: "pdf" and "svg" hold curves and texts, "png" pixels.
-    - `dpi`: of pixels, those inside a PDF or SVG among them.
-    - `printed`: whether a caption will stand below it: then there is no title, nor a legend of signs.
+    - `width`: Width in inches.
+    - `text`: Size of texts in points.
+    - `format`: The format; "pdf" and "svg" hold curves and texts, "png" pixels.
+    - `dpi`: Pixels per inch, also of those inside a PDF or SVG.
+    - `printed`: Whether a caption will stand below it; then it has no title and no legend.
 
     >>> Sheet.column("single").text, Sheet.screen(1600).text
     (8.0, 9.5)
@@ -57,19 +57,19 @@ class Sheet:
 
     @classmethod
     def screen(cls, width_px: int = 1600) -> Sheet:
-        """Pixels to look at; texts grow with the picture."""
+        """Return a sheet of pixels to look at, whose texts grow with the picture."""
         return cls(width_px / _SCREEN_DPI, 9.5 * width_px / _SCREEN_DPI / 8)
 
     @classmethod
     def column(cls, width: str | float = "single", format: FigureFormat = "pdf") -> Sheet:
-        """A figure for print, with texts of 7 to 8 points.
+        """Return a sheet for print, with texts of 7 to 8 points.
 
         Args:
             width: "single" or "double", or mm.
-            format: of the file; a PNG has 600 dots per inch.
+            format: Format of the file; a PNG has 600 dots per inch.
 
         Raises:
-            OrbiflowError: for another word, a width below 40 or above 1000 mm, or another format.
+            OrbiflowError: If the word or the format is unknown, or the width below 40 or above 1000 mm.
         """
         if format not in FORMATS:
             raise OrbiflowError(f"format must be one of {', '.join(FORMATS)}, got {format!r}")
@@ -88,23 +88,23 @@ class Sheet:
 
     @property
     def em(self) -> float:
-        """The texts' size in inches."""
+        """Size of the texts in inches."""
         return self.text / 72
 
     @property
     def small(self) -> float:
-        """Size of the texts at ticks, in points."""
+        """Size of texts at ticks, in points."""
         return SMALL * self.text
 
     def pen(self, points: float, least: float = 0.25) -> float:
-        """The width of a line, in points, that is as wide as given in a figure of eight inches."""
+        """Return the width in points of a line that is `points` wide in a figure of eight inches."""
         return max(points * self.width / _FULL, least) if self.printed else points
 
     def figure(self, height: float, paper: str = "#ffffff") -> Figure:
-        """An empty figure of the sheet's width, `height` inches high.
+        """Return an empty figure of the sheet's width, `height` inches high.
 
         Raises:
-            OrbiflowError: if it would have too few or too many pixels.
+            OrbiflowError: If it would have too few or too many pixels.
         """
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
@@ -118,10 +118,12 @@ class Sheet:
         return figure
 
     def file(self, figure: Figure, *, title: str = "", caption: str = "") -> bytes:
-        """The figure's file; the same figure gives the same bytes.
+        """Return the figure's file; the same figure gives the same bytes.
 
         Args:
-            title, caption: to be kept in the file.
+            figure: The figure.
+            title: A title to be kept in the file.
+            caption: A caption to be kept in the file.
         """
         buffer = io.BytesIO()
         options: dict[str, Any] = {"metadata": _metadata(self.format, title, caption)}
@@ -142,7 +144,7 @@ class Sheet:
 class Picture:
     """A figure on its sheet.
 
-    - `caption`: what its signs mean and what it leaves out, for the words below it in print.
+    - `caption`: What its signs mean and what it leaves out, to be written below it in print.
     """
 
     figure: Figure
@@ -151,17 +153,17 @@ class Picture:
     caption: str = ""
 
     def file(self) -> bytes:
-        """The content of its file, of the sheet's format."""
+        """Return the content of its file, in the sheet's format."""
         return self.sheet.file(self.figure, title=self.title, caption=self.caption)
 
     def _repr_png_(self) -> bytes:
-        """What a notebook shows."""
+        """Return what a notebook shows."""
         sheet = replace(self.sheet, format="png", dpi=min(self.sheet.dpi, _NOTEBOOK_DPI))
         return sheet.file(self.figure)
 
 
 def pdf_pages(pictures: Sequence[Picture]) -> bytes:
-    """One PDF with a page a picture."""
+    """Return one PDF with a page for each picture."""
     from matplotlib.backends.backend_pdf import PdfPages
 
     buffer = io.BytesIO()
@@ -184,9 +186,9 @@ def _metadata(form: FigureFormat, title: str, caption: str) -> dict[str, Any]:
 
 @contextmanager
 def _plain_texts() -> Iterator[None]:
-    """Texts stay texts: whole fonts in a PDF, no outlines of letters in an SVG; names without chance.
+    """Keep texts as texts, with whole fonts in a PDF and no outlines in an SVG, and names the same.
 
-    Matplotlib has these as global settings alone, so one figure is written at a time.
+    Matplotlib has only global settings for this, so one figure is written at a time.
     """
     from matplotlib import rc_context
 
@@ -199,16 +201,16 @@ def _plain_texts() -> Iterator[None]:
         yield
 
 
-def column_width(text: str) -> str | float:
-    """Return the width of a printed figure: a word of `orbiflow.units.COLUMNS`, or millimetres.
+def column_width(text: str) -> float:
+    """Return the width in mm of a printed figure, from a word of `orbiflow.units.COLUMNS` or a length.
 
     Raises:
         OrbiflowError: As `orbiflow.units.length`, and for a width that no figure has.
 
     >>> column_width("double"), column_width("8.5cm")
-    ('double', 85.0)
+    (180.0, 85.0)
     """
     word = text.strip().lower()
-    width = word if word in COLUMNS else length(text)
+    width = COLUMNS[word] if word in COLUMNS else length(text)
     Sheet.column(width)
     return width

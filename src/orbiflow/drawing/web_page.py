@@ -44,12 +44,12 @@ def rendered(package: str, template: str, **values: Any) -> str:
 
 
 def opening(title: str, style: str = "", *, dark: bool = True) -> str:
-    """A page up to its body.
+    """Return a page up to its body.
 
     Args:
-        title: in plain text.
+        title: The title in plain text.
         style: CSS of its own, after what all pages share.
-        dark: whether it is dark where the reader likes it so.
+        dark: Whether it is dark if the reader prefers that.
 
     >>> opening("a < b").splitlines()[6]
     '<title>a &lt; b</title>'
@@ -71,5 +71,5 @@ def opening(title: str, style: str = "", *, dark: bool = True) -> str:
 
 
 def css(package: str, name: str) -> str:
-    """A text that ships beside the code of a package."""
+    """Return the text of a file in a package."""
     return resources.files(package).joinpath(name).read_text("utf-8")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 from importlib import import_module
 from typing import Any
@@ -16,6 +17,7 @@ from orbiflow.runtime import (
     Failed,
     Finished,
     Started,
+    find,
 )
 
 Sink = Callable[[Event], None]
@@ -24,15 +26,14 @@ Sink = Callable[[Event], None]
 _MODULES = {
     "escherize": "escherize",
     "density-fit": "density_fit",
-    "density-plot": "density_plot",
-    "density-compare": "density_compare",
-    "density-region": "density_region",
-    "density-patches": "density_use",
     "batch": "batch",
     "density-batch": "batch",
     "density-cv": "density_cv",
     "density-fold": "density_fold",
 }
+
+_OPERATIONS = ("density-plot", "density-compare", "density-region", "density-patches")
+"""Kinds of requests that operations fulfil."""
 
 
 def run(request: Request, sink: Sink | None = None, cancel: Cancel | None = None) -> Finished:
@@ -66,6 +67,20 @@ def run(request: Request, sink: Sink | None = None, cancel: Cancel | None = None
     return finished
 
 
+def _fulfil(request: Request, tell: Sink, cancel: Cancel) -> Finished:
+    """Call the operation that a request stands for, with what differs from its defaults."""
+    operation = find(request.KIND.replace("-", " "))
+    values = request.to_json()
+    given = {
+        entry.name: values[entry.name]
+        for entry in dataclasses.fields(request)  # pyright: ignore[reportArgumentType]
+        if getattr(request, entry.name) != entry.default
+    }
+    call = operation.call(given)
+    outcome = operation.function(**call.arguments, on_event=tell, cancel=cancel)
+    return Finished(outcome.state, outcome.summary)
+
+
 class _Teller:
     """A sink that is not told of its own failure."""
 
@@ -87,5 +102,7 @@ class _Teller:
 def _job_of(request: Request) -> Callable[[Any, Sink, Cancel], Finished]:
     if type(request) not in REQUESTS.values():
         raise OrbiflowError(f"{type(request).__name__} is no request that can be run")
+    if request.KIND in _OPERATIONS:
+        return _fulfil
     module = import_module(f"orbiflow.jobs.{_MODULES[request.KIND]}")
     return getattr(module, request.KIND.replace("-", "_"))

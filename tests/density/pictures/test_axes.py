@@ -11,15 +11,15 @@ from orbiflow.density.pictures.axes import (
     view_of,
 )
 from orbiflow.density.pictures.scale import (
-    DARKEST,
+    DARK_SHARE,
     Shade,
     bar_label,
     bar_ticks,
     dark_share,
     measure_label,
     minor_places,
-    number,
     shading,
+    short_number,
 )
 
 SPACES = [Torus(2, unit="degrees"), KleinBottle(), Sphere(), ProjectivePlane()]
@@ -68,7 +68,7 @@ def test_logarithms_span_five_decades_at_most_and_one_at_least():
 def test_logarithms_are_taken_where_a_peak_outshines_the_area():
     values = np.full(1000, 0.04)
     values[:40] = 1.0
-    assert dark_share(values) == 0.96 > DARKEST
+    assert dark_share(values) == 0.96 > DARK_SHARE
     assert dark_share(values, np.where(values == 1.0, 10.0, 1.0)) == pytest.approx(960 / 1360)
     assert dark_share(np.linspace(0, 1, 1000)) == 0.1
 
@@ -91,7 +91,7 @@ def test_colour_bars_are_in_short_numbers():
     assert len(minor_places(log)) > 35
     narrow = shading(np.array([0.03, 1.0]), log=True)
     assert [tick.text for tick in bar_ticks(narrow)] == ["0.05", "0.1", "0.2", "0.5", "1"]
-    assert number(12_340.0, 2) == "1.2 × 10⁴"
+    assert short_number(12_340.0, 2) == "1.2 × 10⁴"
 
 
 def test_angles_of_a_torus_run_round_the_centre():

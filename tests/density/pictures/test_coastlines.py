@@ -125,10 +125,10 @@ def test_places_that_are_no_files_and_files_that_are_too_large(
         with pytest.raises(InputFileError, match="it is not a file"):
             read_coastlines(place)
     path = written(tmp_path, shape("LineString", SQUARE * 10))
-    monkeypatch.setattr(coastlines, "MOST_POINTS", 9)
+    monkeypatch.setattr(coastlines, "MAX_POINTS", 9)
     with pytest.raises(InputFileError, match="more than 9 points"):
         read_coastlines(path)
-    monkeypatch.setattr(coastlines, "MOST_BYTES", 99)
+    monkeypatch.setattr(coastlines, "MAX_BYTES", 99)
     with pytest.raises(InputFileError, match="take coarser lines"):
         read_coastlines(path)
 

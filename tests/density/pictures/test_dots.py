@@ -16,6 +16,7 @@ from density.blends import blended
 from orbiflow.density import (
     AdaptiveKernels,
     Mixture,
+    PlotSettings,
     UniformDensity,
     density_page,
     density_picture,
@@ -23,7 +24,7 @@ from orbiflow.density import (
     map_picture,
 )
 from orbiflow.density.models import identity_flow
-from orbiflow.density.pictures.dots import COVER, roomy
+from orbiflow.density.pictures.dots import MAX_COVER, uncrowded
 from orbiflow.drawing import Picture, Sheet
 
 SPACES = ("torus", "klein-bottle", "sphere", "projective-plane")
@@ -35,10 +36,10 @@ def test_widths_are_in_the_points_unit_and_repeated_points_are_one(
 ) -> None:
     rng = np.random.default_rng(seed)
     points = rng.normal(size=(count, dim))
-    places, widths = roomy(points)
+    places, widths = uncrowded(points)
     assert np.array_equal(places, points)
-    np.testing.assert_allclose(roomy(scale * points).widths, scale * widths, rtol=1e-6)
-    again = roomy(np.concatenate([points, points[rng.integers(0, count, 30)]]))
+    np.testing.assert_allclose(uncrowded(scale * points).widths, scale * widths, rtol=1e-6)
+    again = uncrowded(np.concatenate([points, points[rng.integers(0, count, 30)]]))
     assert np.array_equal(again.places, places)
     assert np.array_equal(again.widths, widths)
 
@@ -46,13 +47,13 @@ def test_widths_are_in_the_points_unit_and_repeated_points_are_one(
 @pytest.mark.parametrize("count", [200, 20_000])
 def test_dots_hide_no_more_than_their_share(count: int) -> None:
     points = np.random.default_rng(1).uniform(0, 1, (count, 2))
-    widths = roomy(points).widths
-    assert np.pi / 4 * float((widths**2).sum()) == pytest.approx(COVER, rel=0.35)
+    widths = uncrowded(points).widths
+    assert np.pi / 4 * float((widths**2).sum()) == pytest.approx(MAX_COVER, rel=0.35)
 
 
 @pytest.mark.parametrize("count", [0, 1, 2])
 def test_few_dots(count: int) -> None:
-    places, widths = roomy(np.arange(2.0 * count).reshape(count, 2))
+    places, widths = uncrowded(np.arange(2.0 * count).reshape(count, 2))
     assert len(places) == len(widths) == count
     assert (widths > 0).all()
 
@@ -93,12 +94,13 @@ def test_a_peak_is_seen_through_its_dots(
     density = peaked(name)
     drawn = density.sample((count,), torch.Generator().manual_seed(0))
     sheet = Sheet.column("single", "png")
+    settings = PlotSettings(samples=count, scale="linear")
 
     def picture(dots: torch.Tensor | None) -> np.ndarray:
         if density.space.is_round:
-            made = map_picture(density, dots, about=drawn, most=count, sheet=sheet)
+            made = map_picture(density, dots, settings, about=drawn, sheet=sheet)
         else:
-            made = density_picture(density, dots, most=count, sheet=sheet)
+            made = density_picture(density, dots, settings, sheet=sheet)
         return pixels(made)
 
     bare, dotted = picture(None), picture(drawn)

@@ -23,7 +23,7 @@ from orbiflow.density import (
     density_to_bytes,
     plot_density,
 )
-from orbiflow.density.pictures.plots import refuse_others
+from orbiflow.density.pictures.plots import refuse_foreign_files
 from orbiflow.errors import OrbiflowError, OutputError
 from orbiflow.fields import FourierField
 from orbiflow.flows import Flow
@@ -38,7 +38,7 @@ def _coarse(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("orbiflow.density.pictures.maps._PIXELS", 900)
     monkeypatch.setattr("orbiflow.density.pictures.values._COARSE", 12)
     monkeypatch.setattr("orbiflow.drawing.fields._SAMPLES", 20)
-    monkeypatch.setattr("orbiflow.density.pictures.choice.SAMPLES", 50)
+    monkeypatch.setattr("orbiflow.density.pictures.plots.SAMPLES", 50)
 
 
 def example(space: Any = None) -> Density:
@@ -63,7 +63,7 @@ def test_a_folder_holds_the_pictures_of_one_plot(tmp_path: Path) -> None:
     assert names(out) == {"density.png", "flow.png", "surface.html"}
     assert names(out) < set(PICTURES)
     (out / "notes.txt").write_text("mine")
-    with pytest.raises(OutputError, match=r"holds density\.png, which would go"):
+    with pytest.raises(OutputError, match=r"holds density\.png, which would be removed"):
         plot_density(example(), out)
     assert names(out) == {"density.png", "flow.png", "surface.html", "notes.txt"}
 
@@ -121,11 +121,11 @@ def test_a_fitted_estimator_is_drawn_and_another_refused(tmp_path: Path) -> None
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
-        ({"format": "eps"}, "format must be one of png, pdf, svg"),
-        ({"width": "wide"}, "width must be single, double"),
-        ({"measure": "flat"}, "measure must be one of"),
-        ({"scale": "square"}, "scale must be one of"),
-        ({"projection": "globe"}, "projection must be one of"),
+        ({"format": "eps"}, "format must be png, pdf or svg"),
+        ({"width": "wide"}, "width: 'wide' is not a length"),
+        ({"measure": "flat"}, "measure must be natural, square or uniform"),
+        ({"scale": "square"}, "scale must be auto, linear or log"),
+        ({"projection": "globe"}, "projection must be auto, equal-earth"),
         ({"samples": 0}, "samples must be from 1 to"),
     ],
 )
@@ -137,19 +137,21 @@ def test_settings_are_checked(settings: dict[str, Any], message: str) -> None:
 def test_what_does_not_fit_the_density_is_refused_before_anything_is_written(
     tmp_path: Path,
 ) -> None:
-    out, lines = tmp_path / "plots", [np.zeros((2, 2))]
+    out = tmp_path / "plots"
     for space, settings, message in (
-        (Torus(2), PlotSettings(coastlines=lines), "coastlines belong to the sphere"),
+        (Torus(2), PlotSettings(coastlines="lines.csv"), "coastlines apply to the sphere"),
         (Torus(9), PlotSettings(), "has 9 angles"),
         (Torus(2), PlotSettings(names=["one"]), "2 names of columns"),
         (Sphere(), PlotSettings(center=[0.0, 0.0, 0.0]), "a latitude and a longitude"),
-        (Torus(2), PlotSettings(projection="lambert"), "projection belongs to maps"),
-        (Torus(2), PlotSettings(radius=20), "radius belongs to maps"),
+        (Torus(2), PlotSettings(projection="lambert"), "projection applies to maps"),
+        (Torus(2), PlotSettings(radius=20), "radius applies to maps"),
     ):
         density = example() if space.dim == 2 and space.is_torus else None
         density = density or UniformDensity(space)
         with pytest.raises(OrbiflowError, match=message):
             plot_density(density, out, settings)
+    with pytest.raises(OrbiflowError, match="coastlines apply to the sphere"):
+        plot_density(example(), out, coastlines=[np.zeros((2, 2))])
     with pytest.raises(OrbiflowError):
         plot_density(example(), out, data=DATA[:, :1])
     assert not out.exists()
@@ -158,8 +160,10 @@ def test_what_does_not_fit_the_density_is_refused_before_anything_is_written(
 def test_a_folder_of_ones_own_pictures_is_left_alone(tmp_path: Path) -> None:
     for name in ("density.pdf", "notes.txt"):
         (tmp_path / name).write_text("mine")
-    with pytest.raises(OutputError, match=r"density\.pdf, which would go, beside notes\.txt"):
-        refuse_others(tmp_path)
+    with pytest.raises(
+        OutputError, match=r"density\.pdf, which would be removed, beside notes\.txt"
+    ):
+        refuse_foreign_files(tmp_path)
     (tmp_path / "notes.txt").unlink()
-    refuse_others(tmp_path)  # as an earlier plot left it
-    refuse_others(tmp_path / "not there yet")
+    refuse_foreign_files(tmp_path)  # as an earlier plot left it
+    refuse_foreign_files(tmp_path / "not there yet")

@@ -14,6 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from orbiflow.density import (
+    PlotSettings,
     ProjectivePlane,
     Sphere,
     Torus,
@@ -152,7 +153,7 @@ def test_lines_end_at_the_rim(projection: Azimuthal, line: Any) -> None:
 
 
 def test_nets_run_clockwise_from_the_top_and_globes_are_seen_from_outside() -> None:
-    net = chosen_map(ProjectivePlane(), NOTHING, projection="schmidt")
+    net = chosen_map(ProjectivePlane(), NOTHING, PlotSettings(projection="schmidt"))
     east = np.array([[0.0, 90.0], [0.0, 0.0], [90.0, 0.0]])
     side = math.sqrt(2)
     np.testing.assert_allclose(net.forward(east), [[side, 0], [0, side], [0, 0]], atol=1e-12)
@@ -207,26 +208,26 @@ def test_the_map_that_suits() -> None:
     assert isinstance(near, Lambert)
     assert near.radius == 10
     assert near.contains(space.from_chart(here)).all()
-    assert chosen_map(space, here, center=(0, 150)) == EqualEarth((0.0, 150.0))
-    assert chosen_map(space, here, center=(150,)) == EqualEarth((0.0, 150.0))
-    assert chosen_map(space, everywhere, center=(40, 10)) == Lambert((40.0, 10.0))
-    assert chosen_map(space, everywhere, center=(40, 10), radius=25).radius == 25  # pyright: ignore
+    assert chosen_map(space, here, PlotSettings(center=(0, 150))) == EqualEarth((0.0, 150.0))
+    assert chosen_map(space, here, PlotSettings(center=(150,))) == EqualEarth((0.0, 150.0))
+    assert chosen_map(space, everywhere, PlotSettings(center=(40, 10))) == Lambert((40.0, 10.0))
+    assert chosen_map(space, everywhere, PlotSettings(center=(40, 10), radius=25)).radius == 25  # pyright: ignore
     plane = ProjectivePlane()
     assert chosen_map(plane, NOTHING) == Lambert((90.0, 0.0))
     assert chosen_map(plane, NOTHING, names=["Inc", "Dec"]) == Lambert((90.0, 0.0), flipped=True)
-    assert isinstance(chosen_map(plane, NOTHING, projection="wulff"), Stereographic)
+    assert isinstance(chosen_map(plane, NOTHING, PlotSettings(projection="wulff")), Stereographic)
 
 
 @pytest.mark.parametrize(
     ("space", "asked", "message"),
     [
         (Torus(2), {}, "maps are of the sphere"),
-        (Sphere(), {"projection": "mercator"}, "projection must be one of auto, equal-earth"),
+        (Sphere(), {"projection": "mercator"}, "projection must be auto, equal-earth"),
         (Sphere(), {"projection": "mollweide", "center": (40, 0)}, "centred on a meridian"),
         (Sphere(), {"projection": "mollweide", "radius": 40}, "has no radius"),
         (Sphere(), {"center": (95, 0)}, "latitude must be from -90 to 90"),
         (Sphere(), {"center": (0, 0, 0)}, "a latitude and a longitude"),
-        (Sphere(), {"center": (math.nan,)}, "a latitude and a longitude"),
+        (Sphere(), {"center": (math.nan,)}, "must be a number"),
         (Sphere(), {"projection": "lambert", "radius": 120}, "radius must be"),
         (ProjectivePlane(), {"projection": "mollweide"}, "one point of the projective plane"),
         (ProjectivePlane(), {"projection": "schmidt", "center": (10, 20)}, "give no centre"),
@@ -234,4 +235,4 @@ def test_the_map_that_suits() -> None:
 )
 def test_other_maps_are_refused(space: Any, asked: dict[str, Any], message: str) -> None:
     with pytest.raises(OrbiflowError, match=re.escape(message)):
-        chosen_map(space, NOTHING, **asked)
+        chosen_map(space, NOTHING, PlotSettings(**asked))

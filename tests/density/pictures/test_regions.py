@@ -48,9 +48,13 @@ def broad(name: str) -> Mixture:
     return blended(space, identity_flow(space), UniformDensity(space), kernels, shares)
 
 
-def lines_of(density: Mixture) -> list[RegionLine]:
+def lines_of(density: Mixture, *masses: float) -> list[RegionLine]:
     levels = DensityLevels(density, samples=4000)
-    return [RegionLine(mass, levels.highest(mass).log_prob) for mass in (0.9, 0.5)]
+    return [RegionLine(mass, levels.highest(mass).log_prob) for mass in masses]
+
+
+def with_regions(*masses: float, **options: Any) -> PlotSettings:
+    return PlotSettings(regions=masses, region_samples=4000, **options)
 
 
 def vertices(figure: Any) -> list[np.ndarray]:
@@ -64,11 +68,12 @@ def vertices(figure: Any) -> list[np.ndarray]:
 @pytest.mark.parametrize("name", SPACES)
 def test_lines_are_where_the_density_is_that_of_the_edge(name: str, measure: str) -> None:
     density = broad(name)
-    lines, view = lines_of(density), view_of(density.space, None, None)
-    picture = density_picture(density, measure=measure, regions=lines)
+    lines, view = lines_of(density, 0.5, 0.9), view_of(density.space, None, None)
+    settings = with_regions(0.9, 0.5, measure=measure)
+    picture = density_picture(density, settings=settings)
     found = vertices(picture.figure)
     assert len(found) == 2
-    for line, places in zip(sorted(lines), found, strict=True):  # the smallest first
+    for line, places in zip(lines, found, strict=True):  # the smallest first
         points = torch.tensor(places) + torch.tensor([float(low) for low in view.low])
         # away from cone points, where a pixel is large on the sphere
         clear = density.space.log_area(points) - density.space.log_area(points).amax() > -4
@@ -80,8 +85,9 @@ def test_lines_are_where_the_density_is_that_of_the_edge(name: str, measure: str
 @pytest.mark.parametrize("measure", MEASURES)
 def test_lines_on_a_map(measure: str) -> None:
     density = broad("sphere")
-    lines, projection = lines_of(density)[:1], EqualEarth((0.0, 40.0))
-    picture = map_picture(density, measure=measure, regions=lines, projection=projection)
+    lines, projection = lines_of(density, 0.9), EqualEarth((0.0, 40.0))
+    asked: dict[str, Any] = {"projection": "equal-earth", "center": (40.0,)}
+    picture = map_picture(density, settings=with_regions(0.9, measure=measure, **asked))
     (places,) = vertices(picture.figure)
     # beyond the outline they are cut off
     places = places[MapPath(projection.outline()).contains_points(places, radius=-0.02)]
@@ -99,16 +105,16 @@ def test_logarithms_are_for_lines_alone(name: str, monkeypatch: pytest.MonkeyPat
         called.append(len(values))
         return np.log(values)
 
-    figures = "orbiflow.figures.density"
-    for room in ("square", "map"):
-        monkeypatch.setattr(f"{figures}_{room}.log_natural", counted)
-    monkeypatch.setattr(f"{figures}_square._FINE_GRID", 30)
-    monkeypatch.setattr(f"{figures}_map._PIXELS", 2000)
+    pictures = "orbiflow.density.pictures"
+    for ground in ("square", "maps"):
+        monkeypatch.setattr(f"{pictures}.{ground}.log_natural", counted)
+    monkeypatch.setattr(f"{pictures}.square._FINE_GRID", 30)
+    monkeypatch.setattr(f"{pictures}.maps._PIXELS", 2000)
     density = broad(name)
     draw = density_picture if name == "torus" else map_picture
     draw(density)
     assert not called
-    draw(density, regions=lines_of(density))
+    draw(density, settings=with_regions(0.5, 0.9))
     assert len(called) == 1
 
 
@@ -116,7 +122,7 @@ def test_masses_that_cannot_be_drawn(tmp_path: Any) -> None:
     for masses, said in (
         ((0.5, 0.5), "different masses"),
         ((0.1, 0.2, 0.3, 0.4, 0.5), "at most 4"),
-        ((1.0,), "a region's mass"),
+        ((1.0,), "above 0 and below 1"),
     ):
         with pytest.raises(OrbiflowError, match=said):
             PlotSettings(regions=masses)

@@ -1,4 +1,4 @@
-"""Two data sets: do they come from one density, and how far apart are they?"""
+"""Comparisons of two data sets: whether they come from one density, and how far apart they are."""
 
 from __future__ import annotations
 
@@ -10,32 +10,15 @@ import numpy as np
 import torch
 from numpy.typing import ArrayLike, NDArray
 
-from orbiflow.arguments import (
-    is_a,
-    number,
-    numbers,
-    whole,
-)
+from orbiflow.arguments import as_array, is_a
 from orbiflow.density.arguments import silent
 from orbiflow.density.comparing.divergence import Divergence, cross_fitted
-from orbiflow.density.comparing.paired import (
-    LEVEL,
-    MOST_RESAMPLES,
-    RESAMPLES,
-)
 from orbiflow.density.comparing.resampling import Groups
-from orbiflow.density.comparing.two_samples import (
-    MOST_ROWS,
-    PERMUTATIONS,
-    TestResult,
-    chosen_rows,
-    mmd_test,
-)
+from orbiflow.density.comparing.settings import ComparisonSettings
+from orbiflow.density.comparing.two_samples import MAX_ROWS, TestResult, chosen_rows, mmd_test
 from orbiflow.density.fitting import Progress
 from orbiflow.density.spaces import Space, space_class
 from orbiflow.errors import OrbiflowError
-
-MOST_PERMUTATIONS = 100_000
 
 T = TypeVar("T")
 
@@ -44,11 +27,12 @@ T = TypeVar("T")
 class DataComparison:
     """Two data sets on one space.
 
-    - `names`, `rows`: of both. `groups`: of both together, None if rows are independent.
-    - `test`: whether they come from one density. `differ`: what it says at this `level`.
-    - `divergence`: how far apart they are; None if they have too few rows.
-    - `resamples`, `seed`: of the intervals.
-    - `notes`: what the user should know, in words.
+    - `names`, `rows`: Names and numbers of rows of both.
+    - `groups`: Number of groups of both together, None if rows are independent.
+    - `test`: The test whether they come from one density. `level`: Its level.
+    - `divergence`: How far apart they are, None if they have too few rows.
+    - `resamples`, `seed`: The settings of the intervals.
+    - `notes`: What the user should know, in words.
     """
 
     names: tuple[str, str]
@@ -68,7 +52,7 @@ class DataComparison:
 
     @property
     def verdict(self) -> str:
-        """What came of it, in words."""
+        """The result in words."""
         one, other = self.names
         if self.differ:
             return f"{one} and {other} come from different densities (p {self.test.p:.2g})"
@@ -77,12 +61,12 @@ class DataComparison:
         )
 
     def words(self) -> list[str]:
-        """All of it, a line each."""
+        """Return the result in lines of text."""
         found, names = self.divergence, self.names
         lines = [self.verdict]
         if found is not None:
             lines += [
-                f"told one row, an observer names its data set in {found.accuracy.value:.1%} of cases "
+                f"shown one row, an observer names its data set in {found.accuracy.value:.1%} of cases "
                 f"({found.accuracy.low:.1%} to {found.accuracy.high:.1%}; 50% is chance)",
                 f"Jensen-Shannon divergence at least {found.jensen_shannon} nats of 0.6931",
                 f"Kullback-Leibler divergence, estimated: {names[0]} from {names[1]} "
@@ -91,38 +75,35 @@ class DataComparison:
         return lines
 
     def to_json(self) -> dict[str, Any]:
-        """An object for `json.dumps`."""
+        """Return an object for `json.dumps`."""
         return {"kind": "data", **asdict(self), "differ": self.differ, "verdict": self.verdict}
 
 
 def compare_samples(
     samples: Mapping[str, ArrayLike],
     space: str | Space = "torus",
+    settings: ComparisonSettings | None = None,
     *,
     unit: str = "radians",
     groups: Mapping[str, ArrayLike] | None = None,
-    permutations: int = PERMUTATIONS,
-    resamples: int = RESAMPLES,
-    level: float = LEVEL,
-    seed: int = 0,
     progress: Progress = silent,
 ) -> DataComparison:
     """Test whether two data sets come from one density, and measure how far apart they are.
 
-    The test is `mmd_test`, on `MOST_ROWS` rows at most; the divergences are `cross_fitted`.
+    The test is `mmd_test`, on `MAX_ROWS` rows at most; the divergences are `cross_fitted`.
 
     Args:
-        samples: two data sets (N, k) by their names, in the space's own units.
-        space, unit: as `DensityEstimator` takes them.
-        groups: a label (N,) a row, by the same names; equal labels in both data sets are one group.
-            Permuted, held out and resampled are whole groups.
-        permutations: of the test; the least p is 1 / (permutations + 1).
-        resamples, level: of the intervals. `level` is that of the test, too.
-        seed: of all that is drawn.
+        samples: Two data sets (N, k) by their names, in the space's own units.
+        space: The space, as `DensityEstimator` takes it.
+        settings: Permutations of the test, level, resamples and seed.
+        unit: Unit of angles, as `DensityEstimator` takes it.
+        groups: A label for each row, by the same names; equal labels in both data sets are one group.
+            Whole groups are permuted, held out and resampled.
+        progress: A function that is called with the share of the work done, and what is being done.
 
     Raises:
-        OrbiflowError: for other than two data sets, data that are not of the space, labels of another
-            number, or fewer than five rows or groups.
+        OrbiflowError: If there are not two data sets, data are not on the space, there is another
+            number of labels than rows, or there are fewer than five rows or groups.
 
     >>> rng = np.random.default_rng(0)
     >>> one, other = rng.vonmises(0, 2, (80, 2)), rng.vonmises(0.7, 2, (90, 2))
@@ -130,9 +111,8 @@ def compare_samples(
     True
     """
     names, tables = _two(samples)
-    whole(permutations, "permutations", 19, MOST_PERMUTATIONS)
-    whole(resamples, "resamples", 100, MOST_RESAMPLES)
-    level = number(level, "level", 0.5, 0.999)
+    settings = settings or ComparisonSettings()
+    seed = settings.seed
     own = space if isinstance(space, Space) else _space_of(space, names, tables, unit, seed)
     points = torch.cat(
         [_named(name, own.to_chart, table) for name, table in zip(names, tables, strict=True)]
@@ -142,7 +122,7 @@ def compare_samples(
     members.require()
     notes = members.notes()
     _require_movable(members, first)
-    kept = chosen_rows(first, members, MOST_ROWS, seed)
+    kept = chosen_rows(first, members, MAX_ROWS, seed)
     if len(kept) < len(points):
         notes.append(f"the test looks at {len(kept)} of {len(points)} rows, drawn at random")
     progress(0.0, "permuting")
@@ -151,15 +131,19 @@ def compare_samples(
         points[torch.as_tensor(kept)],
         first[kept],
         Groups.of(members.index[kept] if members.given else None, len(kept)),
-        permutations=permutations,
+        permutations=settings.permutations,
         seed=seed,
     )
     divergence = None
     try:
         divergence = cross_fitted(
-            own, points, first, members, resamples=resamples, level=level, seed=seed,
+            own,
+            points,
+            first,
+            members,
+            settings,
             progress=lambda share, what: progress(0.3 + 0.7 * share, what),
-        )  # fmt: skip
+        )
     except OrbiflowError as error:
         notes.append(f"how far apart they are was not estimated: {error}")
     return DataComparison(
@@ -168,8 +152,8 @@ def compare_samples(
         members.count if members.given else None,
         test,
         divergence,
-        level,
-        resamples,
+        settings.level,
+        settings.bootstrap,
         seed,
         tuple(notes),
     )
@@ -178,7 +162,7 @@ def compare_samples(
 def _two(samples: Mapping[str, ArrayLike]) -> tuple[list[str], list[np.ndarray]]:
     if not is_a(samples, Mapping) or len(samples) != 2:
         raise OrbiflowError("give two data sets by their names, such as {'before': a, 'after': b}")
-    tables = [numbers(table, f"data set {name}", ("N", "k")) for name, table in samples.items()]
+    tables = [as_array(table, f"data set {name}", ("N", "k")) for name, table in samples.items()]
     widths = [table.shape[1] for table in tables]
     if widths[0] != widths[1]:
         raise OrbiflowError(
@@ -192,19 +176,19 @@ def _two(samples: Mapping[str, ArrayLike]) -> tuple[list[str], list[np.ndarray]]
 def _space_of(
     space: str, names: list[str], tables: list[np.ndarray], unit: str, seed: int
 ) -> Space:
-    """That suits both data sets."""
+    """Return the space that suits both data sets."""
     kind = space_class(space)
     try:
         return kind.for_data(np.concatenate(tables), unit=unit, seed=seed)
     except OrbiflowError:
-        # a row by its number in both would be looked for in vain
+        # the number of a row in both tables together would lead nowhere
         for name, table in zip(names, tables, strict=True):
             _named(name, lambda own: kind.for_data(own, unit=unit, seed=seed), table)
         raise
 
 
 def _named(name: str, call: Callable[[np.ndarray], T], table: np.ndarray) -> T:
-    """What is called with a data set, whose errors say which one it is."""
+    """Call a function with a data set, and let its errors say which one it was."""
     try:
         return call(table)
     except OrbiflowError as error:
@@ -233,9 +217,10 @@ def _labels(
 
 
 def _require_movable(groups: Groups, first: np.ndarray) -> None:
-    """
+    """Check that enough groups can change sides to tell a difference from chance.
+
     Raises:
-        OrbiflowError: if too few groups can change sides to tell a difference from chance.
+        OrbiflowError: If there are too few.
     """
     own = np.bincount(groups.index, first, groups.count) > 0
     other = np.bincount(groups.index, ~first, groups.count) > 0

@@ -1,4 +1,4 @@
-"""How much two data sets differ: densities fitted to one part of each, judged by the other."""
+"""How much two data sets differ: densities fitted to one half of each are judged by the other."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from torch import Tensor
 from orbiflow.arrays import Array
 from orbiflow.density.arguments import silent
 from orbiflow.density.comparing.resampling import Groups, resampled_sums
+from orbiflow.density.comparing.settings import ComparisonSettings
 from orbiflow.density.fitting import (
     DensitySettings,
     Progress,
@@ -24,7 +25,7 @@ from orbiflow.density.spaces import Space
 from orbiflow.errors import OrbiflowError
 
 PARTS = ("kernels",)
-"""What the densities are made of: fits of a second or so."""
+"""Components of the densities, which are fitted in a second or so."""
 
 
 @dataclass(frozen=True)
@@ -42,13 +43,13 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Divergence:
-    """How far apart two densities are, by rows held out.
+    """How far apart two densities are, judged by held-out rows.
 
-    - `accuracy`: how often an observer told one row, of either data set with even chances, names its
-      data set; 0.5 is chance.
-    - `jensen_shannon`: in nats, from 0 (the same) to log 2 (never the same place); a lower bound on
-      average, whatever the fits are, so that it may fall below 0.
-    - `first_to_second`, `second_to_first`: estimates of the Kullback-Leibler divergences in nats.
+    - `accuracy`: How often an observer who is shown one row, of either data set with even chances,
+      names its data set; 0.5 is chance.
+    - `jensen_shannon`: The divergence in nats, from 0 (the same) to log 2 (never the same place). It is
+      a lower bound on average, whatever the fits are, so that it may fall below 0.
+    - `first_to_second`, `second_to_first`: Estimates of the Kullback-Leibler divergences in nats.
     """
 
     accuracy: Estimate
@@ -62,26 +63,29 @@ def cross_fitted(
     points: Tensor,
     first: Array,
     groups: Groups,
+    settings: ComparisonSettings,
     *,
-    resamples: int,
-    level: float,
-    seed: int = 0,
     progress: Progress = silent,
 ) -> Divergence:
-    """Fit a density to half of each data set, score the other halves, and change about.
+    """Fit a density to half of each data set, score the other halves, and swap the halves.
 
-    With p and q fitted to the first and second, the log of the odds p / (p + q) at rows held out has
+    With p and q fitted to the first and second, the log of the odds p / (p + q) at held-out rows has
     the mean of a lower bound on the Jensen-Shannon divergence (as of any classifier: Goodfellow and
     others, Generative adversarial nets, 2014, section 4). The log odds of either half are multiplied by
     what suits the other half best. Whole groups are held out, and resampled.
 
     Args:
-        points: chart points (N, d) of both data sets.
-        first: (N,) whether a row is of the first one.
+        space: The space.
+        points: Chart points (N, d) of both data sets.
+        first: Whether each row (N,) is of the first one.
+        groups: The groups of the rows.
+        settings: Resamples, level and seed of the intervals.
+        progress: A function that is called with the share of the work done, and what is being done.
 
     Raises:
-        OrbiflowError: for fewer than ten different points in a half of a data set.
+        OrbiflowError: If half of a data set has fewer than ten different points.
     """
+    seed, level = settings.seed, settings.level
     half = np.random.default_rng(seed).permutation(groups.count)[groups.index] % 2
     ratio = _held_out_ratio(space, points, first, half, seed, progress)
     own = np.where(first, ratio, -ratio)
@@ -102,7 +106,7 @@ def cross_fitted(
     table = np.concatenate(
         [groups.sums(shares * first[:, None]), groups.sums(shares * ~first[:, None])], axis=1
     )
-    drawn = resampled_sums(table, resamples, np.random.default_rng(seed))
+    drawn = resampled_sums(table, settings.bootstrap, np.random.default_rng(seed))
     drawn = drawn[(drawn[:, 0] > 0) & (drawn[:, 4] > 0)]
     found, spread = _figures(table.sum(axis=0)[None])[0], _figures(drawn)
     ends = np.quantile(spread, [(1 - level) / 2, (1 + level) / 2], axis=0)
@@ -116,7 +120,7 @@ def cross_fitted(
 
 
 def _figures(sums: Array) -> Array:
-    """(B, 4): Jensen-Shannon, accuracy and both divergences, of sums (B, 8)."""
+    """Return Jensen-Shannon divergence, accuracy and both divergences (B, 4) from sums (B, 8)."""
     one, other = sums[:, 1:4] / sums[:, :1], sums[:, 5:] / sums[:, 4:5]
     even = (one[:, :2] + other[:, :2]) / 2
     return np.concatenate([even, one[:, 2:], other[:, 2:]], axis=1)
@@ -125,7 +129,7 @@ def _figures(sums: Array) -> Array:
 def _held_out_ratio(
     space: Space, points: Tensor, first: Array, half: Array, seed: int, progress: Progress
 ) -> Array:
-    """(N,) log p - log q at each row, of fits to the other half."""
+    """Return log p - log q (N,) at each row, of fits to the other half."""
     ratio = np.empty(len(points))
     for number in (0, 1):
         held = half == number
@@ -140,7 +144,7 @@ def _held_out_ratio(
 
 
 def _trust(own: Array, weights: Array) -> float:
-    """What to multiply log odds with, so that they score best: few rows make them too bold."""
+    """Return the factor of log odds with which they score best: few rows make them too bold."""
 
     def loss(trust: float) -> float:
         return float((weights * np.logaddexp(0.0, -trust * own)).sum())

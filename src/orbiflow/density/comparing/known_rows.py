@@ -1,4 +1,4 @@
-"""A sketch of the rows that a density was fitted to, by which it knows them again."""
+"""A sketch of the rows that a density was fitted to, from which they are recognised."""
 
 from __future__ import annotations
 
@@ -13,25 +13,26 @@ from orbiflow.arguments import is_a
 from orbiflow.density.spaces import Space
 from orbiflow.errors import OrbiflowError
 
-KEPT = 2048
-"""Hashes of a sketch at most."""
+MAX_HASHES = 2048
+"""Hashes in a sketch at most."""
 
-PLACES = 1e7
-"""Parts of a turn, or of the sphere's radius, within which points are the same."""
+CELLS = 1e7
+"""Cells in a turn, or in the sphere's radius, within which points are the same."""
 
 BITS = 53
-"""Of a hash: whole numbers that every reader of JSON has exactly."""
+"""Bits of a hash: such whole numbers are exact for every reader of JSON."""
 
 
 @dataclass(frozen=True, eq=False)
 class RowSketch:
-    """The smallest hashes of the different rows (Broder, On the resemblance and containment of
-    documents, 1997).
+    """The smallest hashes of a table's different rows.
 
     Rows whose hash is at most the largest one kept can be looked up exactly, and they are a random
-    part of any table: all of it where no hash was left out.
+    part of any table, or all of it if no hash was left out (Broder, On the resemblance and containment
+    of documents, 1997).
 
-    - `rows`: that were fitted. `hashes`: sorted. `whole`: whether all are kept.
+    - `rows`: Number of rows that were fitted.
+    - `hashes`: The hashes, sorted. `whole`: Whether all are kept.
 
     >>> from orbiflow.density import make_space
     >>> torus, rng = make_space("torus"), np.random.default_rng(0)
@@ -46,33 +47,37 @@ class RowSketch:
 
     @classmethod
     def of(cls, space: Space, data: ArrayLike) -> RowSketch:
-        """Of data (N, k) in the space's own units."""
+        """Return the sketch of data (N, k) in the space's own units."""
         found = np.unique(row_hashes(space, data))
-        return cls(len(np.asarray(data)), found[:KEPT], len(found) <= KEPT)
+        return cls(len(np.asarray(data)), found[:MAX_HASHES], len(found) <= MAX_HASHES)
 
     def known(self, space: Space, data: ArrayLike) -> tuple[int, int]:
-        """How many of the rows that can be looked up are among those fitted, and how many can be."""
+        """Return how many of the rows that can be looked up were fitted, and how many can be."""
         found = row_hashes(space, data)
         if not self.whole:
             found = found[found <= self.hashes[-1]]
         return int(np.isin(found, self.hashes).sum()), len(found)
 
     def to_json(self) -> dict[str, Any]:
-        """An object for `json.dumps`."""
+        """Return an object for `json.dumps`."""
         return {"rows": self.rows, "whole": self.whole, "hashes": self.hashes.tolist()}
 
     @classmethod
     def from_json(cls, document: object) -> RowSketch:
-        """What `to_json` gave.
+        """Return the sketch that `to_json` wrote.
 
         Raises:
-            OrbiflowError: if it is no sketch.
+            OrbiflowError: If it is no sketch.
         """
         try:
             assert is_a(document, Mapping)
             given = cast(Mapping[str, Any], document)
             hashes = np.array(given["hashes"], dtype=np.uint64)
-            if hashes.ndim != 1 or not 0 < len(hashes) <= KEPT or (hashes[1:] <= hashes[:-1]).any():
+            if (
+                hashes.ndim != 1
+                or not 0 < len(hashes) <= MAX_HASHES
+                or (hashes[1:] <= hashes[:-1]).any()
+            ):
                 raise ValueError("hashes out of order")
             return cls(int(given["rows"]), hashes, bool(given["whole"]))
         except (AssertionError, KeyError, TypeError, ValueError, OverflowError) as error:
@@ -80,16 +85,16 @@ class RowSketch:
 
 
 def row_hashes(space: Space, data: ArrayLike) -> NDArray[np.uint64]:
-    """A number (N,) below 2^53 for each row of data (N, k), the same for the same point.
+    """Return a number (N,) below 2^53 for each row of data (N, k), the same for the same point.
 
-    Of the point, not of how it is written: turns of a torus, and vectors beside degrees, are seen
-    through. It does not depend on how the space is turned in front of its chart.
+    It depends on the point alone: not on whole turns of a torus, on whether a direction is a vector or
+    in degrees, nor on how the space is rotated in front of its chart.
     """
     points = space.to_chart(data)
     images = space.features(points) if space.is_round else points[None]
-    cells = np.rint(images[0].numpy() * PLACES).astype(np.int64)
+    cells = np.rint(images[0].numpy() * CELLS).astype(np.int64)
     if not space.is_round:
-        cells %= int(PLACES)
+        cells %= int(CELLS)
     elif len(images) > 1:  # an axis has two ends
         first = np.argmax(cells != 0, axis=1)
         cells *= np.sign(cells[np.arange(len(cells)), first])[:, None]
@@ -100,8 +105,11 @@ def row_hashes(space: Space, data: ArrayLike) -> NDArray[np.uint64]:
 
 
 def _mixed(x: NDArray[np.uint64]) -> NDArray[np.uint64]:
-    """A bijection of 64 bits that leaves no pattern (Steele, Lea and Flood, Fast splittable
-    pseudorandom number generators, 2014)."""
+    """Mix 64 bits so that no pattern is left.
+
+    This is the bijection of Steele, Lea and Flood, Fast splittable pseudorandom number generators,
+    2014.
+    """
     x = (x ^ (x >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
     x = (x ^ (x >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
     return x ^ (x >> np.uint64(31))

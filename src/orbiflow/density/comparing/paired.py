@@ -1,4 +1,4 @@
-"""Which of several models gives held-out rows the greater density, and whether the rows can tell."""
+"""Comparisons of models by their log densities at held-out rows."""
 
 from __future__ import annotations
 
@@ -11,22 +11,18 @@ import numpy as np
 import torch
 from numpy.typing import ArrayLike
 
-from orbiflow.arguments import (
-    is_a,
-    number,
-    numbers,
-    whole,
-)
+from orbiflow.arguments import as_array, is_a
 from orbiflow.arrays import Array
 from orbiflow.density.arguments import check_kind
 from orbiflow.density.comparing.resampling import Groups, resampled_sums
+from orbiflow.density.comparing.settings import ComparisonSettings
 from orbiflow.density.estimator import DensityEstimator
 from orbiflow.density.models import Density
 from orbiflow.density.spaces import Space
 from orbiflow.errors import OrbiflowError
 
-RESAMPLES, LEVEL = 2000, 0.95
-MOST_RESAMPLES = 1_000_000
+BLOCK = 65_536
+"""Rows scored between two looks at whether to stop."""
 
 
 @dataclass(frozen=True)
@@ -40,13 +36,13 @@ class ModelScore:
 
 @dataclass(frozen=True)
 class Difference:
-    """Log density of `first` less that of `second`, row by row, in nats.
+    """The log density of `first` less that of `second`, row by row, in nats.
 
-    - `mean`, `error`: the mean over rows and its standard error, paired.
-    - `low`, `high`: interval that holds all differences of the comparison at once.
-    - `p`: of a mean of 0, adjusted for all differences.
-    - `share`: of the rows, to which `first` gives the greater density; half of equal ones.
-    - `better`: name of the better model; None if the rows cannot tell.
+    - `mean`, `error`: The mean over rows, and its standard error from paired rows.
+    - `low`, `high`: The interval that holds all differences of the comparison at once.
+    - `p`: The p-value of a mean of 0, adjusted for all differences.
+    - `share`: The share of the rows to which `first` gives the greater density; equal ones count half.
+    - `better`: The name of the better model, None if the rows cannot tell.
     """
 
     first: str
@@ -60,22 +56,22 @@ class Difference:
     better: str | None
 
     def __str__(self) -> str:
-        told = "the rows cannot tell" if self.better is None else f"{self.better} is better"
+        verdict = "the rows cannot tell" if self.better is None else f"{self.better} is better"
         return (
             f"{self.first} - {self.second}: {self.mean:+.4f} ± {self.error:.4f} nats a row, "
-            f"{self.low:+.4f} to {self.high:+.4f} (p {self.p:.2g}): {told}"
+            f"{self.low:+.4f} to {self.high:+.4f} (p {self.p:.2g}): {verdict}"
         )
 
 
 @dataclass(frozen=True)
 class ModelComparison:
-    """Models at the same held-out rows.
+    """Several models at the same held-out rows.
 
-    - `scores`: best first. `differences`: of all pairs, the better one by its mean first.
-    - `rows`, `groups`: how many; `groups` is None if rows are independent.
-    - `level`, `resamples`, `seed`: of the intervals.
-    - `best`: the model that is better than all others; None if the rows cannot tell.
-    - `notes`: what the user should know, in words.
+    - `scores`: Their scores, best first. `differences`: Those of all pairs, the better mean first.
+    - `rows`, `groups`: How many there are; `groups` is None if rows are independent.
+    - `level`, `resamples`, `seed`: The settings of the intervals.
+    - `best`: The model that is better than all others, None if the rows cannot tell.
+    - `notes`: What the user should know, in words.
     """
 
     scores: tuple[ModelScore, ...]
@@ -89,12 +85,12 @@ class ModelComparison:
     notes: tuple[str, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
-        """An object for `json.dumps`."""
+        """Return an object for `json.dumps`."""
         return {"kind": "models", **asdict(self), "verdict": self.verdict}
 
     @property
     def verdict(self) -> str:
-        """Which is best, in words."""
+        """Which model is best, in words."""
         if self.best is not None:
             return f"{self.best} is better than {_listed([s.name for s in self.scores[1:]])}"
         top = self.scores[0].name
@@ -102,7 +98,7 @@ class ModelComparison:
         return f"the rows cannot tell {_listed([top, *open_])} apart"
 
     def words(self) -> list[str]:
-        """What came of it, in lines."""
+        """Return the result in lines of text."""
         unit = "rows" if self.groups is None else f"rows in {self.groups} groups"
         return [
             f"mean log density at {self.rows} {unit}, in nats:",
@@ -115,31 +111,29 @@ class ModelComparison:
 
 def compare_scores(
     scores: Mapping[str, ArrayLike],
+    settings: ComparisonSettings | None = None,
     *,
     groups: ArrayLike | None = None,
     weights: ArrayLike | None = None,
-    resamples: int = RESAMPLES,
-    level: float = LEVEL,
-    seed: int = 0,
 ) -> ModelComparison:
     """Compare log densities of several models at the same held-out rows.
 
-    Intervals are by the symmetric bootstrap-t, of the largest of all pairs' |t|, so that all hold at
-    once (Efron and Tibshirani, An introduction to the bootstrap, 1993, ch. 12; Romano and Wolf,
+    Intervals come from the symmetric bootstrap-t, of the largest of all pairs' |t|, so that all hold
+    at once (Efron and Tibshirani, An introduction to the bootstrap, 1993, ch. 12; Romano and Wolf,
     Stepwise multiple testing, 2005). Whole groups are resampled, and the standard error is that of
     a ratio of sums over groups, or of weighted rows.
 
     Args:
-        scores: (N,) a model, in nats and with respect to one measure.
-        groups: a label (N,) a row; rows of one group are not independent. None: all are.
-        weights: of the rows (N,) in every mean, above 0; only ratios count. None: all the same.
-        resamples: of the bootstrap, 100 or more.
-        level: of the intervals.
-        seed: of the resamples.
+        scores: The scores (N,) of each model by its name, in nats and with respect to one measure.
+        settings: Resamples, level and seed of the intervals.
+        groups: A label for each row; rows of one group are not independent. Default: all rows are
+            independent.
+        weights: Weights (N,) of the rows in every mean, above 0; only ratios count. Default: all
+            equal.
 
     Raises:
-        OrbiflowError: for fewer than two models, scores of different lengths or not finite, weights
-            that are none, or fewer than five rows or groups.
+        OrbiflowError: If there are fewer than two models, or fewer than five rows or groups, scores
+            have different lengths or are not finite, or weights cannot be used.
 
     >>> rng = np.random.default_rng(0)
     >>> base = rng.normal(size=500)
@@ -147,8 +141,7 @@ def compare_scores(
     >>> found.best, found.differences[0].error < 0.03
     ('a', True)
     """
-    resamples = whole(resamples, "resamples", 100, MOST_RESAMPLES)
-    level = number(level, "level", 0.5, 0.999)
+    settings = settings or ComparisonSettings()
     table = _table(scores)
     members = Groups.of(groups, len(table))
     members.require()
@@ -160,8 +153,8 @@ def compare_scores(
     pairs = list(itertools.combinations(range(len(names)), 2))
     rows = np.stack([table[:, i] - table[:, j] for i, j in pairs], axis=1)
     mean, error = _means(rows, members, counts)
-    largest = _largest_t(rows - mean, members, counts, resamples, seed)
-    reach = float(np.quantile(largest, level, method="higher"))
+    largest = _largest_t(rows - mean, members, counts, settings)
+    reach = float(np.quantile(largest, settings.level, method="higher"))
     found: list[Difference] = []
     for k, (i, j) in enumerate(pairs):
         low, high = mean[k] - reach * error[k], mean[k] + reach * error[k]
@@ -174,7 +167,7 @@ def compare_scores(
                 float(error[k]),
                 float(low),
                 float(high),
-                float((1 + (largest >= t).sum()) / (1 + resamples)) if t else 1.0,
+                float((1 + (largest >= t).sum()) / (1 + settings.bootstrap)) if t else 1.0,
                 float(np.average((rows[:, k] > 0) + (rows[:, k] == 0) / 2, weights=counts)),
                 names[i] if low > 0 else None,
             )
@@ -186,19 +179,19 @@ def compare_scores(
         tuple(found),
         len(table),
         members.count if members.given else None,
-        level,
-        resamples,
-        seed,
+        settings.level,
+        settings.bootstrap,
+        settings.seed,
         names[0] if len(beaten) == len(names) - 1 else None,
         (*members.notes(), *same),
     )
 
 
 def _table(scores: Mapping[str, ArrayLike]) -> Array:
-    """Scores (N, M), checked."""
+    """Return the scores (N, M), checked."""
     if not is_a(scores, Mapping) or len(scores) < 2:
         raise OrbiflowError("a comparison needs the scores of two models or more, by their names")
-    columns = [numbers(v, f"scores of {name}", ("N",)) for name, v in scores.items()]
+    columns = [as_array(v, f"scores of {name}", ("N",)) for name, v in scores.items()]
     lengths = {name: len(column) for name, column in zip(scores, columns, strict=True)}
     if len(set(lengths.values())) > 1:
         raise OrbiflowError(f"models must be scored at the same rows, got {lengths}")
@@ -206,31 +199,34 @@ def _table(scores: Mapping[str, ArrayLike]) -> Array:
 
 
 def _row_weights(weights: ArrayLike | None, rows: int) -> Array:
-    """(N,) of mean 1."""
+    """Return weights (N,) of mean 1."""
     if weights is None:
         return np.ones(rows)
-    found = numbers(weights, "weights", ("N",))
+    found = as_array(weights, "weights", ("N",))
     if len(found) != rows or not (found > 0).all():
         raise OrbiflowError(f"weights must be {rows} numbers above 0, one a row")
     return found / found.mean()
 
 
 def _means(table: Array, groups: Groups, weights: Array) -> tuple[Array, Array]:
-    """Weighted means (k,) over rows of a table (N, k), and their standard errors over groups."""
+    """Return weighted means (k,) over rows of a table (N, k), and their standard errors over groups."""
     mean = weights @ table / len(table)
     residuals = groups.sums(weights[:, None] * (table - mean))
     spread = (residuals**2).sum(axis=0) * groups.count / (groups.count - 1)
     error = np.sqrt(spread) / len(table)
-    # what rounding leaves of equal differences is none
+    # equal differences have none but what rounding leaves
     return mean, np.where(error > 1e-14 * (1 + abs(mean)), error, 0.0)
 
 
-def _largest_t(centered: Array, groups: Groups, weights: Array, resamples: int, seed: int) -> Array:
-    """(B,): of each resample the largest |t| of the columns of `centered` (N, k)."""
+def _largest_t(
+    centered: Array, groups: Groups, weights: Array, settings: ComparisonSettings
+) -> Array:
+    """Return for each resample (B,) the largest |t| of the columns of `centered` (N, k)."""
+    rng = np.random.default_rng(settings.seed)
     sums = groups.sums(weights[:, None] * centered)
     sizes = groups.sums(weights[:, None])
     parts = (sizes, sizes**2, sums, sums**2, sums * sizes)
-    drawn = resampled_sums(np.concatenate(parts, axis=1), resamples, np.random.default_rng(seed))
+    drawn = resampled_sums(np.concatenate(parts, axis=1), settings.bootstrap, rng)
     n, n2, rest = drawn[:, :1], drawn[:, 1:2], drawn[:, 2:]
     s, s2, sn = np.split(rest, 3, axis=1)
     mean = s / n
@@ -242,7 +238,7 @@ def _largest_t(centered: Array, groups: Groups, weights: Array, resamples: int, 
 
 
 def _ratio(size: Any, error: Any) -> Any:
-    """|t|: without a spread, 0 if there is no difference and infinite if there is."""
+    """Return |t|, which without a spread is 0 or, if there is a difference, infinite."""
     with np.errstate(divide="ignore", invalid="ignore"):
         t = np.asarray(size) / np.asarray(error)
     return np.where(np.asarray(size) <= 1e-14, 0.0, t)
@@ -253,49 +249,46 @@ def _equal(difference: Difference) -> bool:
 
 
 def _listed(names: list[str]) -> str:
-    """
+    """Return names in words.
+
     >>> _listed(["a", "b", "c"])
     'a, b and c'
     """
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
-BLOCK = 65_536
-"""Rows scored between two looks at whether to stop."""
-
-
 def compare_models(
     models: Mapping[str, Density | DensityEstimator],
     data: ArrayLike,
+    settings: ComparisonSettings | None = None,
     *,
     groups: ArrayLike | None = None,
-    resamples: int = RESAMPLES,
-    level: float = LEVEL,
-    seed: int = 0,
 ) -> ModelComparison:
-    """Which of several densities suits held-out data (N, k) best; see `compare_scores`.
+    """Compare several densities at held-out data.
 
     Args:
-        models: by their names, all of one space and unit.
-        data: rows that none of them was fitted to, in the space's own units.
+        models: The models by their names, all of one space and unit.
+        data: Rows (N, k) that none of them was fitted to, in the space's own units.
+        settings: Resamples, level and seed of the intervals.
+        groups: A label for each row, as for `compare_scores`.
 
     Raises:
-        OrbiflowError: for models of different spaces or units, or data that are not of the space; and
-            as `compare_scores`.
+        OrbiflowError: If models are on different spaces or have different units, data are not on the
+            space, or as `compare_scores`.
     """
     if not is_a(models, Mapping) or len(models) < 2:
         raise OrbiflowError("give two models or more, by their names")
     densities = {name: density_of(model, name) for name, model in models.items()}
     require_one_space({name: density.space for name, density in densities.items()})
     scores = {name: scores_of(density, data) for name, density in densities.items()}
-    return compare_scores(scores, groups=groups, resamples=resamples, level=level, seed=seed)
+    return compare_scores(scores, settings, groups=groups)
 
 
 def density_of(model: Density | DensityEstimator, name: str = "the model") -> Density:
-    """The density of a fitted estimator, or itself.
+    """Return the density of a fitted estimator, or a density as it is.
 
     Raises:
-        OrbiflowError: for another thing, or an estimator that is not fitted.
+        OrbiflowError: If it is neither, or the estimator is not fitted.
     """
     if isinstance(model, DensityEstimator):
         density = getattr(model, "density_", None)
@@ -306,28 +299,32 @@ def density_of(model: Density | DensityEstimator, name: str = "the model") -> De
 
 
 def require_one_space(spaces: Mapping[str, Space]) -> None:
-    """
+    """Check that log densities on all spaces are with respect to one measure.
+
     Raises:
-        OrbiflowError: unless log densities on all of them are with respect to one measure.
+        OrbiflowError: If they are not.
     """
     (first, one), *others = spaces.items()
     for name, other in others:
         if (one.name, one.dim) != (other.name, other.dim):
             raise OrbiflowError(
-                f"{first} is on the {_said(one)}, {name} on the {_said(other)}: their densities "
+                f"{first} is on the {_title(one)}, {name} on the {_title(other)}: their densities "
                 "have no common measure; compare models of one space"
             )
         if one.unit != other.unit:
             raise OrbiflowError(
-                f"{first} has angles in {one.unit}, {name} in {other.unit}: their densities are per "
-                "other units; fit both with one --unit"
+                f"{first} has angles in {one.unit}, {name} in {other.unit}: their densities are in "
+                "different units; fit both with one --unit"
             )
 
 
 def scores_of(
     density: Density, data: ArrayLike, told: Callable[[float], None] = lambda _: None
 ) -> Array:
-    """Log densities (N,) at data (N, k), in natural measure; `told` the share of rows done."""
+    """Return log densities (N,) at data (N, k), in natural measure.
+
+    `told` is called with the share of the rows that are done.
+    """
     points = density.space.to_chart(data)
     found: list[Sequence[float] | np.ndarray] = []
     with torch.no_grad():
@@ -337,5 +334,5 @@ def scores_of(
     return np.concatenate(found) if found else np.zeros(0)
 
 
-def _said(space: Space) -> str:
+def _title(space: Space) -> str:
     return f"torus of {space.dim} angles" if space.is_torus else space.name

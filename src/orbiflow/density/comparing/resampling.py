@@ -1,4 +1,4 @@
-"""Groups of rows that belong together, and bootstrap resamples of them."""
+"""Groups of rows that belong together, bootstrap resamples of them, and folds."""
 
 from __future__ import annotations
 
@@ -8,27 +8,27 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from orbiflow.arguments import whole
+from orbiflow.arguments import as_whole
 from orbiflow.arrays import Array
 from orbiflow.density.fitting import group_numbers, lightest_folds
 from orbiflow.errors import OrbiflowError
 
-LEAST_GROUPS = 5
-"""Independent rows or groups that an uncertainty needs."""
+MIN_GROUPS = 5
+"""Number of independent rows or groups that an uncertainty needs."""
 
 FEW_GROUPS = 20
-"""Below which it is said that an uncertainty is rough itself."""
+"""Number of rows or groups below which a note says that the uncertainty is rough itself."""
 
 BLOCK_ENTRIES = 4_000_000
-"""Of a block of resamples times groups: bounds the memory."""
+"""Entries of a block of resamples times groups, which bounds the memory."""
 
 
 @dataclass(frozen=True, eq=False)
 class Groups:
     """Rows in groups: those of one group (a protein, a station, an event) are not independent.
 
-    - `index`: (N,) the group of each row, from 0. `count`: of the groups.
-    - `given`: whether there are groups; else each row is one.
+    - `index`: The group (N,) of each row, from 0. `count`: The number of groups.
+    - `given`: Whether there are groups; otherwise each row is one.
 
     >>> Groups.of(["a", "b", "a"], 3).index.tolist()
     [0, 1, 0]
@@ -40,10 +40,10 @@ class Groups:
 
     @classmethod
     def of(cls, labels: ArrayLike | None, rows: int) -> Groups:
-        """From a label a row, of any kind; None for rows that are independent.
+        """Return groups from a label for each row, of any kind; None means independent rows.
 
         Raises:
-            OrbiflowError: for another number of labels.
+            OrbiflowError: If there is another number of labels.
         """
         if labels is None:
             return cls(np.arange(rows), rows, False)
@@ -56,36 +56,37 @@ class Groups:
         return "groups" if self.given else "rows"
 
     def require(self) -> None:
-        """
+        """Check that there are enough for an uncertainty.
+
         Raises:
-            OrbiflowError: if there are too few for an uncertainty.
+            OrbiflowError: If there are too few.
         """
-        if self.count < LEAST_GROUPS:
+        if self.count < MIN_GROUPS:
             raise OrbiflowError(
-                f"{self.count} {self.what} are too few to tell an uncertainty from: there must be "
-                f"{LEAST_GROUPS}"
+                f"{self.count} {self.what} are too few for an uncertainty: there must be at least "
+                f"{MIN_GROUPS}"
             )
 
     def notes(self) -> list[str]:
-        """What should be said of them."""
+        """Return what the user should know of them."""
         if self.count >= FEW_GROUPS:
             return []
         return [f"of only {self.count} {self.what} the uncertainties themselves are rough"]
 
     def sums(self, values: Array) -> Array:
-        """Sums (G, ...) over each group of values (N, ...)."""
+        """Return sums (G, ...) over each group of values (N, ...)."""
         flat = values.reshape(len(values), -1)
         columns = [np.bincount(self.index, column, minlength=self.count) for column in flat.T]
         return np.stack(columns, axis=1).reshape(self.count, *values.shape[1:])
 
 
 def resampled_sums(table: Array, resamples: int, rng: np.random.Generator) -> Array:
-    """Sums (B, k) of a table (G, k) over G rows drawn with replacement, `resamples` times."""
+    """Return sums (B, k) of a table (G, k) over G rows drawn with replacement, `resamples` times."""
     return np.concatenate([w @ table for w in _weights(len(table), resamples, rng)])
 
 
 def _weights(count: int, resamples: int, rng: np.random.Generator) -> Iterator[Array]:
-    """How often each of `count` is drawn: blocks (b, count)."""
+    """Yield how often each of `count` rows is drawn, in blocks (b, count)."""
     size = max(1, BLOCK_ENTRIES // count)
     for start in range(0, resamples, size):
         number = min(size, resamples - start)
@@ -94,7 +95,7 @@ def _weights(count: int, resamples: int, rng: np.random.Generator) -> Iterator[A
         yield found.reshape(number, count).astype(np.float64)
 
 
-MOST_FOLDS = 1000
+MAX_FOLDS = 1000
 
 
 def cross_validation_folds(
@@ -105,25 +106,26 @@ def cross_validation_folds(
     seed: int = 0,
     split: int = 0,
 ) -> NDArray[np.int64]:
-    """The fold (N,) from 0 of each row, at random: each is held out once.
+    """Return the random fold (N,) of each row, from 0; each row is held out once.
 
-    What belongs together is dealt out in random order, always to the fold that has the fewest rows
-    by then. So folds of single rows differ by one row at most, others by the largest group at most.
+    Groups are dealt out in random order, always to the fold that has the fewest rows so far. So the
+    sizes of folds differ by at most one row, or by the size of the largest group.
 
     Args:
-        rows: N.
-        folds: 2 or more.
-        together: a label (N,) a row; rows of one label are in one fold. None: each row is by itself.
-        seed: the same one, the same folds.
-        split: number of the repetition; each is a split of its own, whatever others there are.
+        rows: Number N of rows.
+        folds: Number of folds, 2 or more.
+        together: A label for each row; rows of one label are in one fold. Default: each row is by
+            itself.
+        seed: Seed of the folds.
+        split: Number of the repetition; each is a split of its own, whatever others there are.
 
     Raises:
-        OrbiflowError: for another number of labels than rows, or fewer of them than folds.
+        OrbiflowError: If there is another number of labels than rows, or fewer groups than folds.
 
     >>> cross_validation_folds(6, 3, together=["a", "a", "b", "b", "c", "c"]).tolist()
     [1, 1, 2, 2, 0, 0]
     """
-    folds = whole(folds, "folds", 2, MOST_FOLDS)
+    folds = as_whole(folds, "folds", 2, MAX_FOLDS)
     units = Groups.of(together, rows)
     if units.count < folds:
         raise OrbiflowError(

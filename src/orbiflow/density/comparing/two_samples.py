@@ -1,4 +1,4 @@
-"""Whether two data sets come from one density: a permutation test with kernels of the space."""
+"""A permutation test of whether two data sets come from one density, with kernels of the space."""
 
 from __future__ import annotations
 
@@ -14,31 +14,31 @@ from orbiflow.density.spaces import Space
 from orbiflow.runtime import one_thread
 from orbiflow.typed_torch import listed
 
-MOST_ROWS = 3_000
-"""Of both data sets together: the test looks at all their pairs."""
+MAX_ROWS = 3_000
+"""Rows of both data sets together at most: the test looks at all their pairs."""
 
 QUANTILES = (0.005, 0.05, 0.4, 1.0)
-"""Of the squared distances of pairs: a kernel has fallen to 1/e there. Narrow ones see clusters, the
-widest a shift."""
+"""Quantiles of the squared distances of pairs at which kernels have fallen to 1/e. Narrow kernels see
+clusters, the widest a shift."""
 
-PAIRS, LEAST_SCALE = 500_000, 1e-9
-"""Pairs drawn for the quantiles, and half the squared width of a kernel at least."""
+PAIRS, MIN_SCALE = 500_000, 1e-9
+"""Pairs drawn for the quantiles, and the least half of a kernel's squared width."""
 
-PERMUTATIONS = 999
 BLOCK = 250
-"""Permutations at a time."""
+"""Permutations computed at a time."""
 
 
 @dataclass(frozen=True)
 class TestResult:
-    """What the permutations say.
+    """The result of a permutation test.
 
-    - `p`: that labels at random give as large a difference. `z`: the largest of the differences at
-      all widths, in standard deviations of those of the permutations.
-    - `permutations`: how many. `rows`: that were looked at.
+    - `p`: The share of random labels that give as large a difference.
+    - `z`: The largest of the differences at all widths, in standard deviations of those of the
+      permutations.
+    - `permutations`: Their number. `rows`: The number of rows that were looked at.
     """
 
-    __test__ = False  # no test of pytest's
+    __test__ = False  # pytest would take it for a test
 
     p: float
     z: float
@@ -54,21 +54,24 @@ def mmd_test(
     first: Array,
     groups: Groups,
     *,
-    permutations: int = PERMUTATIONS,
+    permutations: int = 999,
     seed: int = 0,
 ) -> TestResult:
-    """Largest standardised maximum mean discrepancy over kernels of four widths.
+    """Test by the largest standardised maximum mean discrepancy over kernels of four widths.
 
     Kernels are von Mises-Fisher ones, summed over the space's images, so that they are positive
     definite on it (Gretton and others, A kernel two-sample test, 2012). Pairs within a group are left
-    out. What is permuted are whole groups: those of one data set among all such, and of groups with
-    rows in both the two halves change places. All permutations, the one that was observed among them,
-    are standardised alike, so that p is exact.
+    out. Whole groups are permuted: groups of one data set among each other, while the two halves of
+    a group with rows in both change places. All permutations, with the observed one among them, are
+    standardised alike, so that p is exact.
 
     Args:
-        points: chart points (N, d) of both data sets.
-        first: (N,) whether a row is of the first one.
-        groups: of the rows.
+        space: The space.
+        points: Chart points (N, d) of both data sets.
+        first: Whether each row (N,) is of the first one.
+        groups: The groups of the rows.
+        permutations: Number of permutations.
+        seed: Seed of the permutations.
     """
     rng = np.random.default_rng(seed)
     labels = _permuted(first, groups, permutations, rng)
@@ -93,7 +96,7 @@ def mmd_test(
 
 
 def chosen_rows(first: Array, groups: Groups, most: int, seed: int = 0) -> Array:
-    """Numbers of `most` rows at most, of whole groups, each data set's share as it is."""
+    """Return the numbers of at most `most` rows, in whole groups, drawn from both data sets alike."""
     count = len(first)
     if count <= most:
         return np.arange(count)
@@ -107,21 +110,21 @@ def chosen_rows(first: Array, groups: Groups, most: int, seed: int = 0) -> Array
 
 
 def _dots(space: Space, points: Tensor) -> list[Tensor]:
-    """(N, N) an image: what kernels are exponentials of."""
+    """Return for each image the table (N, N) whose exponentials are kernels."""
     images = space.features(points)
     return [images[0] @ image.mT for image in images]
 
 
 def _scales(distances: Tensor, apart: Tensor, rng: np.random.Generator) -> list[float]:
-    """Quantiles of half the squared distances of pairs that are not of one group."""
+    """Return quantiles of half the squared distances of pairs that are not of one group."""
     pairs = torch.as_tensor(rng.integers(len(distances), size=(2, PAIRS)))
     found = distances[pairs[0], pairs[1]][apart[pairs[0], pairs[1]]]
     quantiles = torch.tensor(QUANTILES, dtype=found.dtype)
-    return listed(torch.quantile(found, quantiles).clamp_min(LEAST_SCALE))
+    return listed(torch.quantile(found, quantiles).clamp_min(MIN_SCALE))
 
 
 def _permuted(first: Array, groups: Groups, permutations: int, rng: np.random.Generator) -> Tensor:
-    """Labels (N, 1 + P), 1 for the first data set: as observed, then permuted."""
+    """Return labels (N, 1 + P), 1 for the first data set: first as observed, then permuted."""
     own = np.bincount(groups.index, first, groups.count) > 0
     other = np.bincount(groups.index, ~first, groups.count) > 0
     both, single = own & other, np.flatnonzero(own != other)
@@ -140,9 +143,9 @@ def _permuted(first: Array, groups: Groups, permutations: int, rng: np.random.Ge
 def _difference(
     kernel: Tensor, labels: Tensor, counts: tuple[Array, Array, Array] | None
 ) -> tuple[Array, Array, Array]:
-    """(1 + P,) each: sums of the kernel over pairs within the first, the second, and between.
+    """Return sums of the kernel over pairs within the first, within the second, and between.
 
-    Given `counts` of the pairs, their means.
+    Each is (1 + P,). Given `counts` of the pairs, they are means.
     """
     rows = kernel.sum(dim=1)
     total = float(rows.sum())

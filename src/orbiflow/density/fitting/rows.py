@@ -18,7 +18,7 @@ from orbiflow.density.inference import (
     check_torus,
 )
 from orbiflow.density.models import AdaptiveKernels, Density
-from orbiflow.density.spaces import Space, such_rows
+from orbiflow.density.spaces import Space, row_count
 from orbiflow.errors import OrbiflowError
 from orbiflow.typed_torch import listed, unique
 
@@ -121,7 +121,7 @@ def weighed(points: Tensor, weights: Any, groups: Tensor | None = None) -> Rows:
     if len(bad):
         raise OrbiflowError(
             f"weights must be finite and at least 0; row {int(bad[0]) + 1} has {float(own[bad[0]]):g}"
-            f"{such_rows(len(bad))}"
+            f"{row_count(len(bad))}"
         )
     if not bool((own > 0).any()):
         raise OrbiflowError("all weights are 0: no row is left to fit to")

@@ -1,4 +1,4 @@
-"""Lines that a user has for the globe: GeoJSON, or a table of latitude and longitude."""
+"""Files of lines on the globe: GeoJSON, or tables of latitude and longitude."""
 
 from __future__ import annotations
 
@@ -16,40 +16,40 @@ from orbiflow.arrays import Array
 from orbiflow.density.tables import read_table
 from orbiflow.errors import InputFileError
 
-MOST_BYTES = 32_000_000
-MOST_POINTS = 1_000_000
-"""Of a file: Natural Earth's finest coastline has 18 MB and 400,000 points."""
+MAX_BYTES = 32_000_000
+MAX_POINTS = 1_000_000
+"""Limits of a file: Natural Earth's finest coastline has 18 MB and 400,000 points."""
 
-_NESTED = 20
-"""Collections within collections."""
+_MAX_DEPTH = 20
+"""Depth of collections within collections."""
 
 _SHAPES = {"LineString": 1, "MultiLineString": 2, "Polygon": 2, "MultiPolygon": 3}
 """Depth of the lists of positions in each kind of geometry that has lines."""
 
 _POINTS = ("Point", "MultiPoint")
 _EDGE = 1e-4
-"""Degrees within which a polygon's edge is one along which the globe was cut."""
+"""Degrees from a pole or longitude 180 within which a polygon's edge is where the globe was cut."""
 
-_SLIP = 1e-3
+_ROUNDING = 1e-3
 """Degrees beyond a pole that are taken for rounding."""
 
 
 def read_coastlines(path: Path) -> list[Array]:
-    """Lines (M, 2) of latitude and longitude in degrees, from GeoJSON (RFC 7946) or a table.
+    """Read lines (M, 2) of latitude and longitude in degrees from GeoJSON (RFC 7946) or a table.
 
-    Of polygons the rings, without edges along longitude 180 or at a pole: there files cut what is
+    Polygons become rings, without edges along longitude 180 or at a pole, where files cut what is
     whole on the globe. In a table, a row whose latitude is beyond 90 ends a line.
 
     Raises:
-        InputFileError: for a file that cannot be read, is too large, or holds no lines in degrees.
+        InputFileError: If the file cannot be read, is too large, or holds no lines in degrees.
     """
     try:
         if path.exists() and not path.is_file():
             raise InputFileError(f"cannot read {path}: it is not a file")
         size = path.stat().st_size
-        if size > MOST_BYTES:
+        if size > MAX_BYTES:
             raise InputFileError(
-                f"{path} has {size / 1e6:.0f} MB, more than {MOST_BYTES / 1e6:.0f}: take coarser lines"
+                f"{path} has {size / 1e6:.0f} MB, more than {MAX_BYTES / 1e6:.0f}: take coarser lines"
             )
         with path.open("rb") as file:
             start = file.read(4096)
@@ -60,8 +60,8 @@ def read_coastlines(path: Path) -> list[Array]:
     lines = _geojson(path) if text.startswith((b"{", b"[")) else _table(path)
     if not lines:
         raise InputFileError(f"{path} holds no lines: coastlines need two points or more each")
-    if sum(map(len, lines)) > MOST_POINTS:
-        raise InputFileError(f"{path} has more than {MOST_POINTS} points: take coarser lines")
+    if sum(map(len, lines)) > MAX_POINTS:
+        raise InputFileError(f"{path} has more than {MAX_POINTS} points: take coarser lines")
     return lines
 
 
@@ -101,15 +101,15 @@ def _geojson(path: Path) -> list[Array]:
 
 
 def _geometries(path: Path, item: Any, depth: int) -> Iterator[tuple[str, Any]]:
-    """Kind and coordinates of every geometry with lines."""
+    """Yield the kind and the coordinates of every geometry with lines."""
     kind = item.get("type") if isinstance(item, dict) else None
     kind = kind if isinstance(kind, str) else None
     if kind == "Topology":
         raise InputFileError(
             f"{path} is TopoJSON: make GeoJSON of it, with ogr2ogr -f GeoJSON lines.geojson {path.name}"
         )
-    if depth > _NESTED:
-        raise InputFileError(f"{path} has collections more than {_NESTED} deep")
+    if depth > _MAX_DEPTH:
+        raise InputFileError(f"{path} has collections more than {_MAX_DEPTH} deep")
     if kind in ("FeatureCollection", "GeometryCollection"):
         inner = item.get("features" if kind == "FeatureCollection" else "geometries")
         if not isinstance(inner, list):
@@ -128,7 +128,7 @@ def _geometries(path: Path, item: Any, depth: int) -> Iterator[tuple[str, Any]]:
 
 
 def _flat(path: Path, kind: str, items: Any, depth: int) -> Iterator[list[Any]]:
-    """Lists of positions, `depth` - 1 lists deep."""
+    """Yield the lists of positions in lists `depth` - 1 deep."""
     if not isinstance(items, list):
         raise InputFileError(f"{path}: the coordinates of a {kind} must be lists {depth} deep")
     if depth == 1:
@@ -139,7 +139,7 @@ def _flat(path: Path, kind: str, items: Any, depth: int) -> Iterator[list[Any]]:
 
 
 def _positions(path: Path, kind: str, positions: list[Any]) -> Array:
-    """(M, 2) latitude and longitude; heights are left out."""
+    """Return latitude and longitude (M, 2), without heights."""
     try:
         # a position is longitude, latitude
         line = np.array([(p[1], p[0]) for p in positions], dtype=float).reshape(-1, 2)
@@ -153,7 +153,7 @@ def _positions(path: Path, kind: str, positions: list[Any]) -> Array:
 
 
 def _check_degrees(path: Path, line: Array) -> None:
-    wrong = ~((abs(line[:, 0]) <= 90 + _SLIP) & (abs(line[:, 1]) <= 360))  # NaN, too
+    wrong = ~((abs(line[:, 0]) <= 90 + _ROUNDING) & (abs(line[:, 1]) <= 360))  # NaN, too
     if wrong.any():
         lat, lon = line[wrong.argmax()]
         raise InputFileError(
@@ -163,7 +163,7 @@ def _check_degrees(path: Path, line: Array) -> None:
 
 
 def _without_cuts(ring: Array) -> list[Array]:
-    """A polygon's ring in pieces, without the edges along which a flat map was cut."""
+    """Return a polygon's ring in pieces, without the edges along which a flat map was cut."""
     lat, lon = abs(ring).T
     at_pole, at_cut = abs(lat - 90) < _EDGE, abs(lon - 180) < _EDGE
     edges = (at_pole[1:] & at_pole[:-1]) | (at_cut[1:] & at_cut[:-1])
@@ -172,13 +172,13 @@ def _without_cuts(ring: Array) -> list[Array]:
 
 
 def simplified(lines: list[Array], most: int) -> list[Array]:
-    """Lines of at most about `most` points in all, coarser where they must be."""
+    """Return lines of about `most` points in all at most, coarser if they must be."""
     from shapely import LineString
 
     tolerance = 0.01
     while sum(map(len, lines)) > most and tolerance < math.inf:
         lines = [np.array(LineString(line).simplify(tolerance).coords) for line in lines]
         tolerance *= 2
-        if tolerance > 0.1:  # islands that no one sees
+        if tolerance > 0.1:  # islands that nobody would see
             lines = [line for line in lines if np.ptp(line, axis=0).max() > tolerance]
     return lines

@@ -1,4 +1,4 @@
-"""Dots: points over a density, which they leave readable, or on a light ground."""
+"""Dots for points, over a density that stays readable or on a light ground."""
 
 from __future__ import annotations
 
@@ -16,70 +16,74 @@ if TYPE_CHECKING:
 
 MAX_DOTS = 3000
 
-COVER = 0.3
-"""Of the area about a dot that dots may hide of a density."""
+MAX_COVER = 0.3
+"""Share of a density's area that dots may hide."""
 
-NEAREST = 8
-"""Other dots by whose distance it is told how crowded a place is."""
+NEIGHBOURS = 8
+"""Number of other dots whose distance says how crowded a place is."""
 
-LEAST = 0.5
-"""Points across of the smallest dot on a screen; those that should be smaller are fainter instead."""
+MIN_WIDTH = 0.5
+"""Points (1/72 inch) across the smallest dot on a screen. Those that should be smaller are fainter."""
 
 STEP = 1.1
-"""From one size of dots to the next."""
+"""Ratio of one size of dots to the next."""
 
-FAINTEST = 0.03
-"""Of a dot's ink."""
+MIN_INK = 0.03
+"""Opacity of the faintest dots."""
 
 
 class Dots(NamedTuple):
-    """Where dots are (N, k), each place once, and how wide (N,) they may be."""
+    """Places of dots (N, k), each once, and the widths (N,) that they may have."""
 
     places: Array
     widths: Array
 
 
-def roomy(points: Array) -> Dots:
-    """Widths of dots at points (N, k) of a plane or surface, in their unit, that hide `COVER` of it.
+def uncrowded(points: Array) -> Dots:
+    """Return dots at points (N, k) of a plane or surface that hide `MAX_COVER` of it.
 
-    Points at one place are one dot, or they would be smaller and fainter for being many.
+    Widths are in the unit of the points. Points at one place are one dot; as many dots they would be
+    smaller and fainter.
 
     >>> even = np.stack(np.meshgrid(np.arange(20.0), np.arange(20.0)), axis=-1).reshape(-1, 2)
-    >>> round(float(np.median(roomy(even).widths)), 1)
+    >>> round(float(np.median(uncrowded(even).widths)), 1)
     0.5
     """
     from scipy.spatial import cKDTree
 
     _, first = np.unique(points.round(9), axis=0, return_index=True)
     places = points[np.sort(first)]
-    nearest = min(NEAREST, len(places) - 1)
+    nearest = min(NEIGHBOURS, len(places) - 1)
     if nearest < 1:
         return Dots(places, np.full(len(places), np.inf))
     far = np.asarray(cKDTree(places).query(places, [nearest + 1])[0]).ravel()
     # a disc of this radius holds so many others and the dot itself
-    return Dots(places, 2 * far * np.sqrt(COVER / (nearest + 1)))
+    return Dots(places, 2 * far * np.sqrt(MAX_COVER / (nearest + 1)))
 
 
 def draw_dots_over(
-    axes: Axes, points: Array, inches: float, *, limit: int = MAX_DOTS, shrink: float = 1.0
+    axes: Axes, points: Array, inches: float, *, limit: int = MAX_DOTS, scale: float = 1.0
 ) -> None:
-    """Points (N, 2) as dots over a density, at most `limit` of them, smaller where they crowd.
+    """Draw points (N, 2) as dots over a density, smaller where they crowd.
 
-    Where they crowd the density is high, and its peaks are what a picture is of.
+    Where they crowd the density is high, and its peaks are what a picture should show.
 
     Args:
-        inches: of the figure that a unit of the axes takes.
-        shrink: what to multiply the dots' area by.
+        axes: The axes.
+        points: The points.
+        inches: Size in inches of a unit of the axes.
+        limit: Maximum number of dots.
+        scale: Factor of the dots' area.
     """
     chosen = thinned(points, limit)
-    most, shrink = _largest(len(chosen), shrink)
-    dots = roomy(chosen)
+    most, scale = _largest(len(chosen), scale)
+    dots = uncrowded(chosen)
     steps = np.ceil(np.log(most / (72 * inches * dots.widths).clip(1e-9, most)) / math.log(STEP))
     # one collection a size: a PDF or SVG holds its circle once
     for step in np.unique(steps):
         wanted = most * STEP**-step
-        width = max(wanted, min(LEAST * shrink**0.5, most))
-        ink = max((wanted / width) ** 2, FAINTEST)
+        width = max(wanted, min(MIN_WIDTH * scale**0.5, most))
+        ink = max((wanted / width) ** 2, MIN_INK)
         axes.scatter(
             *dots.places[steps == step].T, s=width**2, c="#ffffff", edgecolors=INK,
             linewidths=0.12 * width, alpha=0.8 * ink, zorder=5, rasterized=len(chosen) > MAX_DOTS,
@@ -93,36 +97,41 @@ def draw_dots(
     *,
     fill: str,
     limit: int = MAX_DOTS,
-    shrink: float = 1.0,
+    scale: float = 1.0,
     rasterized: bool = False,
 ) -> None:
-    """Points (N, 2) as dots of one size on a ground of one colour, at most `limit` of them.
+    """Draw points (N, 2) as dots of one size on a ground of one colour.
 
     Args:
-        shrink: what to multiply the dots' area by.
-        rasterized: whether they are pixels in a PDF or SVG, too; more than `MAX_DOTS` always are.
+        axes: The axes.
+        points: The points.
+        alpha: Opacity of the dots.
+        fill: Their colour.
+        limit: Maximum number of dots.
+        scale: Factor of the dots' area.
+        rasterized: Whether they are pixels in a PDF or SVG, too. More than `MAX_DOTS` always are.
     """
     points = thinned(points, limit)
-    width, _ = _largest(len(points), shrink)
+    width, _ = _largest(len(points), scale)
     axes.scatter(
         *points.T, s=width**2, c=fill, edgecolors="none", alpha=alpha, zorder=5,
         rasterized=rasterized or len(points) > MAX_DOTS,
     )  # fmt: skip
 
 
-def _largest(count: int, shrink: float) -> tuple[float, float]:
-    """Points across of the largest of so many dots, and their area's factor."""
-    shrink = max(shrink / max(1.0, count / MAX_DOTS) ** 0.7, 0.04)
-    return (shrink * max(2.0, 9.0 - count / 500)) ** 0.5, shrink
+def _largest(count: int, scale: float) -> tuple[float, float]:
+    """Return the width of the largest of `count` dots in points (1/72 inch), and the area's factor."""
+    scale = max(scale / max(1.0, count / MAX_DOTS) ** 0.7, 0.04)
+    return (scale * max(2.0, 9.0 - count / 500)) ** 0.5, scale
 
 
 def thinned(points: Array, limit: int = MAX_DOTS) -> Array:
-    """A random choice of at most `limit` of points (N, d), always the same."""
+    """Return a random choice of at most `limit` of points (N, d), always the same."""
     if len(points) <= limit:
         return points
     return points[np.random.default_rng(0).choice(len(points), limit, replace=False)]
 
 
-def dot_shrink(sheet: Sheet, side: float) -> float:
-    """Of dots in a square of so many inches: those on a screen have one of 5.6."""
+def dot_scale(sheet: Sheet, side: float) -> float:
+    """Return the factor of the area of dots in a square of `side` inches, 1 on a screen."""
     return max(0.2, (side / 5.6) ** 2) if sheet.printed else 1.0

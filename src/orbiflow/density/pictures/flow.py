@@ -1,9 +1,9 @@
-"""Picture of the flow that carries a base distribution to a density."""
+"""A picture of the flow that carries a base distribution to a density."""
 
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,23 +11,16 @@ import torch
 from PIL import Image
 from torch import Tensor
 
+from orbiflow.arguments import as_whole
 from orbiflow.arrays import Array
 from orbiflow.density.models import (
     Density,
     FlowDensity,
 )
-from orbiflow.density.pictures.axes import (
-    INK,
-    check_plane,
-    space_title,
-    view_of,
-)
-from orbiflow.density.pictures.frame import (
-    Room,
-    colour_bar,
-    framed,
-)
-from orbiflow.density.pictures.square import COLOURS
+from orbiflow.density.pictures.axes import INK, require_plane, space_title, view_of
+from orbiflow.density.pictures.frame import Room, colour_bar, make_frame, printed_room
+from orbiflow.density.pictures.ground import COLOURS
+from orbiflow.density.pictures.settings import PlotSettings
 from orbiflow.drawing import (
     Picture,
     Sheet,
@@ -42,55 +35,42 @@ if TYPE_CHECKING:
 
 SPEED = "speed, sides of the square per unit time"
 SCREEN = Room(1.8, 3.8, 10.8, 2.7, 1.7, 1.5)
-"""With a caption below."""
-
-
-def flow_png(
-    density: Density,
-    *,
-    cells: int = 3,
-    center: Sequence[float] | None = None,
-    width_px: int = 1600,
-) -> bytes:
-    """PNG of `flow_picture` for a screen, in 256 colours.
-
-    Raises:
-        OrbiflowError: as `flow_picture`, and for a size that cannot be made.
-    """
-    sheet = Sheet.screen(width_px)
-    return few_colours(flow_picture(density, cells=cells, center=center, sheet=sheet).file())
+"""Room on a screen, with a caption below."""
 
 
 def flow_picture(
     density: Density,
+    settings: PlotSettings | None = None,
     *,
     cells: int = 3,
-    center: Sequence[float] | None = None,
     sheet: Sheet | None = None,
 ) -> Picture:
-    """The time mean of the flow's vector fields, over the canonical square and its images.
+    """Draw the time mean of a flow's vector fields, over the canonical square and its images.
 
     The square is outlined; the letter F in every cell shows how the cell is the square's image. Of a
-    density with kernels beside the flow, the flow's part alone.
+    density with kernels beside the flow, the flow's part alone is drawn.
 
     Args:
-        density: on a two-dimensional space.
-        cells: along each side of the picture, 1 to 9.
-        center: of the torus' square; see `orbiflow.figures.density_axes.view_of`.
-        sheet: default a screen of 1600 pixels.
+        density: A density on a two-dimensional space.
+        settings: How it is drawn.
+        cells: Number of cells along each side of the picture, 1 to 9.
+        sheet: The sheet. Default: that of the settings.
 
     Raises:
-        OrbiflowError: for a space of another dimension, another number of cells, or a centre that
-            does not fit.
+        OrbiflowError: If the space has another dimension, the number of cells is not allowed, or a
+            centre does not fit.
     """
-    sheet, space = sheet or Sheet.screen(), density.space
-    check_plane(space)
-    if isinstance(cells, bool) or int(cells) != cells or not 1 <= cells <= 9:
-        raise OrbiflowError(f"cells must be an integer from 1 to 9, got {cells!r}")
-    view = view_of(space, center=center)
+    settings, space = settings or PlotSettings(), density.space
+    sheet = sheet or settings.sheet
+    require_plane(space)
+    as_whole(cells, "cells", 1, 9)
+    view = view_of(space, center=None if space.is_round else settings.center)
     low, high = 0.5 - cells / 2, 0.5 + cells / 2
     window = (low, low, high, high)
-    frame = framed(sheet, None, SPEED, room=None if sheet.printed else SCREEN)
+    room = SCREEN
+    if sheet.printed:
+        room = printed_room(sheet, 0.4, 0.6, 0.6, SPEED, ("0.00",))
+    frame = make_frame(sheet, room)
     axes = frame.axes
     axes.set_xlim(low, high)
     axes.set_ylim(low, high)  # `draw_magnitude` keeps these
@@ -103,13 +83,13 @@ def flow_picture(
     draw_cells(axes, space.group, window, pen=sheet.pen)
     colour_bar(axes.images[0], frame, sheet, SPEED)
     axes.set_axis_off()
-    title, signs = _subject(density), "canonical square outlined, its images thin"
+    title, signs = _title(density), "canonical square outlined, its images thin"
     if not sheet.printed:
         frame.figure.text(0.03, 0.025, f"{title}: {signs}", fontsize=sheet.text, color=INK)
     return Picture(frame.figure, sheet, title, f"The {signs}.")
 
 
-def _subject(density: Density) -> str:
+def _title(density: Density) -> str:
     name = f"the {space_title(density.space)}"
     weight, flow = flow_of(density)
     if flow is density:
@@ -121,7 +101,7 @@ def flow_of(density: Density) -> tuple[float, FlowDensity]:
     """Return the weight and the density of the flow to draw.
 
     Raises:
-        OrbiflowError: if the density has none.
+        OrbiflowError: If the density has none.
     """
     part = density.flow_part
     if part is None:
@@ -130,7 +110,7 @@ def flow_of(density: Density) -> tuple[float, FlowDensity]:
 
 
 def few_colours(png: bytes) -> bytes:
-    """The same picture of a flow in 256 colours: a third of the bytes."""
+    """Return a picture of a flow in 256 colours, a third of the bytes."""
     chart = Image.new("P", (1, 1))
     chart.putpalette(_palette().tobytes().ljust(768, b"\0"))
     image = Image.open(io.BytesIO(png)).convert("RGB")
@@ -141,8 +121,10 @@ def few_colours(png: bytes) -> bytes:
 
 
 def _palette() -> Array:
-    """Colours (N, 3), uint8: the speed's, so finely that no bands are seen; their mixtures with the
-    lines' white, more coarsely; those of outline and letters.
+    """Return the colours (N, 3), uint8, of a picture of a flow.
+
+    There are those of the speed, so finely that no bands are seen, more coarsely their mixtures with
+    the lines' white, and those of outline and letters.
     """
     from matplotlib import colormaps
 
@@ -159,7 +141,7 @@ def _palette() -> Array:
 
 @torch.no_grad()
 def mean_field(density: Density, points: Tensor) -> Tensor:
-    """The time mean of the flow's fields (..., d) at chart points (..., d), float64."""
+    """Return the time mean of the flow's fields (..., d) at chart points (..., d), float64."""
     flow = flow_of(density)[1].flow
     like = next(iter(flow.parameters()), points)
     vectors = [field(points.to(like)) for field in flow.segments]
@@ -173,7 +155,7 @@ def draw_cells(
     *,
     pen: Callable[[float], float] = float,
 ) -> None:
-    """The images of the canonical square in a window, a letter F in each, the square outlined."""
+    """Draw the images of the canonical square in a window, a letter F in each, the square outlined."""
     thin = pen(0.7)
     for t in np.arange(np.floor(window[0]), np.ceil(window[2]) + 1):
         axes.axvline(t, color="#ffffff", linewidth=thin, alpha=0.7, zorder=4)

@@ -1,4 +1,4 @@
-"""Axes of maps: the outline, the graticule with its degrees, coastlines."""
+"""Lines on maps: the outline, the graticule with its degrees, and coastlines."""
 
 from __future__ import annotations
 
@@ -8,45 +8,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from orbiflow.arrays import Array
-from orbiflow.density.pictures.axes import (
-    INK,
-    LETTER,
-    degrees,
-)
-from orbiflow.density.pictures.projections import (
-    Azimuthal,
-    Mollweide,
-    Projection,
-    WorldMap,
-)
+from orbiflow.density.pictures.axes import INK, LETTER, degrees_text
+from orbiflow.density.pictures.projections import Azimuthal, Mollweide, Projection, WorldMap
 from orbiflow.drawing import Sheet
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 COAST = "#ffffff"
-_FINE = 0.03
-"""Points on the sheet that a coast may be off, so that files stay small."""
+_TOLERANCE = 0.03
+"""Points (1/72 inch) by which a coast may be off, so that files stay small."""
 
 
-def set_limits(axes: Axes, projection: Projection) -> None:
-    """The whole map, undistorted, without a frame."""
-    ring = projection.outline()
-    axes.set_axis_off()
-    axes.set_xticks([])
-    axes.set_yticks([])
-    axes.set_xlim(*(ring[:, 0].min(), ring[:, 0].max()))
-    axes.set_ylim(*(ring[:, 1].min(), ring[:, 1].max()))
-    axes.set_aspect("equal")
-
-
-def aspect(projection: Projection) -> float:
-    """Width over height of the map."""
-    width, height = np.ptp(projection.outline(), axis=0)
-    return float(width / height)
-
-
-def dress_map(
+def draw_map_lines(
     axes: Axes,
     projection: Projection,
     sheet: Sheet,
@@ -55,13 +29,23 @@ def dress_map(
     coastlines: Sequence[Array] = (),
     light: bool = False,
 ) -> None:
-    """Outline, graticule, labels and coastlines of a map `side` inches wide.
+    """Draw a map's outline, graticule, labels and coastlines on axes without a frame.
 
     Args:
-        coastlines: lines (M, 2) of latitude and longitude.
-        light: whether the map is drawn on a light ground.
+        axes: The axes, which will show the whole map undistorted.
+        projection: The map.
+        sheet: The sheet of the figure.
+        side: Width of the axes in inches.
+        coastlines: Lines (M, 2) of latitude and longitude.
+        light: Whether the ground is light.
     """
     ring = projection.outline()
+    axes.set_axis_off()
+    axes.set_xticks([])
+    axes.set_yticks([])
+    axes.set_xlim(*(ring[:, 0].min(), ring[:, 0].max()))
+    axes.set_ylim(*(ring[:, 1].min(), ring[:, 1].max()))
+    axes.set_aspect("equal")
     axes.plot(*ring.T, color=INK, linewidth=sheet.pen(1.2, 0.4), clip_on=False, zorder=7)
     lats, lons = graticule(projection)
     line = "#9a9a96" if light else "#ffffff"
@@ -70,16 +54,16 @@ def dress_map(
     for each in (*map(parallel, lats), *map(meridian, lons)):
         for piece in projection.pieces(each):
             axes.plot(*piece.T, **style)
-    _coasts(axes, projection, sheet, side, coastlines, light)
-    texts = _Texts(axes, projection, sheet, side, light)
+    _draw_coastlines(axes, projection, sheet, side, coastlines, light)
+    labels = _Labels(axes, projection, sheet, side, light)
     if isinstance(projection, WorldMap):
-        texts.round_the_world(lats, lons)
+        labels.along_the_sides(lats, lons)
     else:
-        texts.round_the_rim(lats, lons)
+        labels.along_the_rim(lats, lons)
 
 
 def graticule(projection: Projection) -> tuple[list[float], list[float]]:
-    """Latitudes and longitudes in degrees of the lines that are drawn."""
+    """Return the latitudes and longitudes, in degrees, of the lines that are drawn."""
     step = 30.0
     if isinstance(projection, Azimuthal):
         step = next(s for s in (1.0, 2.0, 5.0, 10.0, 15.0, 30.0) if s >= projection.radius / 3.5)
@@ -94,18 +78,18 @@ def graticule(projection: Projection) -> tuple[list[float], list[float]]:
 
 
 def parallel(lat: float) -> Array:
-    """The parallel of a latitude, (361, 2)."""
+    """Return the parallel of a latitude, (361, 2)."""
     lon = np.linspace(-180.0, 180.0, 361)
     return np.stack([np.full_like(lon, lat), lon], axis=-1)
 
 
 def meridian(lon: float) -> Array:
-    """The meridian of a longitude from pole to pole, (181, 2)."""
+    """Return the meridian of a longitude from pole to pole, (181, 2)."""
     lat = np.linspace(-90.0, 90.0, 181)
     return np.stack([lat, np.full_like(lat, lon)], axis=-1)
 
 
-def _coasts(
+def _draw_coastlines(
     axes: Axes,
     projection: Projection,
     sheet: Sheet,
@@ -121,7 +105,7 @@ def _coasts(
     unit = np.ptp(projection.outline()[:, 0]) / (72 * side)
     pieces = [p for line in coastlines for p in projection.pieces(np.asarray(line, dtype=float))]
     # below the resolution of any printer; islands of a point stay as dots
-    fine = [np.array(LineString(p).simplify(_FINE * unit).coords) for p in pieces]
+    fine = [np.array(LineString(p).simplify(_TOLERANCE * unit).coords) for p in pieces]
     axes.add_collection(
         LineCollection(
             fine,
@@ -134,8 +118,8 @@ def _coasts(
     )
 
 
-class _Texts:
-    """Degrees beside the lines of a graticule."""
+class _Labels:
+    """The degrees beside the lines of a graticule, none of which touch."""
 
     def __init__(
         self,
@@ -147,22 +131,25 @@ class _Texts:
     ) -> None:
         self.axes, self.projection, self.sheet, self.light = axes, projection, sheet, light
         self.size = 72 * side / float(np.ptp(projection.outline()[:, 0]))  # points a unit
-        net = isinstance(projection, Azimuthal) and projection.flipped
-        self.north_south, self.east_west = ("", "") if net else ("NS", "EW")
-        self.net = net
+        self.is_net = isinstance(projection, Azimuthal) and projection.flipped
+        self.north_south, self.east_west = ("", "") if self.is_net else ("NS", "EW")
         self.boxes: list[Array] = []
 
-    def longitude(self, lon: float) -> str:
-        return degrees(lon % 360 if self.net else lon, self.east_west)
+    def latitude(self, lat: float) -> str:
+        """Return the text of a latitude."""
+        return degrees_text(lat, self.north_south)
 
-    def round_the_world(self, lats: list[float], lons: list[float]) -> None:
-        """Latitudes at the left, longitudes below, or on the equator where the poles are points."""
+    def longitude(self, lon: float) -> str:
+        """Return the text of a longitude."""
+        return degrees_text(lon % 360 if self.is_net else lon, self.east_west)
+
+    def along_the_sides(self, lats: list[float], lons: list[float]) -> None:
+        """Write latitudes at the left and longitudes below, or on the equator if poles are points."""
         projection, gap = self.projection, 0.5 * self.sheet.small
         west = projection.center[1] - 180 + 1e-7
         for lat in lats:
             end = projection.forward(np.array([[lat, west]]))[0]
-            text = degrees(lat, self.north_south)
-            self._outside(text, end, (-gap, 0.0), ha="right", va="center")
+            self._outside(self.latitude(lat), end, (-gap, 0.0), ha="right", va="center")
         inside = isinstance(projection, Mollweide)
         middle = projection.center[1]
         step = self._step(projection)
@@ -180,45 +167,37 @@ class _Texts:
                 self._outside(text, place, (0.0, -gap), ha="center", va="top")
 
     def _step(self, projection: Projection) -> float:
-        """Degrees between longitudes whose texts do not touch along the lower side."""
+        """Return degrees between longitudes whose texts do not touch along the lower side."""
         lat = 0.0 if isinstance(projection, Mollweide) else -90.0
         ends = np.array([[lat, projection.center[1]], [lat, projection.center[1] + 60.0]])
         room = self.size * float(np.ptp(projection.forward(ends)[:, 0]))
         letters = 7.5 * LETTER * self.sheet.small
         return next((s for s in (60.0, 90.0, 120.0) if room * s / 60 > letters), 180.0)
 
-    def round_the_rim(self, lats: list[float], lons: list[float]) -> None:
-        """Where lines meet the rim, else on them; what would touch another is left out."""
+    def along_the_rim(self, lats: list[float], lons: list[float]) -> None:
+        """Write texts where lines meet the rim, else on them."""
         projection = self.projection
         assert isinstance(projection, Azimuthal)
         lat0, lon0 = projection.center
         polar = abs(lat0) > 89
-        missed = []
-        for lon in sorted(lons, key=lambda v: (v % 90 != 0, v % 60 != 0)):
-            if not self._at_rim(meridian(lon), self.longitude(lon)) and not polar:
-                missed.append(lon)
-        across = (
-            []
-            if polar
-            else [
-                lat
-                for lat in lats
-                if not self._at_rim(parallel(lat), degrees(lat, self.north_south))
-            ]
-        )
-        beside = lon0 + (15 if polar else 0)
-        for lat in lats if polar else across:
-            if projection.contains(np.array([[lat, beside]]))[0]:
-                place = projection.forward(np.array([[lat, beside]]))[0]
-                self._inside(degrees(lat, self.north_south), place)
         level = min(lats, key=lambda lat: abs(lat - lat0))
-        for lon in missed:
-            here = np.array([[level, lon]])
-            if projection.contains(here)[0]:
-                self._inside(self.longitude(lon), projection.forward(here)[0])
+        order = sorted(lons, key=lambda v: (v % 90 != 0, v % 60 != 0))
+        missed = [lon for lon in order if not self._at_rim(meridian(lon), self.longitude(lon))]
+        if not polar:
+            lats = [lat for lat in lats if not self._at_rim(parallel(lat), self.latitude(lat))]
+        for lat in lats:
+            self._on_map(self.latitude(lat), lat, lon0 + (15 if polar else 0))
+        for lon in [] if polar else missed:
+            self._on_map(self.longitude(lon), level, lon)
+
+    def _on_map(self, text: str, lat: float, lon: float) -> None:
+        """Write a text at a direction, if the map shows it."""
+        direction = np.array([[lat, lon]])
+        if self.projection.contains(direction)[0]:
+            self._inside(text, self.projection.forward(direction)[0])
 
     def _at_rim(self, line: Array, text: str) -> bool:
-        """Whether a line has its text outside the rim, at one end at least."""
+        """Write a text outside the rim, where a line meets it, and return whether there was room."""
         projection = self.projection
         assert isinstance(projection, Azimuthal)
         done = False
@@ -259,7 +238,7 @@ class _Texts:
         )  # fmt: skip
 
     def _free(self, text: str, at: Array, ha: str, va: str) -> bool:
-        """Whether nothing is there yet; then it is taken."""
+        """Return whether there is no text yet, and reserve the place."""
         size = np.array([(len(text) + 0.8) * LETTER, 1.3]) * self.sheet.small
         left = {"left": 0.0, "center": 0.5, "right": 1.0}[ha]
         low = {"bottom": 0.0, "center": 0.5, "top": 1.0}[va]

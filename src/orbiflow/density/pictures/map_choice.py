@@ -1,4 +1,4 @@
-"""Which map suits a round space and what is drawn on it."""
+"""The map that suits a round space and the points drawn on it, and its caption."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from torch import Tensor
 
 from orbiflow.arrays import Array
-from orbiflow.density.pictures.axes import degrees
+from orbiflow.density.pictures.axes import degrees_text
 from orbiflow.density.pictures.map_axes import graticule
 from orbiflow.density.pictures.projections import (
     Azimuthal,
@@ -22,55 +22,40 @@ from orbiflow.density.pictures.projections import (
     Stereographic,
     WorldMap,
 )
-from orbiflow.density.spaces import (
-    RoundSpace,
-    Space,
-    to_latlon,
-    to_vectors,
-)
-from orbiflow.errors import OrbiflowError
+from orbiflow.density.pictures.settings import PlotSettings
+from orbiflow.density.spaces import RoundSpace, Space, to_latlon, to_vectors
+from orbiflow.errors import OrbiflowError, SettingError
 
-AUTO = "auto"
 WORLD: dict[str, type[WorldMap]] = {c.name: c for c in (EqualEarth, Mollweide, PlateCarree)}
 CENTRED: dict[str, type[Azimuthal]] = {c.name: c for c in (Lambert, Stereographic)}
 NETS: dict[str, type[Azimuthal]] = {"schmidt": Lambert, "wulff": Stereographic}
 """Nets of structural geology: latitude is plunge or inclination, longitude trend or declination."""
 
-PROJECTIONS = (AUTO, *WORLD, *CENTRED, *NETS)
-
 _NET_WORDS = ("inc", "plunge", "dip")
-"""How names of the first column begin where rows are directions in a net, not places on a globe."""
+"""How names of the first column begin if rows are directions in a net, not places on a globe."""
 
-_RADII = (5, 10, 15, 20, 30, 40, 50, 60, 75, 90)
+_RADII = (5, 10, 15, 20, 30, 40, 50, 60, 75)
 _SHARE = 0.995
-"""Of the points that a map of less than the sphere has to show."""
+"""Share of the points that a map of less than the sphere has to show."""
 
 
 def chosen_map(
     space: Space,
     points: Tensor,
-    *,
-    projection: str = AUTO,
-    center: Sequence[float] | None = None,
-    radius: float | None = None,
+    settings: PlotSettings | None = None,
     names: Sequence[str] | None = None,
 ) -> Projection:
-    """The map of a sphere or projective plane.
-
-    "auto" is, on the sphere, Lambert's projection about the points where nearly all of them are in one
-    hemisphere, with a radius that shows them, else Equal Earth; on the projective plane Lambert's about
-    the north pole, or Schmidt's net where `names` are of inclinations, plunges or dips.
+    """Return the map of a sphere or projective plane that settings ask for, or that suits points.
 
     Args:
-        points: chart points (N, 2), such as the data.
-        projection: one of `PROJECTIONS`.
-        center: of the map: (latitude, longitude), or (longitude,) of its middle meridian.
-        radius: in degrees, of a map about a centre: 90, a hemisphere, at most.
-        names: of the data's columns.
+        space: The sphere or projective plane.
+        points: Chart points (N, 2), such as the data.
+        settings: Settings, with the map's projection, centre and radius.
+        names: Names of the data's columns, which may ask for a net.
 
     Raises:
-        OrbiflowError: for a space without directions, another projection, or a centre or radius that
-            it cannot have.
+        OrbiflowError: If the space has no directions, or the projection cannot have such a centre or
+            radius.
 
     >>> from orbiflow.density import Sphere
     >>> here = Sphere().to_chart([[40.0, 140.0], [44.0, 142.0]])
@@ -79,16 +64,14 @@ def chosen_map(
     """
     if not space.is_round:
         raise OrbiflowError(f"maps are of the sphere and the projective plane, not of {space!r}")
-    if projection not in PROJECTIONS:
-        raise OrbiflowError(
-            f"projection must be one of {', '.join(PROJECTIONS)}, got {projection!r}"
-        )
-    middle = None if center is None else _center(center)
+    settings = settings or PlotSettings()
+    projection, radius = settings.projection, settings.radius
+    middle = None if settings.center is None else _checked_center(settings.center)
     axial = space.name == "projective-plane"
     cap = None if axial else smallest_cap(cast(RoundSpace, space).vectors(points))
-    if projection == AUTO:
+    if projection == "auto":
         if axial:
-            projection = "schmidt" if _of_a_net(names) and middle is None else "lambert"
+            projection = "schmidt" if _name_a_net(names) and middle is None else "lambert"
         elif middle is not None:
             projection = "lambert" if len(middle) == 2 and middle[0] else "equal-earth"
         else:
@@ -97,17 +80,18 @@ def chosen_map(
         return _world(WORLD[projection], space, middle, radius)
     if projection in NETS:
         if middle is not None:
-            raise OrbiflowError(
-                f"a {projection} net has the vertical in its middle: give no centre"
+            raise SettingError(
+                f"{{center}} does not apply to a {projection} net, which has the vertical in its "
+                "middle: give no centre"
             )
         return NETS[projection]((90.0, 0.0), float(radius or 90.0), flipped=True)
     return _centred(CENTRED[projection], middle, radius, axial, cap)
 
 
 def smallest_cap(vectors: Array) -> tuple[tuple[float, float], float] | None:
-    """A centre in whole degrees, and a radius within which nearly all unit vectors (N, 3) are.
+    """Return a centre in whole degrees, and a radius that shows nearly all unit vectors (N, 3).
 
-    None if they do not fit into three quarters of a hemisphere's radius.
+    It is None if they do not fit into 75 degrees around a centre.
     """
     mean = vectors.mean(axis=0) if len(vectors) else np.zeros(3)
     if np.linalg.norm(mean) < 0.2:
@@ -116,7 +100,7 @@ def smallest_cap(vectors: Array) -> tuple[tuple[float, float], float] | None:
     middle = to_vectors([[lat, lon]])[0]
     apart = np.degrees(np.arccos(np.clip(vectors @ middle, -1, 1)))
     reach = 1.1 * float(np.quantile(apart, _SHARE, method="higher"))
-    fitting = [float(r) for r in _RADII[:-1] if r >= reach]
+    fitting = [float(r) for r in _RADII if r >= reach]
     return ((float(lat), float(lon)), fitting[0]) if fitting else None
 
 
@@ -124,12 +108,14 @@ def _world(
     kind: type[WorldMap], space: Space, middle: tuple[float, ...] | None, radius: float | None
 ) -> Projection:
     if space.name == "projective-plane":
-        raise OrbiflowError(
-            f"a direction and its opposite are one point of the projective plane: it needs a map of "
-            f"one hemisphere, {', '.join((*CENTRED, *NETS))}, not {kind.name}"
+        raise SettingError(
+            "a direction and its opposite are one point of the projective plane, which needs a map "
+            f"of one hemisphere: {{projection}} must be {', '.join((*CENTRED, *NETS))}, got {kind.name}"
         )
     if radius is not None:
-        raise OrbiflowError(f"a map of the whole sphere ({kind.name}) has no radius")
+        raise SettingError(
+            f"a map of the whole sphere ({kind.name}) has no radius: leave {{radius}} out"
+        )
     middle = middle or (0.0,)
     return kind(middle if len(middle) == 2 else (0.0, middle[0]))  # pyright: ignore[reportArgumentType]
 
@@ -150,21 +136,22 @@ def _centred(
     return kind((middle[0], middle[1]), float(radius or reach))
 
 
-def _center(center: Sequence[float]) -> tuple[float, ...]:
+def _checked_center(center: Sequence[float]) -> tuple[float, ...]:
     values = tuple(float(value) for value in center)
     if len(values) not in (1, 2) or not all(map(math.isfinite, values)):
-        raise OrbiflowError(
-            f"a map's centre is a latitude and a longitude, or a longitude, in degrees; got {center!r}"
+        raise SettingError(
+            "{center} must be a latitude and a longitude, or a longitude, in degrees, such as 40,140, "
+            f"got {list(center)}"
         )
     return values
 
 
-def _of_a_net(names: Sequence[str] | None) -> bool:
+def _name_a_net(names: Sequence[str] | None) -> bool:
     return bool(names) and names is not None and names[0].strip().lower().startswith(_NET_WORDS)
 
 
 def subtitle(projection: Projection) -> str:
-    """The projection in a title."""
+    """Return the projection as a title has it."""
     if _is_net(projection):
         return "Schmidt net (equal-area)" if projection.is_equal_area else "Wulff net (equal-angle)"
     return projection.title
@@ -176,19 +163,23 @@ def caption(
     notes: Sequence[str] = (),
     *,
     dots: tuple[int, int] | None = None,
-    coasts: bool = False,
+    coastlines: bool = False,
 ) -> str:
-    """Projection, centre, what is one point, what lines and dots are; then `notes`.
+    """Return a map's caption: projection, centre, which points are one, lines and dots, and notes.
 
     Args:
-        dots: how many are drawn, and of how many points.
+        space: The space.
+        projection: The map.
+        notes: What else to say.
+        dots: How many dots are drawn, and of how many points.
+        coastlines: Whether there are any.
 
     >>> from orbiflow.density import Sphere
     >>> from orbiflow.density.pictures.projections import Mollweide
     >>> caption(Sphere(), Mollweide((0.0, 150.0)))
     'The sphere in the Mollweide projection (equal-area), about 150° E. Lines every 30°.'
     """
-    parts = [_projected(space, projection)]
+    parts = [_description(space, projection)]
     if space.name == "projective-plane":
         parts.append(
             "An axis is drawn at the end in this hemisphere; opposite points of the rim are one axis"
@@ -196,11 +187,10 @@ def caption(
     lats, lons = graticule(projection)
     steps = {f"{line[1] - line[0]:g}°" for line in (lats, lons) if len(line) > 1}
     steps = sorted(steps, key=lambda text: float(text[:-1]))
-    if len(steps) == 1:
-        parts.append(f"Lines every {steps[0]}" + (", and coastlines" if coasts else ""))
-    else:
+    lines = f"Lines every {steps[0]}"
+    if len(steps) > 1:
         lines = f"Parallels every {lats[1] - lats[0]:g}°, meridians every {lons[1] - lons[0]:g}°"
-        parts.append(lines + (", and coastlines" if coasts else ""))
+    parts.append(lines + (", and coastlines" if coastlines else ""))
     if dots is not None:
         shown, known = dots
         parts.append(f"Dots are {f'{shown} of ' if shown < known else ''}{known} points")
@@ -208,7 +198,7 @@ def caption(
     return " ".join(f"{part}." for part in parts)
 
 
-def _projected(space: Space, projection: Projection) -> str:
+def _description(space: Space, projection: Projection) -> str:
     lat, lon = projection.center
     frame = (
         ""
@@ -216,7 +206,7 @@ def _projected(space: Space, projection: Projection) -> str:
         else "; latitudes are from the x, y plane towards z, longitudes from x towards y"
     )
     if not isinstance(projection, Azimuthal):
-        middle = degrees((lon + 180) % 360 - 180, "EW")
+        middle = degrees_text((lon + 180) % 360 - 180, "EW")
         return f"The sphere in {projection.title}, about {middle}{frame}"
     within = (
         "the hemisphere" if projection.radius == 90 else f"what is within {projection.radius:g}°"
@@ -229,7 +219,7 @@ def _projected(space: Space, projection: Projection) -> str:
     if abs(lat) == 90:
         where = "the north pole" if lat > 0 else "the south pole"
     else:
-        where = f"{degrees(lat, 'NS')}, {degrees((lon + 180) % 360 - 180, 'EW')}"
+        where = f"{degrees_text(lat, 'NS')}, {degrees_text((lon + 180) % 360 - 180, 'EW')}"
     seen = f"about {where} in {projection.title}, seen from outside{frame}"
     return f"{within[0].upper()}{within[1:]} {seen}"
 

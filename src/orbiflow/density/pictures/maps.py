@@ -1,10 +1,10 @@
-"""A density of directions or axes on a map."""
+"""Pictures of densities of directions or axes on maps."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple, TypedDict, Unpack, cast
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
 import torch
@@ -13,54 +13,31 @@ from torch import Tensor
 
 from orbiflow.arrays import Array
 from orbiflow.density.models import Density
-from orbiflow.density.pictures.axes import chart_points, space_title
-from orbiflow.density.pictures.dots import (
-    MAX_DOTS,
-    dot_shrink,
-    draw_dots_over,
-)
+from orbiflow.density.pictures.axes import chart_points
 from orbiflow.density.pictures.frame import (
     NARROW,
+    Frame,
     Room,
-    bar_beside,
-    bar_under,
-    framed,
-    shade_bar,
+    room_for_bar_below,
+    room_for_bar_beside,
+    write_caption,
 )
-from orbiflow.density.pictures.legend import (
-    SMALLER,
-    wrapped_words,
-    write_below,
+from orbiflow.density.pictures.ground import (
+    LIGHT,
+    Colouring,
+    Ground,
+    Panel,
+    Words,
+    draw_density,
+    draw_samples,
 )
-from orbiflow.density.pictures.map_axes import (
-    aspect,
-    dress_map,
-    set_limits,
-)
-from orbiflow.density.pictures.map_choice import (
-    caption,
-    chosen_map,
-    subtitle,
-)
+from orbiflow.density.pictures.map_axes import draw_map_lines
+from orbiflow.density.pictures.map_choice import caption, chosen_map, subtitle
 from orbiflow.density.pictures.projections import Azimuthal, Projection
-from orbiflow.density.pictures.regions import (
-    RegionLine,
-    draw_regions,
-    log_natural,
-    region_note,
-)
-from orbiflow.density.pictures.scale import (
-    Shade,
-    bar_label,
-    bar_ticks,
-    shading,
-)
-from orbiflow.density.pictures.square import COLOURS
-from orbiflow.density.pictures.values import (
-    chosen_scale,
-    density_on_map,
-    is_sharp_on_map,
-)
+from orbiflow.density.pictures.regions import log_natural, region_lines
+from orbiflow.density.pictures.scale import shading
+from orbiflow.density.pictures.settings import PlotSettings
+from orbiflow.density.pictures.values import chosen_scale, density_on_map, is_sharp
 from orbiflow.density.spaces import (
     RoundSpace,
     Space,
@@ -72,182 +49,176 @@ from orbiflow.drawing import Picture, Sheet
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.image import AxesImage
 
 _PIXELS = 200_000
-"""At which a density is evaluated, about: sharp in two columns of a journal."""
+"""About how many pixels a density is evaluated at: sharp in two columns of a journal."""
 
 _MARGIN = 3
 """Pixels evaluated beyond the outline, which is cut out of the picture as a curve."""
 
-
-class MapOptions(TypedDict, total=False):
-    """Of `map_picture` and `map_samples_picture`; see `orbiflow.figures.map_choice.chosen_map`."""
-
-    projection: str | Projection
-    center: Sequence[float] | None
-    radius: float | None
-    names: Sequence[str] | None
-    coastlines: Sequence[ArrayLike] | None
+_BESIDE = 120 / 25.4
+"""Inches of a printed figure below which discs are above each other, for room round their rims."""
 
 
 def map_picture(
     density: Density,
     samples: Tensor | None = None,
+    settings: PlotSettings | None = None,
     *,
-    measure: str = "natural",
-    scale: str = "linear",
-    sheet: Sheet | None = None,
     about: Tensor | None = None,
-    most: int = MAX_DOTS,
-    regions: Sequence[RegionLine] = (),
-    **options: Unpack[MapOptions],
+    coastlines: Sequence[ArrayLike] = (),
+    sheet: Sheet | None = None,
 ) -> Picture:
-    """A density on a map with its graticule.
+    """Draw a density on a map with its graticule.
 
-    The density is evaluated at each pixel of the map, so that nothing is stretched or sewn; the pixels
-    end at a curve. On the projective plane each axis is drawn at that of its ends which the map shows.
+    The density is evaluated at each pixel of the map, so that nothing is stretched or sewn; the
+    pixels end at a curve. On the projective plane each axis is drawn at the end that the map shows.
 
     Args:
-        density: on the sphere or the projective plane.
-        samples: data or samples to draw as dots, chart points (N, 2); smaller where they crowd.
-        measure, scale: as for `orbiflow.figures.density_square.density_picture`.
-        sheet: default a screen of 1600 pixels.
-        most: dots, of more samples a random choice that is always the same.
-        about: chart points (N, 2) that the map should show, default `samples`.
-        regions: of highest density, whose edges are drawn as lines.
+        density: A density on the sphere or the projective plane.
+        samples: Data or samples to draw as dots, chart points (N, 2). Of too many a random choice is
+            drawn, always the same; dots are smaller where they crowd.
+        settings: How it is drawn.
+        about: Chart points (N, 2) that the map should show. Default: `samples`.
+        coastlines: Lines (M, 2) of latitude and longitude.
+        sheet: The sheet. Default: that of the settings.
 
     Raises:
-        OrbiflowError: for another space, and for options that do not fit it.
+        OrbiflowError: If the density is on another space, or settings do not fit it.
     """
-    sheet, space = sheet or Sheet.screen(), density.space
+    settings = settings or PlotSettings()
     if about is None:
         about = torch.empty(0, 2) if samples is None else samples
-    projection, coasts = map_and_coasts(space, about, options)
-    drawn = coloured_map(density, projection, measure, scale)
-    shade = drawn.shade
-    label = bar_label(shade, space, measure)
-    dots = None if samples is None else places_on(space, projection, samples)
-    notes = [*([] if dots is None else [SMALLER]), drawn.why]
-    notes += [region_note(regions)] if regions else []
-    if is_sharp_on_map(density, drawn.pixels.angle):
-        size = f"{math.degrees(drawn.pixels.angle):.2g}°"
-        notes.append(f"peaks narrower than {size} are averaged over it")
-    counts = None if dots is None else (min(most, len(dots)), len(dots))
-    words = caption(space, projection, notes, dots=counts, coasts=bool(coasts))
-    room = _room(sheet, projection, label, [tick.text for tick in bar_ticks(shade)], words)
-    frame = framed(sheet, None, room=room, aspect=aspect(projection))
-    set_limits(frame.axes, projection)
-    image = drawn.on(frame.axes)
-    if regions:
-        drawn.draw_regions(frame.axes, regions, sheet)
-    if dots is not None:
-        shrink = dot_shrink(sheet, max(1.0, frame.side / aspect(projection)))
-        left, right = frame.axes.get_xlim()
-        draw_dots_over(frame.axes, dots, frame.side / (right - left), limit=most, shrink=shrink)
-    dress_map(frame.axes, projection, sheet, frame.side, coastlines=coasts)
-    shade_bar(image, frame, sheet, shade, label)
-    title = f"Density on the {space_title(space)}"
-    if not sheet.printed:
+    ground = Map(density.space, _projection(density.space, about, settings), coastlines)
+    lines = region_lines(density, settings)
+    return draw_density(ground, density, settings, dots=samples, regions=lines, sheet=sheet)
+
+
+def map_samples_picture(
+    density: Density,
+    data: Tensor | None,
+    samples: Tensor,
+    settings: PlotSettings | None = None,
+    *,
+    coastlines: Sequence[ArrayLike] = (),
+    sheet: Sheet | None = None,
+) -> Picture:
+    """Draw data and samples on two maps; without data, the density and samples.
+
+    Args:
+        density: A density on the sphere or the projective plane.
+        data: Chart points (N, 2).
+        samples: Chart points (M, 2).
+        settings: How it is drawn.
+        coastlines: Lines (M, 2) of latitude and longitude.
+        sheet: The sheet. Default: that of the settings.
+
+    Raises:
+        OrbiflowError: As `map_picture`.
+    """
+    settings = settings or PlotSettings()
+    projection = _projection(density.space, samples if data is None else data, settings)
+    ground = Map(density.space, projection, coastlines)
+    return draw_samples(ground, density, settings, data, samples, sheet=sheet)
+
+
+def _projection(space: Space, about: Tensor, settings: PlotSettings) -> Projection:
+    return chosen_map(space, chart_points(space, about), settings, settings.names)
+
+
+class Map(Ground):
+    """A map of the sphere or the projective plane.
+
+    Raises:
+        OrbiflowError: If coastlines are not lines (N, 2) of latitude and longitude.
+    """
+
+    caption_below = True
+
+    def __init__(
+        self, space: Space, projection: Projection, coastlines: Sequence[ArrayLike] = ()
+    ) -> None:
+        self.space, self.projection = space, projection
+        self.coastlines = [checked_table(line, (2,), "a coastline") for line in coastlines]
+        for line in self.coastlines:
+            to_vectors(line)  # refuses latitudes beyond the poles
+        self.outline = projection.outline()
+        width, height = np.ptp(self.outline, axis=0)
+        self.width, self.aspect = float(width), float(width / height)
+        self.is_disc = isinstance(projection, Azimuthal)
+        self.title_gap = 2.2 if self.is_disc else 0.6
+
+    def places(self, points: Tensor) -> Array:
+        return places_on(self.space, self.projection, points)
+
+    def colouring(self, density: Density, settings: PlotSettings) -> Colouring:
+        pixels = pixels_of(self.projection)
+        points = cast(RoundSpace, self.space).vectors_to_chart(to_vectors(pixels.latlon))
+        values = density_on_map(density, points, settings.measure, pixels.angle)
+        chosen = chosen_scale(density, settings.measure, settings.scale)
+        shade = shading(values[pixels.within], pixels.areas[pixels.within], log=chosen.log)
+
+        def logs() -> Array:
+            found = log_natural(density, values, points, settings.measure)
+            return pixels.table(found, math.nan)
+
+        note = ""
+        if is_sharp(density, angle=pixels.angle):
+            size = f"{math.degrees(pixels.angle):.2g}°"
+            note = f"peaks narrower than {size} are averaged over it"
+        places = pixels.table(shade.places(values), 0.0)
+        return Colouring(places, pixels.extent, shade, chosen.reason, note, logs, self.outline)
+
+    def room(self, sheet: Sheet, label: str, ticks: Sequence[str]) -> Room:
+        above = 0.8 if sheet.printed else 3.2
+        if self.is_disc and (not sheet.printed or sheet.width >= NARROW):
+            beside = Room(3.6, 1.8, 0.0, above + 1.2, 4.4, 1.2)
+            return room_for_bar_beside(sheet, beside, label, ticks)
+        left, right, top = (3.4, 3.4, 1.2) if self.is_disc else (3.6, 1.8, 0.0)
+        under = Room(left, 0.0, right, above + top, 2.2, 1.0)
+        return room_for_bar_below(sheet, under, label)
+
+    def panels_room(self, sheet: Sheet) -> tuple[Room, bool]:
+        if not self.is_disc:
+            return Room(3.6, 2.4, 1.8, 2.2, 4.4, 0.0), True
+        stacked = sheet.printed and sheet.width < _BESIDE
+        return Room(3.6, 1.8, 3.6, 3.8, 5.6 if stacked else 7.4, 0.0), stacked
+
+    def fill(self, axes: Axes) -> None:
+        axes.fill(*self.outline.T, color=LIGHT, linewidth=0, zorder=0)
+
+    def draw_axes(self, axes: Axes, sheet: Sheet, side: float, panel: Panel) -> None:
+        """Draw the outline, the graticule with its degrees, and coastlines."""
+        draw_map_lines(
+            axes, self.projection, sheet, side, coastlines=self.coastlines, light=panel.light
+        )
+
+    def caption(self, notes: Sequence[str], dots: tuple[int, int] | None) -> str:
+        return caption(
+            self.space, self.projection, notes, dots=dots, coastlines=bool(self.coastlines)
+        )
+
+    def samples_caption(self, notes: Sequence[str]) -> str:
+        return self.caption(notes or ["dots are points"], None)
+
+    def write_on_screen(self, frame: Frame, sheet: Sheet, title: str, words: Words) -> None:
+        top = 1 - 1.6 * sheet.em / frame.figure.get_size_inches()[1]
         frame.figure.text(
-            0.5, 1 - 1.6 * sheet.em / frame.figure.get_size_inches()[1],
-            f"{title}: {subtitle(projection)}", ha="center", va="center",
+            0.5, top, f"{title}: {subtitle(self.projection)}", ha="center", va="center",
             fontsize=1.15 * sheet.text,
         )  # fmt: skip
-        write_below(frame.figure, words, sheet)
-    return Picture(frame.figure, sheet, title, words)
-
-
-def map_and_coasts(
-    space: Space, about: Tensor, options: MapOptions
-) -> tuple[Projection, list[Array]]:
-    """What is asked for, or suits.
-
-    Raises:
-        OrbiflowError: as `chosen_map`, and for coastlines that are not (N, 2).
-    """
-    asked: dict[str, Any] = dict(options)
-    lines = asked.pop("coastlines", None) or ()
-    coasts = [checked_table(line, (2,), "a coastline") for line in lines]
-    for line in coasts:
-        to_vectors(line)
-    if isinstance(asked.get("projection"), Projection):
-        return asked["projection"], coasts
-    return chosen_map(space, chart_points(space, about), **asked), coasts
-
-
-class ColouredMap(NamedTuple):
-    """A density on a map.
-
-    - `places`: (N,) of its pixels on the colour bar.
-    - `why`: the scale is linear or logarithmic.
-    - `log_natural`: called, (N,) logarithms of the density in natural measure: for lines alone.
-    """
-
-    projection: Projection
-    pixels: Pixels
-    places: Array
-    shade: Shade
-    why: str
-    log_natural: Callable[[], Array]
-
-    def draw_regions(self, axes: Axes, regions: Sequence[RegionLine], sheet: Sheet) -> None:
-        """Lines about regions, cut out along the outline as the picture is."""
-        from matplotlib.patches import Polygon
-
-        table = np.full(self.pixels.shown.shape, np.nan)
-        table[self.pixels.shown] = self.log_natural()
-        ends, counts = np.reshape(self.pixels.extent, (2, 2)), table.shape[::-1]
-        x, y = (
-            low + (high - low) * (np.arange(count) + 0.5) / count
-            for (low, high), count in zip(ends, counts, strict=True)
-        )
-        ring = Polygon(self.projection.outline().tolist(), closed=True, transform=axes.transData)
-        draw_regions(axes, regions, x, y, table, sheet, ring)
-
-    def on(self, axes: Axes) -> AxesImage:
-        """One picture cut out along the outline: neither seams nor steps at the rim."""
-        from matplotlib.patches import Polygon
-
-        table = np.zeros(self.pixels.shown.shape)
-        table[self.pixels.shown] = self.places
-        image = axes.imshow(
-            table, extent=self.pixels.extent, origin="lower", cmap=COLOURS,
-            interpolation="bicubic", vmin=0, vmax=1, aspect="auto", zorder=1,
-        )  # fmt: skip
-        set_limits(axes, self.projection)
-        ring = self.projection.outline().tolist()
-        image.set_clip_path(Polygon(ring, closed=True, transform=axes.transData))
-        return image
-
-
-def coloured_map(density: Density, projection: Projection, measure: str, scale: str) -> ColouredMap:
-    """The colours of a density on a map.
-
-    Raises:
-        OrbiflowError: for an unknown measure or scale.
-    """
-    pixels = pixels_of(projection)
-    points = cast(RoundSpace, density.space).vectors_to_chart(to_vectors(pixels.latlon))
-    values = density_on_map(density, points, measure, pixels.angle)
-    chosen = chosen_scale(density, measure, scale)
-    shade = shading(values[pixels.within], pixels.areas[pixels.within], log=chosen.log)
-
-    def logs() -> Array:
-        return log_natural(density, values, points, measure)
-
-    return ColouredMap(projection, pixels, shade.places(values), shade, chosen.why, logs)
+        write_caption(frame.figure, words.caption, sheet)
 
 
 class Pixels(NamedTuple):
-    """Of a map that are drawn: a rectangle of (rows, columns) of them, from below.
+    """The pixels of a map that are drawn, in a rectangle whose lowest row is the first.
 
-    - `shown`: (rows, columns) of bool, those on the map or next to it.
-    - `latlon`: (N, 2) directions of those.
-    - `within`: (N,) of bool, those of them on the map.
-    - `areas`: (N,) on the sphere, up to a factor.
-    - `angle`: a pixel's side on the sphere, in radians, where it is largest.
-    - `extent`: of the rectangle on the map: left, right, below, above.
+    - `shown`: Which pixels are on the map or next to it, (rows, columns) of bool.
+    - `latlon`: Directions (N, 2) of these.
+    - `within`: Which of these are on the map, (N,) of bool.
+    - `areas`: Their areas (N,) on the sphere, up to a factor.
+    - `angle`: A pixel's side on the sphere in radians, where it is largest.
+    - `extent`: Left, right, bottom and top of the rectangle on the map.
     """
 
     shown: Array
@@ -257,32 +228,33 @@ class Pixels(NamedTuple):
     angle: float
     extent: tuple[float, float, float, float]
 
+    def table(self, values: Array, elsewhere: float) -> Array:
+        """Return values (N,) in the rectangle, (rows, columns), with another value elsewhere."""
+        table = np.full(self.shown.shape, elsewhere)
+        table[self.shown] = values
+        return table
+
 
 def pixels_of(projection: Projection, count: int | None = None) -> Pixels:
-    """About `count` pixels, default `_PIXELS`."""
+    """Return about `count` pixels of a map, by default `_PIXELS`."""
     from matplotlib.path import Path
 
     ring = projection.outline()
     low, high = ring.min(axis=0), ring.max(axis=0)
     step = math.sqrt(float(np.prod(high - low)) / (count or _PIXELS))
     counts = np.ceil((high - low) / step).astype(int) + 2 * _MARGIN
-    middle = (low + high) / 2
-    first = middle - step * counts / 2
+    first = (low + high) / 2 - step * counts / 2
     x, y = (first[k] + step * (np.arange(counts[k]) + 0.5) for k in (0, 1))
     places = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-    outline = Path(ring)
-    within = outline.contains_points(places)
+    within = Path(ring).contains_points(places)
     shown = within.reshape(counts[::-1])
     for _ in range(_MARGIN):
         shown = _grown(shown)
     kept = shown.ravel()
     latlon = projection.inverse(places[kept])
-    extent = (
-        *(first[0] + step * np.array([0, counts[0]])),
-        *(first[1] + step * np.array([0, counts[1]])),
-    )
-    areas = _areas(projection, latlon)
-    return Pixels(shown, latlon, within[kept], areas, step, extent)  # pyright: ignore
+    last = first + step * counts
+    extent = (float(first[0]), float(last[0]), float(first[1]), float(last[1]))
+    return Pixels(shown, latlon, within[kept], _areas(projection, latlon), step, extent)
 
 
 def _grown(shown: Array) -> Array:
@@ -295,7 +267,7 @@ def _grown(shown: Array) -> Array:
 
 
 def _areas(projection: Projection, latlon: Array) -> Array:
-    """Of equal pixels of the map on the sphere."""
+    """Return the areas on the sphere of equal pixels of the map."""
     if projection.is_equal_area:
         return np.ones(len(latlon))
     if isinstance(projection, Azimuthal):
@@ -305,34 +277,15 @@ def _areas(projection: Projection, latlon: Array) -> Array:
 
 
 def places_on(space: Space, projection: Projection, points: Tensor) -> Array:
-    """Places (M, 2) of chart points (N, 2), of axes at the end that the map shows; those on it alone.
+    """Return the places (M, 2) of those of chart points (N, 2) that are on a map.
+
+    Axes are placed at the end that the map shows.
 
     Raises:
-        OrbiflowError: for points of another shape.
+        OrbiflowError: If the points have another shape.
     """
     vectors = cast(RoundSpace, space).vectors(chart_points(space, points))
     if space.name == "projective-plane" and isinstance(projection, Azimuthal):
         vectors = np.where(vectors @ projection.frame[2] < 0, -1.0, 1.0)[:, None] * vectors
     latlon = to_latlon(vectors)
     return projection.forward(latlon[projection.contains(latlon)])
-
-
-def _room(
-    sheet: Sheet, projection: Projection, label: str, ticks: Sequence[str], words: str
-) -> Room:
-    disc = isinstance(projection, Azimuthal)
-    above = 0.8 if sheet.printed else 3.2
-    beside = disc and (not sheet.printed or sheet.width >= NARROW)
-    if beside:
-        made = Room(3.6, 1.8, 0.0, above + 1.2, 4.4, 1.2)
-        return _with_words(bar_beside(sheet, made, label, ticks), sheet, words)
-    edges = (3.4, 3.4, 1.2) if disc else (3.6, 1.8, 0.0)
-    made = Room(edges[0], 0.0, edges[1], above + edges[2], 2.2, 1.0)
-    return _with_words(bar_under(sheet, made, label), sheet, words)
-
-
-def _with_words(room: Room, sheet: Sheet, words: str) -> Room:
-    if sheet.printed:
-        return room
-    more = 1.3 * (len(wrapped_words(words, sheet)) + 1)
-    return room._replace(below=room.below + more, gap=room.gap)

@@ -1,14 +1,11 @@
-"""A page with a surface to turn in space, coloured by a density: one file, no network."""
+"""A web page with a surface to turn in space, coloured by a density: one file, no network."""
 
 from __future__ import annotations
 
 import base64
-import html
-import json
-import re
-from collections.abc import Sequence
-from importlib import resources
-from typing import Any
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, cast
 
 import numpy as np
 import torch
@@ -18,162 +15,140 @@ from torch import Tensor
 from orbiflow.arrays import Array
 from orbiflow.density.models import Density
 from orbiflow.density.pictures.axes import (
+    View,
+    angle_text,
+    axis_label,
     chart_points,
+    column_name,
     space_title,
     view_of,
 )
-from orbiflow.density.pictures.dots import roomy, thinned
-from orbiflow.density.pictures.drawings import DRAWINGS
-from orbiflow.density.pictures.legend import SMALLER
-from orbiflow.density.pictures.scale import (
-    bar_label,
-    bar_ticks,
-    shading,
-)
-from orbiflow.density.pictures.square import COLOURS, average_note
+from orbiflow.density.pictures.dots import thinned, uncrowded
+from orbiflow.density.pictures.ground import COLOURS, SMALLER
+from orbiflow.density.pictures.scale import bar_label, bar_ticks, shading
+from orbiflow.density.pictures.settings import PlotSettings
+from orbiflow.density.pictures.square import average_note
 from orbiflow.density.pictures.surfaces import (
     EYE,
-    Mesh,
+    KLEIN_RADIUS,
+    RING_RADIUS,
+    TUBE_RADIUS,
     immersion,
     mesh,
     normals,
-    of_vectors,
+    vector_immersion,
     viewpoint,
 )
-from orbiflow.density.pictures.values import (
-    density_on_grid,
-    is_sharp,
-    takes_logarithms,
-)
-from orbiflow.density.spaces import (
-    Space,
-    checked_table,
-    to_vectors,
-)
+from orbiflow.density.pictures.values import chosen_scale, density_on_grid, is_sharp
+from orbiflow.density.spaces import RoundSpace, Space, checked_table, to_vectors
+from orbiflow.drawing import rendered
 from orbiflow.errors import OrbiflowError
 
 MAX_BYTES = 3_000_000
 
 _CELLS, _FINE_CELLS = 160, 240
+"""Cells along an edge of the square: of a flow, and with kernels beside it."""
+
 _SOFT = 1.6
-"""Cells that the narrowest peak is averaged over: of fewer, a triangle's corners would be seen."""
+"""Cells that the narrowest peak is averaged over: with fewer, a triangle's corners would be seen."""
+
+_EVERY_45 = "Lines every 45°, heavier where an angle is 0."
 
 
 def density_page(
     density: Density,
+    settings: PlotSettings | None = None,
     *,
-    measure: str = "natural",
-    scale: str = "linear",
-    names: Sequence[str] | None = None,
     samples: Tensor | None = None,
-    dots: bool = True,
+    coastlines: Sequence[ArrayLike] = (),
     resolution: int | None = None,
-    coastlines: Sequence[ArrayLike] | None = None,
     title: str = "",
 ) -> str:
-    """A self-contained HTML page: the surface of the space, coloured by the density, to be turned.
+    """Return a self-contained HTML page with the surface of the space, to be turned.
 
-    Torus: a ring. Sphere: the unit sphere in the user's frame. Klein bottle: the figure-8 immersion.
-    Projective plane: Boy's surface. The density is evaluated at every vertex, so the colours close
-    over the seams; peaks narrower than its triangles are averaged over them, and the caption says so.
-    The page opens with the peak in front. WebGL 2 draws it, or a plain canvas where there is none.
+    The torus is a ring, the sphere the unit sphere in the user's frame, the Klein bottle the figure-8
+    immersion, the projective plane Boy's surface. The density is evaluated at every vertex, so the
+    colours close over the seams; peaks narrower than its triangles are averaged over them, and the
+    caption says so. The page opens with the peak in front. WebGL 2 draws it, or a plain canvas if
+    there is none.
 
     Args:
-        density: on a two-dimensional space.
-        measure: with respect to which the density is drawn (`orbiflow.density.spaces.space.MEASURES`).
-        scale: of the colours, one of `orbiflow.figures.density_scale.SCALES`.
-        names: of the data's columns on torus and Klein bottle, default `space.columns`.
-        samples: chart points (N, 2) to draw as dots; of more than `MAX_DOTS`, a random choice.
-        dots: whether the samples are seen at first; a box in the page shows and hides them.
-        resolution: cells along an edge of the square, 2 to 250; default 160, or 240 for a density
+        density: A density on a two-dimensional space.
+        settings: How it is drawn; `dots` says whether the samples are seen at first.
+        samples: Chart points (N, 2) to draw as dots, which a box in the page shows and hides. Of more
+            than `MAX_DOTS` a random choice is drawn.
+        coastlines: For the sphere and the projective plane, lines (M, 2) of latitude and longitude.
+        resolution: Cells along an edge of the square, 2 to 250. Default: 160, or 240 for a density
             with kernels.
-        coastlines: for the sphere and the projective plane, lines (M, 2) of latitude and longitude
-            in degrees in the data's frame.
-        title: default "Density on the" and the space.
+        title: The title. Default: "Density on the" and the space.
 
     Raises:
-        OrbiflowError: for a space of another dimension, an unknown measure or scale, names that do not
-            fit, coastlines on a space without latitudes, or a page above `MAX_BYTES`.
+        OrbiflowError: If the space has another dimension, names do not fit, there are coastlines on a
+            space without latitudes, or the page would be larger than `MAX_BYTES`.
     """
-    space = density.space
+    settings, space = settings or PlotSettings(), density.space
     cells = resolution or (_FINE_CELLS if density.has_fine_detail else _CELLS)
-    grid, view = mesh(space, cells), view_of(space, names)
+    grid, view = mesh(space, cells), view_of(space, settings.names)
     drawing = DRAWINGS[space.name]
     t = torch.linspace(0.0, 1.0, cells + 1, dtype=torch.float64)
-    values = density_on_grid(density, t, t, measure, pixel=_SOFT / cells).ravel()
+    values = density_on_grid(density, t, t, settings.measure, pixel=_SOFT / cells).ravel()
     # by area on the surface: vertices crowd at the cone points
     areas = space.log_area(grid.points).exp().numpy()
-    shade = shading(values, areas, log=takes_logarithms(density, measure, scale))
+    chosen = chosen_scale(density, settings.measure, settings.scale)
+    shade = shading(values, areas, log=chosen.log)
+    lines = (*drawing.grid(space), (1.6, _coast(space, coastlines)))
+    notes = []
     data = {
-        **_surface(space, grid, values),
+        **_surface(space, grid.points, int(values.argmax())),
+        "round": drawing.is_ball,
+        "triangles": _packed(grid.triangles, "<u2"),
         "values": _packed(65535 * np.clip(shade.places(values), 0, 1), "<u2"),
-        "lines": [
-            {"width": width, **_polylines(lines)}
-            for width, lines in (*drawing.grid(space), (1.6, _coast(space, coastlines)))
-            if lines
-        ],
+        "lines": [{"width": width, **_polylines(parts)} for width, parts in lines if parts],
         "samples": "",
         "widths": "",
-        "dots": dots,
+        "dots": settings.dots,
         "labels": drawing.labels(view),
         "colours": _packed(_colours(), "u1"),
         "ticks": [tick._asdict() for tick in bar_ticks(shade, ends=True)],
-        "measure": bar_label(shade, space, measure),
+        "measure": bar_label(shade, space, settings.measure),
     }
     if samples is not None:
         points = torch.tensor(thinned(chart_points(space, samples).numpy()))
-        places, widths = roomy(immersion(space)(space.project(points)))
-        data["samples"], data["widths"] = _packed(places, "<f4"), _packed(widths, "<f4")
-    caption = drawing.caption(view)
-    if samples is not None:
-        caption += f" {SMALLER[0].upper()}{SMALLER[1:]}."
-    if is_sharp(density, _SOFT / cells):
-        note = average_note(round(cells / _SOFT))
-        caption += f" {note[0].upper()}{note[1:]}."
-    return _filled(title or f"Density on the {space_title(space)}", caption, data)
-
-
-def _surface(space: Space, grid: Mesh, values: Array) -> dict[str, Any]:
-    """The mesh in space, how large it is, and from where it is seen first."""
-    drawing = DRAWINGS[space.name]
-    points = immersion(space)(grid.points)
-    center = (points.min(axis=0) + points.max(axis=0)) / 2
-    return {
-        "center": center.tolist(),
-        "radius": float(np.linalg.norm(points - center, axis=1).max()),
-        "start": viewpoint(space, grid.points[int(values.argmax())])._asdict(),
-        "eye": EYE,
-        "round": drawing.is_ball,
-        "points": _packed(points, "<f4"),
-        "normals": _packed(127 * normals(space, grid.points), "i1"),
-        "triangles": _packed(grid.triangles, "<u2"),
-    }
-
-
-def _filled(heading: str, text: str, data: dict[str, Any]) -> str:
-    template = (
-        resources.files("orbiflow.density.pictures")
-        .joinpath("density_page.html")
-        .read_text("utf-8")
+        places, widths = uncrowded(immersion(space)(space.project(points)))
+        data |= {"samples": _packed(places, "<f4"), "widths": _packed(widths, "<f4")}
+        notes.append(SMALLER)
+    if is_sharp(density, pixel=_SOFT / cells):
+        notes.append(average_note(round(cells / _SOFT)))
+    caption = " ".join([drawing.caption(view), *(f"{n[0].upper()}{n[1:]}." for n in notes)])
+    title = title or f"Density on the {space_title(space)}"
+    page = rendered(
+        "orbiflow.density.pictures", "surface.html", title=title, caption=caption, data=data
     )
-    parts = {
-        "%TITLE%": html.escape(heading),
-        "%CAPTION%": html.escape(text),
-        "%DATA%": json.dumps(data).replace("<", "\\u003c"),
-    }
-    # in one pass: a title may hold the name of a part
-    template = re.sub("|".join(parts), lambda found: parts[found[0]], template)
-    size = len(template.encode())
+    size = len(page.encode())
     if size > MAX_BYTES:
         raise OrbiflowError(
             f"the page would have {size / 1e6:.1f} MB, more than {MAX_BYTES / 1e6:g}: lower the "
             "resolution or give coastlines of fewer points"
         )
-    return template
+    return page
+
+
+def _surface(space: Space, points: Tensor, peak: int) -> dict[str, Any]:
+    """Return the mesh in space, its size, and from where it is seen first."""
+    places = immersion(space)(points)
+    center = (places.min(axis=0) + places.max(axis=0)) / 2
+    return {
+        "center": center.tolist(),
+        "radius": float(np.linalg.norm(places - center, axis=1).max()),
+        "start": viewpoint(space, points[peak])._asdict(),
+        "eye": EYE,
+        "points": _packed(places, "<f4"),
+        "normals": _packed(127 * normals(space, points), "i1"),
+    }
 
 
 def _packed(array: Array, kind: str) -> str:
-    """Base64 of an array, rounded if `kind` is an integer."""
+    """Return the base64 text of an array, rounded if `kind` is an integer."""
     if np.dtype(kind).kind != "f":
         array = np.rint(array)
     return base64.b64encode(np.ascontiguousarray(array.astype(kind)).tobytes()).decode()
@@ -186,16 +161,121 @@ def _polylines(lines: list[Array]) -> dict[str, Any]:
     }
 
 
-def _coast(space: Space, coastlines: Sequence[ArrayLike] | None) -> list[Array]:
-    if coastlines is None:
+def _coast(space: Space, coastlines: Sequence[ArrayLike]) -> list[Array]:
+    if not coastlines:
         return []
     if not space.is_round:
         raise OrbiflowError(f"coastlines need latitudes and longitudes, the {space.name} has none")
     tables = [checked_table(line, (2,), "a coastline") for line in coastlines]
-    return [of_vectors(space)(to_vectors(table)) for table in tables if len(table) > 1]
+    return [vector_immersion(space)(to_vectors(table)) for table in tables if len(table) > 1]
 
 
 def _colours() -> Array:
     from matplotlib import colormaps
 
     return 255 * colormaps[COLOURS](np.linspace(0, 1, 256))
+
+
+Lines = tuple[tuple[float, list[Array]], tuple[float, list[Array]]]
+"""Lines (M, 3) of equal coordinates with their widths, then those of coordinate 0, which are wider."""
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """What is drawn on the surface of a space beside the density.
+
+    - `grid`: A function that returns lines of equal coordinates.
+    - `labels`: A function that returns texts of directions, and where they stand.
+    - `caption`: A function that returns what is seen, and which way the coordinates run.
+    - `is_ball`: Whether the near side hides the far one.
+    """
+
+    grid: Callable[[Space], Lines]
+    labels: Callable[[View], list[dict[str, Any]]]
+    caption: Callable[[View], str]
+    is_ball: bool = False
+
+
+def _graticule(space: Space, step: int) -> Lines:
+    """Return parallels and meridians, every `step` degrees."""
+    t = np.linspace(-180.0, 180.0, 181)
+    across = [np.stack([np.full(181, lat), t], axis=-1) for lat in range(0, 90, step)]
+    across += [line * (-1, 1) for line in across[1:]]
+    along = [np.stack([t / 2, np.full(181, lon)], axis=-1) for lon in range(0, 360, step)]
+    surface = vector_immersion(space)
+    parallels, meridians = (
+        [surface(to_vectors(line)) for line in lines] for lines in (across, along)
+    )
+    return (1.0, parallels + meridians), (2.0, [parallels[0], meridians[0]])
+
+
+def _eighths(space: Space, steps: int, zero: int) -> Lines:
+    """Return lines every eighth of a turn, `steps` of them up the square; x = zero / 8 is angle 0."""
+    surface, t = immersion(space), torch.linspace(0, 1, 161, dtype=torch.float64)
+    across = [torch.stack([torch.full_like(t, k / 8), t], dim=-1) for k in range(8)]
+    along = [torch.stack([t, torch.full_like(t, k / steps)], dim=-1) for k in range(steps)]
+    zeros = [across[zero], along[0]]
+    return (1.0, [surface(line) for line in across + along]), (2.0, [surface(z) for z in zeros])
+
+
+def _labels(texts: Sequence[str], places: Array) -> list[dict[str, Any]]:
+    return [{"text": t, "at": place.tolist()} for t, place in zip(texts, places, strict=True)]
+
+
+def _ring_labels(view: View, turns: Sequence[float], radius: float) -> list[dict[str, Any]]:
+    """Return the first angle at four places round a ring."""
+    name, unit = column_name(view, 0), view.space.unit
+    places = 1.1 * radius * np.array([[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0]])
+    return _labels([f"{name} {angle_text(t, unit)}" for t in turns], places)
+
+
+def _globe_labels(view: View) -> list[dict[str, Any]]:
+    latlon = ("0°", "90° E", "N", "180°", "90° W", "S")
+    form = cast(RoundSpace, view.space).form
+    names = latlon if form == "latlon" else ("+x", "+y", "+z", "−x", "−y", "−z")
+    return _labels(names, 1.07 * np.concatenate([np.eye(3), -np.eye(3)]))
+
+
+def _ring_caption(view: View) -> str:
+    first, second = axis_label(view, 0), axis_label(view, 1)
+    return f"{first} runs round the ring, {second} round its tube. {_EVERY_45}"
+
+
+def _bottle_caption(view: View) -> str:
+    first, second = axis_label(view, 0), axis_label(view, 1)
+    return (
+        f"The Klein bottle as a figure eight that makes half a turn on its way round: {first} runs "
+        f"round the ring, {second} along the figure eight. {_EVERY_45} The surface passes through "
+        "itself along a circle; the sheets that cross there are far apart on the bottle."
+    )
+
+
+_GLOBE_CAPTION = (
+    "The sphere in the data's frame. Lines every 30°, heavier the equator and longitude 0."
+)
+_BOY_CAPTION = (
+    "Boy's surface, where a direction and its opposite are one point. Lines every 15° of latitude and "
+    "longitude, heavier the equator and longitude 0. The surface passes through itself; sheets that "
+    "cross are far apart on the projective plane."
+)
+
+DRAWINGS: dict[str, Drawing] = {
+    "torus": Drawing(
+        lambda space: _eighths(space, 8, 0),
+        lambda view: _ring_labels(view, (0, 0.25, 0.5, -0.25), RING_RADIUS + TUBE_RADIUS),
+        _ring_caption,
+    ),
+    # the square is half a turn high, and phi is 0 inside
+    "klein-bottle": Drawing(
+        lambda space: _eighths(space, 4, 2),
+        lambda view: _ring_labels(view, (0, 0.125, 0.25, 0.375), KLEIN_RADIUS + 1),
+        _bottle_caption,
+    ),
+    "sphere": Drawing(
+        lambda space: _graticule(space, 30), _globe_labels, lambda _: _GLOBE_CAPTION, is_ball=True
+    ),
+    "projective-plane": Drawing(
+        lambda space: _graticule(space, 15), lambda _: [], lambda _: _BOY_CAPTION
+    ),
+}
+"""What is drawn on each surface, by the name of the space."""

@@ -2,47 +2,54 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
+import torch
 from numpy.typing import ArrayLike
+from torch import Tensor
 
-from orbiflow.arguments import path as as_path
+from orbiflow.arguments import as_path
 from orbiflow.density.estimator import DensityEstimator
-from orbiflow.density.models import Density
-from orbiflow.density.pictures.choice import (
-    MODEL,
-    DensityPlots,
-    PlotSettings,
-)
-from orbiflow.density.pictures.flow import few_colours
-from orbiflow.drawing import (
-    FORMATS,
-    Picture,
-    Sheet,
-    pdf_pages,
-)
-from orbiflow.errors import OutputError
-from orbiflow.runtime import (
-    LITTER,
-    make_folder,
-    one_thread,
-    write_atomic,
-    write_set,
-)
+from orbiflow.density.models import Density, read_density
+from orbiflow.density.pictures.axes import space_title, view_of
+from orbiflow.density.pictures.coastlines import read_coastlines, simplified
+from orbiflow.density.pictures.corner import MAX_COLUMNS, corner_picture
+from orbiflow.density.pictures.flow import few_colours, flow_picture
+from orbiflow.density.pictures.ground import Ground, draw_density, draw_samples
+from orbiflow.density.pictures.map_choice import chosen_map
+from orbiflow.density.pictures.maps import Map
+from orbiflow.density.pictures.page import density_page
+from orbiflow.density.pictures.projections import PlateCarree, Projection
+from orbiflow.density.pictures.regions import RegionLine, region_lines
+from orbiflow.density.pictures.settings import PlotSettings
+from orbiflow.density.pictures.square import Square
+from orbiflow.density.spaces import Space
+from orbiflow.drawing import FORMATS, Picture, Sheet, pdf_pages
+from orbiflow.errors import OrbiflowError, OutputError, SettingError
+from orbiflow.runtime import LITTER, make_folder, one_thread, write_atomic, write_set
 
+MODEL = "density.safetensors"
 REPORT = "report.json"
 TABLE = "density.csv"
-"""What the folder of a marginal or conditional density of one or two angles has beside its model."""
+"""The table beside the model in the folder of a marginal or conditional density."""
 
 THUMBNAIL = "thumbnail.png"
-"""What a fit of a batch has beside its model."""
+"""The small picture beside the model of a fit in a batch."""
 
 PAGE = "surface.html"
 NAMES = ("density", "latlon", "square", "flow", "samples")
 PICTURES = (*(f"{name}.{form}" for form in FORMATS for name in NAMES), PAGE)
-"""What a plot may write into a folder, and what goes when another one is written there."""
+"""The files that a plot may write into a folder, and that go when another one is written there."""
+
+SAMPLES = 3000
+PAGE_POINTS = 40_000
+"""Points of coastlines on the surface that turns, at most."""
+
+Maker = Callable[[], Picture]
 
 
 class Plotted(NamedTuple):
@@ -60,75 +67,76 @@ def plot_density(
     settings: PlotSettings | None = None,
     *,
     data: ArrayLike | None = None,
+    coastlines: Sequence[ArrayLike] = (),
     told: Callable[[float, str], None] = lambda *_: None,
 ) -> Plotted:
-    """Draw the density, the flow, samples beside the data, and the surface to turn.
+    """Draw a density, its flow, samples beside the data, and the surface to turn.
 
     The density of angles is drawn on its square; that of directions or axes on a map ("density"), on
     the sphere also in plain latitude and longitude ("latlon"), and on its square ("square"). A flow
-    that has no part in the density is left out. All is drawn before anything is written. Of a torus of
-    more or fewer than two angles: samples alone, all pairs of angles.
+    that has no part in the density is left out. On a torus of more or fewer than two angles there are
+    samples alone, all pairs of angles. All is drawn before anything is written.
 
     Args:
-        density: or the folder of `orbiflow density fit`.
-        out: a folder, made if need be, whose pictures of an earlier density go; or a .pdf, which gets a
-            page a figure, without the surface.
-        settings: see `PlotSettings`; an `out` that ends in .pdf is one whatever they say.
-        data: (N, k) in the space's own units, to be drawn beside the samples.
-        told: told the share of the work done and what is drawn; what it raises ends it.
+        density: A density, a fitted estimator, or the folder of `orbiflow density fit`.
+        out: A folder, made if need be, from which the pictures of an earlier density are removed; or a
+            .pdf, which gets a page for each figure, without the surface.
+        settings: How it is drawn. An `out` that ends in .pdf is a PDF whatever they say.
+        data: Data (N, k) in the space's own units, to be drawn beside the samples.
+        coastlines: Lines (M, 2) of latitude and longitude, beside those in the settings' file.
+        told: A function that is called with the share of the work done and what is drawn. What it
+            raises ends the work.
 
     Raises:
-        OrbiflowError: for settings or data that do not fit the density.
-        InputFileError: if there is no density to read.
-        OutputError: if a file cannot be written, or `out` ends like a file of one picture.
+        OrbiflowError: If settings or data do not fit the density.
+        InputFileError: If there is no density to read.
+        OutputError: If a file cannot be written, or `out` ends like a file of one picture.
     """
     settings, out = settings or PlotSettings(), as_path(out, "the folder to draw into")
     single = is_one_file(out)
     if not single:
-        refuse_others(out)
-    plots = DensityPlots.of(density, settings, data)
+        refuse_foreign_files(out)
+    plots = _Plots.of(density, settings, data, coastlines)
     if single:
-        pictures = plots.pictures(Sheet.column(settings.width or "single", "pdf"), told)
-        made = list(pictures.values())
-        return Plotted((write_atomic(out, pdf_pages(made)),), _words(made), plots.notes)
+        sheet = Sheet.column(settings.width or "single", "pdf")
+        made = list(plots.pictures(sheet, told).values())
+        return Plotted((write_atomic(out, pdf_pages(made)),), _captions(made), plots.notes)
     make_folder(out)
     sheet = settings.sheet
     pictures = plots.pictures(sheet, told)
     contents: dict[str, str | bytes] = {
         f"{name}.{sheet.format}": _content(name, picture) for name, picture in pictures.items()
     }
-    if plots.has_surface:
+    if plots.space.dim == 2:
         told(0.75, f"drawing {PAGE}")
         contents[PAGE] = plots.page()
     paths = write_set(out, PICTURES, contents)
-    return Plotted(tuple(paths), _words(pictures.values()), plots.notes)
+    return Plotted(tuple(paths), _captions(pictures.values()), plots.notes)
 
 
-def refuse_others(out: Path) -> None:
-    """Pictures that would go, beside files that orbiflow did not write, may be somebody's own.
+def refuse_foreign_files(out: Path) -> None:
+    """Refuse a folder with pictures beside files of others: the pictures may be somebody's own.
 
     Raises:
-        OutputError: for such a folder.
+        OutputError: If it is such a folder.
     """
     if not out.is_dir():
         return
     inside = {path.name for path in out.iterdir()} - LITTER
-    foreign, old = (
-        sorted(inside - {MODEL, REPORT, TABLE, THUMBNAIL, *PICTURES}),
-        sorted(inside & set(PICTURES)),
-    )
+    foreign = sorted(inside - {MODEL, REPORT, TABLE, THUMBNAIL, *PICTURES})
+    old = sorted(inside & set(PICTURES))
     if foreign and old:
         raise OutputError(
-            f"{out} holds {old[0]}, which would go, beside {foreign[0]}, which is of no earlier run: "
-            "choose another --out or move it"
+            f"{out} holds {old[0]}, which would be removed, beside {foreign[0]}, which orbiflow did "
+            "not write: choose another --out or move it"
         )
 
 
 def is_one_file(out: Path) -> bool:
-    """Whether the pictures are the pages of one PDF.
+    """Return whether the pictures will be the pages of one PDF.
 
     Raises:
-        OutputError: for a name like that of one picture, which is no folder.
+        OutputError: If the name is like that of one picture.
     """
     ending = out.suffix.lower()
     if out.is_dir() or ending not in (".png", ".svg", ".pdf", ".html"):
@@ -141,12 +149,187 @@ def is_one_file(out: Path) -> bool:
     return True
 
 
+def known_names(space: Space, columns: Sequence[str] | None) -> tuple[str, ...] | None:
+    """Return the columns of a table as names of axes, or None if they are not angles."""
+    if space.unit is None or not columns or len(columns) != len(space.columns):
+        return None
+    return tuple(columns)
+
+
 def _content(name: str, picture: Picture) -> bytes:
     content = picture.file()
-    # on a screen the flow's colours are few
+    # on a screen the flow has few colours
     few = name == "flow" and picture.sheet.format == "png" and not picture.sheet.printed
     return few_colours(content) if few else content
 
 
-def _words(pictures: Iterable[Picture]) -> tuple[str, ...]:
+def _captions(pictures: Iterable[Picture]) -> tuple[str, ...]:
     return tuple(f"{picture.title}. {picture.caption}".strip() for picture in pictures)
+
+
+@dataclass(frozen=True, eq=False)
+class _Plots:
+    """A density and what is drawn with it: chart points, lines around regions, coastlines."""
+
+    density: Density
+    settings: PlotSettings
+    samples: Tensor
+    data: Tensor | None
+    projection: Projection | None
+    regions: tuple[RegionLine, ...]
+    coastlines: Sequence[ArrayLike]
+
+    @classmethod
+    def of(
+        cls,
+        given: Density | DensityEstimator | str | Path,
+        settings: PlotSettings,
+        data: ArrayLike | None,
+        coastlines: Sequence[ArrayLike],
+    ) -> _Plots:
+        """Check all that can be wrong, before the work.
+
+        Raises:
+            OrbiflowError: As `plot_density`.
+        """
+        density, columns = _density_of(given)
+        space = density.space
+        if settings.names is None:
+            names = known_names(space, columns)
+            settings = settings if names is None else settings.replace(names=names)
+        coastlines = _all_coastlines(space, settings, coastlines)
+        _check_space(space, settings)
+        points = None if data is None else space.to_chart(data)
+        generator = torch.Generator().manual_seed(settings.seed)
+        samples = density.sample((settings.samples or SAMPLES,), generator)
+        chosen = None
+        if space.is_round:
+            about = samples if points is None else points
+            chosen = chosen_map(space, about, settings, columns)
+        lines = region_lines(density, settings)
+        return cls(density, settings, samples, points, chosen, lines, coastlines)
+
+    @property
+    def space(self) -> Space:
+        """The density's space."""
+        return self.density.space
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What is not drawn, and why."""
+        if self.space.dim != 2 or self._has_flow:
+            return ()
+        return ("the flow has no part in this density, so that there is no picture of it",)
+
+    def pictures(
+        self, sheet: Sheet, told: Callable[[float, str], None] = lambda *_: None
+    ) -> dict[str, Picture]:
+        """Draw all figures, by the names of their files without the ending."""
+        makers = self._makers(sheet)
+        made: dict[str, Picture] = {}
+        for k, (name, make) in enumerate(makers.items()):
+            told(k / (len(makers) + 1), f"drawing {name}.{sheet.format}")
+            made[name] = make()
+        return made
+
+    def page(self) -> str:
+        """Return the page of the surface to turn in a browser."""
+        return density_page(
+            self.density,
+            self.settings,
+            samples=self._shown,
+            coastlines=simplified(list(map(np.asarray, self.coastlines)), PAGE_POINTS),
+            title=f"Density on the {space_title(self.space)}",
+        )
+
+    @property
+    def _shown(self) -> Tensor:
+        return self.samples if self.data is None else self.data
+
+    @property
+    def _has_flow(self) -> bool:
+        """Whether a flow has a part in the density."""
+        return self.density.flow_part is not None
+
+    def _makers(self, sheet: Sheet) -> dict[str, Maker]:
+        """Return functions that draw the figures, by name."""
+        density, settings, data = self.density, self.settings, self.data
+        if self.space.dim != 2:
+            draw = lambda: corner_picture(density, data, self.samples, settings, sheet=sheet)  # noqa: E731
+            return {"samples": draw}
+        grounds = self._grounds()
+        makers = {name: self._maker(ground, sheet) for name, ground in grounds.items()}
+        if self._has_flow:
+            makers["flow"] = lambda: flow_picture(density, settings, sheet=sheet)
+        if data is not None or settings.samples is not None:
+            ground = grounds["density"]
+            makers["samples"] = lambda: draw_samples(
+                ground, density, settings, data, self.samples, sheet=sheet
+            )
+        return makers
+
+    def _maker(self, ground: Ground, sheet: Sheet) -> Maker:
+        dots = self._shown if self.settings.dots else None
+        return lambda: draw_density(
+            ground, self.density, self.settings, dots=dots, regions=self.regions, sheet=sheet
+        )
+
+    def _grounds(self) -> dict[str, Ground]:
+        """Return what the density is drawn on, by the names of the figures."""
+        space, chosen = self.space, self.projection
+        square = Square(space, self.settings)
+        if chosen is None:
+            return {"density": square}
+        grounds: dict[str, Ground] = {"density": Map(space, chosen, self.coastlines)}
+        if space.name == "sphere" and not isinstance(chosen, PlateCarree):
+            plain = PlateCarree((0.0, chosen.center[1]))
+            grounds["latlon"] = Map(space, plain, self.coastlines)
+        return {**grounds, "square": square}
+
+
+def _check_space(space: Space, settings: PlotSettings) -> None:
+    """Check that a space can be drawn, and that settings fit it.
+
+    Raises:
+        OrbiflowError: If it has too many angles, or a setting applies to another space.
+    """
+    if space.dim > MAX_COLUMNS:
+        raise OrbiflowError(
+            f"this {space.name} has {space.dim} angles, pictures have {MAX_COLUMNS} at most: draw "
+            "columns of `orbiflow density sample` beside those of the data"
+        )
+    view_of(space, settings.names, None if space.is_round else settings.center)
+    if not space.is_round and (settings.projection != "auto" or settings.radius is not None):
+        name = "radius" if settings.projection == "auto" else "projection"
+        raise SettingError(
+            f"{{{name}}} applies to maps of the sphere and the projective plane, not to the "
+            f"{space.name}"
+        )
+
+
+def _all_coastlines(
+    space: Space, settings: PlotSettings, lines: Sequence[ArrayLike]
+) -> Sequence[ArrayLike]:
+    if settings.coastlines is None and not lines:
+        return ()
+    if space.name != "sphere":
+        raise SettingError(f"{{coastlines}} apply to the sphere, not to the {space.name}")
+    if settings.coastlines is None:
+        return lines
+    return [*lines, *read_coastlines(settings.coastlines)]
+
+
+def _density_of(
+    given: Density | DensityEstimator | str | Path,
+) -> tuple[Density, Sequence[str] | None]:
+    """Return the density, and the columns that it was fitted to, if they are known."""
+    if isinstance(given, Density):
+        return given, None
+    if isinstance(given, DensityEstimator):
+        density = getattr(given, "density_", None)
+        if density is None:
+            raise OrbiflowError("this DensityEstimator is not fitted; call fit(data) first")
+        return density, None
+    path = as_path(given, "the density")
+    density, extra = read_density(path / MODEL if path.is_dir() else path)
+    return density, extra.get("columns")

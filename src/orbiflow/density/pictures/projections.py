@@ -1,4 +1,4 @@
-"""Projections of the sphere onto a map: what all of them do, and lines on them.
+"""Projections of the sphere onto a map.
 
 Directions are degrees (N, 2) of latitude and longitude, places on the map (N, 2) in radii of the
 sphere.
@@ -13,25 +13,25 @@ from typing import ClassVar
 
 import numpy as np
 
-from orbiflow.arguments import number
+from orbiflow.arguments import as_number
 from orbiflow.arrays import Array
 from orbiflow.density.spaces import to_latlon, to_vectors
-from orbiflow.errors import OrbiflowError
+from orbiflow.errors import SettingError
 
 FINEST = 1.0
-"""Degrees between points of lines that are drawn, at most: curves look like curves."""
+"""Degrees between points of lines that are drawn, at most, so that curves look smooth."""
 
 
 @dataclass(frozen=True)
 class Projection(ABC):
     """A map of directions.
 
-    - `name`: as asked for. `title`: in a sentence.
-    - `is_equal_area`: whether equal areas of the sphere are equal on the map.
-    - `center`: latitude and longitude of the map's middle.
+    - `name`: Its name in settings. `title`: Its name in a sentence.
+    - `is_equal_area`: Whether equal areas of the sphere are equal on the map.
+    - `center`: Latitude and longitude of the map's middle.
 
     Raises:
-        OrbiflowError: for a centre that is no direction.
+        OrbiflowError: If the centre is no direction.
     """
 
     name: ClassVar[str]
@@ -41,36 +41,37 @@ class Projection(ABC):
     center: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
-        number(self.center[0], "the centre's latitude", -90, 90)
-        number(self.center[1], "the centre's longitude", -360, 360)
+        as_number(self.center[0], "the centre's latitude", -90, 90)
+        as_number(self.center[1], "the centre's longitude", -360, 360)
 
     @abstractmethod
     def forward(self, latlon: Array) -> Array:
-        """Places of directions."""
+        """Return the places of directions."""
 
     @abstractmethod
     def inverse(self, places: Array) -> Array:
-        """Directions of places, those next to the outline continued beyond it; longitudes in
-        [-180, 180).
+        """Return the directions of places, continued a little beyond the outline.
+
+        Longitudes are in [-180, 180).
         """
 
     @abstractmethod
     def outline(self) -> Array:
-        """(N, 2) closed ring of places around the map."""
+        """Return the closed ring (N, 2) of places around the map."""
 
     @abstractmethod
     def pieces(self, latlon: Array) -> list[Array]:
-        """A line (M, 2) of directions on the map, cut where the map is: places (K, 2), K > 1, each."""
+        """Return a line (M, 2) of directions on the map, cut where the map is: places (K, 2), K > 1."""
 
     @abstractmethod
     def contains(self, latlon: Array) -> Array:
-        """Which directions the map shows, (N,) of bool."""
+        """Return which directions the map shows, (N,) of bool."""
 
 
 def refined(latlon: Array) -> Array:
-    """A line (M, 2) of directions with points at most `FINEST` degrees apart.
+    """Return a line (M, 2) of directions with points at most `FINEST` degrees apart.
 
-    Straight in latitude and longitude, as GeoJSON has it (RFC 7946, 3.1.1), the short way round.
+    It is straight in latitude and longitude, as in GeoJSON (RFC 7946, 3.1.1), the short way round.
     """
     lon = np.unwrap(latlon[:, 1], period=360.0)
     steps = np.maximum(abs(np.diff(latlon[:, 0])), abs(np.diff(lon)))
@@ -82,26 +83,27 @@ def refined(latlon: Array) -> Array:
 
 
 def wrapped(lon: Array) -> Array:
-    """Longitudes in [-180, 180)."""
+    """Return longitudes in [-180, 180)."""
     return (lon + 180.0) % 360.0 - 180.0
 
 
-def of_some_length(lines: list[Array]) -> list[Array]:
-    """Those of lines (M, 2) that are more than a point."""
+def _without_points(lines: list[Array]) -> list[Array]:
+    """Return the lines (M, 2) that are more than a point."""
     return [line for line in lines if len(line) > 1 and bool((line != line[0]).any())]
 
 
 @dataclass(frozen=True)
 class Azimuthal(Projection):
-    """What is within `radius` degrees of the centre, in its true direction from there.
+    """A map of what is within `radius` degrees of the centre, in its true direction from there.
 
-    Seen from outside, north up, and at the poles the centre's longitude down (north) or up (south).
+    It is seen from outside, north up, and at the poles with the centre's longitude down (north) or up
+    (south).
 
-    - `flipped`: upside down, so that about the north pole longitudes run clockwise from the top: a net
-      of structural geology and palaeomagnetism.
+    - `flipped`: Whether it is upside down, so that about the north pole longitudes run clockwise from
+      the top: a net of structural geology and palaeomagnetism.
 
     Raises:
-        OrbiflowError: also for a radius that is not above 0 and at most 90.
+        OrbiflowError: If the centre is no direction, or the radius is not above 0 and at most 90.
     """
 
     radius: float = 90.0
@@ -109,15 +111,15 @@ class Azimuthal(Projection):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        number(self.radius, "the map's radius", 0, 90, above=True)
+        as_number(self.radius, "the map's radius", above=0, most=90)
 
     @abstractmethod
     def distance(self, angle: Array) -> Array:
-        """Of a place from the map's middle, of angles in radians from the centre."""
+        """Return the distance from the map's middle at angles in radians from the centre."""
 
     @abstractmethod
     def angle(self, distance: Array) -> Array:
-        """The inverse of `distance`."""
+        """Return the angle in radians at a distance, the inverse of `distance`."""
 
     @property
     def rim(self) -> float:
@@ -126,7 +128,7 @@ class Azimuthal(Projection):
 
     @property
     def frame(self) -> Array:
-        """(3, 3): unit vectors to the right, upwards and to the centre."""
+        """Unit vectors (3, 3) to the right, upwards and to the centre."""
         lat, lon = np.radians(self.center)
         east = np.array([-np.sin(lon), np.cos(lon), 0.0])
         out = to_vectors([self.center])[0]
@@ -164,7 +166,7 @@ class Azimuthal(Projection):
                     cut = (1 - share) * vectors[inner] + share * vectors[outer]
                     line.insert(place, cut[None])
             found.append(self._placed(np.concatenate(line)))
-        return of_some_length(found)
+        return _without_points(found)
 
     def _placed(self, vectors: Array) -> Array:
         right, up, out = (vectors @ self.frame.T).T
@@ -204,35 +206,35 @@ class Stereographic(Azimuthal):
 
 
 _NEWTON = 12
-"""Newton steps: from the starts below, rounding is reached in half as many."""
+"""Newton steps, twice as many as are needed from the starts below."""
 
 
 class WorldMap(Projection):
-    """The whole sphere, cut along the meridian opposite the map's own.
+    """A map of the whole sphere, cut along the meridian opposite the map's own.
 
     Raises:
-        OrbiflowError: also for a centre off the equator.
+        OrbiflowError: If the centre is no direction, or off the equator.
     """
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.center[0]:
-            raise OrbiflowError(
+            raise SettingError(
                 f"a map of the whole sphere ({self.name}) is centred on a meridian, not at latitude "
-                f"{self.center[0]:g}: give a longitude alone, or another projection"
+                f"{self.center[0]:g}: give {{center}} a longitude alone, or choose another projection"
             )
 
     @abstractmethod
     def height(self, lat: Array) -> Array:
-        """y of latitudes in radians."""
+        """Return y of latitudes in radians."""
 
     @abstractmethod
     def latitude(self, y: Array) -> Array:
-        """Latitudes in radians of y, those of the poles beyond them."""
+        """Return latitudes in radians of y, those of the poles beyond them."""
 
     @abstractmethod
     def stretch(self, y: Array) -> Array:
-        """x per radian of longitude."""
+        """Return x per radian of longitude."""
 
     def forward(self, latlon: Array) -> Array:
         return self._placed(latlon[:, 0], self._relative(latlon[:, 1]))
@@ -263,7 +265,7 @@ class WorldMap(Projection):
             found.append(np.concatenate([head, line, [[cut, sign * 180]]]))
             start, head = k + 1, np.array([[cut, -sign * 180]])
         found.append(np.concatenate([head, np.stack([lat[start:], lon[start:]], axis=-1)]))
-        return of_some_length([self._placed(*line.T) for line in found])
+        return _without_points([self._placed(*line.T) for line in found])
 
     def contains(self, latlon: Array) -> Array:
         return np.ones(len(latlon), dtype=bool)
@@ -272,13 +274,13 @@ class WorldMap(Projection):
         return wrapped(lon - self.center[1])
 
     def _placed(self, lat: Array, lon: Array) -> Array:
-        """Of longitudes from the map's own meridian, -180 and 180 at its two sides."""
+        """Return places of longitudes from the map's own meridian, -180 and 180 at its two sides."""
         y = self.height(np.radians(lat))
         return np.stack([np.radians(lon) * self.stretch(y), y], axis=-1)
 
 
 class PlateCarree(WorldMap):
-    """Plain latitude and longitude: neither areas nor angles are kept.
+    """The projection in plain latitude and longitude, which keeps neither areas nor angles.
 
     >>> PlateCarree((0.0, 180.0)).forward(np.array([[90.0, 180.0]])).round(4).tolist()
     [[0.0, 1.5708]]
@@ -297,7 +299,7 @@ class PlateCarree(WorldMap):
 
 
 class Mollweide(WorldMap):
-    """An ellipse of equal areas, the poles points.
+    """A projection onto an ellipse, of equal areas, in which the poles are points.
 
     With sin theta = y / sqrt 2, 2 theta + sin 2 theta = pi sin lat; in distances from the pole,
     d = pi / 2 - theta, that is 2 d - sin 2 d = pi (1 - sin lat), which loses no digits there.
@@ -323,7 +325,7 @@ class Mollweide(WorldMap):
 
 
 class EqualEarth(WorldMap):
-    """Equal areas, the poles lines, shapes less squeezed than in an ellipse.
+    """A projection of equal areas in which the poles are lines, and shapes less squeezed.
 
     B. Šavrič, T. Patterson, B. Jenny: The Equal Earth map projection (Int. J. Geogr. Inf. Sci. 33,
     2019), equations 7 and 8.

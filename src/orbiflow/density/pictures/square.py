@@ -1,203 +1,330 @@
-"""Flat pictures of a density: on the canonical square, beside its samples."""
+"""Pictures on the canonical square, whose edges are marked where they are the same edge."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple, TypedDict, Unpack
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import torch
 from torch import Tensor
 
 from orbiflow.arrays import Array
-from orbiflow.density.models import (
-    Density,
-    midpoints,
-)
+from orbiflow.density.models import Density, midpoints
 from orbiflow.density.pictures.axes import (
-    View,
-    check_plane,
-    dress,
-    space_title,
+    ANGLE_AXES,
+    INK,
+    angle_axis,
+    degrees_text,
+    legible,
+    require_plane,
+    shortened,
     view_of,
 )
-from orbiflow.density.pictures.dots import (
-    MAX_DOTS,
-    dot_shrink,
-    draw_dots_over,
+from orbiflow.density.pictures.frame import (
+    NARROW,
+    Frame,
+    Room,
+    caption_lines,
+    printed_room,
+    write_caption,
 )
-from orbiflow.density.pictures.frame import framed, shade_bar
-from orbiflow.density.pictures.legend import (
-    SMALLER,
-    caption,
-    legend,
+from orbiflow.density.pictures.ground import (
+    LIGHT,
+    Colouring,
+    Ground,
+    Panel,
+    Words,
+    draw_density,
+    draw_samples,
 )
-from orbiflow.density.pictures.regions import (
-    RegionLine,
-    draw_regions,
-    log_natural,
-    region_note,
-)
-from orbiflow.density.pictures.scale import (
-    Shade,
-    bar_label,
-    bar_ticks,
-    shading,
-)
-from orbiflow.density.pictures.values import (
-    chosen_scale,
-    density_on_grid,
-    is_sharp,
-)
-from orbiflow.drawing import Picture, Sheet
+from orbiflow.density.pictures.regions import log_natural, region_lines
+from orbiflow.density.pictures.scale import shading
+from orbiflow.density.pictures.settings import PlotSettings
+from orbiflow.density.pictures.surfaces import edge_pairs
+from orbiflow.density.pictures.values import chosen_scale, density_on_grid, is_sharp
+from orbiflow.density.spaces import Space
+from orbiflow.drawing import CENTER_COLOURS, Picture, Sheet, center_sign
+from orbiflow.symmetry import CrystallographicGroup, symmetry_elements
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.image import AxesImage
-
-COLOURS = "viridis"
+    from matplotlib.figure import Figure
 
 _GRID, _FINE_GRID = 240, 360
 """Pixels along a side at which a density is evaluated: of a flow, and with kernels beside it."""
 
+EDGE_COLOURS = ("#d95f02", "#1f78b4")
+"""Colours of the two pairs of edges that are one edge each."""
 
-class AxesOptions(TypedDict, total=False):
-    """Of `samples_picture`."""
+HEAD = 0.035
+"""Length of an arrow's head on a screen, in sides of the square."""
 
-    names: Sequence[str] | None
-    center: Sequence[float] | None
+SCREEN = Room(6.67, 10.4, 11.52, 5.26, 3.33, 1.52)
+"""Room on a screen, with a title above and a legend of five lines below."""
 
+TURNS, SIGNS = {2: "half", 4: "quarter"}, {2: "Lenses", 4: "Squares"}
+"""Names of the turns of cone points, and of their signs."""
 
-class DensityOptions(AxesOptions, total=False):
-    """Of `density_picture` and `samples_picture`."""
-
-    measure: str
-    scale: str
-
-
-class SquareOptions(DensityOptions, total=False):
-    """Of `density_picture`."""
-
-    regions: Sequence[RegionLine]
-
-
-def density_png(
-    density: Density,
-    samples: Tensor | None = None,
-    *,
-    width_px: int = 1600,
-    **options: Unpack[SquareOptions],
-) -> bytes:
-    """PNG of `density_picture`, which has the `options`, for a screen; the height follows.
-
-    Raises:
-        OrbiflowError: as `density_picture`, and for a size that cannot be made.
-    """
-    return density_picture(density, samples, sheet=Sheet.screen(width_px), **options).file()
+CROWDED = "dots crowd where the square shrinks areas"
 
 
 def density_picture(
     density: Density,
     samples: Tensor | None = None,
+    settings: PlotSettings | None = None,
     *,
-    measure: str = "natural",
-    scale: str = "linear",
-    names: Sequence[str] | None = None,
-    center: Sequence[float] | None = None,
     sheet: Sheet | None = None,
-    most: int = MAX_DOTS,
-    regions: Sequence[RegionLine] = (),
 ) -> Picture:
-    """A density on the canonical square, with the edges marked that are the same edge.
+    """Draw a density on the canonical square, with the edges marked that are the same edge.
 
     Edges of one colour and number of arrow heads are identified, in the sense of the arrows. Ticks
     are in the user's units where the chart is a plain rescaling of them (torus, Klein bottle).
     Peaks narrower than a pixel are averaged over it, and a note says so.
 
     Args:
-        density: on a two-dimensional space.
-        samples: data or samples to draw as dots, chart points (N, 2); of more than `most`, a random
-            choice that is always the same; smaller where they crowd, so that peaks stay in sight.
-        measure: with respect to which the density is drawn (`orbiflow.density.spaces.space.MEASURES`).
-        scale: of the colours, one of `orbiflow.figures.density_scale.SCALES`.
-        names, center: of the axes; see `orbiflow.figures.density_axes.view_of`.
-        sheet: default a screen of 1600 pixels.
-        regions: of highest density, whose edges are drawn as lines.
+        density: A density on a two-dimensional space.
+        samples: Data or samples to draw as dots, chart points (N, 2). Of too many a random choice is
+            drawn, always the same; dots are smaller where they crowd, so that peaks stay in sight.
+        settings: How it is drawn.
+        sheet: The sheet. Default: that of the settings.
 
     Raises:
-        OrbiflowError: for a space of another dimension, an unknown measure or scale, samples of
-            another shape, or names or a centre that do not fit.
+        OrbiflowError: If the space has another dimension, samples have another shape, or names or a
+            centre do not fit.
     """
-    sheet = sheet or Sheet.screen()
-    space = density.space
-    check_plane(space)
-    view = view_of(space, names, center)
-    drawn = square_colours(density, view, measure, scale)
-    shade, count = drawn.shade, len(drawn.places)
-    label = bar_label(shade, space, measure)
-    frame = framed(sheet, view, label, [tick.text for tick in bar_ticks(shade)])
-    image = drawn.on(frame.axes)
-    if regions:
-        middles = (np.arange(count) + 0.5) / count
-        draw_regions(frame.axes, regions, middles, middles, drawn.log_natural().T, sheet)
-    if samples is not None:
-        shrink = dot_shrink(sheet, frame.side)
-        draw_dots_over(frame.axes, view.places(samples), frame.side, limit=most, shrink=shrink)
-    shade_bar(image, frame, sheet, shade, label)
-    dress(frame.axes, view, sheet)
-    title = f"Density on the {space_title(space)}"
-    signs: dict[str, Any] = {"dots": samples is not None}
-    signs["notes"] = [*([SMALLER] if signs["dots"] else []), drawn.why]
-    signs["notes"] += [region_note(regions)] if regions else []
-    if is_sharp(density, 1 / count):
-        signs["notes"].append(average_note(count))
-    if not sheet.printed:
+    settings = settings or PlotSettings()
+    ground, lines = Square(density.space, settings), region_lines(density, settings)
+    return draw_density(ground, density, settings, dots=samples, regions=lines, sheet=sheet)
+
+
+def samples_picture(
+    density: Density,
+    data: Tensor | None,
+    samples: Tensor,
+    settings: PlotSettings | None = None,
+    *,
+    sheet: Sheet | None = None,
+) -> Picture:
+    """Draw data and samples on two squares; without data, the density and samples.
+
+    Args:
+        density: A density on a two-dimensional space.
+        data: Chart points (N, 2), such as `space.to_chart(table)`.
+        samples: Chart points (M, 2), such as `density.sample((M,))`.
+        settings: How it is drawn.
+        sheet: The sheet. Default: that of the settings.
+
+    Raises:
+        OrbiflowError: If the space has another dimension, points have another shape, or names or a
+            centre do not fit.
+    """
+    settings = settings or PlotSettings()
+    ground = Square(density.space, settings)
+    return draw_samples(ground, density, settings, data, samples, sheet=sheet)
+
+
+class Square(Ground):
+    """The canonical square of a two-dimensional space.
+
+    Raises:
+        OrbiflowError: If the space has another dimension, or names or a centre do not fit.
+    """
+
+    width = aspect = 1.0
+    title_gap = 0.7
+    caption_below = False
+
+    def __init__(self, space: Space, settings: PlotSettings) -> None:
+        require_plane(space)
+        self.space = space
+        # on round spaces the centre is that of a map
+        self.view = view_of(space, settings.names, None if space.is_round else settings.center)
+
+    def places(self, points: Tensor) -> Array:
+        return self.view.places(points)
+
+    def colouring(self, density: Density, settings: PlotSettings) -> Colouring:
+        count = _FINE_GRID if density.has_fine_detail else _GRID
+        middles = (torch.arange(count, dtype=torch.float64) + 0.5) / count
+        x, y = (middles + low for low in self.view.low)
+        values = density_on_grid(density, x, y, settings.measure)
+        areas = self.space.log_area(midpoints(self.space, count)).exp().numpy()
+        chosen = chosen_scale(density, settings.measure, settings.scale)
+        shade = shading(values, areas.reshape(count, count), log=chosen.log)
+
+        def logs() -> Array:
+            points = torch.stack(torch.meshgrid(x, y, indexing="ij"), dim=-1).reshape(-1, 2)
+            found = log_natural(density, values.ravel(), points, settings.measure)
+            return found.reshape(count, count).T
+
+        note = average_note(count) if is_sharp(density, pixel=1 / count) else ""
+        places = shade.places(values).T
+        return Colouring(places, (0, 1, 0, 1), shade, chosen.reason, note, logs)
+
+    def room(self, sheet: Sheet, label: str, ticks: Sequence[str]) -> Room:
+        if not sheet.printed:
+            return SCREEN
+        edges = (5.4, 3.8, 0.8) if self._has_ticks else (1.0, 2.8, 2.8)
+        return printed_room(sheet, *edges, label, ticks)
+
+    def panels_room(self, sheet: Sheet) -> tuple[Room, bool]:
+        edges = (5.4, 4.2, 1.6, 2.4, 4.2) if self._has_ticks else (1.0, 1.0, 1.0, 2.4, 1.6)
+        room, stacked = Room(*edges, 0.0), sheet.printed and sheet.width < NARROW
+        return (room._replace(gap=room.below + 2.0) if stacked else room), stacked
+
+    def fill(self, axes: Axes) -> None:
+        axes.set_facecolor(LIGHT)
+
+    def draw_axes(self, axes: Axes, sheet: Sheet, side: float, panel: Panel) -> None:
+        """Draw ticks, edges with their arrows, and cone points with their places in the data."""
+        axes.set_xlim(0, 1)
+        axes.set_ylim(0, 1)
+        axes.set_aspect("equal")
+        for spine in axes.spines.values():
+            spine.set_visible(False)
+        self._draw_ticks(axes, sheet, side, panel.labelled)
+        # signs that can be made out in a small square and are no larger than letters in a large one
+        head = 1.1 * sheet.em / side if sheet.printed else HEAD
+        for order, pair in enumerate(edge_pairs(self.space.group)):
+            for edge in pair:
+                _draw_edge(axes, edge, EDGE_COLOURS[order % 2], order + 1, sheet, head)
+        for corner, order in cone_points(self.space.group):
+            sign = np.array(corner) + center_sign(order, 0.5 * head)
+            axes.fill(
+                *sign.T, facecolor=CENTER_COLOURS[order], edgecolor="#ffffff",
+                linewidth=0.08 * sheet.text, zorder=8, clip_on=False,
+            )  # fmt: skip
+            if panel.alone:
+                self._write_place(axes, corner, sheet)
+
+    def caption(self, notes: Sequence[str], dots: tuple[int, int] | None) -> str:
+        parts = ["The edges with one arrow head are one edge, and so are those with two"]
+        parts += [
+            f"{SIGNS[order]} are cone points of a {TURNS[order]} turn, which no flow moves"
+            for order in self._orders
+        ]
+        parts += ["Dots are points"] if dots else []
+        return _sentences([*parts, *self._notes(notes, bool(dots))])
+
+    def samples_caption(self, notes: Sequence[str]) -> str:
+        return self.caption(notes, (0, 0))
+
+    def write_on_screen(self, frame: Frame, sheet: Sheet, title: str, words: Words) -> None:
         frame.axes.set_title(title, fontsize=1.15 * sheet.text, pad=14)
-        legend(frame.figure, space, sheet, **signs)
-    return Picture(frame.figure, sheet, title, caption(space, **signs))
+        self._draw_legend(frame.figure, sheet, words)
 
+    @property
+    def _has_ticks(self) -> bool:
+        return self.space.name in ANGLE_AXES
 
-class Coloured(NamedTuple):
-    """A density on the window of a square: places of its pixels (N, N) on the colour bar, first x.
+    @property
+    def _orders(self) -> list[int]:
+        return sorted({order for _, order in cone_points(self.space.group)}, reverse=True)
 
-    - `why`: the scale is linear or logarithmic.
-    - `log_natural`: called, (N, N) logarithms of the density in natural measure: for lines alone.
-    """
+    def _notes(self, notes: Sequence[str], dots: bool) -> list[str]:
+        return [*([CROWDED] if dots and self.space.is_round else []), *notes]
 
-    places: Array
-    shade: Shade
-    why: str
-    log_natural: Callable[[], Array]
+    def _draw_ticks(self, axes: Axes, sheet: Sheet, side: float, labelled: bool) -> None:
+        size = sheet.text
+        axes.tick_params(
+            labelsize=sheet.small, length=0.3 * size, pad=0.4 * size, width=sheet.pen(0.8)
+        )
+        axes.set_xticks([])
+        axes.set_yticks([])
+        if not self._has_ticks:
+            return
+        style: dict[str, Any] = {"fontsize": size, "color": INK, "parse_math": False}
+        label, at, texts = angle_axis(self.view, 0)
+        axes.set_xticks(at, legible(at, texts, side, sheet))
+        axes.set_xlabel(shortened(label, side, sheet), **style)
+        label, at, texts = angle_axis(self.view, 1)
+        axes.set_yticks(at, texts if labelled else [""] * len(at))
+        if labelled:
+            axes.set_ylabel(shortened(label, side, sheet), labelpad=0.2 * size, **style)
 
-    def on(self, axes: Axes) -> AxesImage:
-        """The picture of it."""
-        return axes.imshow(
-            self.places.T, extent=(0, 1, 0, 1), origin="lower", cmap=COLOURS,
-            interpolation="bicubic", vmin=0, vmax=1,
+    def _write_place(self, axes: Axes, corner: tuple[float, float], sheet: Sheet) -> None:
+        """Write where in the data's columns a cone point lies."""
+        columns = self.space.columns
+        row = self.space.from_chart(torch.tensor([corner], dtype=torch.float64))[0]
+        if len(columns) == 2:
+            text = ", ".join(map(degrees_text, row.round() + 0.0, ("NS", "EW")))
+        else:
+            row = row.round(2) + 0.0
+            text = ", ".join(
+                f"{name} {value:.2f}" for name, value in zip(columns, row, strict=True)
+            )
+        axes.annotate(
+            text.replace("-", "\N{MINUS SIGN}"), corner,
+            xytext=(0, sheet.text * (2 * corner[1] - 1)), textcoords="offset points",
+            ha="right" if corner[0] else "left", va="bottom" if corner[1] else "top",
+            fontsize=sheet.small, color=INK,
+        )  # fmt: skip
+
+    def _draw_legend(self, figure: Figure, sheet: Sheet, words: Words) -> None:
+        """Draw a legend of edges, cone points and dots above the notes, in the lower left corner."""
+        from matplotlib.lines import Line2D
+
+        size = sheet.text
+        entries = [
+            Line2D([], [], color=colour, linewidth=0.28 * size, marker=">",
+                   label=f"both {name} edges are one edge")
+            for colour, name in zip(EDGE_COLOURS, ("orange", "blue"), strict=True)
+        ]  # fmt: skip
+        style: dict[str, Any] = {"linestyle": "none"}
+        for order in self._orders:
+            sign = center_sign(order, 1.0)
+            style |= {"marker": np.concatenate([sign, sign[:1]]), "markersize": size}
+            text = f"cone point of a {TURNS[order]} turn: no flow moves it"
+            entries.append(Line2D([], [], color=CENTER_COLOURS[order], label=text, **style))
+        if words.dots:
+            style = {"markerfacecolor": "#ffffff", "markeredgecolor": INK, "linestyle": "none"}
+            entries.append(Line2D([], [], marker="o", label="points", **style))
+        notes = _sentences(self._notes(words.notes, words.dots))
+        write_caption(figure, notes, sheet)
+        lines = len(caption_lines(notes, sheet))
+        up = (0.6 + 1.25 * lines) * sheet.em / figure.get_size_inches()[1]
+        figure.legend(
+            handles=entries, loc="lower left", bbox_to_anchor=(0.02, up), ncols=2, frameon=False,
+            fontsize=sheet.small, borderaxespad=0.3,
         )  # fmt: skip
 
 
-def square_colours(density: Density, view: View, measure: str, scale: str) -> Coloured:
-    """The colours of a density's picture on the square.
-
-    Raises:
-        OrbiflowError: for an unknown measure or scale.
-    """
-    space, count = density.space, _FINE_GRID if density.has_fine_detail else _GRID
-    middles = (torch.arange(count, dtype=torch.float64) + 0.5) / count
-    values = density_on_grid(density, middles + view.low[0], middles + view.low[1], measure)
-    areas = space.log_area(midpoints(space, count)).exp().numpy().reshape(count, count)
-    chosen = chosen_scale(density, measure, scale)
-    shade = shading(values, areas, log=chosen.log)
-
-    def logs() -> Array:
-        ends = torch.meshgrid(*(middles + low for low in view.low), indexing="ij")
-        points = torch.stack(ends, dim=-1).reshape(-1, 2)
-        return log_natural(density, values.ravel(), points, measure).reshape(count, count)
-
-    return Coloured(shade.places(values), shade, chosen.why, logs)
-
-
 def average_note(count: int) -> str:
-    """What a picture of `count` pixels along a side says of peaks that are narrower."""
+    """Return what a picture with `count` pixels along a side says of narrower peaks."""
     return f"peaks narrower than 1/{count} of a side are averaged over it"
+
+
+def cone_points(group: CrystallographicGroup) -> list[tuple[tuple[float, float], int]]:
+    """Return the corners of the square that are rotation centres, with their orders."""
+    found = symmetry_elements(group, np.full(2, 0.5), 1.0).centers
+    corners = [(x, y) for x in (0.0, 1.0) for y in (0.0, 1.0)]
+    return [
+        (corner, center.order)
+        for corner in corners
+        for center in found
+        if np.allclose(center.point, corner)
+    ]
+
+
+def _draw_edge(
+    axes: Axes, edge: Array, colour: str, heads: int, sheet: Sheet, length: float
+) -> None:
+    """Draw an edge with as many arrow heads in its middle as the number of its pair."""
+    size = sheet.text
+    width = (0.16 if sheet.printed else 0.28) * size
+    axes.plot(*edge.T, color=colour, linewidth=width, clip_on=False, zorder=6)
+    along = edge[1] - edge[0]
+    across = np.array([-along[1], along[0]])
+    for k in range(heads):
+        tip = edge[0] + (0.5 + length * (0.86 + k - (heads - 1) / 2)) * along
+        back = tip - length * along
+        ring = np.stack([tip, back + 0.46 * length * across, back - 0.46 * length * across])
+        axes.fill(
+            *ring.T, facecolor=colour, edgecolor="#ffffff", linewidth=0.06 * size,
+            clip_on=False, zorder=7,
+        )  # fmt: skip
+
+
+def _sentences(parts: Sequence[str]) -> str:
+    return " ".join(f"{part[0].upper()}{part[1:]}." for part in parts)

@@ -1,7 +1,8 @@
-"""A density at a glance: a small picture without axes, for a page of many.
+"""Small pictures of densities without axes, for pages of many.
 
-Two dimensions: the canonical square, or a map of directions. One angle: the data's histogram and the
-density. A few angles: every pair of samples, and each alone; many: a stripe each.
+In two dimensions they show the canonical square, or a map of directions; of one angle the data's
+histogram and the density; of a few angles every pair of samples, and each alone; of many a stripe for
+each.
 """
 
 from __future__ import annotations
@@ -20,40 +21,35 @@ from orbiflow.density.models import Density, midpoints
 from orbiflow.density.pictures.axes import view_of
 from orbiflow.density.pictures.map_choice import chosen_map
 from orbiflow.density.pictures.maps import pixels_of
-from orbiflow.density.pictures.scale import (
-    DARKEST,
-    Shade,
-    dark_share,
-    shading,
-)
+from orbiflow.density.pictures.scale import DARK_SHARE, Shade, dark_share, shading
 from orbiflow.density.pictures.values import density_on_grid, density_on_map
 from orbiflow.density.spaces import RoundSpace, to_vectors
 
 SIZE = (360, 240)
-"""Pixels: half as many again as a page shows."""
+"""Width and height in pixels, half as many again as a page shows."""
 
 PAPER, INK, BARS = "#ffffff", "#1a1a1a", "#b9c4d0"
 COARSE = 120
-"""Places along a side at which a density is evaluated; pixels between them are interpolated."""
+"""Points along a side at which a density is evaluated; pixels between them are interpolated."""
 
 MAP_PLACES = 14_000
 SAMPLES, SEED = 4_000, 0
-MOST_PAIRS = 6
-"""Angles whose pairs are drawn; of more there are stripes."""
+MAX_PAIRS = 6
+"""Number of angles up to which pairs are drawn, instead of stripes."""
 
 MARGIN = 6
 
 
 @torch.no_grad()
 def density_thumbnail(density: Density, data: ArrayLike) -> bytes:
-    """PNG of 360 x 240 pixels, the same every time.
+    """Return a PNG of 360 x 240 pixels, the same every time.
 
     Colours are by logarithms where most of the picture would be dark otherwise.
 
     Args:
-        density: of any space.
-        data: (N, k) in the space's own units, that it was fitted to; rows that lack angles are left
-            out.
+        density: A density on any space.
+        data: The data (N, k) that it was fitted to, in the space's own units. Rows that lack angles
+            are left out.
     """
     space, table = density.space, np.asarray(data, dtype=np.float64)
     whole = table[~np.isnan(table).any(axis=1)]
@@ -66,7 +62,7 @@ def density_thumbnail(density: Density, data: ArrayLike) -> bytes:
     else:
         drawn = density.sample((SAMPLES,), torch.Generator().manual_seed(SEED))
         places = view_of(space).places(drawn)
-        picture = _pairs(places) if space.dim <= MOST_PAIRS else _stripes(places)
+        picture = _pairs(places) if space.dim <= MAX_PAIRS else _stripes(places)
     sheet = Image.new("RGB", SIZE, PAPER)
     width, height = picture.size
     sheet.paste(picture, ((SIZE[0] - width) // 2, (SIZE[1] - height) // 2))
@@ -76,7 +72,7 @@ def density_thumbnail(density: Density, data: ArrayLike) -> bytes:
 
 
 def _coloured(places: Array) -> Image.Image:
-    """Places (rows, columns) on the colour bar, the first row above."""
+    """Return an image of places (rows, columns) on the colour bar, the first row on top."""
     from matplotlib import colormaps
 
     shades = colormaps["viridis"](np.clip(places, 0, 1))[..., :3]
@@ -84,7 +80,7 @@ def _coloured(places: Array) -> Image.Image:
 
 
 def _shade(values: Array, areas: Array) -> Shade:
-    return shading(values, areas, log=dark_share(values, areas) > DARKEST)
+    return shading(values, areas, log=dark_share(values, areas) > DARK_SHARE)
 
 
 def _square(density: Density) -> Image.Image:
@@ -104,14 +100,13 @@ def _map(density: Density, data: Array) -> Image.Image:
     points = space.vectors_to_chart(to_vectors(pixels.latlon))
     values = density_on_map(density, points, "natural", pixels.angle)
     shade = _shade(values[pixels.within], pixels.areas[pixels.within])
-    places = np.zeros(pixels.shown.shape)
-    places[pixels.shown] = shade.places(values)
+    places = pixels.table(shade.places(values), 0.0)
     left, right, below, above = pixels.extent
     scale = min((SIZE[0] - MARGIN) / (right - left), (SIZE[1] - MARGIN) / (above - below))
     size = (round(scale * (right - left)), round(scale * (above - below)))
     picture = _coloured(places[::-1]).resize(size, Image.Resampling.BICUBIC)
     ring = (projection.outline() - (left, above)) * (scale, -scale)
-    # four times finer: the outline is a curve
+    # four times finer, so that the outline is a curve
     mask = Image.new("L", (4 * size[0], 4 * size[1]))
     ImageDraw.Draw(mask).polygon([tuple(place) for place in (4 * ring).tolist()], fill=255)
     paper = Image.new("RGB", size, PAPER)
@@ -120,7 +115,7 @@ def _map(density: Density, data: Array) -> Image.Image:
 
 
 def _histogram(density: Density, data: Array) -> Image.Image:
-    """Bars of the data under the density's line, from minus half a turn to half a turn."""
+    """Draw bars of the data under the density's line, from minus half a turn to half a turn."""
     space, view, fine = density.space, view_of(density.space), 4
     width, height = (fine * (side - 2 * MARGIN) for side in SIZE)
     bins = min(72, max(12, round(2 * len(data) ** (1 / 3))))
@@ -139,7 +134,7 @@ def _histogram(density: Density, data: Array) -> Image.Image:
 
 
 def _pairs(places: Array) -> Image.Image:
-    """Every pair of angles below the diagonal, each alone on it."""
+    """Draw every pair of angles below the diagonal, each alone on it."""
     count = places.shape[1]
     side = SIZE[1] // count
     sheet = Image.new("RGB", (side * count, side * count), PAPER)
@@ -168,7 +163,7 @@ def _bars(places: Array, side: int) -> Image.Image:
 
 
 def _stripes(places: Array) -> Image.Image:
-    """An angle a stripe, from above, each as bright as its largest bin."""
+    """Draw a stripe for each angle, from the top, each as bright as its largest bin."""
     bins = 90
     counts = [np.histogram(column, bins, (0, 1))[0] for column in places.T]
     shades = np.stack([count / max(1, count.max()) for count in counts])

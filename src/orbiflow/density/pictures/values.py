@@ -1,8 +1,9 @@
-"""Values of a density for a picture: at points, and on a grid whose pixels average narrow peaks."""
+"""Values of a density for a picture: at points, and on pixels over which narrow peaks are averaged."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 import torch
@@ -14,20 +15,15 @@ from orbiflow.density.models import (
     Density,
     midpoints,
 )
-from orbiflow.density.pictures.scale import (
-    DARKEST,
-    SCALES,
-    dark_share,
-)
+from orbiflow.density.pictures.scale import DARK_SHARE, dark_share
 from orbiflow.density.pictures.surfaces import off_cones
 from orbiflow.density.spaces import rectangle
-from orbiflow.errors import OrbiflowError
 
 _TOLERANCE = 1e-5
-"""Of what is drawn, relative to it."""
+"""Relative error of the sums over kernels."""
 
 _KERNELS = 4096
-"""Summed at a time: tables of all would be gigabytes."""
+"""Kernels summed at a time: tables of all of them would be gigabytes."""
 
 _COARSE = 120
 """Points along a side by which a scale is chosen."""
@@ -35,145 +31,140 @@ _COARSE = 120
 
 @torch.no_grad()
 def density_at(density: Density, points: Tensor, measure: str) -> Array:
-    """Density (N,) at chart points (N, 2) of the plane; at cone points, next to them.
+    """Return the density (N,) at chart points (N, 2), and next to them at cone points.
 
     Raises:
-        OrbiflowError: for an unknown measure.
+        OrbiflowError: If the measure is unknown.
     """
     if density.space.is_round:
         points = off_cones(points)
-    return (
-        density.log_prob(points.to(device=density.device, dtype=density.dtype), measure=measure)
-        .double()
-        .cpu()
-        .exp()
-        .numpy()
-    )
+    own = points.to(device=density.device, dtype=density.dtype)
+    return density.log_prob(own, measure=measure).double().cpu().exp().numpy()
 
 
 @torch.no_grad()
 def density_on_grid(
     density: Density, x: Tensor, y: Tensor, measure: str, *, pixel: float | None = None
 ) -> Array:
-    """Density (len(x), len(y)) on the grid of chart coordinates x and y, float64.
+    """Return the density (len(x), len(y)) on a grid of chart coordinates, float64.
 
-    A kernel narrower than a pixel would be seen or missed by where the grid falls. To each kernel's
-    deviation half a pixel is added, in squares: then its values on the grid sum to its mass within
-    2 %, wherever it lies, and broad kernels stay as they are.
+    A kernel narrower than a pixel would be seen or missed depending on where the grid falls. So half
+    a pixel is added to the deviation of each kernel, in squares: then its values on the grid sum to
+    its mass within 2 %, wherever it lies, and broad kernels stay as they are.
 
     Args:
-        pixel: its side, default the step of x.
+        density: The density.
+        x: First coordinates.
+        y: Second coordinates.
+        measure: What the density is per.
+        pixel: Side of a pixel. Default: the step of `x`.
 
     Raises:
-        OrbiflowError: for an unknown measure.
+        OrbiflowError: If the measure is unknown.
     """
-    space, shape = density.space, (len(x), len(y))
+    shape = (len(x), len(y))
     points = torch.stack(torch.meshgrid(x, y, indexing="ij"), dim=-1).reshape(-1, 2)
     part = density.kernel_part
     if part is None:
         return density_at(density, points, measure).reshape(shape)
-    if space.is_round:
+    half = _half_pixels(part[1], pixel or float(x[1] - x[0]))
+    if density.space.is_round:
         points = off_cones(points)
-    weight, kernels = part
-    values = _without_kernels(density, points).numpy()
-    pixel = pixel or float(x[1] - x[0])
-    kappa = _widened(kernels, _half_pixels(kernels, pixel))
-    if space.is_round:
-        sums = _round_sums(kernels, kappa, points).reshape(shape)
-    else:
-        sums = _flat_sums(kernels, kappa, x, y)
-    values = values.reshape(shape) + weight * sums.numpy()
-    return values * space.log_density_factor(points, measure).exp().numpy().reshape(shape)
+        return _averaged(density, part, points, measure, half, _round_sums).reshape(shape)
+    sums = lambda wide, _: _flat_sums(wide, x, y).reshape(-1)  # noqa: E731
+    return _averaged(density, part, points, measure, half, sums).reshape(shape)
 
 
 @torch.no_grad()
 def density_on_map(density: Density, points: Tensor, measure: str, angle: float) -> Array:
-    """Density (N,) at chart points (N, 2) of a round space, that of kernels averaged over pixels.
+    """Return the density (N,) at chart points (N, 2) of a round space, averaged over pixels.
 
     Args:
-        angle: a pixel's side on the sphere, in radians.
+        density: The density.
+        points: Chart points of the pixels.
+        measure: What the density is per.
+        angle: Side of a pixel on the sphere, in radians.
 
     Raises:
-        OrbiflowError: for an unknown measure.
+        OrbiflowError: If the measure is unknown.
     """
     part = density.kernel_part
     if part is None:
         return density_at(density, points, measure)
-    weight, kernels = part
-    points = off_cones(points)
-    kappa = _widened(kernels, torch.tensor(angle / 2))
-    values = _without_kernels(density, points)
-    values = values + weight * _round_sums(kernels, kappa, points)
-    return (values * density.space.log_density_factor(points, measure).exp()).numpy()
+    half = torch.tensor(angle / 2)
+    return _averaged(density, part, off_cones(points), measure, half, _round_sums)
 
 
-class Chosen(NamedTuple):
+class ChosenScale(NamedTuple):
     """Whether colours are by logarithms, and why, in words for a caption."""
 
     log: bool
-    why: str
+    reason: str
 
 
-def chosen_scale(density: Density, measure: str, scale: str) -> Chosen:
-    """The scale of colours: the same for all pictures of a density.
+def chosen_scale(density: Density, measure: str, scale: str) -> ChosenScale:
+    """Return the scale of colours, which is the same for all pictures of a density.
+
+    Args:
+        density: The density.
+        measure: What the density is per.
+        scale: "auto", "linear" or "log".
 
     Raises:
-        OrbiflowError: for a scale that is not one of `SCALES`, or an unknown measure.
+        OrbiflowError: If the measure is unknown.
     """
-    if scale not in SCALES:
-        raise OrbiflowError(f"scale must be one of {', '.join(SCALES)}, got {scale!r}")
     if scale != "auto":
-        return Chosen(scale == "log", f"{_SAID[scale == 'log']}, as asked for")
+        return ChosenScale(scale == "log", f"{_COLOURS_ARE[scale == 'log']}, as asked for")
     t = (torch.arange(_COARSE, dtype=torch.float64) + 0.5) / _COARSE
     values = density_on_grid(density, t, t, measure, pixel=0.5 / _COARSE).ravel()
     areas = density.space.log_area(midpoints(density.space, _COARSE)).exp().numpy()
     dark = dark_share(values, areas)
-    log = dark > DARKEST
+    log = dark > DARK_SHARE
     # never more than what is true: 99.6 % are not all
     share, side = (int(100 * dark), "below") if log else (math.ceil(100 * (1 - dark)), "above")
     reason = f"the density is {side} a tenth of its peak on {share} % of the area"
-    return Chosen(log, f"{_SAID[log]}, as {reason}")
+    return ChosenScale(log, f"{_COLOURS_ARE[log]}, as {reason}")
 
 
-_SAID = {False: "colours are linear", True: "colours are logarithmic"}
+_COLOURS_ARE = {False: "colours are linear", True: "colours are logarithmic"}
 
 
-def takes_logarithms(density: Density, measure: str, scale: str) -> bool:
-    """`chosen_scale` without the reason."""
-    return chosen_scale(density, measure, scale).log
+def is_sharp(density: Density, *, pixel: float | None = None, angle: float | None = None) -> bool:
+    """Return whether peaks of a density may be narrower than the pixels of a picture.
 
-
-def is_sharp(density: Density, pixel: float) -> bool:
-    """Whether peaks of the density may be narrower than pixels of that side show."""
+    Args:
+        density: The density.
+        pixel: Side of a pixel of the square.
+        angle: Instead of `pixel`, the side of a pixel on the sphere, in radians.
+    """
     part = density.kernel_part
-    return part is not None and _is_narrower(part[1], _half_pixels(part[1], pixel))
+    if part is None:
+        return False
+    half = torch.tensor(angle / 2) if angle else _half_pixels(part[1], pixel or 0.0)
+    return bool((part[1].concentrations ** -0.5 < 2 * half).any())
 
 
-def is_sharp_on_map(density: Density, angle: float) -> bool:
-    """The same of pixels `angle` radians wide on the sphere."""
-    part = density.kernel_part
-    return part is not None and _is_narrower(part[1], torch.tensor(angle / 2))
-
-
-def _without_kernels(density: Density, points: Tensor) -> Tensor:
-    """Return the density (N,) per area of the square, without its kernels."""
-    values = density.log_density_without_kernels(points)
+def _averaged(
+    density: Density,
+    part: tuple[float, AdaptiveKernels],
+    points: Tensor,
+    measure: str,
+    half: Tensor,
+    sums: Callable[[AdaptiveKernels, Tensor], Tensor],
+) -> Array:
+    """Return the density (N,) with kernels whose deviations are at least `half` a pixel."""
+    weight, own = part
+    kappa = 1 / (1 / own.concentrations + half**2)
+    widened = AdaptiveKernels(own.space, own.centers, kappa, own.weights)
+    logs = density.log_density_without_kernels(points)
     if density.space.is_round:
-        values = values + density.space.log_area(points)
-    return values.exp()
-
-
-def _is_narrower(kernels: AdaptiveKernels, half: Tensor) -> bool:
-    return bool((kernels.concentrations**-0.5 < 2 * half).any())
-
-
-def _widened(kernels: AdaptiveKernels, half: Tensor) -> Tensor:
-    """Concentrations of kernels whose deviations are at least `half` a pixel."""
-    return 1 / (1 / kernels.concentrations + half**2)
+        logs = logs + density.space.log_area(points)
+    values = logs.exp() + weight * sums(widened, points)
+    return (values * density.space.log_density_factor(points, measure).exp()).numpy()
 
 
 def _half_pixels(kernels: AdaptiveKernels, pixel: float) -> Tensor:
-    """Half a pixel's side in the kernels' angles, (d,), or, on round spaces, (N, 1)."""
+    """Return half a pixel's side in the kernels' angles, (d,), or, on round spaces, (N, 1)."""
     if kernels.space.is_round:
         # the chart is conformal: a small square stays a square
         area = kernels.space.log_area(off_cones(kernels.centers)).exp()
@@ -181,8 +172,11 @@ def _half_pixels(kernels: AdaptiveKernels, pixel: float) -> Tensor:
     return math.pi * pixel / rectangle(kernels.space)
 
 
-def _flat_sums(kernels: AdaptiveKernels, kappa: Tensor, x: Tensor, y: Tensor) -> Tensor:
-    """The mixture of kernels on the grid: a matrix product, as kernels are products of the axes'."""
+def _flat_sums(kernels: AdaptiveKernels, x: Tensor, y: Tensor) -> Tensor:
+    """Return the mixture of kernels on a grid.
+
+    It is a matrix product, since kernels are products of functions of one coordinate.
+    """
     space = kernels.space
     # cosets are rotations by half a turn and glides along the axes: each image of a grid is one
     ends = [torch.stack([t, torch.zeros_like(t)], dim=-1) for t in (x, y)]
@@ -190,19 +184,18 @@ def _flat_sums(kernels: AdaptiveKernels, kappa: Tensor, x: Tensor, y: Tensor) ->
     along = space.group.images(ends[1].flip(-1))[..., 1]
     total = x.new_zeros(len(x), len(y))
     for images in zip(across, along, strict=True):
-        for part in torch.arange(len(kappa)).split(_KERNELS):
+        for part in torch.arange(len(kernels.concentrations)).split(_KERNELS):
             tables: list[Tensor] = []
             sides = zip(images, rectangle(space).tolist(), strict=True)
             for axis, (image, period) in enumerate(sides):
-                own = kappa[part, axis]
+                own = kernels.concentrations[part, axis]
                 angle = 2 * math.pi * (image[:, None] - kernels.centers[part, axis]) / period
                 tables.append((own * (angle.cos() - 1)).exp() / (period * torch.special.i0e(own)))
             total += (tables[0] * kernels.weights[part]) @ tables[1].T
     return total
 
 
-def _round_sums(kernels: AdaptiveKernels, kappa: Tensor, points: Tensor) -> Tensor:
-    """The mixture of kernels (N,) at points off the cone points, per area of the square."""
-    widened = AdaptiveKernels(kernels.space, kernels.centers, kappa, kernels.weights)
-    values = widened.log_density(points, tolerance=_TOLERANCE)
+def _round_sums(kernels: AdaptiveKernels, points: Tensor) -> Tensor:
+    """Return the mixture of kernels (N,) at points off the cone points, per area of the square."""
+    values = kernels.log_density(points, tolerance=_TOLERANCE)
     return (values + kernels.space.log_area(points)).exp()

@@ -17,48 +17,44 @@ from orbiflow.density.arguments import silent
 from orbiflow.density.models import Density
 from orbiflow.density.regions.contours import filled
 from orbiflow.density.regions.grid import LevelGrid, Seeds
+from orbiflow.density.regions.islands import with_islands
 from orbiflow.density.regions.levels import DensityLevels, DensityRegion
-from orbiflow.density.regions.specks import (
-    Window,
-    window_of,
-    with_specks,
-)
-from orbiflow.errors import OrbiflowError
+from orbiflow.density.regions.windows import Window, window_of
 from orbiflow.runtime import one_thread
 from orbiflow.typed_torch import unique
 
 DOUBLINGS = 3
-"""Of the coarsest grid: cells of a quarter of a degree on the globe."""
+"""How often the coarsest grid is made twice as fine: to a quarter of a degree on the globe."""
 
 BUDGET = 300_000
-"""Evaluations after which no grid gets finer."""
+"""Number of evaluations after which no grid gets finer."""
 
-MOST_PEAKS = 30_000
-"""Centres of kernels that are looked at for islands."""
+MAX_PEAKS = 30_000
+"""Number of kernels' centres at which islands are looked for."""
 
 CHECKED = 100_000
-"""New samples by which the mass inside the polygons is measured."""
+"""Number of new samples with which the mass inside the polygons is measured."""
 
 TOLERANCE = 0.005
-"""Of that mass, beyond what samples leave open; more is said aloud."""
+"""Error of that mass beyond what samples leave open; the user is told of a larger one."""
 
-LONGEST = 4.0
-"""Degrees of a side on the globe, so that it hardly matters which lines a reader draws."""
+MAX_SIDE = 4.0
+"""Degrees of a side on the globe, so that it hardly matters which lines a program draws."""
 
 SIMPLIFIED = 0.03
-"""Of a cell: by how much vertices that are left out may lie off the line."""
+"""Distance from the line, in cells, of vertices that may be left out."""
 
 
 @dataclass(frozen=True, eq=False)
 class Outline:
     """A region's boundary.
 
-    - `region`: the region. `window`: in which it is drawn.
-    - `shape`: polygons in the window's units, outer rings counter-clockwise, cut at the window's edges.
-    - `size`: area of the polygons in natural measure.
-    - `mass`, `error`: of new samples that lie inside the polygons, and its standard error.
-    - `off`: root mean square of the log density at the vertices, less the threshold, in nats.
-    - `notes`: what the user should know.
+    - `region`: The region. `window`: The window in which it is drawn.
+    - `shape`: Polygons in the window's units, outer rings counter-clockwise, cut at the window's edges.
+    - `size`: Area of the polygons in natural measure.
+    - `mass`, `error`: Share of new samples that lie inside the polygons, and its standard error.
+    - `off`: Root mean square of the log density at the vertices, less the threshold, in nats.
+    - `notes`: What the user should know, in words.
     """
 
     region: DensityRegion
@@ -72,18 +68,18 @@ class Outline:
 
     @property
     def fraction(self) -> float:
-        """Of the space's natural measure."""
+        """The share of the space's natural measure."""
         return self.size / self.region.density.space.volume
 
     def rings(self) -> list[list[Array]]:
-        """Of each polygon, its outer ring (n, 2), closed, and then its holes."""
+        """Return for each polygon its outer ring (n, 2), closed, and then its holes."""
         return [
             [np.asarray(ring.coords) for ring in (part.exterior, *part.interiors)]
             for part in self.shape.geoms
         ]
 
     def to_json(self) -> dict[str, Any]:
-        """An object for `json.dumps`."""
+        """Return an object for `json.dumps`."""
         return {
             **self.region.to_json(),
             "polygons": [[ring.tolist() for ring in rings] for rings in self.rings()],
@@ -106,21 +102,22 @@ def outlines(
     seed: int = 0,
     told: Callable[[float, str], None] = silent,
 ) -> list[Outline]:
-    """Draw the boundaries of regions of one density of two dimensions.
+    """Return the boundaries of regions of one density of two dimensions.
 
-    A grid is made finer where a threshold is crossed, three times over; samples on the other side of a
+    A grid is made finer three times where a threshold is crossed. Samples on the other side of a
     threshold than all of their cell show islands between its nodes, and get a grid of their own. Each
     vertex is moved along its cell's side to where the density itself is at the threshold. The mass
     inside the polygons is measured with new samples.
 
     Args:
-        regions: of `levels`.
-        budget: evaluations of the density after which no grid gets finer.
-        seed: of the new samples.
-        told: told the share of the work done and what is being done.
+        levels: Samples of the density.
+        regions: Regions of `levels`.
+        budget: Number of evaluations of the density after which no grid gets finer.
+        seed: Seed of the new samples.
+        told: A function that is called with the share of the work done, and what is being done.
 
     Raises:
-        OrbiflowError: for a density that is not of two dimensions.
+        OrbiflowError: If the density is not of two dimensions.
     """
     density = levels.density
     window = window_of(density.space)
@@ -149,9 +146,9 @@ def outlines(
         told(min(0.9, spent / budget), "drawing outlines")
         shape, off = filled(grid.values, grid.low, grid.step, region.log_prob, function)
         left = (budget - spent) // (len(regions) - number)
-        shape, more, missed = with_specks(shape, grid, region.log_prob, seeds, function, left)
+        shape, more, missed = with_islands(shape, grid, region.log_prob, seeds, function, left)
         spent += more
-        shape = _polygons(shape, float(grid.step.min()), LONGEST if window.on_globe else np.inf)
+        shape = _polygons(shape, float(grid.step.min()), MAX_SIDE if window.on_globe else np.inf)
         inside = _share_inside(shape, fresh)
         error = float(np.sqrt(max(inside * (1 - inside), 1 / CHECKED) / CHECKED))
         found.append(
@@ -170,13 +167,13 @@ def outlines(
 
 
 def _peaks(density: Density) -> Tensor:
-    """Chart points (P, 2) at which narrow islands may be: centres of kernels."""
+    """Return chart points (P, 2) at which narrow islands may be: centres of kernels."""
     part = density.kernel_part
     if part is None:
         return torch.zeros(0, 2, dtype=torch.float64)
     places = unique((part[1].centers * 1e6).round(), dim=0) / 1e6
     chosen = torch.randperm(len(places), generator=torch.Generator().manual_seed(0))
-    return places[chosen[:MOST_PEAKS]]
+    return places[chosen[:MAX_PEAKS]]
 
 
 def _polygons(shape: shapely.Geometry, step: float, longest: float) -> shapely.MultiPolygon:
@@ -189,7 +186,7 @@ def _polygons(shape: shapely.Geometry, step: float, longest: float) -> shapely.M
 
 
 def _share_inside(shape: shapely.MultiPolygon, points: Array) -> float:
-    """Of points (N, 2) in the polygons."""
+    """Return the share of points (N, 2) in the polygons."""
     if shape.is_empty:
         return 0.0
     tree = shapely.STRtree(list(shape.geoms))
@@ -208,57 +205,3 @@ def _notes(region: DensityRegion, inside: float, error: float, missed: int) -> t
     if missed:
         notes.append(f"{missed} islands or holes were not outlined: a larger budget would")
     return tuple(notes)
-
-
-DIGITS = 7
-"""After the point, of degrees: a centimetre on the ground."""
-
-
-def to_geojson(outlines: Sequence[Outline]) -> dict[str, Any]:
-    """A FeatureCollection, a MultiPolygon a region, for `json.dumps`.
-
-    Coordinates are longitude and latitude in degrees, outer rings counter-clockwise (section 3.1.6);
-    polygons are cut at the antimeridian (3.1.9), and one that holds a pole runs along the edge of the
-    map there. Sides are straight in longitude and latitude (3.1.1). Of axes northern ends are drawn.
-
-    Properties of each: `mass` (asked for, or null), `held` and `held_error` (by samples of the
-    density), `log_prob` (the threshold, nats per steradian) and its interval of 95 %, `area` in
-    steradians, `fraction` of the space, `polygons_mass` and `polygons_mass_error` (of new samples
-    inside the polygons).
-
-    Raises:
-        OrbiflowError: for a space that is not round.
-    """
-    for outline in outlines:
-        if not outline.window.on_globe:
-            space = outline.region.density.space
-            raise OrbiflowError(
-                f"GeoJSON is for places on a globe, not for the angles of a {space.name}: write "
-                ".json or .csv"
-            )
-    return {"type": "FeatureCollection", "features": [_feature(outline) for outline in outlines]}
-
-
-def _feature(outline: Outline) -> dict[str, Any]:
-    region = outline.region
-    return {
-        "type": "Feature",
-        "properties": {
-            "mass": region.mass,
-            "held": region.held,
-            "held_error": region.error,
-            "log_prob": region.log_prob,
-            "log_prob_low": region.log_prob_low,
-            "log_prob_high": region.log_prob_high,
-            "area": outline.size,
-            "fraction": outline.fraction,
-            "polygons_mass": outline.mass,
-            "polygons_mass_error": outline.error,
-        },
-        "geometry": {
-            "type": "MultiPolygon",
-            "coordinates": [
-                [np.round(ring, DIGITS).tolist() for ring in rings] for rings in outline.rings()
-            ],
-        },
-    }

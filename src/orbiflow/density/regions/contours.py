@@ -1,4 +1,4 @@
-"""Where values on a grid are at least a level: polygons, with vertices found on the function itself."""
+"""Polygons where values on a grid are at least a level, with vertices on the function itself."""
 
 from __future__ import annotations
 
@@ -10,26 +10,33 @@ from orbiflow.arrays import Array
 from orbiflow.density.regions.grid import Function
 
 TOLERANCE = 1e-3
-"""Of the function at a vertex, less the level."""
+"""Difference between the function at a vertex and the level that is good enough."""
 
-STEPS = 8
-"""Of finding a vertex, at most."""
+MAX_STEPS = 8
+"""Steps in which a vertex is found, at most."""
 
-BELOW = 1e12
+FAR_BELOW = 1e12
 
 
 def filled(
     values: Array, low: Array, step: Array, level: float, function: Function
 ) -> tuple[shapely.Geometry, float]:
-    """The area in which `values` (n + 1, m + 1) are at least `level`, cut at the grid's border.
+    """Return the area in which values on a grid are at least `level`, cut at the grid's border.
 
     Vertices lie on sides of cells, moved along them to where `function` is at the level.
 
+    Args:
+        values: Values (n + 1, m + 1) at the nodes.
+        low: Lower corner of the grid.
+        step: Sides of a cell.
+        level: The level.
+        function: The function.
+
     Returns:
-        A polygon, several, or an empty one; and the root mean square of what the function is off at the
-        vertices inside.
+        A polygon, several, or an empty one; and the root mean square of the difference between the
+        function and the level at the vertices inside.
     """
-    padded = np.pad(values, 1, constant_values=level - BELOW)
+    padded = np.pad(values, 1, constant_values=level - FAR_BELOW)
     rings = [ring - 1 for ring in find_contours(padded, level)]
     if not rings:
         return shapely.MultiPolygon(), 0.0
@@ -45,7 +52,7 @@ def filled(
 def _on_level(
     at: Array, values: Array, low: Array, step: Array, level: float, function: Function
 ) -> tuple[Array, float]:
-    """Vertices (V, 2), in cells, by false position between the nodes beside them (Illinois)."""
+    """Return vertices (V, 2), in cells, by false position between nodes (the Illinois algorithm)."""
     most = np.array(values.shape) - 1
     inside = ((at >= 0) & (at <= most)).all(axis=1)
     at = np.clip(at, 0, most)
@@ -59,7 +66,7 @@ def _on_level(
     off = np.full(len(rows), np.inf)
     found = at[rows]
     todo, last = np.arange(len(rows)), np.zeros(len(rows))
-    for _ in range(STEPS):
+    for _ in range(MAX_STEPS):
         width = fb[todo] - fa[todo]
         share = np.clip(-fa[todo] / np.where(width == 0, 1.0, width), 0.0, 1.0)
         here = a[todo] + share[:, None] * (b[todo] - a[todo])

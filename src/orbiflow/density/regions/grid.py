@@ -1,4 +1,4 @@
-"""A function on a grid that is fine only where it crosses certain levels."""
+"""A grid of a function's values that is fine only where the function crosses certain levels."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from orbiflow.arrays import Array
 
 Function = Callable[[Array], Array]
-"""Points (N, 2) to values (N,)."""
+"""A function from points (N, 2) to values (N,)."""
 
 Flags = NDArray[np.bool_]
 
-ROUNDS = 200
-"""Of evaluating what lies beside a crossing, at most, a level of the grid."""
+MAX_ROUNDS = 200
+"""Rounds of evaluating what lies beside a crossing, at most, for each size of cells."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,9 +31,13 @@ class Seeds:
 class LevelGrid:
     """Values (n + 1, m + 1) at the nodes of n x m even cells between `low` and `high`.
 
-    True at both ends of every side of a cell whose ends are on different sides of a level; elsewhere
-    interpolated from coarser cells. `missed`: (n, m, levels) of cells all of whose nodes are on one
-    side of a level, how many seeds are on the other.
+    Values are exact at both ends of every side of a cell whose ends are on different sides of a level;
+    elsewhere they are interpolated from coarser cells.
+
+    - `low`, `step`: The lower corner, and the sides of a cell.
+    - `missed`: For each cell and level (n, m, T) how many seeds are on the other side of the level than
+      all nodes of the cell.
+    - `evaluations`: Number of evaluations of the function.
     """
 
     low: Array
@@ -57,9 +61,14 @@ class LevelGrid:
         """Evaluate everywhere on `cells`, then halve them where a level is crossed.
 
         Args:
-            levels: (T,).
-            doublings: of the grid, at most.
-            budget: no further doubling after as many evaluations.
+            function: The function.
+            low: Lower corner of the grid.
+            high: Upper corner of the grid.
+            cells: Numbers of cells along both sides, at first.
+            levels: The levels (T,).
+            seeds: Points at which the function is known.
+            doublings: How often cells are halved at most.
+            budget: Number of evaluations after which they are not halved again.
         """
         maker = _Maker(function, low, high, cells, levels, seeds)
         for _ in range(doublings):
@@ -70,6 +79,8 @@ class LevelGrid:
 
 
 class _Maker:
+    """A grid that is being refined."""
+
     def __init__(
         self,
         function: Function,
@@ -79,13 +90,8 @@ class _Maker:
         levels: Array,
         seeds: Seeds,
     ) -> None:
-        self.function, self.low, self.high, self.levels, self.seeds = (
-            function,
-            low,
-            high,
-            levels,
-            seeds,
-        )
+        self.function, self.low, self.high = function, low, high
+        self.levels, self.seeds = levels, seeds
         self.values = np.zeros((cells[0] + 1, cells[1] + 1))
         self.known = np.zeros(self.values.shape, dtype=bool)
         self.evaluations = 0
@@ -96,16 +102,16 @@ class _Maker:
         return (self.high - self.low) / (np.array(self.values.shape) - 1)
 
     def double(self) -> None:
-        """Halve the cells; evaluate about what crosses, and where seeds were missed."""
+        """Halve the cells, and evaluate around crossings and where seeds were missed."""
         wanted = (self.missed() > 0).any(axis=2)
         self.values, self.known = _doubled(self.values), _spread(self.known)
         self._evaluate(_corners(np.repeat(np.repeat(wanted, 2, axis=0), 2, axis=1)))
-        for _ in range(ROUNDS):
+        for _ in range(MAX_ROUNDS):
             if not self._evaluate(_corners(self._mixed())):
                 return
 
     def missed(self) -> NDArray[np.int64]:
-        """(n, m, T)"""
+        """Return for each cell and level (n, m, T) how many seeds are on the other side."""
         shape = np.array(self.values.shape) - 1
         cell = np.clip(
             np.floor((self.seeds.points - self.low) / self.step).astype(int), 0, shape - 1
@@ -120,7 +126,7 @@ class _Maker:
         return found
 
     def _mixed(self) -> Flags:
-        """(n, m): cells that cross a level."""
+        """Return the cells (n, m) that cross a level."""
         found = np.zeros(np.array(self.values.shape) - 1, dtype=bool)
         for level in self.levels:
             least, most = _extremes(self.values >= level)
@@ -128,7 +134,7 @@ class _Maker:
         return found
 
     def _evaluate(self, wanted: Flags) -> int:
-        """Evaluate at nodes that are not known; how many."""
+        """Evaluate at wanted nodes that are not known, and return their number."""
         index = np.argwhere(wanted & ~self.known)
         if len(index):
             found = self.function(self.low + index * self.step)
@@ -139,13 +145,13 @@ class _Maker:
 
 
 def _extremes(above: Flags) -> tuple[Flags, Flags]:
-    """Whether all, and any, of a cell's four nodes are."""
+    """Return whether all, and whether any, of a cell's four nodes are above a level."""
     four = (above[:-1, :-1], above[1:, :-1], above[:-1, 1:], above[1:, 1:])
     return np.logical_and.reduce(four), np.logical_or.reduce(four)
 
 
 def _corners(cells: Flags) -> Flags:
-    """Nodes of cells."""
+    """Return the nodes of cells."""
     found = np.zeros(np.array(cells.shape) + 1, dtype=bool)
     for i in (0, 1):
         for j in (0, 1):
@@ -154,7 +160,7 @@ def _corners(cells: Flags) -> Flags:
 
 
 def _doubled(values: Array) -> Array:
-    """Interpolated on cells of half the size."""
+    """Return values interpolated on cells of half the size."""
     found = np.empty(2 * np.array(values.shape) - 1)
     found[::2, ::2] = values
     found[1::2, ::2] = (values[1:] + values[:-1]) / 2

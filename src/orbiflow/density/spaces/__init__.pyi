@@ -19,4 +19,4 @@ from .space import Space as Space
 from .space import check_measure as check_measure
 from .space import checked_table as checked_table
 from .space import rectangle as rectangle
-from .space import such_rows as such_rows
+from .space import row_count as row_count

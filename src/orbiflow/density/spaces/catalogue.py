@@ -1,4 +1,4 @@
-"""The four spaces by their names."""
+"""The four identification spaces by name."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ CLASSES: dict[str, type[Space]] = {
     kind.name: kind for kind in (Torus, Sphere, KleinBottle, ProjectivePlane)
 }
 SPACES = tuple(CLASSES)
-"""Names of the four."""
+"""Names of the four spaces."""
 
 
 def space_class(name: str) -> type[Space]:
-    """The class of a space, by its name.
+    """Return the class of a space, by its name.
 
     Raises:
-        OrbiflowError: for an unknown name.
+        OrbiflowError: If the name is unknown.
     """
     if not is_a(name, str) or name not in CLASSES:
         raise OrbiflowError(f"unknown space {name!r}; the four are {', '.join(SPACES)}")
@@ -30,10 +30,10 @@ def space_class(name: str) -> type[Space]:
 
 
 def make_space(name: str, **options: Any) -> Space:
-    """A space by its name; `options` are those of its class.
+    """Return a space by its name, with the options of its class.
 
     Raises:
-        OrbiflowError: for an unknown name or an option that the space does not have.
+        OrbiflowError: If the name is unknown, or the space has no such option.
 
     >>> make_space("torus", dim=2, unit="degrees")
     Torus(dim=2, unit='degrees')

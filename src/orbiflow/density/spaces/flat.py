@@ -11,11 +11,9 @@ import torch
 from numpy.typing import ArrayLike
 from torch import Tensor
 
-from orbiflow.arguments import is_a
+from orbiflow.arguments import as_choice, as_whole
 from orbiflow.arrays import Array
-from orbiflow.density.arguments import check_range
 from orbiflow.density.spaces.space import Space, checked_table
-from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import CrystallographicGroup, identification_group
 
 TURN: dict[str, float] = {"radians": 2 * math.pi, "degrees": 360.0, "turns": 1.0}
@@ -25,14 +23,12 @@ MAX_DIM = 64
 
 
 def whole_turn(unit: str) -> float:
-    """360 degrees in `unit`.
+    """Return a whole turn in a unit.
 
     Raises:
-        OrbiflowError: for an unknown unit.
+        OrbiflowError: If the unit is unknown.
     """
-    if not is_a(unit, str) or unit not in TURN:
-        raise OrbiflowError(f"unit must be one of {', '.join(TURN)}, got {unit!r}")
-    return TURN[unit]
+    return TURN[as_choice(unit, tuple(TURN), "unit")]
 
 
 @lru_cache(maxsize=16)
@@ -48,11 +44,11 @@ def _klein_group() -> CrystallographicGroup:
 
 
 class Torus(Space):
-    """The torus of `dim` angles; the natural measure is their product in the user's unit.
+    """The torus of several angles, whose natural measure is their product in the user's unit.
 
     Args:
-        dim: number of angles, 1 to 64.
-        unit: "radians", "degrees" or "turns" of the data; any real number is taken.
+        dim: Number of angles, 1 to 64.
+        unit: Unit of the data, "radians", "degrees" or "turns". Angles may be any real numbers.
 
     >>> space = Torus(2, unit="degrees")
     >>> space.to_chart([[90.0, -90.0]]).tolist()
@@ -62,11 +58,11 @@ class Torus(Space):
     name = "torus"
 
     def __init__(self, dim: int = 2, *, unit: str = "radians") -> None:
-        check_range("dim", dim, 1, MAX_DIM, integer=True)
+        dim = as_whole(dim, "dim", 1, MAX_DIM)
         self.period = whole_turn(unit)
         self.unit = unit
-        self.group = _integer_lattice(int(dim))
-        self.columns = tuple(f"angle{k + 1}" for k in range(int(dim)))
+        self.group = _integer_lattice(dim)
+        self.columns = tuple(f"angle{k + 1}" for k in range(dim))
 
     @classmethod
     def for_data(cls, data: Array, *, unit: str = "radians", seed: int = 0) -> Self:
@@ -89,7 +85,7 @@ class Torus(Space):
         return gradient.numpy() / self.period
 
     def from_chart(self, points: Tensor) -> Array:
-        """Angles (N, dim) in [-1/2, 1/2) turns."""
+        """Return angles (N, dim) in [-1/2, 1/2) turns."""
         x = self._checked(points).detach().double().cpu().numpy()
         return (x - np.floor(x + 0.5)) * self.period
 
@@ -120,7 +116,7 @@ class KleinBottle(Space):
     In the chart x = (phi + pi/2) / 2 pi and y = theta / pi, so (x, y) ~ (1 - x, y + 1).
 
     Args:
-        unit: "radians", "degrees" or "turns" of the data (N, 2): theta, phi.
+        unit: Unit of the data (N, 2), theta and phi: "radians", "degrees" or "turns".
 
     >>> KleinBottle(unit="degrees").to_chart([[190.0, 150.0], [10.0, 30.0]]).numpy().round(6).tolist()
     [[0.333333, 0.055556], [0.333333, 0.055556]]
@@ -156,7 +152,7 @@ class KleinBottle(Space):
         return np.stack([2 * along_y, along_x], axis=-1) / self.period
 
     def from_chart(self, points: Tensor) -> Array:
-        """(N, 2): theta in [0, 1/2) turns, phi in [-1/4, 3/4) turns."""
+        """Return angles (N, 2): theta in [0, 1/2) turns, phi in [-1/4, 3/4) turns."""
         x, y = self.project(points).detach().double().cpu().numpy().T
         return np.stack([y / 2, x - 0.25], axis=-1) * self.period
 

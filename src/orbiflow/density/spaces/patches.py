@@ -28,7 +28,7 @@ from numpy.typing import ArrayLike
 
 from orbiflow.arrays import Array
 from orbiflow.density.spaces.flat import whole_turn
-from orbiflow.density.spaces.space import checked_table, such_rows
+from orbiflow.density.spaces.space import checked_table, row_count
 from orbiflow.errors import OrbiflowError
 
 FLAT = 1e-12
@@ -37,7 +37,8 @@ FLAT = 1e-12
 _GRID = 96
 _STARTS = 3
 _NEWTON = 12
-_BLOCK = 8192  # patches at a time: bounds the memory
+_BLOCK = 8192
+"""Patches computed at a time, which bounds the memory."""
 
 
 def _dct_basis() -> Array:
@@ -61,10 +62,10 @@ DCT_BASIS = _dct_basis()
 
 
 class KleinCoordinates(NamedTuple):
-    """Where patches are on the Klein bottle, and how far they are from it.
+    """Places of patches on the Klein bottle, and their distances from it.
 
-    - `angles`: (N, 2): theta in [0, 1/2) turns, phi in [-1/4, 3/4) turns.
-    - `distances`: (N,), between unit vectors in DCT coordinates: 0 on the surface, at most sqrt(2).
+    - `angles`: Angles (N, 2): theta in [0, 1/2) turns, phi in [-1/4, 3/4) turns.
+    - `distances`: Distances (N,) of unit vectors in DCT coordinates, from 0 on the surface to sqrt(2).
     """
 
     angles: Array
@@ -72,15 +73,14 @@ class KleinCoordinates(NamedTuple):
 
 
 def to_klein(patches: ArrayLike, *, unit: str = "radians") -> KleinCoordinates:
-    """The nearest points of the Klein bottle to patches, of which mean and contrast are taken away.
+    """Return the points of the Klein bottle nearest to patches, whatever their mean and contrast.
 
     Args:
-        patches: (N, 9) pixel values, row by row from the top left, or (N, 8) DCT coordinates.
-        unit: of the angles: "radians", "degrees" or "turns".
+        patches: Pixel values (N, 9), row by row from the top left, or DCT coordinates (N, 8).
+        unit: Unit of the angles: "radians", "degrees" or "turns".
 
     Raises:
-        OrbiflowError: for another shape, values that are not finite, or a patch without contrast,
-            by its row.
+        OrbiflowError: If the shape is another one, a value is not finite, or a patch has no contrast.
 
     >>> to_klein([[0, 1, 2, 0, 1, 2, 0, 1, 2]], unit="degrees").angles.round(9).tolist()
     [[0.0, 0.0]]
@@ -95,10 +95,10 @@ def to_klein(patches: ArrayLike, *, unit: str = "radians") -> KleinCoordinates:
 
 
 def from_klein(angles: ArrayLike, *, unit: str = "radians") -> Array:
-    """Patches (N, 9) on the Klein bottle at `angles` (N, 2): theta, phi. See `klein_patch`.
+    """Return the patches (N, 9) on the Klein bottle at angles (N, 2), theta and phi.
 
     Raises:
-        OrbiflowError: for another shape, values that are not finite, or an unknown unit.
+        OrbiflowError: If the shape is another one, a value is not finite, or the unit is unknown.
     """
     turn = whole_turn(unit)
     theta, phi = checked_table(angles, (2,), "theta and phi").T * (2 * math.pi / turn)
@@ -106,10 +106,11 @@ def from_klein(angles: ArrayLike, *, unit: str = "radians") -> Array:
 
 
 def klein_patch(theta: ArrayLike, phi: ArrayLike) -> Array:
-    """K(theta, phi) (..., 9), pixels row by row: of mean 0 and contrast norm 1.
+    """Return K(theta, phi) (..., 9), pixels row by row, of mean 0 and contrast norm 1.
 
     Args:
-        theta, phi: radians, of shapes that broadcast.
+        theta: First angle in radians.
+        phi: Second angle in radians, of a shape that broadcasts.
 
     >>> klein_patch(0.0, -np.pi / 2).reshape(3, 3).round(3).tolist()[0]
     [-0.136, 0.272, -0.136]
@@ -120,19 +121,19 @@ def klein_patch(theta: ArrayLike, phi: ArrayLike) -> Array:
 
 
 def dct_to_pixels(coordinates: ArrayLike) -> Array:
-    """Patches (N, 9) of mean 0, row by row from the top left, of DCT coordinates (N, 8).
+    """Return patches (N, 9) of mean 0, row by row from the top left, from DCT coordinates (N, 8).
 
     Raises:
-        OrbiflowError: for another shape or values that are not finite.
+        OrbiflowError: If the shape is another one, or a value is not finite.
     """
     return checked_table(coordinates, (8,), "DCT coordinates of patches") @ DCT_BASIS.T
 
 
 def pixels_to_dct(patches: ArrayLike) -> Array:
-    """DCT coordinates (N, 8) of patches (N, 9); their length is the contrast norm, the mean is lost.
+    """Return DCT coordinates (N, 8) of patches (N, 9), whose length is the contrast norm.
 
     Raises:
-        OrbiflowError: for another shape or values that are not finite.
+        OrbiflowError: If the shape is another one, or a value is not finite.
     """
     # the basis is orthogonal in the plain product, too
     dual = DCT_BASIS / (DCT_BASIS**2).sum(axis=0)
@@ -140,7 +141,7 @@ def pixels_to_dct(patches: ArrayLike) -> Array:
 
 
 def _unit_coordinates(patches: ArrayLike) -> Array:
-    """DCT coordinates (N, 8) of length 1."""
+    """Return DCT coordinates (N, 8) of length 1."""
     table = checked_table(patches, (8, 9), "patches: 9 pixel values or 8 DCT coordinates")
     scale = abs(table).max(axis=1)
     table = table / np.where(scale > 0, scale, 1.0)[:, None]  # so that no square overflows
@@ -150,26 +151,26 @@ def _unit_coordinates(patches: ArrayLike) -> Array:
     if len(flat):
         raise OrbiflowError(
             f"row {flat[0] + 1}: a patch without contrast has no place on the Klein bottle"
-            f"{such_rows(len(flat))}: remove {'it' if len(flat) == 1 else 'them'} first"
+            f"{row_count(len(flat))}: remove {'it' if len(flat) == 1 else 'them'} first"
         )
     return found / length[:, None]
 
 
 def _edge(theta: Array) -> Array:
-    """t / |t| in the first five DCT coordinates (..., 5): e_1 grows bright to the left, e_2 up."""
+    """Return t / |t| in five DCT coordinates (..., 5): e_1 grows bright to the left, e_2 up."""
     none = np.zeros_like(theta)
     return np.stack([-np.cos(theta), np.sin(theta), none, none, none], axis=-1)
 
 
 def _line(theta: Array) -> Array:
-    """(t^2 - mean) / |t^2 - mean| in the first five DCT coordinates (..., 5)."""
+    """Return (t^2 - mean) / |t^2 - mean| in the first five DCT coordinates (..., 5)."""
     c, s, none = np.cos(theta), np.sin(theta), np.zeros_like(theta)
     square = np.stack([none, none, 6**0.5 * c * c, 6**0.5 * s * s, -(32**0.5) * c * s], axis=-1)
     return square / np.sqrt(6 + 5 * np.sin(2 * theta) ** 2)[..., None]
 
 
 def _nearest(units: Array) -> tuple[Array, Array]:
-    """Angles (N, 2) in radians and distances (N,) of unit vectors (N, 8).
+    """Return angles (N, 2) in radians and distances (N,) of unit vectors (N, 8).
 
     For a given theta the best phi is the angle of the two products with edge and line, whose squares
     add up to f(theta), the squared cosine to the surface, of period pi. Its highest places on a grid
@@ -199,7 +200,7 @@ def _nearest(units: Array) -> tuple[Array, Array]:
 
 
 def _squared_cosine(units: Array, theta: Array) -> tuple[Array, Array, Array]:
-    """f and its first two derivatives, each (..., S), of unit vectors (..., 1, 8) at theta (..., S)."""
+    """Return f and two derivatives, each (..., S), of unit vectors (..., 1, 8) at theta (..., S)."""
     x, y, xx, yy, xy = (units[..., k] for k in range(5))
     c, s = np.cos(theta), np.sin(theta)
     edge, edge_1 = s * y - c * x, c * y + s * x

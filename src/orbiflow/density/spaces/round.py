@@ -12,32 +12,31 @@ import torch
 from numpy.typing import ArrayLike, NDArray
 from torch import Tensor
 
-from orbiflow.arguments import is_a
+from orbiflow.arguments import as_choice, as_instance
 from orbiflow.arrays import Array
-from orbiflow.density.arguments import check_kind
 from orbiflow.density.spaces import uniformization
 from orbiflow.density.spaces.space import (
     Space,
     checked_table,
-    such_rows,
+    row_count,
 )
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import CrystallographicGroup, identification_group
 from orbiflow.typed_torch import linalg
 
 UNIT_TOLERANCE = 1e-3
-"""How far the length of what is given as a unit vector may be from 1."""
+"""Difference from 1 that the length of a unit vector may have."""
 
 FORMS: dict[str, tuple[str, ...]] = {"latlon": ("lat", "lon"), "vector": ("x", "y", "z")}
-"""How directions are written: degrees north and east, or unit vectors."""
+"""Columns of directions in each form: degrees north and east, or unit vectors."""
 
 
 def to_vectors(data: ArrayLike) -> Array:
-    """Directions as unit vectors (N, 3), from (N, 2) latitude and longitude or (N, 3) vectors.
+    """Return unit vectors (N, 3) of directions, from latitudes and longitudes (N, 2) or vectors (N, 3).
 
     Raises:
-        OrbiflowError: for a latitude beyond 90 degrees, a longitude beyond 360, or a vector whose
-            length is not 1 within a thousandth.
+        OrbiflowError: If a latitude is beyond 90 degrees, a longitude beyond 360, or the length of a
+            vector not 1 within a thousandth.
 
     >>> to_vectors([[0.0, 90.0]]).round(12).tolist()
     [[0.0, 1.0, 0.0]]
@@ -66,7 +65,7 @@ def to_vectors(data: ArrayLike) -> Array:
 
 
 def to_latlon(vectors: Array) -> Array:
-    """Unit vectors (N, 3) as degrees (N, 2): latitude, longitude in [-180, 180)."""
+    """Return degrees (N, 2) of unit vectors (N, 3): latitude, and longitude in [-180, 180)."""
     x, y, z = vectors.T
     lon: Array = np.degrees(np.arctan2(y, x))
     lat = np.degrees(np.arctan2(z, np.hypot(x, y)))
@@ -76,18 +75,17 @@ def to_latlon(vectors: Array) -> Array:
 def _refuse(wrong: NDArray[np.bool_], message: Callable[[int], str]) -> None:
     rows = np.flatnonzero(wrong)
     if len(rows):
-        raise OrbiflowError(f"row {rows[0] + 1}: {message(int(rows[0]))}{such_rows(len(rows))}")
+        raise OrbiflowError(f"row {rows[0] + 1}: {message(int(rows[0]))}{row_count(len(rows))}")
 
 
 class RoundSpace(Space):
     """A quotient of the square with the area of the unit sphere: `Sphere` and `ProjectivePlane`.
 
     Args:
-        form: "latlon" (degrees) or "vector": how `from_chart` writes directions; `to_chart` takes
+        form: How `from_chart` writes directions: "latlon" (degrees) or "vector". `to_chart` takes
             both.
-        rotation: (3, 3) turn of the sphere in front of the chart: where the cone points lie is
-            where densities are least flexible, so it should move them away from the data
-            (`clear_rotation`).
+        rotation: Rotation (3, 3) of the sphere in front of the chart. Densities are least flexible at
+            the cone points, so it should move these away from the data (`clear_rotation`).
     """
 
     power: int
@@ -100,12 +98,11 @@ class RoundSpace(Space):
         return cls(form=form, rotation=clear_rotation(cls(form=form), data, seed=seed))
 
     def __init__(self, *, form: str = "latlon", rotation: ArrayLike | None = None) -> None:
-        if not is_a(form, str) or form not in FORMS:
-            raise OrbiflowError(f"form must be one of {', '.join(FORMS)}, got {form!r}")
         turn = np.eye(3) if rotation is None else checked_table(rotation, (3,), "rotation")
         if turn.shape != (3, 3) or not np.allclose(turn @ turn.T, np.eye(3), atol=1e-9):
             raise OrbiflowError("rotation must be an orthogonal (3, 3) matrix")
-        self.form, self.columns = form, FORMS[form]
+        self.form = as_choice(form, tuple(FORMS), "form")
+        self.columns = FORMS[self.form]
         self.rotation = turn
         self.group = _group(self.name)
 
@@ -113,17 +110,20 @@ class RoundSpace(Space):
         return uniformization.log_area(points, self.power)
 
     def vectors_to_chart(self, vectors: Array) -> Tensor:
-        """Unit vectors (N, 3) to canonical points (N, 2)."""
+        """Return the canonical points (N, 2) of unit vectors (N, 3)."""
         turned = np.asarray(vectors) @ self.rotation.T
         return self.project(torch.tensor(uniformization.from_sphere(turned, self.power)))
 
     def unit_vectors(self, points: Tensor) -> Tensor:
-        """Chart points (..., 2) to unit vectors (..., 3), of an axis one of the two; differentiable."""
+        """Return unit vectors (..., 3) of chart points (..., 2), for an axis one of the two.
+
+        The function is differentiable.
+        """
         turned = uniformization.to_sphere(self.project(points), self.power)
         return turned @ torch.as_tensor(self.rotation).to(turned)
 
     def vectors(self, points: Tensor) -> Array:
-        """As `unit_vectors`, float64 for NumPy."""
+        """Return `unit_vectors` as a NumPy array, float64."""
         return self.unit_vectors(self._checked(points).detach().double().cpu()).numpy()
 
     def features(self, points: Tensor) -> Tensor:
@@ -133,7 +133,7 @@ class RoundSpace(Space):
         return self.vectors_to_chart(to_vectors(data))
 
     def data_gradient(self, data: ArrayLike, points: Tensor, gradient: Tensor) -> Array:
-        """As of any space; at cone points, where the chart says nothing, not a number."""
+        """Return gradients as any space does; at cone points, where there is none, NaN."""
         own = to_vectors(data)
         with torch.enable_grad():
             at = points.detach().clone().requires_grad_()
@@ -145,7 +145,7 @@ class RoundSpace(Space):
         jacobian = torch.stack(rows, dim=1)
         scale = (jacobian**2).sum(dim=(1, 2)) / 2
         slope = (torch.einsum("nkd,nd->nk", jacobian, gradient) / scale[:, None]).numpy()
-        # of an axis the chart may have the other end
+        # the chart may have the other end of an axis
         slope *= np.sign((own * found.detach().numpy()).sum(axis=1, keepdims=True))
         if np.shape(data)[1] == 3:
             return slope
@@ -169,7 +169,7 @@ class RoundSpace(Space):
         )
 
     def cone_vectors(self) -> Array:
-        """Unit vectors of the chart's cone points, in the data's frame."""
+        """Return unit vectors of the chart's cone points, in the data's frame."""
         corners = torch.tensor([[0.0, 0.0], [1.0, 1.0], [1.0, 0.0]], dtype=torch.float64)
         cones = corners if self.power == 4 else corners[[0, 2]]
         return uniformization.to_sphere(cones, self.power).numpy() @ self.rotation
@@ -181,7 +181,7 @@ class RoundSpace(Space):
         return vectors
 
     def round_distance(self, start: Tensor, end: Tensor) -> Tensor:
-        """Great-circle distance (...,) in radians."""
+        """Return the great-circle distance (...,) in radians."""
         one, other = (
             uniformization.to_sphere(self.project(points), self.power) for points in (start, end)
         )
@@ -209,9 +209,9 @@ class Sphere(RoundSpace):
 
 
 class ProjectivePlane(RoundSpace):
-    """The projective plane of axes, which are directions without a sense; densities per steradian.
+    """The projective plane of axes, which are directions without a sense; densities are per steradian.
 
-    Of the two ends of an axis, `from_chart` gives that in the northern hemisphere.
+    `from_chart` gives the end of an axis that is in the northern hemisphere.
 
     >>> space = ProjectivePlane()
     >>> space.from_chart(space.to_chart([[-30.0, 20.0]])).round(9).tolist()
@@ -236,12 +236,12 @@ class ProjectivePlane(RoundSpace):
 def clear_rotation(
     space: RoundSpace, data: ArrayLike, *, trials: int = 400, seed: int = 0
 ) -> Array:
-    """A rotation (3, 3) for `space` that puts the cone points where the data is thin.
+    """Return a rotation (3, 3) that puts a space's cone points where there is little data.
 
-    Of `trials` random ones, that of least von Mises-Fisher kernel density (concentration 30) at the
-    cone points.
+    It is the one of `trials` random rotations that has the least von Mises-Fisher kernel density
+    (concentration 30) at the cone points.
     """
-    check_kind(space, RoundSpace, "space")
+    as_instance(space, RoundSpace, "space")
     vectors = to_vectors(data)
     rng = np.random.default_rng(seed)
     if len(vectors) > 5000:

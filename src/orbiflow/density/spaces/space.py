@@ -1,4 +1,4 @@
-"""What the four identification spaces have in common: a chart, a group, measures, distances."""
+"""The base of the four identification spaces: a chart, a group, measures, distances."""
 
 from __future__ import annotations
 
@@ -12,36 +12,36 @@ import torch
 from numpy.typing import ArrayLike
 from torch import Tensor
 
-from orbiflow.arguments import is_a
+from orbiflow.arguments import as_choice, as_tensor
 from orbiflow.arrays import Array
-from orbiflow.density.arguments import float_tensor
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import CrystallographicGroup, DirichletDomain
 from orbiflow.typed_torch import linalg
 
 MEASURES = ("natural", "square", "uniform")
-"""Natural: the user's units, or round area in steradians. Square: area of the canonical square.
-Uniform: the uniform distribution, so that a density of 1 is that of no structure at all.
+"""Measures of densities. "natural" is the user's units, or round area in steradians; "square" is the
+area of the canonical square; "uniform" is the uniform distribution, for which a density of 1 means no
+structure at all.
 
-Whatever takes chart points (`log_prob`, `entropy`) is with respect to the square by default, as torch
-wants of a distribution over them; whatever takes data in the user's units (`DensityEstimator`, the
-commands) and whatever people look at (pictures) is in natural measure."""
+Functions of chart points (`log_prob`, `entropy`) use the square by default, as torch does for a
+distribution over them. Functions of data in the user's units (`DensityEstimator`, the commands) and
+pictures use the natural measure."""
 
 CHART = "square"
-"""The default of all that takes chart points."""
+"""The default measure of functions of chart points."""
 
 
 class Space(ABC):
     """An identification space: the unit cube modulo a crystallographic group (design point 12).
 
     Points in the chart are float tensors (..., d); `project` brings them to the canonical cube
-    [0, 1)^d. Data are arrays (N, k) in the units that people have.
+    [0, 1)^d. Data are arrays (N, k) in the user's units.
 
-    - `name`: such as "klein-bottle".
-    - `group`: acts on R^d; densities are invariant under it.
-    - `columns`: names of the data's columns.
-    - `unit`: of angles, None where the natural measure is in steradians.
-    - `is_round`: whether the natural measure is the area of the unit sphere.
+    - `name`: Its name, such as "klein-bottle".
+    - `group`: The group that acts on R^d, under which densities are invariant.
+    - `columns`: Names of the data's columns.
+    - `unit`: Unit of angles, None if the natural measure is in steradians.
+    - `is_round`: Whether the natural measure is the area of the unit sphere.
 
     Spaces of the same class, settings and group are equal.
     """
@@ -55,15 +55,15 @@ class Space(ABC):
     @classmethod
     @abstractmethod
     def for_data(cls, data: Array, *, unit: str = "radians", seed: int = 0) -> Self:
-        """The space that suits data (N, k): of its number of columns, its unit, its best rotation.
+        """Return the space that suits data (N, k) in its dimension, unit and rotation.
 
         Raises:
-            OrbiflowError: for data or a unit that are not of the space.
+            OrbiflowError: If the space has no such data or unit.
         """
 
     @property
     def dim(self) -> int:
-        """Dimension d of the space."""
+        """The dimension d of the space."""
         return self.group.dim
 
     @property
@@ -77,64 +77,68 @@ class Space(ABC):
         return DirichletDomain(self.group, np.full(self.dim, 0.5))
 
     def project(self, points: Tensor) -> Tensor:
-        """Canonical representatives in [0, 1]^d of points (..., d); differentiable almost anywhere.
+        """Return canonical representatives in [0, 1]^d of points (..., d).
+
+        The function is differentiable almost everywhere.
 
         Raises:
-            OrbiflowError: for points of another dimension.
+            OrbiflowError: If the points have another dimension.
         """
         return self.domain.project(self._checked(points))
 
     def _checked(self, points: Tensor) -> Tensor:
-        points = float_tensor(points, "points")
+        points = as_tensor(points, "points")
         if not points.dim() or points.shape[-1] != self.dim:
             raise OrbiflowError(f"expected points (..., {self.dim}), got {tuple(points.shape)}")
         return points
 
     def log_area(self, points: Tensor) -> Tensor:
-        """log of natural area over chart area (...,) at points (..., d)."""
+        """Return the logarithm of natural area over chart area (...,) at points (..., d)."""
         return torch.full_like(points[..., 0], math.log(self.volume))
 
     @property
     @abstractmethod
     def volume(self) -> float:
-        """Of the whole space, in natural measure."""
+        """The natural measure of the whole space."""
 
     @abstractmethod
     def to_chart(self, data: ArrayLike) -> Tensor:
-        """Data (N, k) to canonical points (N, d), float64.
+        """Return the canonical points (N, d), float64, of data (N, k).
 
         Raises:
-            OrbiflowError: for a wrong shape, values that are not finite or out of range.
+            OrbiflowError: If the shape is wrong, or a value is not finite or out of range.
         """
 
     @abstractmethod
     def from_chart(self, points: Tensor) -> Array:
-        """Chart points (N, d) to data (N, k)."""
+        """Return the data (N, k) of chart points (N, d)."""
 
     def cover(self, data: ArrayLike) -> Tensor:
-        """Points (N, d) of the plane that data (N, k) stand for: `to_chart`, or images of it."""
+        """Return points (N, d) of the plane for data (N, k): `to_chart`, or images of it."""
         return self.to_chart(data)
 
     @abstractmethod
     def data_gradient(self, data: ArrayLike, points: Tensor, gradient: Tensor) -> Array:
-        """Gradients (N, k) in the data's own coordinates, from those (N, d) in the chart at `points`.
+        """Return gradients (N, k) in the data's own coordinates.
+
+        They are per unit of each angle; on round spaces per degree of latitude and longitude or, for
+        unit vectors, the vector of R^3 that is tangent to the sphere, per radian.
 
         Args:
+            data: The data (N, k).
             points: `cover` of the data.
-
-        Per unit of each angle: radian, degree or turn. On round spaces per degree of latitude and
-        longitude, or, of unit vectors, the vector of R^3 that is tangent to the sphere, per radian.
+            gradient: The gradients (N, d) in the chart at these points.
         """
 
     @abstractmethod
     def settings(self) -> dict[str, Any]:
-        """What, with `name`, makes the same space again; ready for JSON."""
+        """Return the options that, with `name`, make the same space again, for JSON."""
 
     def log_density_factor(self, points: Tensor, measure: str) -> Tensor:
-        """What to add to a log density of the square at points (..., d) for another `measure`.
+        """Return what to add to a log density of the square at points (..., d) for another measure.
 
         Raises:
-            OrbiflowError: for a measure that is not one of `MEASURES`.
+            OrbiflowError: If the measure is not one of `MEASURES`.
         """
         check_measure(measure)
         if measure == "square":
@@ -143,36 +147,37 @@ class Space(ABC):
         return shift - self.log_area(points)
 
     def displacement(self, start: Tensor, end: Tensor) -> Tensor:
-        """Shortest flat displacement (..., d) from `start` to an image of `end` under the group."""
+        """Return the shortest flat displacement (..., d) from `start` to an image of `end`."""
         images = self._images_of(end) - start
         nearest = (images**2).sum(dim=-1).argmin(dim=0)
         return torch.take_along_dim(images, nearest[None, ..., None], dim=0)[0]
 
     def distance(self, start: Tensor, end: Tensor) -> Tensor:
-        """Geodesic distance (...,) in the flat metric of the chart, over group images."""
+        """Return the geodesic distance (...,) in the flat metric of the chart, over group images."""
         return linalg.vector_norm(self.displacement(start, end), dim=-1)
 
     def squared_distances(self, start: Tensor, end: Tensor) -> Tensor:
-        """Squares (N, M) of `distance` between all of `start` (N, d) and `end` (M, d)."""
+        """Return squares (N, M) of `distance` between all of `start` (N, d) and `end` (M, d)."""
         images = self._images_of(end)
         dot = images @ start.mT
         square = (images**2).sum(dim=-1, keepdim=True) - 2 * dot
         return (square.amin(dim=0).mT + (start**2).sum(dim=-1, keepdim=True)).clamp_min(0.0)
 
     def features(self, points: Tensor) -> Tensor:
-        """(E, N, m): what kernels see of points (N, d) and of their E images, its own image first.
+        """Return what kernels see of the E images of points (N, d), themselves first: (E, N, m).
 
-        Cosines and sines of the lattice's angles; unit vectors on round spaces. Differentiable.
+        They are cosines and sines of the lattice's angles, or unit vectors on round spaces. The
+        function is differentiable.
         """
         angles = 2 * math.pi * self.group.images(points) / rectangle(self).to(points)
         return torch.cat([angles.cos(), angles.sin()], dim=-1)
 
     def uniform(self, count: int, generator: torch.Generator) -> Tensor:
-        """`count` chart points, uniform in natural measure."""
+        """Draw chart points that are uniform in natural measure."""
         return torch.rand(count, self.dim, dtype=torch.float64, generator=generator)
 
     def __eq__(self, other: object) -> bool:
-        """Whether both are made by the same class and settings, on the same group."""
+        """Return whether both have the same class, settings and group."""
         if not isinstance(other, Space):
             return NotImplemented
         return (
@@ -196,7 +201,7 @@ class Space(ABC):
         )
 
     def _images_of(self, points: Tensor) -> Tensor:
-        """(E, ..., d): all images of canonical points that can be nearest to one of the cube."""
+        """Return all images (E, ..., d) of canonical points that can be nearest to one of the cube."""
         linear, shift = (
             torch.as_tensor(a, dtype=points.dtype, device=points.device) for a in self._near
         )
@@ -210,19 +215,19 @@ class Space(ABC):
 
 
 def check_measure(measure: str) -> None:
-    """
+    """Check that a measure is one of `MEASURES`.
+
     Raises:
-        OrbiflowError: for a measure that is not one of `MEASURES`.
+        OrbiflowError: If it is not.
     """
-    if not is_a(measure, str) or measure not in MEASURES:
-        raise OrbiflowError(f"measure must be one of {', '.join(MEASURES)}, got {measure!r}")
+    as_choice(measure, MEASURES, "measure")
 
 
 def rectangle(space: Space) -> Tensor:
-    """Lengths (d,) of the sides of the lattice's rectangle, in sides of the square.
+    """Return the lengths (d,) of the sides of the lattice's rectangle, in sides of the square.
 
     Raises:
-        OrbiflowError: if the lattice is not rectangular.
+        OrbiflowError: If the lattice is not rectangular.
     """
     lattice = space.group.lattice
     sides = np.diag(lattice)
@@ -231,20 +236,25 @@ def rectangle(space: Space) -> Tensor:
     return torch.tensor(sides.copy())
 
 
-def such_rows(count: int) -> str:
-    """How many rows are as wrong as the one that a message names.
+def row_count(count: int) -> str:
+    """Return how many rows are as wrong as the one that a message names, if there are others.
 
-    >>> such_rows(1), such_rows(3)
+    >>> row_count(1), row_count(3)
     ('', ' (3 such rows)')
     """
     return f" ({count} such rows)" if count > 1 else ""
 
 
 def checked_table(data: ArrayLike, widths: tuple[int, ...], what: str) -> Array:
-    """Data as a finite float64 array (N, k), k one of `widths`.
+    """Return data as a finite float64 array (N, k).
+
+    Args:
+        data: The data.
+        widths: The numbers k of columns that are allowed.
+        what: What the data are, for messages.
 
     Raises:
-        OrbiflowError: naming the first row that is wrong.
+        OrbiflowError: If the shape is another one, or a value is not finite; it names the first row.
     """
     try:
         table = np.asarray(data, dtype=np.float64)
@@ -256,7 +266,7 @@ def checked_table(data: ArrayLike, widths: tuple[int, ...], what: str) -> Array:
     bad = np.flatnonzero(~np.isfinite(table).all(axis=1))
     if len(bad):
         raise OrbiflowError(
-            f"{what}: row {bad[0] + 1} has a missing or infinite value{such_rows(len(bad))}: remove "
+            f"{what}: row {bad[0] + 1} has a missing or infinite value{row_count(len(bad))}: remove "
             f"{'it' if len(bad) == 1 else 'them'} first"
         )
     return table

@@ -25,14 +25,14 @@ NULL3 = 1.086434811213308014575316121510
 """theta_3(0) = pi^(1/4) / Gamma(3/4)."""
 
 TERMS = 4
-"""Of each series; the first left out is below 1e-16 for |Im z| <= 1."""
+"""Terms of each series; the first one left out is below 1e-16 for |Im z| <= 1."""
 
 
 def thetas(z: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-    """theta_1, ..., theta_4 at v = pi z / 2.
+    """Return theta_1, ..., theta_4 at v = pi z / 2.
 
     Args:
-        z: complex, with |Im z| <= 1; there the terms that are summed give rounding accuracy.
+        z: Complex numbers with |Im z| <= 1, for which so many terms give rounding accuracy.
 
     Reference: DLMF 20.2(i), https://dlmf.nist.gov/20.2.
     """
@@ -55,15 +55,16 @@ def thetas(z: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
 
 
 TINY = 1e-30
-"""Least product of theta functions in a logarithm: cone points have area factor 0."""
+"""Least product of theta functions in a logarithm, since cone points have area factor 0."""
 
 
 def to_sphere(points: Tensor, power: int) -> Tensor:
-    """Points (..., 2) of the square [0, 1]^2 to unit vectors (..., 3).
+    """Return the unit vectors (..., 3) of points (..., 2) of the square [0, 1]^2.
 
     Args:
-        points: in the canonical square, or near it.
-        power: 4 for the sphere (p4), 2 for the projective plane (pgg), one of two opposite vectors.
+        points: Points in the canonical square, or near it.
+        power: 4 for the sphere (p4), or 2 for the projective plane (pgg), where one of two opposite
+            vectors is returned.
     """
     one, _, three, _ = thetas(_complex(points))
     a, b = three**power, one**power
@@ -74,7 +75,7 @@ def to_sphere(points: Tensor, power: int) -> Tensor:
 
 
 def log_area(points: Tensor, power: int) -> Tensor:
-    """log of the area factor J (...,) of `to_sphere` at points (..., 2), anywhere in the plane.
+    """Return the logarithm of the area factor J (...,) of `to_sphere` at points (..., 2) of the plane.
 
     J = (power/2)^2 4 pi^2 theta_3(0)^4 |theta_1 theta_3|^(2 power - 2) |theta_2 theta_4|^2 /
     (|theta_1|^(2 power) + |theta_3|^(2 power))^2: from the derivative
@@ -88,14 +89,14 @@ def log_area(points: Tensor, power: int) -> Tensor:
 
 
 def from_sphere(vectors: Array, power: int) -> Array:
-    """Unit vectors (..., 3) to points (..., 2), somewhere in their orbit under p4 or pgg.
+    """Return points (..., 2) of unit vectors (..., 3), somewhere in their orbit under p4 or pgg.
 
     u = a / b with b >= 0 and Re u >= 0, then K z = sqrt(2 b) R_F(a - b, a, a + b): the inverse of
     sn^2 = 2 / (u + 1) (DLMF 19.25(v)).
     """
     along: list[Array] = list(np.moveaxis(np.asarray(vectors, dtype=np.float64), -1, 0))
     x, y, z = along
-    if power == 2:  # of the two opposite vectors, that on the side x >= 0
+    if power == 2:  # the one of the two opposite vectors with x >= 0
         sign = np.where(x < 0, -1.0, 1.0)
         x, y, z = sign * x, sign * y, sign * z
     radius = np.hypot(x, y)
@@ -106,7 +107,7 @@ def from_sphere(vectors: Array, power: int) -> Array:
     if power == 4:
         a, b = np.sqrt(a), np.sqrt(b)
     first = a - b + 0j
-    # on the cut both sides are the same point of the space; SciPy wants to be told which
+    # on the cut both sides are the same point of the space; SciPy needs to know which
     first = np.where((first.imag == 0) & (first.real < 0), first + 1e-300j, first)
     found = np.sqrt(2 * b) * elliprf(first, a + 0j, a + b + 0j) / K
     return np.stack([found.real, found.imag], axis=-1)

@@ -16,4 +16,5 @@ from .settings import check_table_name as check_table_name
 from .table import MissingCellsError as MissingCellsError
 from .table import Table as Table
 from .table import TableError as TableError
+from .table import find as find
 from .table import listing as listing

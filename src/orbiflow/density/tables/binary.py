@@ -1,4 +1,7 @@
-"""Tables in `.npy` and Parquet files, bounded before they are decoded; nothing is unpickled."""
+"""Tables in `.npy` and Parquet files, whose sizes are checked before they are decoded.
+
+Nothing is unpickled.
+"""
 
 from __future__ import annotations
 
@@ -14,37 +17,32 @@ from numpy.typing import NDArray
 from orbiflow.density.tables.table import (
     BLOCK,
     MAX_COLUMNS,
+    Reading,
     Table,
     TableError,
     check_count,
-    check_finite,
+    checked_rows,
     choose,
     find,
     quote,
-    without_missing,
 )
 from orbiflow.errors import InputFileError, OrbiflowError, literal
 
-MAX_NPY_HEADER = 10_000  # characters; numpy parses the header with `ast.literal_eval`
+MAX_NPY_HEADER = 10_000
+"""Characters of a header, which numpy parses with `ast.literal_eval`."""
 
 
-def read_npy(
-    path: Path,
-    columns: Sequence[str] | None,
-    width: int | None,
-    max_rows: int,
-    drop_missing: bool = False,
-    keep_missing: bool = False,
-) -> Table:
+def read_npy(path: Path, reading: Reading) -> Table:
+    """Read a table from an `.npy` file."""
     shape, dtype = _npy_header(path)
-    check_count(path, shape[0], max_rows, "rows")
+    check_count(path, shape[0], reading.max_rows, "rows")
     fields = dtype.names
     n_columns = len(fields) if fields is not None else shape[1]
     check_count(path, n_columns, MAX_COLUMNS, "columns")
     names = fields or tuple(f"column{i}" for i in range(1, n_columns + 1))
     types = [dtype[name] for name in fields] if fields is not None else [dtype] * n_columns
     numeric = [kind.kind in "fiu" for kind in types]
-    picked, notes = choose(path, names, numeric, columns, width)
+    picked, notes = choose(path, names, numeric, reading)
     _check_numeric(path, names, types, numeric, picked)
     try:
         data = np.load(path, mmap_mode="r", allow_pickle=False, max_header_size=MAX_NPY_HEADER)
@@ -53,13 +51,11 @@ def read_npy(
             values = np.stack([part.astype(np.float64) for part in parts], axis=1)
     except (OSError, ValueError, TypeError, IndexError, OverflowError) as exc:
         raise _damaged(path, exc) from exc
-    return _numbered(
-        path, values, tuple(names[i] for i in picked), notes, drop_missing, keep_missing
-    )
+    return _table(path, values, tuple(names[i] for i in picked), notes, reading)
 
 
 def _npy_header(path: Path) -> tuple[tuple[int, ...], np.dtype]:
-    """Shape and dtype, once they are known to be a table's and to fit into the file."""
+    """Return shape and dtype, once they are known to be a table's and to fit into the file."""
     form = np.lib.format
     try:
         with path.open("rb") as file:
@@ -87,12 +83,12 @@ def _npy_header(path: Path) -> tuple[tuple[int, ...], np.dtype]:
 
 
 def npy_names(path: Path) -> tuple[str, ...] | None:
-    """Of the fields of a structured array, None for a plain one."""
+    """Return the names of a structured array's fields, or None for a plain one."""
     return _npy_header(path)[1].names
 
 
 def parquet_names(path: Path) -> tuple[str, ...]:
-    """Of all columns."""
+    """Return the names of all columns."""
     arrow, parquet = _arrow(path)
     try:
         with parquet.ParquetFile(path) as file:
@@ -102,7 +98,7 @@ def parquet_names(path: Path) -> tuple[str, ...]:
 
 
 def parquet_labels(path: Path, column: str) -> list[str]:
-    """A column's cells as text, "" where there is none."""
+    """Return a column's cells as text, "" for empty ones."""
     arrow, parquet = _arrow(path)
     name = parquet_names(path)[find(path, parquet_names(path), column)]
     try:
@@ -121,26 +117,20 @@ def _arrow(path: Path) -> tuple[Any, Any]:
         raise OrbiflowError(f"{path}: reading Parquet needs pyarrow: pip install pyarrow") from exc
 
 
-def read_parquet(
-    path: Path,
-    columns: Sequence[str] | None,
-    width: int | None,
-    max_rows: int,
-    drop_missing: bool = False,
-    keep_missing: bool = False,
-) -> Table:
+def read_parquet(path: Path, reading: Reading) -> Table:
+    """Read a table from a Parquet file."""
     arrow, parquet = _arrow(path)
     try:
         with parquet.ParquetFile(path) as file:
-            check_count(path, file.metadata.num_rows, max_rows, "rows")
+            check_count(path, file.metadata.num_rows, reading.max_rows, "rows")
             schema = file.schema_arrow
             check_count(path, len(schema.names), MAX_COLUMNS, "columns")
             tests = arrow.types.is_integer, arrow.types.is_floating, arrow.types.is_decimal
             numeric = [any(test(kind) for test in tests) for kind in schema.types]
-            picked, notes = choose(path, schema.names, numeric, columns, width)
+            picked, notes = choose(path, schema.names, numeric, reading)
             names = tuple(schema.names[i] for i in picked)
             _check_numeric(path, schema.names, schema.types, numeric, picked)
-            for name in names:  # Parquet is read by name alone
+            for name in names:  # Parquet columns are read by name alone
                 find(path, schema.names, name)
             blocks = [np.empty((0, len(names)))]
             for batch in file.iter_batches(BLOCK, columns=list(names)):
@@ -150,23 +140,19 @@ def read_parquet(
         raise
     except (arrow.ArrowException, OSError, ValueError, KeyError, MemoryError) as exc:
         raise _damaged(path, exc) from exc
-    return _numbered(path, np.concatenate(blocks), names, notes, drop_missing, keep_missing)
+    return _table(path, np.concatenate(blocks), names, notes, reading)
 
 
-def _numbered(
+def _table(
     path: Path,
     values: NDArray[np.float64],
     names: tuple[str, ...],
     notes: list[str],
-    drop_missing: bool,
-    keep_missing: bool,
+    reading: Reading,
 ) -> Table:
-    rows, dropped = np.arange(1, len(values) + 1, dtype=np.int64), frozenset[int]()
-    if drop_missing and len(values):
-        values, rows, dropped, more = without_missing(path, values, rows, "row")
-        notes = [*notes, *more]
-    check_finite(path, values, rows, names, "row", keep_missing)
-    return Table(values, names, rows, tuple(notes), None, None, dropped=dropped)
+    rows = np.arange(1, len(values) + 1, dtype=np.int64)
+    values, rows, dropped, more = checked_rows(path, values, rows, names, "row", reading)
+    return Table(values, names, rows, (*notes, *more), None, None, dropped=dropped)
 
 
 def _check_numeric(

@@ -1,4 +1,4 @@
-"""Reading a table by the kind of its file, and writing one."""
+"""Reading tables of any kind of file, and writing them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from orbiflow.density.tables.binary import (
     read_npy,
     read_parquet,
 )
-from orbiflow.density.tables.table import Table, find
+from orbiflow.density.tables.table import Reading, Table, find
 from orbiflow.density.tables.text import (
     layout_of,
     read_text,
@@ -42,47 +42,54 @@ def read_table(
 ) -> Table:
     """Read columns of finite numbers from a text, `.npy` or Parquet file.
 
-    In text, cells are parted by tabs, semicolons, commas or whitespace, and a quoted cell may not
-    run over a line's end. Blank lines and lines that begin with # are passed over; the first line
-    left is a header when a cell in it is neither a number nor a missing value. `.npy` files hold a
-    2-dimensional array of numbers or a 1-dimensional structured one.
+    In text, cells are separated by tabs, semicolons, commas or whitespace, and a quoted cell may not
+    run over a line's end. Blank lines and lines that begin with # are skipped; the first other line is
+    a header if a cell in it is neither a number nor a missing value. Decimal commas are read if they
+    cannot be taken for anything else. `.npy` files hold a 2-dimensional array of numbers or a
+    1-dimensional structured one.
 
-    `columns` names the columns wanted, in the order of `values`: each by its name (the very name
-    first, then without regard to case), else by its 1-based number as text ("3"). None takes all
-    columns of numbers. `width` is how many columns there must be, None for any number. `has_header`
-    says whether a text file's first line names the columns, None to look. With `drop_missing`, rows
-    that lack a value in a chosen column are left out; with `keep_missing` they stay, with NaN. Decimal
-    commas are read where they cannot be
-    taken for anything else.
+    Args:
+        path: The file.
+        columns: The columns that are wanted, in this order: each by its name (exactly, or else without
+            regard to case), or by its number from 1 as text ("3"). None takes all columns of numbers.
+        width: How many columns there must be, None for any number.
+        max_rows: How many rows there may be.
+        has_header: Whether a text file's first line names the columns, None to look.
+        drop_missing: Whether rows that lack a value in a chosen column are left out.
+        keep_missing: Whether they stay, with NaN.
 
-    Raises `InputFileError` naming the file, the line and the column at fault; `OrbiflowError` for
-    a Parquet file without pyarrow.
+    Raises:
+        InputFileError: If the file cannot be read; it names the line and the column at fault.
+        OrbiflowError: If pyarrow is missing for a Parquet file.
     """
     path = Path(path)
-    kind = kind_of_file(path)
-    if kind == "text":
-        return read_text(path, columns, width, max_rows, drop_missing, has_header, keep_missing)
-    read = {"npy": read_npy, "parquet": read_parquet}[kind]
-    return read(path, columns, width, max_rows, drop_missing, keep_missing)
+    read = {"text": read_text, "npy": read_npy, "parquet": read_parquet}[kind_of_file(path)]
+    return read(path, Reading(columns, width, max_rows, has_header, drop_missing, keep_missing))
 
 
 def append_column(table: Table, path_of_source: str | Path, name: str, values: ArrayLike) -> bytes:
-    """As `append_columns`, of one column: `values` (N,)."""
+    """Return the source file with one more column of values (N,); see `append_columns`."""
     return append_columns(table, path_of_source, {name: values})
 
 
 def append_columns(
     table: Table, path_of_source: str | Path, columns: Mapping[str, ArrayLike]
 ) -> bytes:
-    """The source file with more columns, as UTF-8 text that ends its lines with a newline.
+    """Return the source file with more columns, as UTF-8 text that ends its lines with a newline.
 
-    Each is (N,), a value for each row of `table`, written with 10 significant digits. A text file
-    keeps its delimiter, its other columns and its comments, and loses its blank lines; it gets the
-    new names only where it has a header. Rows that were left out get an empty cell. From npy and
-    Parquet come `table`'s columns, as CSV. A name that is taken gets a number: "density_2".
+    Values are written with 10 significant digits. A text file keeps its delimiter, its other columns
+    and its comments, and loses its blank lines; it gets the new names only if it has a header. Rows
+    that were left out get an empty cell. From npy and Parquet files the table's columns are written,
+    as CSV. A name that is taken gets a number: "density_2".
 
-    Raises `InputFileError` where the source has changed since it was read, `ValueError` where
-    `values` has another shape.
+    Args:
+        table: The table that was read.
+        path_of_source: The file that it was read from.
+        columns: Values (N,) for the rows of the table, by the names of the new columns.
+
+    Raises:
+        InputFileError: If the source has changed since it was read.
+        ValueError: If values have another shape.
     """
     values = [np.asarray(column, dtype=np.float64) for column in columns.values()]
     for column in values:
@@ -115,7 +122,7 @@ def append_columns(
 
 
 def to_csv(columns: Sequence[str], values: ArrayLike) -> bytes:
-    """`values`, (N, k), as UTF-8 CSV under a header of k names, with 10 significant digits.
+    """Return values (N, k) as UTF-8 CSV under a header of k names, with 10 significant digits.
 
     >>> to_csv(["lat", "lon"], [[0.1, 2], [1e-20, 1 / 3]]).decode().splitlines()
     ['lat,lon', '0.1,2', '1e-20,0.3333333333']
@@ -165,7 +172,7 @@ def _name_cell(name: str, delimiter: str) -> str:
 
 
 def kind_of_file(path: Path) -> str:
-    """ "text", "npy" or "parquet", by the first bytes, which an extension must not belie."""
+    """Return "text", "npy" or "parquet", by the first bytes, which must agree with the extension."""
     try:
         size, is_file, head = path.stat().st_size, path.is_file(), b""
         if is_file:
@@ -197,11 +204,15 @@ def kind_of_file(path: Path) -> str:
 def column_names(
     path: str | Path, *, wanted: Sequence[str] | None = None, has_header: bool | None = None
 ) -> tuple[str, ...] | None:
-    """Names of all columns of a file, None where it names none.
+    """Return the names of all columns of a file, or None if it names none.
 
-    `wanted` and `has_header` are as for `read_table`: they tell a header from a row.
+    Args:
+        path: The file.
+        wanted: Columns that are wanted, which help to tell a header from a row.
+        has_header: Whether a text file's first line names the columns, None to look.
 
-    Raises `InputFileError` for a file that is no table.
+    Raises:
+        InputFileError: If the file is no table.
     """
     path = Path(path)
     kind = kind_of_file(path)
@@ -213,9 +224,16 @@ def column_names(
 def read_labels(
     path: str | Path, column: str, table: Table, *, has_header: bool | None = None
 ) -> NDArray[np.str_]:
-    """The cells (N,) of a column, numbers or not, of the rows of a `table` read from the file.
+    """Return the cells (N,) of a column, numbers or not, for the rows of a table.
 
-    Raises `InputFileError` for an unknown column, an empty cell, or a file that has changed.
+    Args:
+        path: The file that the table was read from.
+        column: Name or number of the column.
+        table: The table.
+        has_header: Whether a text file's first line names the columns, None to look.
+
+    Raises:
+        InputFileError: If the column is unknown, a cell is empty, or the file has changed.
     """
     path = Path(path)
     kind = kind_of_file(path)
@@ -241,7 +259,7 @@ def read_labels(
 
 
 def _picked(path: Path, column: str, found: dict[int, str], table: Table) -> NDArray[np.str_]:
-    """Cells by the numbers of their lines, for the rows of the table."""
+    """Return cells, given by the numbers of their lines, for the rows of the table."""
     missing = [line for line in table.lines.tolist() if line not in found]
     if missing:
         raise InputFileError(
@@ -251,12 +269,14 @@ def _picked(path: Path, column: str, found: dict[int, str], table: Table) -> NDA
     return np.array([found[line] for line in table.lines.tolist()])
 
 
-NAMES = frozenset({"", "#", "id", "idx", "index", "key", "no", "no.", "nr", "number", "row"})
-"""Of columns that may hold any different whole numbers."""
+IDENTIFIER_NAMES = frozenset(
+    {"", "#", "id", "idx", "index", "key", "no", "no.", "nr", "number", "row"}
+)
+"""Names of columns that number the rows with any different whole numbers."""
 
 
 def is_identifier(name: str, values: NDArray[np.float64]) -> bool:
-    """Whether a column (N,) counts the rows, or is named so and has a whole number for each.
+    """Return whether a column (N,) numbers the rows, one by one or by its name.
 
     >>> is_identifier("phi", np.arange(5.0)), is_identifier("phi", np.array([1.0, 1.0, 2.0]))
     (True, False)
@@ -266,5 +286,5 @@ def is_identifier(name: str, values: NDArray[np.float64]) -> bool:
     if bool((np.diff(values) == 1).all()):
         return True
     word = name.strip().casefold()
-    named = word in NAMES or word.endswith(("_id", " id"))
+    named = word in IDENTIFIER_NAMES or word.endswith(("_id", " id"))
     return named and len(np.unique(values)) == len(values)

@@ -1,4 +1,4 @@
-"""A table of numbers, the choice of its columns, and what is said of them."""
+"""A table of numbers, the choice of its columns, and the check of its rows."""
 
 from __future__ import annotations
 
@@ -12,21 +12,34 @@ from numpy.typing import NDArray
 from orbiflow.errors import InputFileError, SettingError, literal
 
 MAX_COLUMNS = 10_000
-BLOCK = 65_536  # rows
+BLOCK = 65_536
+"""Rows read at a time."""
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What is read of a table: see `orbiflow.density.tables.read_table`."""
+
+    columns: Sequence[str] | None
+    width: int | None
+    max_rows: int = 20_000_000
+    has_header: bool | None = None
+    drop_missing: bool = False
+    keep_missing: bool = False
 
 
 @dataclass(frozen=True, eq=False)
 class Table:
     """The chosen columns of a file.
 
-    - `values`: (N, k) float64, all finite; NaN where a value is missing, if that was asked for.
-    - `columns`: k names; a column without one is called "column3", after its 1-based number.
-    - `lines`: (N,) int64, 1-based number of each row's line (of the row, in npy and Parquet).
-    - `notes`: what was decided for the user, in plain words.
-    - `header`: names of all columns in a text file's header line, None where there is none.
-    - `delimiter`: of a text file, " " for runs of whitespace; None for npy and Parquet.
-    - `decimal`: the mark before the decimals of a text file, "." or ",".
-    - `dropped`: numbers of the lines that were left out because a value was missing.
+    - `values`: Numbers (N, k), float64, all finite; NaN for missing values, if they were asked for.
+    - `columns`: Names of the k columns; one without a name is called "column3", after its number.
+    - `lines`: Number (N,) of each row's line, from 1 (of the row, in npy and Parquet).
+    - `notes`: What was decided for the user, in plain words.
+    - `header`: Names of all columns in a text file's header line, None if there is none.
+    - `delimiter`: Delimiter of a text file, " " for runs of whitespace; None for npy and Parquet.
+    - `decimal`: Mark before the decimals of a text file, "." or ",".
+    - `dropped`: Numbers of the lines that were left out because a value was missing.
     """
 
     values: NDArray[np.float64]
@@ -39,7 +52,7 @@ class Table:
     dropped: frozenset[int] = frozenset()
 
     def without(self, column: int) -> Table:
-        """The table less a column, by its 0-based number."""
+        """Return the table without a column, by its number from 0."""
         names = self.columns[:column] + self.columns[column + 1 :]
         return replace(self, values=np.delete(self.values, column, axis=1), columns=names)
 
@@ -49,17 +62,17 @@ class TableError(SettingError, InputFileError):
 
 
 class MissingCellsError(TableError):
-    """Cells that are empty, NaN or infinite in rows that must not lack any."""
+    """An error for cells that are empty, NaN or infinite in rows that must be complete."""
 
 
 def choose(
     path: Path,
     names: Sequence[str],
     numeric: Sequence[bool],
-    columns: Sequence[str] | None,
-    width: int | None,
+    reading: Reading,
 ) -> tuple[list[int], list[str]]:
-    """0-based numbers of the columns wanted, and notes."""
+    """Return the numbers, from 0, of the columns that are read, and notes."""
+    columns, width = reading.columns, reading.width
     if columns is not None:
         picked = [find(path, names, wanted) for wanted in columns]
         if len(set(picked)) < len(picked):
@@ -67,7 +80,7 @@ def choose(
                 literal(f"{path}: ") + "{columns} names a column twice; name each once"
             )
     else:
-        # Of just `width` columns all are meant, so that a bad cell is named rather than passed by.
+        # if there are just `width` columns all are meant, and a bad cell is named rather than ignored
         picked = [i for i, ok in enumerate(numeric) if ok or len(names) == width]
     if not picked or (width is not None and len(picked) != width):
         got = f"{{columns}} names {len(picked)}" if columns is not None else f"it has {len(picked)}"
@@ -88,6 +101,7 @@ def choose(
 
 
 def find(path: Path, names: Sequence[str], wanted: str) -> int:
+    """Return the number, from 0, of the column with this name or, counted from 1, number."""
     key = wanted.strip()
     hits = [i for i, name in enumerate(names) if name == key]
     hits = hits or [i for i, name in enumerate(names) if name.casefold() == key.casefold()]
@@ -109,67 +123,75 @@ def find(path: Path, names: Sequence[str], wanted: str) -> int:
 
 
 def column_number(text: str, n: int) -> int | None:
-    """0-based number of the column that `text` counts from 1, None where there is none such."""
+    """Return the number, from 0, of the column that `text` counts from 1, or None if there is none."""
     if not (text.isascii() and text.isdigit() and len(text) < 9 and 1 <= int(text) <= n):
         return None
     return int(text) - 1
 
 
 def check_count(path: Path, n: int, most: int, what: str) -> None:
+    """Check that there are not too many rows or columns."""
     if n > most:
         raise InputFileError(
             f"{path}: more than {most} {what}, the most that is read; save a part of the table"
         )
 
 
-def check_finite(
+def checked_rows(
     path: Path,
     values: NDArray[np.float64],
     lines: NDArray[np.int64],
     columns: Sequence[str],
     unit: str,
-    missing: bool = False,
-) -> None:
-    """
+    reading: Reading,
+) -> tuple[NDArray[np.float64], NDArray[np.int64], frozenset[int], list[str]]:
+    """Return rows and lines without those to leave out, the lines of these, and a note of them.
+
+    Args:
+        path: The file.
+        values: Numbers (N, k), NaN for missing ones.
+        lines: Number (N,) of each row's line.
+        columns: Names of the columns.
+        unit: What a row is in: "line" or "row".
+        reading: Which rows may lack values.
+
     Raises:
-        InputFileError: for no rows, and for cells that are empty, NaN or infinite; with `missing`
-            the first two may be.
+        InputFileError: If there are no rows, or a cell is infinite or, unless it may be, missing.
     """
+    dropped, notes = frozenset[int](), list[str]()
+    if reading.drop_missing and len(values):
+        whole = ~np.isnan(values).any(axis=1)
+        if not whole.any():
+            raise TableError(
+                literal(f"{path}: ") + "every row lacks a value; choose others with {columns}"
+            )
+        left = lines[~whole].tolist()
+        if left:
+            rows = f"{len(left)} row{'s' * (len(left) > 1)}"
+            notes = [f"left out {rows} with missing values, the first in {unit} {left[0]}"]
+        values, lines, dropped = values[whole], lines[whole], frozenset(left)
     if not len(values):
         raise InputFileError(f"{path}: holds no rows of numbers; export it again")
-    rows, at = np.nonzero(np.isinf(values) if missing else ~np.isfinite(values))
-    if len(rows):
+    wrong = np.isinf(values) if reading.keep_missing else ~np.isfinite(values)
+    rows_wrong, at = np.nonzero(wrong)
+    if len(rows_wrong):
         raise MissingCellsError(
             literal(
-                f"{path}: {len(rows)} cell{'s' * (len(rows) > 1)} empty, NaN or infinite, the first "
-                f"in {unit} {lines[rows[0]]}, column {quote(columns[int(at[0])])}"
+                f"{path}: {len(rows_wrong)} cell{'s' * (len(rows_wrong) > 1)} empty, NaN or infinite, "
+                f"the first in {unit} {lines[rows_wrong[0]]}, column {quote(columns[int(at[0])])}"
             )
             + "; fill them in or leave their rows out with {drop_missing}"
         )
-
-
-def without_missing(
-    path: Path, values: NDArray[np.float64], lines: NDArray[np.int64], unit: str
-) -> tuple[NDArray[np.float64], NDArray[np.int64], frozenset[int], list[str]]:
-    """Rows and lines without a missing value, the lines left out, and a note of them."""
-    whole = ~np.isnan(values).any(axis=1)
-    if not whole.any():
-        raise TableError(
-            literal(f"{path}: ") + "every row lacks a value; choose others with {columns}"
-        )
-    left = lines[~whole].tolist()
-    first = f", the first in {unit} {left[0]}" if left else ""
-    rows = f"{len(left)} row{'s' * (len(left) > 1)}"
-    notes = [f"left out {rows} with missing values{first}"] if left else []
-    return values[whole], lines[whole], frozenset(left), notes
+    return values, lines, dropped, notes
 
 
 def listing(names: Sequence[str]) -> str:
+    """Return names for a message: the first twenty, and how many more there are."""
     shown = ", ".join(quote(name)[1:-1] for name in names[:20])
     return shown if len(names) <= 20 else f"{shown} and {len(names) - 20} more"
 
 
 def quote(text: str) -> str:
-    """`text` for a message: at most 40 characters, and on one line."""
+    """Return text for a message: at most 40 characters, on one line."""
     text = text.strip()
     return ascii(text if len(text) <= 40 else text[:37] + "...")

@@ -1,8 +1,8 @@
-"""Tables in text: two streamed passes.
+"""Tables in text files, read in two passes.
 
-A first look at 100 rows finds the delimiter, the header and the columns of numbers; the second pass
-turns blocks of cells into numbers, and only a block that fails is gone through cell by cell to name
-the culprit. Memory holds the numbers and one block of text.
+The first looks at 100 rows to find the delimiter, the header and the columns of numbers. The second
+turns blocks of cells into numbers, and only a block that fails is searched cell by cell for the one
+at fault. Memory holds the numbers and one block of text.
 """
 
 from __future__ import annotations
@@ -22,20 +22,23 @@ import numpy as np
 from orbiflow.density.tables.table import (
     BLOCK,
     MAX_COLUMNS,
+    Reading,
     Table,
     TableError,
     check_count,
-    check_finite,
+    checked_rows,
     choose,
     column_number,
     listing,
     quote,
-    without_missing,
 )
 from orbiflow.errors import InputFileError, literal
 
-MAX_LINE = 2**20  # characters
-SAMPLE = 100  # rows looked at to find the layout
+MAX_LINE = 2**20
+"""Characters of a line at most."""
+
+SAMPLE = 100
+"""Rows looked at to find the layout."""
 
 DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+(e[+-]?\d+)?", re.IGNORECASE)
 _WHOLE = re.compile(r"[+-]?\d+")
@@ -44,9 +47,13 @@ _MISSING = frozenset({"", "na", "n/a", "nan", "null", "none"})
 
 @dataclass(frozen=True)
 class Layout:
-    """How a text file is laid out.
+    """The layout of a text file.
 
-    `first` is the number of its first line that is no comment, `decimal` the mark before decimals.
+    - `delimiter`: The mark between cells, " " for runs of whitespace.
+    - `header`: The names in the header line, None if there is none.
+    - `names`: The columns' names. `numeric`: Which columns hold numbers.
+    - `first`: The number of the first line that is no comment.
+    - `decimal`: The mark before decimals.
     """
 
     delimiter: str
@@ -57,17 +64,10 @@ class Layout:
     decimal: str
 
 
-def read_text(
-    path: Path,
-    columns: Sequence[str] | None,
-    width: int | None,
-    max_rows: int,
-    drop_missing: bool = False,
-    has_header: bool | None = None,
-    keep_missing: bool = False,
-) -> Table:
-    layout = layout_of(path, columns, has_header)
-    picked, notes = choose(path, layout.names, layout.numeric, columns, width)
+def read_text(path: Path, reading: Reading) -> Table:
+    """Read a table from a text file."""
+    layout = layout_of(path, reading.columns, reading.has_header)
+    picked, notes = choose(path, layout.names, layout.numeric, reading)
     names = tuple(layout.names[i] for i in picked)
     values, lines, comments = array("d"), array("q"), 0
     cells: list[str] = []
@@ -83,21 +83,18 @@ def read_text(
         if len(cells) >= BLOCK * len(picked):
             values.extend(_numbers(path, cells, lines, names, layout.decimal))
             cells.clear()
-            check_count(path, len(lines), max_rows, "rows")
+            check_count(path, len(lines), reading.max_rows, "rows")
     values.extend(_numbers(path, cells, lines, names, layout.decimal))
-    check_count(path, len(lines), max_rows, "rows")
+    check_count(path, len(lines), reading.max_rows, "rows")
     rows, at = np.frombuffer(values).reshape(-1, len(picked)), np.frombuffer(lines, dtype=np.int64)
-    dropped = frozenset[int]()
-    if drop_missing and len(lines):
-        rows, at, dropped, more = without_missing(path, rows, at, "line")
-        notes += more
-    check_finite(path, rows, at, names, "line", keep_missing)
+    rows, at, dropped, more = checked_rows(path, rows, at, names, "line", reading)
+    notes += more
     if layout.decimal == ",":
         notes.append("read decimal commas")
     if layout.header is not None:
         notes.append(f"took line {layout.first} as the header: {listing(layout.header)}")
     if comments:
-        notes.append(f"passed over {comments} comment line{'s' * (comments > 1)}")
+        notes.append(f"skipped {comments} comment line{'s' * (comments > 1)}")
     return Table(
         rows,
         names,
@@ -111,7 +108,7 @@ def read_text(
 
 
 def text_lines(path: Path) -> Iterator[tuple[int, str, bool]]:
-    """Number, text and whether it is a comment, of every line that is not blank."""
+    """Yield the number and text of every line that is not blank, and whether it is a comment."""
     try:
         with path.open(encoding="utf-8-sig") as file:
             for number, line in enumerate(iter(partial(file.readline, MAX_LINE), ""), start=1):
@@ -142,6 +139,7 @@ def _undecodable(path: Path) -> int:
 
 
 def layout_of(path: Path, columns: Sequence[str] | None, has_header: bool | None = None) -> Layout:
+    """Find the layout of a text file from its first rows."""
     lines = (line[:2] for line in text_lines(path) if not line[2])
     sample = list(islice(lines, SAMPLE))
     if not sample:
@@ -170,7 +168,7 @@ def layout_of(path: Path, columns: Sequence[str] | None, has_header: bool | None
 
 
 def _decimal(rows: list[list[str]]) -> str:
-    """The mark before decimals: a comma where cells are numbers with one and none has a point."""
+    """Return the mark before decimals, a comma if numbers have one and none has a point."""
     cells = [cell.strip() for row in rows for cell in row]
     commas = any(DECIMAL_COMMA.fullmatch(cell) for cell in cells)
     points = any("." in cell and _class(cell) == "number" for cell in cells)
@@ -182,9 +180,9 @@ def _pointed(cell: str, decimal: str) -> str:
 
 
 def _delimiter(lines: list[str]) -> str:
-    r"""The mark that parts every one of `lines` into as many cells, else that parts most of them.
+    r"""Return the mark that splits all lines into as many cells, or else splits most of them.
 
-    The semicolon goes before the comma, which may be a decimal one.
+    The semicolon is tried before the comma, which may be a decimal one.
 
     >>> _delimiter(["lat;lon", "1,5;2"]), _delimiter(["1, 2", "3, 4"]), _delimiter(["1 2", "3\t4"])
     (';', ',', ' ')
@@ -202,7 +200,7 @@ def _delimiter(lines: list[str]) -> str:
 
 
 def _is_spaced(lines: list[str]) -> bool:
-    """Whether all lines are numbers parted by spaces, some with decimal commas.
+    """Return whether all lines are numbers separated by spaces, some with decimal commas.
 
     >>> _is_spaced(["1,5 2", "3 4,25"]), _is_spaced(["1, 2", "3, 4"])
     (True, False)
@@ -215,6 +213,7 @@ def _is_spaced(lines: list[str]) -> bool:
 
 
 def split_line(path: Path, number: int, line: str, delimiter: str) -> list[str]:
+    """Return the cells of a line."""
     if delimiter == " ":
         return line.split()
     if '"' not in line:
@@ -253,7 +252,7 @@ def _has_header(
         return True
     if any(column[0] == "word" and "number" in column[1:] for column in classes):
         return True
-    # `Paris,48.9,2.4` above `Rome,41.9,12.5` is a row; `city,2019,2020` above it is a header.
+    # `Paris,48.9,2.4` above `Rome,41.9,12.5` is a row; `city,2019,2020` above it is a header
     names = {cell.strip().casefold() for cell in row}
     wanted = [name.strip() for name in columns or ()]
     by_number = all(column_number(name, len(row)) is not None for name in wanted)
@@ -271,7 +270,7 @@ def _has_header(
 def _numbers(
     path: Path, cells: list[str], lines: array[int], names: tuple[str, ...], decimal: str
 ) -> list[float]:
-    """`cells` of the last of `lines`, row after row, as floats; NaN where one is missing."""
+    """Return the cells of the last of `lines`, row after row, as floats; NaN for missing ones."""
     if decimal != ".":
         cells = [_pointed(cell, decimal) for cell in cells]
     try:
@@ -290,7 +289,7 @@ def _number(path: Path, line: int, name: str, cell: str) -> float:
     if kind == "missing":
         return math.nan
     if kind == "number":
-        return float(cell.strip())  # of what float takes for no space, such as \x1c
+        return float(cell.strip())  # float does not strip all that `strip` does, such as \x1c
     comma = _class(cell.replace(",", ".")) == "number"
     raise InputFileError(
         f"{path}: line {line}: column {quote(name)}: {quote(cell)} is not a number; "

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from orbiflow.arrays import Array
 from orbiflow.density import (
+    ComparisonSettings,
     ModelComparison,
     compare_scores,
     read_table,
@@ -115,11 +116,9 @@ def compared(request: DensityCvRequest, found: HeldOut, split: Split) -> ModelCo
     try:
         made = compare_scores(
             {name: means[k, chosen] for k, name in enumerate(found.settings)},
+            ComparisonSettings(bootstrap=request.bootstrap, level=request.level, seed=request.seed),
             groups=None if labels is None else labels[chosen],
             weights=None if weights is None else weights[chosen],
-            resamples=request.bootstrap,
-            level=request.level,
-            seed=request.seed,
         )
     except OrbiflowError as error:
         return str(error)

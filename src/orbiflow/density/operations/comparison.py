@@ -1,0 +1,358 @@
+"""The operation that compares fitted densities at held-out rows, or two tables."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from orbiflow.density.comparing import ComparisonSettings
+from orbiflow.density.operations.drawing import ColumnSettings, require_ending
+from orbiflow.errors import OrbiflowError, SettingError
+from orbiflow.runtime import (
+    Cancel,
+    Note,
+    Outcome,
+    Progress,
+    Sink,
+    Written,
+    ignore,
+    operation,
+)
+from orbiflow.settings import DefaultText, Option, Repeated
+
+if TYPE_CHECKING:
+    from orbiflow.arrays import Array
+    from orbiflow.density.comparing import DataComparison, ModelComparison
+    from orbiflow.density.models import Density
+    from orbiflow.density.tables import Table
+
+SpaceName = Literal["torus", "sphere", "klein-bottle", "projective-plane"]
+Unit = Literal["radians", "degrees", "turns"]
+Columns = tuple[str, ...] | None
+
+FITTED_SHARE, MIN_LOOKED_UP = 0.5, 5
+"""Share of the rows that a model knows, and rows that must have been looked up, for a warning."""
+
+
+@operation("density compare")
+def compare(
+    settings: ComparisonSettings = ComparisonSettings(),
+    table: ColumnSettings = ColumnSettings(),
+    *,
+    data: Annotated[tuple[Path, ...], Option("-d"), Repeated()],
+    models: Annotated[tuple[Path, ...] | None, Option("--model", "-m"), Repeated()] = None,
+    space: SpaceName | None = None,
+    unit: Annotated[Unit | None, DefaultText("radians, if no value is beyond 2 pi")] = None,
+    group: str | None = None,
+    out: Annotated[Path | None, Option("-o"), DefaultText("nothing is written")] = None,
+    on_event: Sink = ignore,
+    cancel: Cancel = Cancel(),
+) -> Outcome:
+    """Which model suits held-out rows better, or do two data sets differ? With its uncertainty.
+
+    Models: -m A -m B -d held-out.csv. Data sets: -d a.csv -d b.csv --space sphere.
+
+    Args:
+        data: Table of held-out rows for models; or give it twice, for two data sets.
+        models: Folder that `fit` wrote; give it twice or more.
+        space: Where two data sets live.
+        unit: Unit of angles in two data sets.
+        group: Column that names what rows belong to (a protein, a station, an event): those of one are
+            not independent.
+        out: A .json or .csv for the result.
+    """
+    models = models or ()
+    require_ending(out, (".json", ".csv"))
+    _check_what_is_compared(data, models, space, unit)
+
+    import json
+
+    from orbiflow.runtime import check_output_file, one_thread, write_atomic
+
+    if out is not None:
+        check_output_file(out, *models, *data)
+    read = _Reader(table, group, on_event, cancel)
+    with one_thread():
+        if models:
+            found = _compare_models(data[0], models, read, settings)
+        else:
+            assert space is not None
+            found = _compare_data(data, space, unit, read, settings)
+    document = found.to_json()
+    cancel.check()
+    for line in [*found.words(), *found.notes]:
+        on_event(Note(line))
+    if out is not None:
+        as_csv = out.suffix.lower() == ".csv"
+        write_atomic(
+            out, _csv(found) if as_csv else json.dumps(document, allow_nan=False, indent=1)
+        )
+        on_event(Written(out))
+        on_event(Note(f"written to {out}"))
+    return Outcome({"file": None if out is None else str(out), "comparison": document})
+
+
+def _check_what_is_compared(
+    data: Sequence[Path], models: Sequence[Path], space: str | None, unit: str | None
+) -> None:
+    """Check that there are models and a table, or two tables and a space.
+
+    Raises:
+        SettingError: If there is something else.
+    """
+    if not models and len(data) != 2:
+        raise SettingError(
+            "give two {models} or more and one {data} to compare models, or two {data} and their "
+            "{space} to compare data"
+        )
+    if not models and space is None:
+        raise SettingError("two {data} need their {space}")
+    if not models and data[0].resolve() == data[1].resolve():
+        raise SettingError("{data} names one file twice: give two data sets")
+    if not models:
+        return
+    if len(models) < 2:
+        raise SettingError(
+            "{models} must be given twice or more, to be compared; or give two {data}"
+        )
+    if len(set(models)) < len(models):
+        raise SettingError("{models} names one folder twice: give each once")
+    if len(data) != 1:
+        raise SettingError("models are compared at one {data}, rows that none was fitted to")
+    for name, value in (("space", space), ("unit", unit)):
+        if value is not None:
+            raise SettingError(f"{{{name}}} is that of the models: leave it out")
+
+
+class _Reader:
+    """Tables as a comparison reads them, with its progress and notes.
+
+    Args:
+        settings: Which columns and rows are read.
+        group: The column of groups.
+        tell: The sink of events.
+        cancel: Ends the work early.
+    """
+
+    def __init__(
+        self, settings: ColumnSettings, group: str | None, tell: Sink, cancel: Cancel
+    ) -> None:
+        self.columns, self.header, self.drop_missing = (
+            settings.columns, settings.header, settings.drop_missing
+        )  # fmt: skip
+        self.group, self.tell, self.cancel = group, tell, cancel
+
+    def progress(self, share: float, what: str) -> None:
+        """Tell the progress, unless the work was cancelled."""
+        self.cancel.check()
+        self.tell(Progress(min(1.0, share), what))
+
+    def table(self, data: Path, columns: Columns, tell: Sink) -> Table:
+        """Return numbers, without the column of groups if columns are not named."""
+        from orbiflow.jobs.density_data import read_data
+
+        how: dict[str, Any] = {"has_header": self.header, "drop_missing": self.drop_missing}
+        table = read_data(data, columns, None, tell, **how)
+        if columns is not None or self.group is None:
+            return table
+        wanted = self.group.strip().casefold()
+        at = [k for k, name in enumerate(table.columns) if name.casefold() == wanted]
+        return table.without(at[0]) if at else table
+
+    def labels(self, data: Path, table: Table) -> Any:
+        """Return the group of each row, or None if there are no groups."""
+        from orbiflow.density.tables import read_labels
+
+        if self.group is None:
+            return None
+        return read_labels(data, self.group, table, has_header=self.header)
+
+
+def _compare_models(
+    data: Path, paths: Sequence[Path], read: _Reader, settings: ComparisonSettings
+) -> ModelComparison:
+    from dataclasses import replace
+
+    from orbiflow.density.comparing import compare_scores, require_one_space, scores_of
+    from orbiflow.jobs.density_models import check_fits, model_at
+
+    names = _names(paths)
+    models = dict(zip(names, map(model_at, paths), strict=True))
+    require_one_space({name: density.space for name, (density, _) in models.items()})
+    columns = _columns_of_models(data, {name: extra for name, (_, extra) in models.items()}, read)
+    tables: dict[Columns, Table] = {}
+    scores: dict[str, Array] = {}
+    notes: list[str] = []
+    for k, (name, (density, extra)) in enumerate(models.items()):
+        own = columns[name]
+        if own not in tables:
+            tell_once = ignore if tables else read.tell
+            tables[own] = read.table(data, own, tell_once)
+            check_fits(data, tables[own], density.space, extra, tell_once)
+        values = tables[own].values
+
+        def told(share: float, k: int = k) -> None:
+            read.progress((k + share) / len(models), "scoring")
+
+        scores[name] = scores_of(density, values, told)
+        notes += _notes_on_known_rows(name, density, extra, values)
+    groups = read.labels(data, next(iter(tables.values())))
+    found = compare_scores(scores, settings, groups=groups)
+    return replace(found, notes=(*notes, *found.notes))
+
+
+def _compare_data(
+    data: Sequence[Path],
+    space: SpaceName,
+    unit: Unit | None,
+    read: _Reader,
+    settings: ComparisonSettings,
+) -> DataComparison:
+    from dataclasses import replace
+
+    import numpy as np
+
+    from orbiflow.density.comparing import compare_samples
+    from orbiflow.jobs.density_data import unit_of
+
+    names = _names(data)
+    columns = read.columns or _common_columns(data, read)
+    tables = [read.table(path, columns, read.tell) for path in data]
+    groups = None
+    if read.group is not None:
+        labels = [read.labels(path, table) for path, table in zip(data, tables, strict=True)]
+        groups = dict(zip(names, labels, strict=True))
+    both = tables[0]
+    if len({table.values.shape[1] for table in tables}) == 1:
+        both = replace(both, values=np.concatenate([table.values for table in tables]))
+    return compare_samples(
+        {name: table.values for name, table in zip(names, tables, strict=True)},
+        space,
+        settings,
+        unit=unit_of(space, unit, both, read.tell),
+        groups=groups,
+        progress=read.progress,
+    )
+
+
+def _columns_of_models(
+    data: Path, extras: Mapping[str, Mapping[str, Any]], read: _Reader
+) -> dict[str, Columns]:
+    """Return the table's columns in the order in which each model was fitted to them."""
+    from orbiflow.jobs.density_data import same_columns
+
+    own = {name: tuple(extra.get("columns") or ()) for name, extra in extras.items()}
+    (first, wanted), *others = own.items()
+    if read.columns is not None:
+        places = {name: k for k, name in enumerate(wanted)}
+        asked = read.columns
+        if len(places) != len(asked):
+            return dict.fromkeys(own, asked)
+        # by the order of the first; another model may have the same ones in another order
+        return {
+            name: tuple(asked[places[column]] for column in other)
+            if sorted(other) == sorted(wanted)
+            else asked
+            for name, other in own.items()
+        }
+    for name, other in others:
+        if sorted(wanted) != sorted(other):
+            raise OrbiflowError(
+                f"{first} was fitted to {', '.join(wanted)}, {name} to {', '.join(other)}: are they "
+                "the same quantities? Then say with --columns which columns they are"
+            )
+    if same_columns(data, dict(extras[first]), read.tell, has_header=read.header) is not None:
+        return dict(own)
+    if len(set(own.values())) > 1:
+        raise OrbiflowError(
+            f"{data} does not name its columns, and the models have them in other orders: give it a "
+            "header"
+        )
+    return dict.fromkeys(own)
+
+
+def _common_columns(data: Sequence[Path], read: _Reader) -> Columns:
+    """Return the first table's columns if the second has them in another order, else None."""
+    from orbiflow.density.tables import column_names
+
+    one, other = (column_names(path, has_header=read.header) for path in data)
+    if one is None or other is None or one == other:
+        return None
+    if sorted(n.casefold() for n in one) != sorted(n.casefold() for n in other):
+        raise OrbiflowError(
+            f"{data[0]} has the columns {', '.join(one)}, {data[1]} {', '.join(other)}: say with "
+            "--columns which to compare"
+        )
+    group = (read.group or "").strip().casefold()
+    return tuple(name for name in one if name.casefold() != group)
+
+
+def _notes_on_known_rows(
+    name: str, density: Density, extra: Mapping[str, Any], values: Array
+) -> list[str]:
+    """Return a note if a model was, or may have been, fitted to the rows."""
+    from orbiflow.density.comparing import RowSketch
+
+    if not extra.get("fitted_rows"):
+        return [
+            f"{name} has no record of the rows that it was fitted to: make sure that none of these "
+            "is one"
+        ]
+    known, looked_up = RowSketch.from_json(extra["fitted_rows"]).known(density.space, values)
+    if not known:
+        return []
+    if looked_up >= MIN_LOOKED_UP and known >= FITTED_SHARE * looked_up:
+        return [
+            f"WARNING: {name} seems to have been fitted to these rows ({known} of {looked_up} that "
+            "were looked up): a model's score at rows that it has seen says little; compare at others"
+        ]
+    return [
+        f"{known} of {looked_up} rows that were looked up equal one that {name} was fitted to: "
+        "repeated values, or the same rows"
+    ]
+
+
+def _names(paths: Sequence[Path]) -> list[str]:
+    """Return names of what is compared, short if that tells them apart.
+
+    >>> _names([Path("a/x.csv"), Path("a/y.csv")]), _names([Path("a/x"), Path("b/x")])
+    (['x', 'y'], ['a/x', 'b/x'])
+    """
+    real = [path.resolve() for path in paths]
+    short = [
+        own.stem if path.is_file() or path.suffix else own.name
+        for path, own in zip(paths, real, strict=True)
+    ]
+    if len(set(short)) == len(short) and all(short):
+        return short
+    full = [str(path) for path in paths]
+    if len(set(full)) == len(full):
+        return full
+    return [f"{k}: {path}" for k, path in enumerate(full, 1)]
+
+
+def _csv(found: ModelComparison | DataComparison) -> str:
+    """Return the differences of models, or the figures of data sets, a row each."""
+    import csv
+    import io
+
+    document = found.to_json()
+    rows: list[Mapping[str, Any]]
+    if document["kind"] == "models":
+        rows = document["differences"]
+    else:
+        p = {
+            "figure": "p",
+            "value": document["test"]["p"],
+            "error": None,
+            "low": None,
+            "high": None,
+        }
+        divergence: dict[str, Any] = document["divergence"] or {}
+        rows = [p, *({"figure": name, **estimate} for name, estimate in divergence.items())]
+    text = io.StringIO()
+    writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    return text.getvalue()

@@ -1,0 +1,325 @@
+"""Operations on a fitted density and on image patches: pictures, regions, angles of patches."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from orbiflow.density.pictures import PlotSettings
+from orbiflow.density.regions import RegionSettings
+from orbiflow.errors import OrbiflowError, SettingError
+from orbiflow.runtime import (
+    Cancel,
+    Note,
+    Outcome,
+    Progress,
+    Sink,
+    Written,
+    ignore,
+    operation,
+)
+from orbiflow.settings import DefaultText, Option, Range, Settings
+
+if TYPE_CHECKING:
+    from orbiflow.density.regions import DensityRegion, Outline
+    from orbiflow.density.spaces import Space
+
+Model = Annotated[Path, Option("-m")]
+"""The parameter of a fitted density."""
+
+PATCH_WIDTHS = (8, 9)
+"""Columns of image patches."""
+
+
+class ColumnSettings(Settings, group="Reading the table"):
+    """Which columns and rows of a table are read."""
+
+    columns: Annotated[tuple[str, ...] | None, DefaultText("those of numbers")] = None
+    """Names or numbers of the columns, such as lat,lon."""
+
+    header: Annotated[bool | None, DefaultText("found automatically")] = None
+    """Whether the table's first line names the columns."""
+
+    drop_missing: bool = False
+    """Leave out rows that lack a value."""
+
+
+def require_ending(out: Path | None, endings: tuple[str, ...]) -> None:
+    """Check that a file's name ends in one of these.
+
+    Raises:
+        SettingError: If it does not.
+    """
+    if out is not None and out.suffix.lower() not in endings:
+        raise SettingError(f"{{out}} must end in {', '.join(endings)}, got {out.name!r}")
+
+
+@operation("density plot")
+def plot(
+    settings: PlotSettings = PlotSettings(),
+    table: ColumnSettings = ColumnSettings(),
+    *,
+    model: Model,
+    out: Annotated[Path, Option("-o")] = Path("plots"),
+    data: Path | None = None,
+    on_event: Sink = ignore,
+    cancel: Cancel = Cancel(),
+) -> Outcome:
+    """Draw a density: density, flow, samples as PNG, PDF or SVG, and surface.html, to turn in 3-D.
+
+    Directions and axes are drawn on maps (density, latlon) and on the square.
+
+    On a torus of more or fewer than two angles there are samples alone, all pairs of angles.
+
+    Args:
+        model: Folder that `fit` wrote.
+        out: Folder for the pictures, made if need be; or a .pdf, which gets a page for each figure.
+        data: Table to draw beside samples in samples.png, and as the dots of --dots.
+    """
+    if data is None and table.fields_given:
+        name = min(table.fields_given)
+        raise SettingError(f"{{{name}}} applies only to {{data}}; give both or neither")
+
+    from orbiflow.density.pictures import is_one_file, known_names, plot_density
+    from orbiflow.jobs.density_data import read_data, same_columns
+    from orbiflow.jobs.density_models import check_fits, model_at
+    from orbiflow.runtime import check_output_file, check_outside_runs
+
+    single = is_one_file(out)
+    if single and settings.format not in (None, "pdf"):
+        raise SettingError(f"{{out}} ends in .pdf but {{format}} is {settings.format}")
+    reads = (model, data, settings.coastlines)
+    if single:
+        check_output_file(out, *reads)
+    else:  # pictures may stand beside their model
+        check_outside_runs(out, *reads)
+    density, extra = model_at(model)
+    space = density.space
+    names = known_names(space, extra.get("columns"))
+    if settings.names is None and names is not None:
+        settings = settings.replace(names=names)
+    points = None
+    if data is not None:
+        header = table.header
+        columns = table.columns or same_columns(data, extra, on_event, has_header=header)
+        found = read_data(
+            data, columns, None, on_event, has_header=header, drop_missing=table.drop_missing
+        )
+        check_fits(data, found, space, extra, on_event)
+        points = found.values
+
+    def told(share: float, what: str) -> None:
+        cancel.check()
+        on_event(Progress(share, what))
+
+    plotted = plot_density(density, out, settings, data=points, told=told)
+    captions = plotted.captions if single or settings.sheet.printed else ()
+    for path in plotted.files:
+        on_event(Written(path))
+    for note in (*(f"caption: {caption}" for caption in captions), *plotted.notes):
+        on_event(Note(note))
+    on_event(Note(_where_pictures_are(out, single, space)))
+    folder = out.parent if single else out
+    return Outcome({"folder": str(folder), "files": [path.name for path in plotted.files]})
+
+
+def _where_pictures_are(out: Path, single: bool, space: Space) -> str:
+    if space.dim != 2:
+        where = out if single else f"the picture in {out}"
+        return (
+            f"density, flow and surface are drawn in two dimensions, this {space.name} has "
+            f"{space.dim}: {where} shows samples, angle by angle"
+        )
+    if single:
+        return f"written {out}, a page for each figure; a folder gets the surface to turn, too"
+    return f"written to {out}; open {out / 'surface.html'} in a browser"
+
+
+@operation("density region")
+def region(
+    settings: RegionSettings = RegionSettings(),
+    *,
+    model: Model,
+    out: Annotated[Path, Option("-o")] = Path("regions.json"),
+    on_event: Sink = ignore,
+    cancel: Cancel = Cancel(),
+) -> Outcome:
+    """Find the smallest regions that hold a mass: threshold, size, and boundary as closed polygons.
+
+    On a torus of more or fewer than two angles there are threshold and size alone.
+
+    Args:
+        model: Folder that `fit` wrote.
+        out: File for the regions: .geojson (of directions and axes), .json or .csv.
+    """
+    require_ending(out, (".geojson", ".json", ".csv"))
+
+    import json
+
+    from orbiflow.density.regions import (
+        DensityLevels,
+        outlines,
+        outlines_csv,
+        regions_document,
+        samples_for,
+        to_geojson,
+    )
+    from orbiflow.jobs.density_models import model_at
+    from orbiflow.runtime import check_output_file, one_thread, write_atomic
+
+    check_output_file(out, model)
+    density, _ = model_at(model)
+    kind, space = out.suffix.lower(), density.space
+    _require_format(out, kind, space)
+    samples = samples_for(settings.masses, settings.samples)
+    on_event(Progress(0.0, f"drawing {samples} samples"))
+    cancel.check()
+    with one_thread():
+        levels = DensityLevels(density, samples=samples, seed=settings.seed)
+        regions = [levels.highest(mass) for mass in settings.masses]
+        regions += [levels.above(level) for level in settings.level or ()]
+        reached = 0.1
+
+        def told(share: float, what: str) -> None:
+            nonlocal reached
+            cancel.check()
+            reached = max(reached, 0.1 + 0.9 * share)
+            on_event(Progress(reached, what))
+
+        drawn: list[Outline] = []
+        if space.dim == 2:
+            budget, seed = settings.budget, settings.seed
+            drawn = outlines(levels, regions, budget=budget, seed=seed, told=told)
+    if kind == ".geojson":
+        text = json.dumps(to_geojson(drawn), allow_nan=False)
+    elif kind == ".csv":
+        text = outlines_csv(drawn)
+    else:
+        document = regions_document(regions, drawn, samples=samples, seed=settings.seed)
+        text = json.dumps(document, allow_nan=False)
+    cancel.check()
+    write_atomic(out, text)
+    on_event(Written(out))
+    for note in _region_notes(regions, drawn):
+        on_event(Note(note))
+    on_event(Note(f"written to {out}"))
+    return Outcome({"file": str(out), "regions": [one.to_json() for one in regions]})
+
+
+def _require_format(out: Path, kind: str, space: Space) -> None:
+    """Check that regions of a space can be written in a format.
+
+    Raises:
+        OrbiflowError: If they cannot.
+    """
+    if kind == ".geojson" and not space.is_round:
+        raise OrbiflowError(
+            f"{out}: GeoJSON is for places on a globe, not for the angles of a {space.name}: write "
+            ".json or .csv"
+        )
+    if kind == ".csv" and space.dim != 2:
+        raise OrbiflowError(
+            f"{out}: a table holds outlines, which are drawn in two dimensions; this {space.name} has "
+            f"{space.dim}: write .json, and use `orbiflow density score --region` for the rows inside"
+        )
+
+
+def _region_notes(regions: list[DensityRegion], drawn: list[Outline]) -> list[str]:
+    """Return what the user should know of regions, whose outlines may not have been drawn."""
+    space = regions[0].density.space
+    notes: list[str] = []
+    if not drawn:
+        notes.append(
+            f"outlines are drawn in two dimensions, this {space.name} has {space.dim}: there are "
+            "thresholds and sizes alone; `orbiflow density score --region` says of each row how far "
+            "inside it is"
+        )
+    for k, one in enumerate(regions):
+        notes.append(_described(one, drawn[k] if drawn else None))
+        notes += drawn[k].notes if drawn else ()
+    return notes
+
+
+def _described(found: DensityRegion, outline: Outline | None) -> str:
+    from orbiflow.density.regions import size_unit
+    from orbiflow.jobs.wording import counted, percentage, with_error
+
+    size, fraction, polygons = found.size, found.fraction, ""
+    if outline is not None:
+        size, fraction = outline.size, outline.fraction
+        count = len(outline.shape.geoms)
+        holds = "holds" if count == 1 else "hold"
+        polygons = f"; {counted(count, 'polygon')}, which {holds} "
+        polygons += with_error(outline.mass, outline.error)
+    return (
+        f"mass {with_error(found.held, found.error)}: log density of at least "
+        f"{found.log_prob:.4f} ({found.log_prob_low:.4f} to {found.log_prob_high:.4f}), "
+        f"{size:.6g} {size_unit(found.density.space)}, {percentage(fraction)} of the space{polygons}"
+    )
+
+
+@operation("density patches")
+def patches(
+    data: Path,
+    table: ColumnSettings = ColumnSettings(),
+    *,
+    out: Annotated[Path, Option("-o")] = Path("angles.csv"),
+    unit: Literal["radians", "degrees", "turns"] = "radians",
+    farthest: Annotated[float | None, Range(0), DefaultText("all are kept")] = None,
+    on_event: Sink = ignore,
+    cancel: Cancel = Cancel(),
+) -> Outcome:
+    """Turn image patches into theta,phi on the Klein bottle, for `fit --space klein-bottle`.
+
+    Distances are between patches of mean 0 and contrast 1.
+
+    Args:
+        data: Table of 9 pixel values a row, from the top left, or 8 DCT coordinates.
+        out: CSV of theta, phi and distance.
+        unit: Unit of theta and phi.
+        farthest: Largest distance from the Klein bottle, 0 to 1.41, of the patches that are kept.
+    """
+    import numpy as np
+
+    from orbiflow.density.spaces import to_klein
+    from orbiflow.density.tables import listing, to_csv
+    from orbiflow.jobs.density_data import read_data
+    from orbiflow.jobs.request import NO_TABLES, TABLES
+    from orbiflow.jobs.wording import counted
+    from orbiflow.runtime import check_output_file, one_thread, write_atomic
+
+    if out.suffix.lower() in NO_TABLES:
+        require_ending(out, TABLES)
+    check_output_file(out, data)
+    how: dict[str, Any] = {"has_header": table.header, "drop_missing": table.drop_missing}
+    found = read_data(data, table.columns, None, on_event, **how)
+    width = len(found.columns)
+    if width not in PATCH_WIDTHS:
+        raise OrbiflowError(
+            f"{data}: a patch has 9 pixel values or 8 DCT coordinates, and there "
+            f"{'is' if width == 1 else 'are'} {counted(width, 'column')} "
+            f"({listing(found.columns)}): choose with --columns"
+        )
+    with one_thread():
+        angles, distances = to_klein(found.values, unit=unit)
+    near = distances <= (np.inf if farthest is None else farthest)
+    if not near.any():
+        raise OrbiflowError(
+            f"none of {len(near)} patches is within {farthest:g} of the Klein bottle; the "
+            f"nearest is {distances.min():.3f} away"
+            if len(near)
+            else f"{data}: no patches"
+        )
+    kept = np.column_stack([angles, distances])[near]
+    cancel.check()
+    write_atomic(out, to_csv(("theta", "phi", "distance"), kept))
+    on_event(Written(out))
+    left_out = int((~near).sum())
+    left = f", {left_out} farther ones left out" if left_out else ""
+    on_event(
+        Note(
+            f"{len(kept)} patches, half of them within {np.median(kept[:, 2]):.3f} of the Klein "
+            f"bottle{left}; written to {out}"
+        )
+    )
+    return Outcome({"file": str(out), "rows": len(kept), "left_out": left_out})
