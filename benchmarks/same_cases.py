@@ -34,8 +34,14 @@ class Renamed:
 
 
 BEFORE = Renamed()
-PRESENT = Renamed()
-"""The one table to change with the present tree: Renamed(options={"--parts": "--components"})."""
+PRESENT = Renamed(
+    options={
+        "density fit --parts": "--components",
+        "density fit --detail": "--max-frequency",
+    },
+    keys={"parts": "components", "detail": "max_frequency"},
+)
+"""The one table to change with the present tree."""
 
 
 @dataclass(frozen=True)

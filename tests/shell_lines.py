@@ -122,8 +122,11 @@ def refusal_by_orbiflow(words: Sequence[str]) -> Refusal | None:
     """
     import typer
 
-    from orbiflow.cli.app import app
+    from orbiflow.cli.app import DERIVED, app
     from orbiflow.errors import OrbiflowError
+
+    if " ".join(words[:2]) in DERIVED:
+        return _refusal_by_operation(words)
 
     class Accepted(Exception):
         """The command would now begin its work."""
@@ -148,6 +151,32 @@ def refusal_by_orbiflow(words: Sequence[str]) -> Refusal | None:
             missing = type(error).__name__ in ("MissingParameter", "NoArgsIsHelpError")
             return Refusal(message(), incomplete=missing)
     return None  # such as --help and --version, which are done by now
+
+
+def _refusal_by_operation(words: Sequence[str]) -> Refusal | None:
+    """Return why a command that is derived from its operation refuses the words."""
+    from orbiflow.cli import commands
+    from orbiflow.runtime import Call, find
+
+    class Accepted(Exception):
+        """The command would now begin its work."""
+
+    # what is missing is told first, and a line may leave it out: an unknown option must not pass
+    options = [entry.option for entry in find(" ".join(words[:2])).fields]
+    known = {"--help", *(name for option in options for name in (*option.names, option.off))}
+    for word in words[2:]:
+        if word.startswith("--") and word.partition("=")[0] not in known:
+            return Refusal(f"unknown option {word}")
+    told: list[str] = []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Call, "run", mock.Mock(side_effect=Accepted))
+        patch.setattr(commands.errors, "print", lambda text, **_: told.append(text))
+        try:
+            if commands.run(list(words)) == 0:  # such as --help, which is done by now
+                return None
+        except Accepted:
+            return None
+    return Refusal(told[-1], incomplete="is missing; give" in told[-1])
 
 
 def _refusal_by_make(words: Sequence[str]) -> Refusal | None:

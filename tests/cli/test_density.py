@@ -199,8 +199,8 @@ def test_mistakes_in_the_options(tmp_path: Path, orbiflow) -> None:
     score = ("density", "score", data)
     for arguments, message in (
         ((*fit, "--columns", "lat,height"), "height"),
-        ((*fit, "--columns", " , "), "--columns names no column"),
-        ((*fit, "--max-frequency", 0), "max_frequency must be from 1 to 64"),
+        ((*fit, "--columns", " , "), "--columns must be a list of one or more"),
+        ((*fit, "--max-frequency", 0), "--max-frequency must be from 1 to 64"),
         (("density", "fit", data, "--space", "moebius"), "moebius"),
         ((*score, "--model", tmp_path), "cannot read"),
         ((*score, "--model", data), "not a density saved by orbiflow"),

@@ -13,7 +13,6 @@ import pytest
 
 from jobs.cross_validations import lines_of, table_of
 from orbiflow.cli.batch import batch
-from orbiflow.cli.density import fit
 from orbiflow.cli.density_batch import batch as density_batch
 from orbiflow.cli.density_compare import compare
 from orbiflow.cli.density_cv import cv
@@ -92,11 +91,11 @@ def test_mistakes(
 
 
 def test_options_are_those_of_other_commands() -> None:
-    own, fitting, comparing, one, other = (
-        get_type_hints(f, include_extras=True) for f in (cv, fit, compare, density_batch, batch)
+    own, comparing, one, other = (
+        get_type_hints(f, include_extras=True) for f in (cv, compare, density_batch, batch)
     )
-    shared = [(name, fitting) for name in ("columns", "unit", "parts", "repeats", "weights")]
-    shared += [(name, one) for name in ("out", "workers", "scheduler", "retry_failed")]
+    names = ("columns", "unit", "parts", "repeats", "out", "workers", "scheduler", "retry_failed")
+    shared = [(name, one) for name in names]
     for name, theirs in [*shared, ("group", comparing)]:
         assert own[name].__metadata__[0] is theirs[name].__metadata__[0], name
     assert one["out"].__metadata__[0] is other["out"].__metadata__[0]

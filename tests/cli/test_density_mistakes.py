@@ -44,7 +44,7 @@ def table(path: Path, header: str, values: np.ndarray) -> None:
             "fit two.csv --space torus --components kernels --max-frequency 5",
             "--max-frequency needs a flow: add flow to --components",
         ),
-        ("fit two.csv --space torus --segments 0", "--segments must be from 1 to 256, got 0"),
+        ("fit two.csv --space torus --segments 0", "--segments must be from 1 to 256, got '0'"),
         ("fit two.csv --space torus --seconds -1", "--seconds must be at least 0, got '-1'"),
         (
             "fit places.csv --space sphere --unit radians",

@@ -11,7 +11,7 @@ import pytest
 from cli.conftest import Run
 from orbiflow.density import DensityEstimator, density_to_bytes
 
-KERNELS = ("--components", "kernels", "--space", "torus", "--unit", "degrees")
+KERNELS = ("--components", "kernels", "--unit", "degrees")
 
 
 def table(path: Path, *, gaps: bool = False) -> Path:
@@ -91,7 +91,18 @@ def test_mistakes(words: str, message: str, tmp_path: Path, model: Path, orbiflo
 
 def test_weights_and_missing_angles(tmp_path: Path, orbiflow: Run) -> None:
     data, model, out = table(tmp_path / "gaps.csv", gaps=True), tmp_path / "m", tmp_path / "s.csv"
-    fit = ("density", "fit", data, *KERNELS, "--weights", "count", "--out", model)
+    fit = (
+        "density",
+        "fit",
+        data,
+        *KERNELS,
+        "--space",
+        "torus",
+        "--weights",
+        "count",
+        "--out",
+        model,
+    )
     done = orbiflow(*fit, "--missing", "marginalise")
     assert done.status == 0, done.err
     assert "2 of 59 rows lack some angles" in done.out
@@ -124,12 +135,16 @@ def test_weights_and_missing_angles(tmp_path: Path, orbiflow: Run) -> None:
         ("--weights phi --columns phi,psi", "cannot be a column of the data as well"),
         ("--weights chi", "at least 0; row 1 has -"),
         ("--missing marginalise --drop-missing", "would use; give one"),
-        ("--missing marginalise --space sphere --columns phi,psi", "missing"),
+        (
+            "--missing marginalise --space sphere --columns phi,psi",
+            "--missing marginalise is for angles",
+        ),
     ],
 )
 def test_mistakes_of_rows(options: str, message: str, tmp_path: Path, orbiflow: Run) -> None:
     data = table(tmp_path / "data.csv", gaps="sphere" in options)
-    done = orbiflow(*("density", "fit", data, *KERNELS, "--out", tmp_path / "m", *options.split()))
+    words = options.split() if "--space" in options else ["--space", "torus", *options.split()]
+    done = orbiflow(*("density", "fit", data, *KERNELS, "--out", tmp_path / "m", *words))
     assert done.status == 2
     assert message in done.err
 

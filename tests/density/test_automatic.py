@@ -2,7 +2,7 @@
 
 import math
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pytest
@@ -22,6 +22,7 @@ from orbiflow.density import (
     read_density,
 )
 from orbiflow.density.fitting import COMPONENTS
+from orbiflow.density.fitting.settings import Component
 from orbiflow.errors import OrbiflowError
 from orbiflow.jobs import density_requests
 

@@ -19,11 +19,12 @@ def test_the_snippet(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_the_commands_are_there() -> None:
+    from orbiflow.cli.app import DERIVED
     from orbiflow.cli.density import density
 
     names = {
         command.name or getattr(command.callback, "__name__", "")
         for command in density.registered_commands
-    }
+    } | {name.removeprefix("density ") for name in DERIVED}
     for name in re.findall(r"^orbiflow density (\w+)", TEXT, flags=re.MULTILINE):
         assert name in names

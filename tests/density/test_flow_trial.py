@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import torch
 
-from orbiflow.density import DensitySettings, Torus, fit_automatic, weighed
+from orbiflow.density import DensitySettings, FlowSettings, Torus, fit_automatic, weighed
 from orbiflow.density.fitting import COMPONENTS, flow_trial
 from orbiflow.density.fitting.automatic import BEFORE_END
 from orbiflow.density.fitting.budget import Budget

@@ -123,7 +123,7 @@ def test_a_call_from_one_mapping() -> None:
     [
         {"operation": "export", "result": "out", "kerf": "1mm", "cut": "pieces", "bed": [30, 20]},
         {"operation": "escherize", "image": "cat.png", "classes": ["IH4"], "pin": ["1,2"]},
-        {"operation": "density fit", "data": "d.csv", "space": "torus", "parts": ["flow"]},
+        {"operation": "density fit", "data": "d.csv", "space": "torus", "components": ["flow"]},
     ],
 )
 def test_json_round_trip(given: dict[str, Any]) -> None:

@@ -26,7 +26,7 @@ REPORTED = (
 
 def is_whole(rows: TableRows) -> NDArray[np.bool_]:
     """Return which rows (N,) lack no value."""
-    return ~np.isnan(rows.table.values).any(axis=1)
+    return np.logical_and.reduce(np.isfinite(rows.table.values), axis=1)
 
 
 def fit_document(
