@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from orbiflow.density.comparing import ComparisonSettings
-from orbiflow.density.operations.drawing import ColumnSettings, require_ending
+from orbiflow.density.operations.drawing import require_ending
+from orbiflow.density.tables import TableSettings
 from orbiflow.errors import OrbiflowError, SettingError
 from orbiflow.runtime import (
     Cancel,
@@ -38,7 +39,7 @@ FITTED_SHARE, MIN_LOOKED_UP = 0.5, 5
 @operation("density compare")
 def compare(
     settings: ComparisonSettings = ComparisonSettings(),
-    table: ColumnSettings = ColumnSettings(),
+    table: TableSettings = TableSettings(),
     *,
     data: Annotated[tuple[Path, ...], Option("-d"), Repeated()],
     models: Annotated[tuple[Path, ...] | None, Option("--model", "-m"), Repeated()] = None,
@@ -136,11 +137,9 @@ class _Reader:
     """
 
     def __init__(
-        self, settings: ColumnSettings, group: str | None, tell: Sink, cancel: Cancel
+        self, settings: TableSettings, group: str | None, tell: Sink, cancel: Cancel
     ) -> None:
-        self.columns, self.header, self.drop_missing = (
-            settings.columns, settings.header, settings.drop_missing
-        )  # fmt: skip
+        self.settings, self.columns, self.header = settings, settings.columns, settings.header
         self.group, self.tell, self.cancel = group, tell, cancel
 
     def progress(self, share: float, what: str) -> None:
@@ -150,15 +149,10 @@ class _Reader:
 
     def table(self, data: Path, columns: Columns, tell: Sink) -> Table:
         """Return numbers, without the column of groups if columns are not named."""
-        from orbiflow.jobs.density_data import read_data
+        from orbiflow.density.tables import read_rows
 
-        how: dict[str, Any] = {"has_header": self.header, "drop_missing": self.drop_missing}
-        table = read_data(data, columns, None, tell, **how)
-        if columns is not None or self.group is None:
-            return table
-        wanted = self.group.strip().casefold()
-        at = [k for k, name in enumerate(table.columns) if name.casefold() == wanted]
-        return table.without(at[0]) if at else table
+        settings = self.settings.replace(columns=columns)
+        return read_rows(data, settings, tell, group=self.group).table
 
     def labels(self, data: Path, table: Table) -> Any:
         """Return the group of each row, or None if there are no groups."""
@@ -175,7 +169,7 @@ def _compare_models(
     from dataclasses import replace
 
     from orbiflow.density.comparing import compare_scores, require_one_space, scores_of
-    from orbiflow.jobs.density_models import check_fits, model_at
+    from orbiflow.density.operations.saved import check_fits, model_at
 
     names = _names(paths)
     models = dict(zip(names, map(model_at, paths), strict=True))
@@ -214,7 +208,7 @@ def _compare_data(
     import numpy as np
 
     from orbiflow.density.comparing import compare_samples
-    from orbiflow.jobs.density_data import unit_of
+    from orbiflow.density.tables import angle_unit
 
     names = _names(data)
     columns = read.columns or _common_columns(data, read)
@@ -230,7 +224,7 @@ def _compare_data(
         {name: table.values for name, table in zip(names, tables, strict=True)},
         space,
         settings,
-        unit=unit_of(space, unit, both, read.tell),
+        unit=angle_unit(space, unit, both, read.tell),
         groups=groups,
         progress=read.progress,
     )
@@ -240,7 +234,7 @@ def _columns_of_models(
     data: Path, extras: Mapping[str, Mapping[str, Any]], read: _Reader
 ) -> dict[str, Columns]:
     """Return the table's columns in the order in which each model was fitted to them."""
-    from orbiflow.jobs.density_data import same_columns
+    from orbiflow.density.operations.saved import with_columns_of
 
     own = {name: tuple(extra.get("columns") or ()) for name, extra in extras.items()}
     (first, wanted), *others = own.items()
@@ -262,7 +256,8 @@ def _columns_of_models(
                 f"{first} was fitted to {', '.join(wanted)}, {name} to {', '.join(other)}: are they "
                 "the same quantities? Then say with --columns which columns they are"
             )
-    if same_columns(data, dict(extras[first]), read.tell, has_header=read.header) is not None:
+    settings = with_columns_of(read.settings, data, dict(extras[first]), read.tell)
+    if settings.columns is not None:
         return dict(own)
     if len(set(own.values())) > 1:
         raise OrbiflowError(

@@ -18,7 +18,14 @@ from orbiflow.arrays import Array
 from orbiflow.density.inference import axes_named, given_named, log_prob_observed
 from orbiflow.density.models import Density, density_to_bytes
 from orbiflow.density.operations.saved import unit_warning
-from orbiflow.density.pictures import MODEL, REPORT, TABLE, corner_picture, density_picture
+from orbiflow.density.pictures import (
+    MODEL,
+    REPORT,
+    TABLE,
+    PlotSettings,
+    corner_picture,
+    density_picture,
+)
 from orbiflow.density.spaces import Space, Torus
 from orbiflow.density.tables import to_csv
 from orbiflow.errors import OrbiflowError, SettingError, literal
@@ -197,7 +204,8 @@ def _table(density: Density) -> Array:
 
 
 def _picture(density: Density, names: list[str]) -> bytes:
+    settings = PlotSettings(names=tuple(names))
     if density.space.dim == 2:
-        return density_picture(density, names=names, scale="auto").file()
+        return density_picture(density, settings=settings).file()
     drawn = density.sample((DRAWN,), torch.Generator().manual_seed(0))
-    return corner_picture(density, None, drawn, names=names).file()
+    return corner_picture(density, None, drawn, settings).file()

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from orbiflow.density.pictures import PlotSettings
 from orbiflow.density.regions import RegionSettings
+from orbiflow.density.tables import TableSettings, check_table_name
 from orbiflow.errors import OrbiflowError, SettingError
 from orbiflow.runtime import (
     Cancel,
@@ -18,7 +20,7 @@ from orbiflow.runtime import (
     ignore,
     operation,
 )
-from orbiflow.settings import DefaultText, Option, Range, Settings
+from orbiflow.settings import DefaultText, Option, Range
 
 if TYPE_CHECKING:
     from orbiflow.density.regions import DensityRegion, Outline
@@ -29,19 +31,6 @@ Model = Annotated[Path, Option("-m")]
 
 PATCH_WIDTHS = (8, 9)
 """Columns of image patches."""
-
-
-class ColumnSettings(Settings, group="Reading the table"):
-    """Which columns and rows of a table are read."""
-
-    columns: Annotated[tuple[str, ...] | None, DefaultText("those of numbers")] = None
-    """Names or numbers of the columns, such as lat,lon."""
-
-    header: Annotated[bool | None, DefaultText("found automatically")] = None
-    """Whether the table's first line names the columns."""
-
-    drop_missing: bool = False
-    """Leave out rows that lack a value."""
 
 
 def require_ending(out: Path | None, endings: tuple[str, ...]) -> None:
@@ -57,7 +46,7 @@ def require_ending(out: Path | None, endings: tuple[str, ...]) -> None:
 @operation("density plot")
 def plot(
     settings: PlotSettings = PlotSettings(),
-    table: ColumnSettings = ColumnSettings(),
+    table: TableSettings = TableSettings(),
     *,
     model: Model,
     out: Annotated[Path, Option("-o")] = Path("plots"),
@@ -80,9 +69,9 @@ def plot(
         name = min(table.fields_given)
         raise SettingError(f"{{{name}}} applies only to {{data}}; give both or neither")
 
+    from orbiflow.density.operations.saved import check_fits, model_at, with_columns_of
     from orbiflow.density.pictures import is_one_file, known_names, plot_density
-    from orbiflow.jobs.density_data import read_data, same_columns
-    from orbiflow.jobs.density_models import check_fits, model_at
+    from orbiflow.density.tables import read_rows
     from orbiflow.runtime import check_output_file, check_outside_runs
 
     single = is_one_file(out)
@@ -100,11 +89,8 @@ def plot(
         settings = settings.replace(names=names)
     points = None
     if data is not None:
-        header = table.header
-        columns = table.columns or same_columns(data, extra, on_event, has_header=header)
-        found = read_data(
-            data, columns, None, on_event, has_header=header, drop_missing=table.drop_missing
-        )
+        reading = with_columns_of(table, data, extra, on_event)
+        found = read_rows(data, reading, on_event).table
         check_fits(data, found, space, extra, on_event)
         points = found.values
 
@@ -156,6 +142,7 @@ def region(
 
     import json
 
+    from orbiflow.density.operations.saved import model_at
     from orbiflow.density.regions import (
         DensityLevels,
         outlines,
@@ -164,7 +151,6 @@ def region(
         samples_for,
         to_geojson,
     )
-    from orbiflow.jobs.density_models import model_at
     from orbiflow.runtime import check_output_file, one_thread, write_atomic
 
     check_output_file(out, model)
@@ -242,26 +228,51 @@ def _region_notes(regions: list[DensityRegion], drawn: list[Outline]) -> list[st
 
 def _described(found: DensityRegion, outline: Outline | None) -> str:
     from orbiflow.density.regions import size_unit
-    from orbiflow.jobs.wording import counted, percentage, with_error
 
     size, fraction, polygons = found.size, found.fraction, ""
     if outline is not None:
         size, fraction = outline.size, outline.fraction
         count = len(outline.shape.geoms)
         holds = "holds" if count == 1 else "hold"
-        polygons = f"; {counted(count, 'polygon')}, which {holds} "
-        polygons += with_error(outline.mass, outline.error)
+        polygons = f"; {_counted(count, 'polygon')}, which {holds} "
+        polygons += _with_error(outline.mass, outline.error)
     return (
-        f"mass {with_error(found.held, found.error)}: log density of at least "
+        f"mass {_with_error(found.held, found.error)}: log density of at least "
         f"{found.log_prob:.4f} ({found.log_prob_low:.4f} to {found.log_prob_high:.4f}), "
-        f"{size:.6g} {size_unit(found.density.space)}, {percentage(fraction)} of the space{polygons}"
+        f"{size:.6g} {size_unit(found.density.space)}, {_percentage(fraction)} of the space{polygons}"
     )
+
+
+def _with_error(value: float, error: float) -> str:
+    """Return a number and its standard error, in two digits of the error, at least four decimals.
+
+    >>> _with_error(0.5, 0.00354), _with_error(0.9999, 0.00001)
+    ('0.5000 ± 0.0035', '0.999900 ± 0.000010')
+    """
+    decimals = 4 if error <= 0 else max(4, 1 - math.floor(math.log10(error)))
+    return f"{value:.{decimals}f} ± {error:.{decimals}f}"
+
+
+def _percentage(share: float) -> str:
+    """Return a share in percent, in two decimals or, where these would say nothing, two digits.
+
+    >>> _percentage(0.0218), _percentage(0.0000123), _percentage(0.0)
+    ('2.18%', '0.0012%', '0.00%')
+    """
+    percents = 100 * share
+    if percents <= 0 or percents >= 0.1:
+        return f"{percents:.2f}%"
+    return f"{percents:.{1 - math.floor(math.log10(percents))}f}%"
+
+
+def _counted(count: int, noun: str) -> str:
+    return f"{count} {noun}{'s' * (count != 1)}"
 
 
 @operation("density patches")
 def patches(
     data: Path,
-    table: ColumnSettings = ColumnSettings(),
+    table: TableSettings = TableSettings(),
     *,
     out: Annotated[Path, Option("-o")] = Path("angles.csv"),
     unit: Literal["radians", "degrees", "turns"] = "radians",
@@ -282,22 +293,17 @@ def patches(
     import numpy as np
 
     from orbiflow.density.spaces import to_klein
-    from orbiflow.density.tables import listing, to_csv
-    from orbiflow.jobs.density_data import read_data
-    from orbiflow.jobs.request import NO_TABLES, TABLES
-    from orbiflow.jobs.wording import counted
+    from orbiflow.density.tables import listing, read_rows, to_csv
     from orbiflow.runtime import check_output_file, one_thread, write_atomic
 
-    if out.suffix.lower() in NO_TABLES:
-        require_ending(out, TABLES)
+    check_table_name(out)
     check_output_file(out, data)
-    how: dict[str, Any] = {"has_header": table.header, "drop_missing": table.drop_missing}
-    found = read_data(data, table.columns, None, on_event, **how)
+    found = read_rows(data, table, on_event).table
     width = len(found.columns)
     if width not in PATCH_WIDTHS:
         raise OrbiflowError(
             f"{data}: a patch has 9 pixel values or 8 DCT coordinates, and there "
-            f"{'is' if width == 1 else 'are'} {counted(width, 'column')} "
+            f"{'is' if width == 1 else 'are'} {_counted(width, 'column')} "
             f"({listing(found.columns)}): choose with --columns"
         )
     with one_thread():

@@ -19,7 +19,7 @@ from orbiflow.density.fitting import mean_of, weighed
 from orbiflow.density.gradients import log_density_gradient
 from orbiflow.density.inference import chart_of_observed, log_prob_observed
 from orbiflow.density.models import CHECKED, Density, TabulatedDensity
-from orbiflow.density.regions import DensityLevels, samples_for, told_masses
+from orbiflow.density.regions import DensityLevels, resolvable_masses, samples_for
 from orbiflow.density.tables import TableRows
 from orbiflow.runtime import Cancel, Progress, Sink
 
@@ -147,7 +147,7 @@ def _mean(scores: Array, weights: Array | None, whole: NDArray[np.bool_]) -> flo
 
 def _region_note(samples: int) -> str:
     """How far `hdr` can be trusted."""
-    low, high = told_masses(samples)
+    low, high = resolvable_masses(samples)
     return (
         "hdr: the mass of the smallest highest-density region that holds the row, by "
         f"{samples} samples (--samples): ± {0.5 / math.sqrt(samples):.2g} at most; what is below "
