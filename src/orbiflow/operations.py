@@ -2,6 +2,7 @@
 
 OPERATIONS = {
     "escherize": "orbiflow.tiles.operations:escherize",
+    "batch": "orbiflow.tiles.batches:batch",
     "export": "orbiflow.tiles.operations:export",
     "art": "orbiflow.tiles.operations:art",
     "animate": "orbiflow.tiles.operations:animate",
@@ -14,8 +15,15 @@ OPERATIONS = {
     "density plot": "orbiflow.density.operations.drawing:plot",
     "density compare": "orbiflow.density.operations.comparison:compare",
     "density region": "orbiflow.density.operations.drawing:region",
+    "density cv": "orbiflow.density.cross_validation.operations:cross_validate",
     "density patches": "orbiflow.density.operations.drawing:patches",
+    "density batch": "orbiflow.density.operations.batches:batch",
 }
+
+WORK = {
+    "density fold": "orbiflow.density.cross_validation.operations:fold",
+}
+"""Operations that others give to workers, and that are no commands."""
 
 RUN_FOLDERS = {
     "result.json": "orbiflow.tiles:written_files",
