@@ -122,7 +122,7 @@ def test_where_a_table_goes_is_looked_at_first(
     command: str, out: str, message: str, folder: Path, orbiflow, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("orbiflow.density.operations.saved.model_at", None)
-    monkeypatch.setattr("orbiflow.jobs.density_use.read_data", None)
+    monkeypatch.setattr("orbiflow.density.tables.rows.read_rows", None)
     options = {
         "score": (folder / "torus.csv", "-m", folder / "torus"),
         "sample": ("-m", folder / "torus"),
