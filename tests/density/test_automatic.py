@@ -10,6 +10,7 @@ import torch
 from density.blends import kernels_of
 from orbiflow.density import (
     AutomaticSettings,
+    Density,
     DensityEstimator,
     FitSettings,
     FlowDensity,
