@@ -27,7 +27,7 @@ LAUNCH = (
 # the first class to be fitted is done after one step, the others never; both workers say so
 FIRST_IS_SHORT = (
     "import dataclasses\n"
-    "from orbiflow.escher import methods\n"
+    "from orbiflow.tiles.search import methods\n"
     "whole = methods.fit_occupancy\n"
     "def fit(target, kind, settings, progress, **options):\n"
     "    steps = 1 if kind.name == 'IH1' else settings.iterations\n"
@@ -39,8 +39,8 @@ FIRST_IS_SHORT = (
 # two who speak at once would make one line
 DEAF = (
     "import os, time\n"
-    "from orbiflow.cancel import Cancel\n"
-    "from orbiflow import processes\nfrom orbiflow.escher import methods\n"
+    "from orbiflow.runtime.cancel import Cancel\n"
+    "from orbiflow.runtime import processes\nfrom orbiflow.tiles.search import methods\n"
     "def fit(*_, **__):\n"
     "    os.write(1, b'deaf\\n')\n"
     "    time.sleep(1e6)\n"

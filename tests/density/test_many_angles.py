@@ -26,7 +26,7 @@ def data(count: int = 400) -> np.ndarray:
 
 def test_five_angles(tmp_path: Path) -> None:
     points = data()
-    estimator = DensityEstimator("torus", unit="degrees", evaluations=20).fit(points[:300])
+    estimator = DensityEstimator("torus", unit="degrees").fit(points[:300])
     assert isinstance(estimator.density_, Mixture)
     assert "chains" in estimator.density_.weight_of_kind
     assert estimator.score(points[300:]) > -5 * np.log(360) + 3

@@ -1,4 +1,4 @@
-"""What docs/jobs.md says runs, and its events are those that there are."""
+"""What docs/operations.md says runs, and its events are those that there are."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from orbiflow.jobs import Event
 from orbiflow.jobs.requests import request_from_json
 
 ROOT = Path(__file__).parents[2]
-TEXT = (ROOT / "docs" / "jobs.md").read_text(encoding="utf-8")
+TEXT = (ROOT / "docs" / "operations.md").read_text(encoding="utf-8")
 
 
 def test_the_snippet(tmp_path: Path, monkeypatch, capsys: pytest.CaptureFixture[str]) -> None:
@@ -21,7 +21,7 @@ def test_the_snippet(tmp_path: Path, monkeypatch, capsys: pytest.CaptureFixture[
     shutil.copy(ROOT / "examples" / "silhouettes" / "turtle.png", tmp_path)
     monkeypatch.chdir(tmp_path)
     one_class = snippet.replace('effort="fast"', 'effort="fast", classes=("IH6",)')
-    exec(compile(one_class, "jobs.md", "exec"), {})
+    exec(compile(one_class, "operations.md", "exec"), {})
     assert capsys.readouterr().out == "a first tile: IH6\ndone out/turtle\n"
 
 

@@ -163,6 +163,10 @@ class Finished(Event):
     state: State
     summary: dict[str, Any]
 
+    def __post_init__(self) -> None:
+        # lists for tuples, so that it is the same here as after a journey as JSON
+        object.__setattr__(self, "summary", json.loads(json.dumps(self.summary)))
+
 
 @dataclass(frozen=True)
 class Failed(Event):

@@ -99,11 +99,11 @@ def test_logarithms_are_for_lines_alone(name: str, monkeypatch: pytest.MonkeyPat
         called.append(len(values))
         return np.log(values)
 
-    figures = "orbiflow.figures.density"
-    for room in ("square", "map"):
-        monkeypatch.setattr(f"{figures}_{room}.log_natural", counted)
-    monkeypatch.setattr(f"{figures}_square._FINE_GRID", 30)
-    monkeypatch.setattr(f"{figures}_map._PIXELS", 2000)
+    pictures = "orbiflow.density.pictures"
+    for room in ("square", "maps"):
+        monkeypatch.setattr(f"{pictures}.{room}.log_natural", counted)
+    monkeypatch.setattr(f"{pictures}.square._FINE_GRID", 30)
+    monkeypatch.setattr(f"{pictures}.maps._PIXELS", 2000)
     density = broad(name)
     draw = density_picture if name == "torus" else map_picture
     draw(density)

@@ -30,9 +30,9 @@ def test_rank_score_rises_with_both(iou: float, found: float, more: float) -> No
 
 @pytest.mark.parametrize("bad", [-0.1, 1.1, np.nan])
 def test_rank_score_names_what_is_out_of_range(bad: float) -> None:
-    with pytest.raises(OrbiflowError, match=r"^iou must be from 0 to 1"):
+    with pytest.raises(OrbiflowError, match=r"^iou must be .*from 0 to 1"):
         rank_score(bad, 0.5)
-    with pytest.raises(OrbiflowError, match=r"^recognisability must be from 0 to 1"):
+    with pytest.raises(OrbiflowError, match=r"^recognisability must be .*from 0 to 1"):
         rank_score(0.5, bad)
 
 
@@ -101,9 +101,9 @@ def test_twins_of_one_class_only() -> None:
         ({"scores": [np.nan]}, "^scores: "),
         ({"scores": ["best"]}, "^scores: "),
         ({"count": 0}, "^count must be at least 1"),
-        ({"twin": 1.5}, "^twin must be from 0 to 1"),
-        ({"variety": -1.0}, "^variety must be at least 0"),
-        ({"variety": np.inf}, "^variety must be at least 0"),
+        ({"twin": 1.5}, "^twin must be .*from 0 to 1"),
+        ({"variety": -1.0}, "^variety must be .*at least 0"),
+        ({"variety": np.inf}, "^variety must be .*at least 0"),
     ],
 )
 def test_bad_arguments(change: dict[str, object], message: str) -> None:
