@@ -54,8 +54,8 @@ def test_fit_score_sample_plot(space: str, tmp_path: Path, orbiflow) -> None:
 
 @pytest.fixture
 def small_pictures(monkeypatch) -> None:
-    for name, size in (("square._GRID", 40), ("page._CELLS", 20), ("map._PIXELS", 2000)):
-        monkeypatch.setattr(f"orbiflow.figures.density_{name}", size)
+    for name, size in (("square._GRID", 40), ("page._CELLS", 20), ("maps._PIXELS", 2000)):
+        monkeypatch.setattr(f"orbiflow.density.pictures.{name}", size)
     monkeypatch.setattr("orbiflow.drawing.fields._SAMPLES", 40)
 
 
