@@ -1,6 +1,6 @@
 """What `density fit` chooses on tori of four to fourteen angles, beside each part alone.
 
-    python benchmarks/density_many.py [--splits K] [--grouped] [--alone] [--flow] [--workers W]
+    python benchmarks/density_many.py [--splits K] [--grouped] [--alone] [--workers W]
         [--quick] [DATA ...]
 
 sidechains-D: phi, psi and side-chain angles of one, two or three neighbouring residues (Top8000, in
@@ -8,7 +8,7 @@ the repository: data/sidechains.npz). backbone-D: phi, psi of D / 2 residues in 
 known-D: a hidden Markov chain of rotamers, whose density is known. rna-7: the RNA benchmark. Random
 90/10 splits, or with --grouped those that keep the rows of a protein or molecule on one side; test
 NLL in nats per radian^D, beside a von Mises kernel estimate of one width and a floor, tuned.
---alone: kernels, mixtures, chains and networks alone as well, --flow: a neural flow on chains.
+--alone: kernels, mixtures, chains and networks alone as well.
 Differences, regret, bar and seconds are those of density_default.py.
 """
 
@@ -38,7 +38,6 @@ def main() -> None:
     parser.add_argument("--splits", type=int, default=2)
     parser.add_argument("--grouped", action="store_true", help="proteins on one side of a split")
     parser.add_argument("--alone", action="store_true", help="each part alone as well")
-    parser.add_argument("--flow", action="store_true", help="a neural flow on chains as well")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--quick", action="store_true", help="two sets, one split")
     options = parser.parse_args()
@@ -51,7 +50,7 @@ def main() -> None:
         names = [name for name in names if name.startswith(("sidechains", "known"))]
     if options.grouped:
         names = [name for name in names if not name.startswith("known")]
-    parts = (*(PARTS if options.alone else ()), *(("flow",) if options.flow else ()))
+    parts = PARTS if options.alone else ()
     print(f"{count} {'grouped' if options.grouped else 'random'} splits")
     print(HEAD)
     with ProcessPoolExecutor(options.workers) as pool:
