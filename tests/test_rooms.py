@@ -16,7 +16,7 @@ HOME = Path(__file__).parents[1] / "src" / "orbiflow"
 TILES = ["geometry", "tilings", "silhouette", "likeness", "tile_map", "tile", "result_file"]
 TILES += ["search", "pictures", "exporting"]
 TILES += ["art", "motion", "pages"]
-DENSITY = ["arguments", "spaces", "models", "inference", "gradients", "fitting"]
+DENSITY = ["arguments", "spaces", "models", "inference", "fitting"]
 DENSITY += ["estimator", "comparing", "regions", "tables", "pictures", "run_folder", "operations"]
 ROOMS = [
     *("runtime", "symmetry", "fields", "flows", "drawing"),

@@ -17,7 +17,7 @@ from orbiflow.density import (
     VonMisesChains,
     VonMisesNetwork,
 )
-from orbiflow.density.models import SCALES, chained, identity_flow
+from orbiflow.density.models import SCALES, chained
 from orbiflow.fields import SplineField
 from orbiflow.flows import Flow
 
@@ -57,7 +57,7 @@ def random_kernels(rng: np.random.Generator, space: Torus, count: int = 4) -> Ad
 
 def blended(
     space: Space,
-    flow: Flow,
+    flow: Flow | None,
     base: Density,
     kernels: AdaptiveKernels,
     weights: torch.Tensor,
@@ -66,9 +66,11 @@ def blended(
     network: VonMisesNetwork | None = None,
 ) -> Mixture:
     """A mixture of these, of a uniform floor, and of chains and a network; of no weight: none."""
-    parts = [FlowDensity(space, flow, base), kernels, UniformDensity(space), chains, network]
+    moved = None if flow is None else FlowDensity(space, flow, base)
+    parts = [moved, kernels, UniformDensity(space), chains, network]
     there = [part for part in parts if part is not None]
-    kept = [(part, w) for part, w in zip(there, weights.tolist(), strict=True) if w > 0]
+    shares = [w for w in weights.tolist() if w > 0 or flow is not None]
+    kept = [(part, w) for part, w in zip(there, shares, strict=True) if w > 0]
     return Mixture([part for part, _ in kept], [w for _, w in kept])
 
 
@@ -91,7 +93,7 @@ def random_blend(
 ) -> Mixture:
     rng = np.random.default_rng(seed)
     space = Torus(dim, unit="degrees")
-    moving = identity_flow(space)
+    moving = None
     if flow:
         field = SplineField(space.group, 2)
         with torch.no_grad():

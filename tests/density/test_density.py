@@ -208,7 +208,7 @@ def test_large_batches_are_the_same_in_blocks(monkeypatch) -> None:
 
 
 def test_what_is_refused() -> None:
-    with pytest.raises(OrbiflowError, match=r"expected points \(..., 2\), got \(5, 3\)"):
+    with pytest.raises(OrbiflowError, match=r"points must be .*\(5, 3\)"):
         make(Torus(2)).log_prob(torch.zeros(5, 3))
     with pytest.raises(OrbiflowError, match="a grid needs two dimensions"):
         FlowDensity(Torus(3), Flow(lambda x: 0 * x)).mass()

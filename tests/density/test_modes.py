@@ -43,13 +43,13 @@ class Watched(UniformDensity):
         super().__init__(space)
         self.seen: set[int] = set()
 
-    def log_prob(self, points):
+    def log_chart(self, points):
         self.seen.add(torch.get_num_threads())
-        return super().log_prob(points)
+        return super().log_chart(points)
 
-    def sample(self, count, generator):
+    def draw(self, count, generator):
         self.seen.add(torch.get_num_threads())
-        return super().sample(count, generator)
+        return super().draw(count, generator)
 
 
 @pytest.mark.usefixtures("three_threads")

@@ -29,7 +29,6 @@ from .fitting.rows import weighed as weighed
 from .fitting.settings import ComponentSettings as ComponentSettings
 from .fitting.settings import DensitySettings as DensitySettings
 from .fitting.settings import FlowSettings as FlowSettings
-from .gradients import log_density_gradient as log_density_gradient
 from .inference.axes import axes_named as axes_named
 from .inference.axes import chart_of_observed as chart_of_observed
 from .inference.axes import given_named as given_named
@@ -39,8 +38,9 @@ from .inference.derived import log_prob_observed as log_prob_observed
 from .inference.derived import marginal as marginal
 from .models.chains import VonMisesChains as VonMisesChains
 from .models.density import Density as Density
-from .models.density import kl_by_quadrature as kl_by_quadrature
-from .models.density import midpoints as midpoints
+from .models.evaluation import kl_by_quadrature as kl_by_quadrature
+from .models.evaluation import log_density_gradient as log_density_gradient
+from .models.evaluation import midpoints as midpoints
 from .models.files import density_to_bytes as density_to_bytes
 from .models.files import read_density as read_density
 from .models.flow import FlowDensity as FlowDensity

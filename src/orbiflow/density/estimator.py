@@ -24,7 +24,6 @@ from orbiflow.density.fitting import (
     mean_of,
     weighed,
 )
-from orbiflow.density.gradients import log_density_gradient
 from orbiflow.density.inference import (
     axes_named,
     chart_of_observed,
@@ -33,7 +32,7 @@ from orbiflow.density.inference import (
     log_prob_observed,
     marginal,
 )
-from orbiflow.density.models import MOST_DIM, Density
+from orbiflow.density.models import MOST_DIM, Density, log_density_gradient
 from orbiflow.density.spaces import Space, space_class
 from orbiflow.errors import OrbiflowError, SettingError
 from orbiflow.settings import check_names, fields_of

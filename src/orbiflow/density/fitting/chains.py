@@ -20,10 +20,10 @@ from orbiflow.density.spaces import Space
 from orbiflow.typed_torch import linalg, special
 
 PRIOR, PRIOR_RESULTANT = 0.05, 0.9
-"""Imaginary points of a component and their mean cosine: none shrinks to a point."""
+"""Prior points of each component and their mean cosine, so that none shrinks to a point."""
 
 SHARED = 5.0
-"""Imaginary points that draw a component's weights of the scales to those of all."""
+"""Prior points that pull a component's weights of the scales to those of all."""
 
 RIDGE = 10.0
 """Prior precision of the slopes of the regressions."""
@@ -32,7 +32,7 @@ STRAIGHT = 5
 """First iterations of EM, without regressions."""
 
 EVERY, PATIENCE = 5, 2
-"""Iterations between looks at the validation points, and looks that may bring nothing better."""
+"""Iterations between looks at the held-out points, and looks that may gain nothing."""
 
 
 def _nll(mixture: VonMisesChains, rows: Rows) -> float:
@@ -50,9 +50,9 @@ def fit_chain_mixture(
     patience: int = PATIENCE,
     worthwhile: float = 0.0,
 ) -> VonMisesChains:
-    """EM from a start, all of whose chains have one order; the iterate that was best on `held`.
+    """Fit by EM from a start whose chains have one order; return the iterate best on `held`.
 
-    It ends after more looks than `patience` that bring no more than `worthwhile` nats.
+    It ends after more than `patience` looks at `held` that gain no more than `worthwhile` nats.
     """
     step = _Maximization(train, start.order[0])
     mixture = best = start
@@ -76,7 +76,7 @@ def fit_chain_mixture(
 def spread_chains(
     space: Space, rows: Rows, count: int, order: Tensor, generator: torch.Generator
 ) -> VonMisesChains:
-    """A uniform component and `count` round ones at rows far from each other (k-means++).
+    """Return a uniform component and `count` round ones at rows far from each other (k-means++).
 
     Its chains take the angles in `order` (d,).
     """
@@ -142,7 +142,7 @@ class _Maximization:
         return (drawn * total / total.sum()).log()
 
     def _regressed(self, mixture: VonMisesChains, precise: Tensor, center: Tensor) -> Tensor:
-        """One Fisher scoring step of all circular regressions, their slopes held by a ridge."""
+        """Take one Fisher scoring step of all circular regressions, their slopes held by a ridge."""
         count, d = center.shape
         kappa = mixture.concentrations[1:]
         bessel = special.i1e(kappa) / special.i0e(kappa)
@@ -166,7 +166,7 @@ class _Maximization:
 
 
 def _local(center: Tensor) -> Tensor:
-    """Matrices (K, p, p): 1, sin(x - c), 1 - cos(x - c) from 1, sin x, cos x.
+    """Return matrices (K, p, p) that make 1, sin(x - c), 1 - cos(x - c) from 1, sin x, cos x.
 
     About its centre a component's regression is well conditioned and its slopes can be compared.
     """
@@ -183,7 +183,7 @@ def _local(center: Tensor) -> Tensor:
 
 
 def concentration(resultant: Tensor) -> Tensor:
-    """kappa of mean cosines I1(kappa) / I0(kappa) in (0, 1): Best and Fisher (1981), then Newton."""
+    """Return kappa of mean cosines I1(kappa) / I0(kappa): Best and Fisher (1981), then Newton."""
     r = resultant.clamp(1e-6, 1 - 1e-8)
     kappa = torch.where(
         r < 0.53,

@@ -1,4 +1,4 @@
-"""What rows that were held out say of families of densities: weights, shares, gains."""
+"""What held-out rows say of families of densities: weights and gains."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ from orbiflow.density.spaces import Space
 from orbiflow.typed_torch import listed
 
 KEPT = 2
-"""Sizes of a family that are fitted to all folds, beside the best alone."""
+"""Sizes of a family that are fitted to all folds, besides the best alone."""
 
 STEP = 0.85
-"""Of a fold's work, what is left of it after each thing that is tried."""
+"""The share of a fold's work that is left after each thing that is tried."""
 
 FLOOR = "uniform"
-"""Name of the part that is always there."""
+"""The name of the component that is always there."""
 
 
 @dataclass(frozen=True)
@@ -58,11 +58,11 @@ class Candidates:
 
     @property
     def floor(self) -> Tensor:
-        """Which candidate is the floor (P,)."""
+        """A mask (P,) of the candidate that is the floor."""
         return torch.tensor([family == FLOOR for family in self.families])
 
     def of(self, *families: str) -> Tensor:
-        """The floor and the candidates of these families (P,)."""
+        """Return a mask (P,) of the floor and the candidates of these families."""
         return torch.tensor([family in (FLOOR, *families) for family in self.families])
 
 
@@ -103,7 +103,7 @@ def candidates_of(
 
 
 def _teller(number: int, used: int, say: Progress) -> Callable[[str], None]:
-    """Tells what is tried in a fold; how much that will be is not known beforehand."""
+    """Return what tells the progress in a fold, whose amount of work is not known beforehand."""
     begin, size = (number + 1, 1) if number else (0, 2)  # the first fold tries more
     tried = count()
 
@@ -115,7 +115,7 @@ def _teller(number: int, used: int, say: Progress) -> Callable[[str], None]:
 
 
 def _narrow(families: list[Family[Any]], block: dict[tuple[str, str], Tensor], held: Rows) -> None:
-    """Of each family keep what has most weight in the first fold, and the best alone."""
+    """Keep of each family what has most weight in the first fold, and the best alone."""
     keys = list(block)
     table = torch.stack([block[key] for key in keys])
     weights: list[float] = listed(stacking_weights(table, held.weights))
@@ -128,7 +128,7 @@ def _narrow(families: list[Family[Any]], block: dict[tuple[str, str], Tensor], h
 
 
 def without_idle(candidates: Candidates, weights: Tensor) -> Tensor:
-    """The weights (P,) without families that held-out rows are as well or better off without."""
+    """Return the weights (P,) without families that gain nothing on held-out rows."""
     while True:
         idle = [part for part in judged(candidates, weights) if part.share and part.gain <= 0]
         if not idle:
@@ -144,7 +144,7 @@ def without_idle(candidates: Candidates, weights: Tensor) -> Tensor:
 
 
 def judged(candidates: Candidates, weights: Tensor) -> list[ComponentEvidence]:
-    """What each family is worth in the mixture of these weights (P,)."""
+    """Return what each family contributes to the mixture of these weights (P,)."""
     table, own_weights = candidates.table, candidates.row_weights
     whole, uniform = stacked(table, weights), table[-1]
     found: list[ComponentEvidence] = []

@@ -1,4 +1,4 @@
-"""Families of densities that a fit by evidence tries: what is fitted to a fold, and in the end."""
+"""Families of densities that a fit tries: what is fitted to each fold, and what in the end."""
 
 from __future__ import annotations
 
@@ -43,22 +43,22 @@ SIZES = (1, 2, 4, 8, 16, 32, 64)
 """Components of the mixtures and chains tried."""
 
 MIXTURE_ROWS, CHAIN_ROWS = 8, 20
-"""That each component must have on average."""
+"""Rows that each component must have on average."""
 
 SMALLEST_CHAINS = 4
-"""Components: fewer are no better than a mixture's."""
+"""The fewest components of chains: fewer are no better than a mixture's."""
 
 MOST_MIXED, MOST_CHAINED = 20_000, 12_000
 """Rows that mixtures and chains are fitted to at most."""
 
 CLEARLY = 2.0
-"""Standard errors by which a larger mixture must be worse, to be the last that is tried."""
+"""Standard errors by which a larger mixture must be worse to be the last that is tried."""
 
 ITERATIONS, IDLE = 60, 1e-3
 """Of EM at most; it ends where five bring fewer nats than the latter."""
 
 Say = Callable[[str], None]
-"""Told what is being tried."""
+"""A function that is called with what is being tried."""
 
 
 D = TypeVar("D", bound=Density)
@@ -72,11 +72,11 @@ class Family(ABC, Generic[D]):
 
     @abstractmethod
     def fitted(self, number: int, train: Rows, held: Rows, say: Say) -> dict[str, D]:
-        """What is fitted to the training rows of a fold, to be judged by the rows held out."""
+        """Return what is fitted to the training rows of a fold, to be judged by the rows held out."""
 
     @abstractmethod
     def final(self, rows: Rows, folds: list[dict[str, D]], names: list[str]) -> list[D]:
-        """What the density is made of, given all rows and what was fitted to each fold."""
+        """Return what the density is made of, given all rows and what was fitted to each fold."""
 
     def keep(self, names: set[str]) -> None:
         """Leave out all but `names` from now on, where that saves time."""
@@ -252,7 +252,7 @@ class NetworkFamily(Family[VonMisesNetwork]):
 
 
 def _grown(fit: Callable[[int], D], sizes: Iterable[int], held: Rows) -> dict[str, D]:
-    """Fits of growing size, until one is clearly worse on the held-out rows than the best before."""
+    """Return fits of growing size, until one is clearly worse on the held-out rows than the best."""
     found: dict[str, D] = {}
     best: Tensor | None = None
     for size in sizes:

@@ -1,4 +1,4 @@
-"""Folds: which rows are held out, and how often."""
+"""Folds of rows that are held out, and rows that repeat another."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.typed_torch import unique
 
 FOLDS = 10
-"""Each holds out a tenth of the rows."""
+"""Number of folds: each holds out a tenth of the rows."""
 
 LEAST_PLACES = 10
-"""Different points that a density needs."""
+"""The fewest different points that a density needs."""
 
 USED = ((600, 10), (2_000, 5), (10_000, 3))
-"""Of them are used, by the number of rows at most: few rows need all, many need few to tell; else 2."""
+"""The number of folds that are used, for up to so many rows; with more rows 2 are enough."""
 
 MOST_HELD = 2_000
-"""Rows of a fold that are scored."""
+"""The most rows of a fold that are scored."""
 
 
 @dataclass(frozen=True)
@@ -42,11 +42,11 @@ class Folds:
     used: int
 
     def train(self, number: int) -> Rows:
-        """All rows but those of a fold."""
+        """Return all rows but those of a fold."""
         return self.rows[self.fold != number]
 
     def held(self, number: int) -> Rows:
-        """Rows of a fold, `MOST_HELD` at most."""
+        """Return the rows of a fold, `MOST_HELD` at most."""
         return self.rows[self.fold == number][:MOST_HELD]
 
     def __iter__(self) -> Iterator[tuple[Rows, Rows]]:
@@ -55,7 +55,7 @@ class Folds:
 
 
 def folds_of(rows: Rows, *, together: bool, generator: torch.Generator) -> Folds:
-    """Tenths of the rows at random, N >= 10 different ones.
+    """Return random tenths of the rows, of which 10 or more are different.
 
     A new row of the same source repeats an old one as often as the old ones repeat each other, and so
     do rows held out at random. Where equal rows are an accident of rounding, that would reward peaks
@@ -89,9 +89,10 @@ def folds_of(rows: Rows, *, together: bool, generator: torch.Generator) -> Folds
 
 
 def _check_rest(folds: Folds) -> None:
-    """
+    """Check that enough rows are left to fit to.
+
     Raises:
-        OrbiflowError: if too little is left to fit to where a fold is held out.
+        OrbiflowError: if too few are left where a fold is held out.
     """
     left = min(len(places(folds.train(number).points)[0]) for number in range(folds.used))
     if left < LEAST_PLACES:
@@ -102,7 +103,7 @@ def _check_rest(folds: Folds) -> None:
 
 
 def lightest_folds(sizes: NDArray[np.int64], folds: int) -> NDArray[np.int64]:
-    """The fold of each group, of these sizes, in order: the one that has the fewest rows by then."""
+    """Return the fold of each group, of these sizes, in order: the one with the fewest rows so far."""
     if bool((sizes == sizes[0]).all()):
         return np.arange(len(sizes)) % folds
     heap = [(0, k) for k in range(folds)]
@@ -114,7 +115,7 @@ def lightest_folds(sizes: NDArray[np.int64], folds: int) -> NDArray[np.int64]:
 
 
 def places(points: Tensor) -> tuple[Tensor, Tensor]:
-    """How many of the points (N, d) are at each different place (M,), and the place (N,) of each."""
+    """Return the number of points (N, d) at each different place (M,), and the place (N,) of each."""
     # rounding keeps together what differs by the projection's last digit
     _, place, counts = unique(
         (points * 1e9).round(), dim=0, return_inverse=True, return_counts=True
@@ -123,20 +124,21 @@ def places(points: Tensor) -> tuple[Tensor, Tensor]:
 
 
 STEPS = tuple(m * 10.0**e for e in range(2, -7, -1) for m in (5, 2, 1))
-"""Of rounding that are looked for."""
+"""Steps of rounding that are looked for."""
 
 MANY = 2.0
-"""Times the repeats that rounding explains: more are places of their own."""
+"""If there are more than so many times the repeats that rounding explains, they are real."""
 
 
 @dataclass(frozen=True)
 class Repeats:
-    """What was found.
+    """Rows that repeat another, and how far rounding explains them.
 
-    - `rows`: that repeat an earlier row; `places`: different ones.
-    - `step`: to which all values are rounded, in the data's unit; None if to none.
-    - `explained`: pairs of equal rows that rounding explains, over those there are; None where values
-      are not rounded or nothing repeats.
+    - `rows`: The number of rows that repeat an earlier one.
+    - `places`: The number of different ones.
+    - `step`: The step to which all values are rounded, in the data's unit; None if there is none.
+    - `explained`: The share of pairs of equal rows that rounding explains; None if values are not
+      rounded or nothing repeats.
     """
 
     rows: int
@@ -150,7 +152,7 @@ class Repeats:
         return self.explained is not None and self.explained * MANY >= 1
 
     def notes(self, taken_for: str) -> list[str]:
-        """What was found and assumed, in words; `taken_for` is "places" or "rounding"."""
+        """Return what was found and assumed, in words; `taken_for` is "places" or "rounding"."""
         if not self.rows:
             return []
         total = self.rows + self.places
@@ -169,7 +171,7 @@ class Repeats:
 
 
 def repeats_of(space: Space, points: Tensor) -> Repeats:
-    """What repeats among points (N, d).
+    """Return what repeats among points (N, d).
 
     Where values are rounded and the density is even over a few steps, as many pairs of rows are equal
     as are exactly one step apart in one direction.
@@ -183,7 +185,7 @@ def repeats_of(space: Space, points: Tensor) -> Repeats:
 
 
 def _step(data: Array) -> float | None:
-    """The largest of `STEPS` of which all values are multiples, within rounding errors."""
+    """Return the largest of `STEPS` of which all values are multiples, within rounding errors."""
     scale = max(1.0, float(abs(data).max()))
     for step in STEPS:
         tolerance = 1e-9 * scale / step
@@ -196,7 +198,7 @@ def _step(data: Array) -> float | None:
 
 
 def _explained(data: Array, step: float, counts: Tensor) -> float | None:
-    """Pairs one step apart over pairs that are equal."""
+    """Return the ratio of pairs that are one step apart to pairs that are equal."""
     equal = float((counts.double() * (counts - 1) / 2).sum())
     cells, number = np.unique(np.round(data / step).astype(np.int64), axis=0, return_counts=True)
     of = {tuple(cell): int(n) for cell, n in zip(cells.tolist(), number, strict=True)}

@@ -1,4 +1,4 @@
-"""Choosing the kernels' widths and their share beside a flow, on held-out points."""
+"""Kernel estimates, and kernels beside a flow, with widths and weights by held-out points."""
 
 from __future__ import annotations
 
@@ -25,16 +25,16 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.typed_torch import unique
 
 MOST_KERNELS, MOST_HELD = 20_000, 2_000
-"""Centers at most, and held-out points that choose the widths."""
+"""The most centers, and the most held-out points that choose the widths."""
 
 NEIGHBOURS = (2, 4, 8, 16)
 SCALES = (0.1, 0.2, 0.4, 0.8, 1.6)
 ISOTROPY = (0.05, 0.3)
 NARROWEST, WIDEST = 1e7, 0.5
-"""Concentrations at most and at least: a deviation of 0.02 degrees, or nearly uniform."""
+"""The largest and the least concentration: a deviation of 0.02 degrees, or nearly uniform."""
 
 FLOOR = 1e-3
-"""Least share of the uniform density: no observation is impossible."""
+"""The least weight of the uniform density, so that no observation is impossible."""
 
 
 @training()
@@ -46,16 +46,18 @@ def blend_kernels(
     row_weights: Tensor | None = None,
     held_weights: Tensor | None = None,
 ) -> Mixture:
-    """A fitted density blended with adaptive kernels about the training points and a uniform floor.
+    """Blend a fitted density with adaptive kernels about the training points and a uniform floor.
 
     Each kernel's variance is a share of the mean square distance to its nearest neighbours (Breiman,
     Meisel, Purcell, 1977), on tori axis by axis. The share, the number of neighbours and the
     proportions of flow, kernels and floor are those best on the held-out points.
 
     Args:
-        density: a flow's.
-        train, held: canonical points (N, d).
-        row_weights, held_weights: of the two (N,); default equal.
+        density: Any density.
+        train: Canonical points (N, d) that the kernels are about.
+        held: Canonical points (M, d) that choose widths and proportions.
+        row_weights: Weights of the training points (N,); default: equal.
+        held_weights: Weights of the held-out points (M,); default: equal.
 
     Raises:
         OrbiflowError: for points of another shape, fewer than three different ones to train on, or none
@@ -99,7 +101,7 @@ def blend_kernels(
 def proportions(
     parts: Tensor, *, iterations: int = 60, row_weights: Tensor | None = None
 ) -> tuple[Tensor, float]:
-    """Proportions (3,) that suit log densities `parts` (3, N) best, by EM; and their score.
+    """Return proportions (3,) that suit log densities `parts` (3, N) best, by EM, and their score.
 
     The last is kept at `FLOOR` or more.
     """
@@ -114,7 +116,7 @@ def proportions(
 
 
 def spreads(space: Space, centers: Tensor, neighbours: list[int]) -> list[Tensor]:
-    """Mean squares of the distance to the nearest neighbours, per axis: (N, 1) or (N, d) each."""
+    """Return mean square distances to the nearest neighbours, per axis: (N, 1) or (N, d) each."""
     images = space.features(centers)
     count = images.shape[1]
     tree = KDTree(images.reshape(-1, images.shape[-1]).numpy())
@@ -130,10 +132,10 @@ def spreads(space: Space, centers: Tensor, neighbours: list[int]) -> list[Tensor
 
 
 MOST_CENTERS = 20_000
-"""Kernels of an estimate at most."""
+"""The most kernels of an estimate."""
 
 LADDER = 27
-"""Widths, from `WIDEST` to `NARROWEST`: neighbours differ by a factor of 1.4."""
+"""Number of widths from `WIDEST` to `NARROWEST`; neighbours differ by a factor of 1.4."""
 
 
 def kernel_estimates(
@@ -144,16 +146,18 @@ def kernel_estimates(
     repeats: bool = True,
     row_weights: Tensor | None = None,
 ) -> dict[str, AdaptiveKernels]:
-    """Estimates about training points (N, d) in random order, by their names.
+    """Return estimates about training points (N, d) in random order, by their names.
 
     "width ..." have one concentration, in a ladder; "near ..." a share of the mean square distance to
     the nearest neighbours, on tori axis by axis (Breiman, Meisel, Purcell, 1977); "repeated" are the
     narrowest kernels, about the places of several points alone.
 
     Args:
-        narrowest: concentration at most.
-        repeats: whether places of several points count as such.
-        row_weights: of the points (N,); default equal.
+        space: The space.
+        train: The points.
+        narrowest: The largest concentration.
+        repeats: Whether places of several points count as such.
+        row_weights: Weights of the points (N,); default: equal.
     """
     train = train[:MOST_CENTERS]
     own = (
@@ -189,7 +193,7 @@ def kernel_estimates(
 def even_kernels(
     space: Space, centers: Tensor, kappa: float, weights: Tensor | None = None
 ) -> AdaptiveKernels:
-    """Kernels of one concentration about centers (N, d); weights default equal."""
+    """Return kernels of one concentration about centers (N, d); weights are equal by default."""
     width = 1 if space.is_round else space.dim
     if weights is None:
         weights = torch.full((len(centers),), 1 / len(centers), dtype=torch.float64)

@@ -19,7 +19,7 @@ from orbiflow.fields import InvariantField
 from orbiflow.typed_torch import unique
 
 ORDER = 3
-"""Of the derivatives whose energy is the roughness: smooth displacements are to be cheap."""
+"""Order of the derivatives whose energy is the roughness, so that smooth displacements cost little."""
 
 EVERY = 3
 """Iterations between scores of the validation points."""
@@ -31,18 +31,18 @@ MOST_EVALUATIONS = 10**9
 """For SciPy, whose own bound is 15,000: `Budget` counts them."""
 
 Watch = Callable[[int, float, float], None]
-"""Told the iteration, the training and the validation negative log-likelihood, in nats."""
+"""A function called with the iteration and the training and validation scores, in nats."""
 
 
 @dataclass(frozen=True)
 class Refinement:
-    """What became of it.
+    """The course of a stage of refinement.
 
-    - `train`, `validation`: mean negative log density with respect to the square, at the start,
-      every `EVERY` iterations and at the end.
-    - `best`: the entry whose parameters were kept.
-    - `stopped`: "iterations", "validation", "converged", "evaluations" or "time".
-    - `seconds`: that it took.
+    - `train`, `validation`: Mean negative log densities with respect to the square, at the start, every
+      `EVERY` iterations and at the end.
+    - `best`: The entry whose parameters were kept.
+    - `stopped`: What ended it: "iterations", "validation", "converged", "evaluations" or "time".
+    - `seconds`: The time that it took.
     """
 
     train: tuple[float, ...]
@@ -59,14 +59,14 @@ class _Idle(Exception):
 
 
 class Objective:
-    """Mean NLL of the training points plus penalties, as SciPy wants it.
+    """The mean negative log density of the training points plus penalties, as SciPy wants it.
 
     Args:
-        density: whose flow has Fourier or spline fields.
-        points: (N, d) canonical, training.
-        weights: (N,) of sum 1; default equal.
-        kinetic: weight of the flow's kinetic energy, E|V|^2 summed over segments.
-        roughness: weight of E|grad^3 V|^2 summed over segments, with lengths in wavelengths.
+        density: A density whose flow has Fourier or spline fields.
+        points: Canonical training points (N, d).
+        weights: Weights (N,) of sum 1; default: equal.
+        kinetic: Weight of the flow's kinetic energy, E|V|^2 summed over segments.
+        roughness: Weight of E|grad^3 V|^2 summed over segments, with lengths in wavelengths.
     """
 
     def __init__(
@@ -86,7 +86,7 @@ class Objective:
         self.last = math.inf
 
     def get(self) -> Array:
-        """All parameters, flat."""
+        """Return all parameters, flat."""
         flat = torch.cat([p.detach().reshape(-1) for p in self.parameters])
         return flat.double().cpu().numpy()
 
@@ -99,7 +99,7 @@ class Objective:
             flat = flat[parameter.numel() :]
 
     def penalty(self) -> Tensor:
-        """Kinetic energy and roughness, exact: the basis is orthonormal."""
+        """Return kinetic energy and roughness, which are exact as the basis is orthonormal."""
         total = self.points.new_zeros(())
         count = len(self.fields)
         for field, weights in zip(self.fields, self._weights, strict=True):
@@ -108,12 +108,12 @@ class Objective:
 
     @staticmethod
     def _penalty_weights(field: InvariantField, kinetic: float, roughness: float) -> Tensor:
-        """Of each coefficient's square, (P,)."""
+        """Return the weights (P,) of each coefficient's square."""
         magnitude = torch.as_tensor(field.basis.magnitude).to(field.parameters_)
         return kinetic + roughness * magnitude ** (2 * ORDER)
 
     def __call__(self, values: Array) -> tuple[float, Array]:
-        """Loss and gradient; a barrier where the density is not finite."""
+        """Return loss and gradient, or a barrier where the density is not finite."""
         self.set(values)
         for parameter in self.parameters:
             parameter.grad = None
@@ -145,16 +145,20 @@ def refine(
     budget: Budget | None = None,
     watch: Watch | None = None,
 ) -> Refinement:
-    """Descend on the negative log-likelihood; the parameters best on `validation` are left in place.
+    """Descend on the negative log-likelihood, and leave the parameters best on `validation`.
 
     Args:
-        density: its flow's parameters are changed.
-        train, validation: canonical points (N, d) in the parameters' dtype.
-        weights, held_weights: of the two, (N,) of sum 1; default equal.
-        iterations: at most; it stops where validation has not improved for `PATIENCE` of them.
-        kinetic, roughness: see `Objective`.
-        budget: of evaluations and time; where it is spent, the best so far is left.
-        watch: called with every score.
+        density: The density; the parameters of its flow are changed.
+        train: Canonical training points (N, d) in the parameters' dtype.
+        validation: Canonical validation points (M, d).
+        weights: Weights of the training points, of sum 1; default: equal.
+        held_weights: Weights of the validation points, of sum 1; default: equal.
+        iterations: Maximum number of iterations. It stops if validation has not improved for
+            `PATIENCE` of them.
+        kinetic: Weight of the kinetic energy, see `Objective`.
+        roughness: Weight of the roughness.
+        budget: The budget of evaluations and time; when it is spent, the best so far is left.
+        watch: A function called with every score.
     """
     weights = _even(train) if weights is None else weights
     budget = Budget() if budget is None else budget
@@ -258,7 +262,7 @@ LEVELS = 5
 def merged(
     points: Tensor, cells: int, crowd: int, row_weights: Tensor | None = None
 ) -> tuple[Tensor, Tensor]:
-    """Means of the points in each cell of a grid that is finer where points crowd, and their shares.
+    """Return means of the points in each cell of a grid, finer where points crowd, and their shares.
 
     A smooth log density summed over the points changes by half its curvature times their variance
     within a cell, which is below 1 / (6 cells^2). Where the density is sharp, points crowd: cells of
@@ -299,7 +303,7 @@ def merged(
 
 
 def _labels(points: Tensor, cells: int) -> Tensor:
-    """The number (N,) of each point's cell."""
+    """Return the number (N,) of each point's cell."""
     cell = (points * cells).floor().clamp(0, cells - 1).long()
     label = cell[:, 0]
     for axis in range(1, points.shape[1]):

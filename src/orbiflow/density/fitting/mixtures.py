@@ -28,10 +28,10 @@ from orbiflow.density.spaces import (
 from orbiflow.typed_torch import linalg, special
 
 CONVERGED = 1e-4
-"""Nats that an iteration of EM must bring."""
+"""Nats that an iteration of EM must gain."""
 
 BLOCK = 4_096
-"""Points at a time."""
+"""Points worked on at a time."""
 
 
 @training()
@@ -46,22 +46,23 @@ def fit_mixture(
     generator: torch.Generator,
     row_weights: Tensor | None = None,
 ) -> AdaptiveKernels:
-    """A mixture of components whose places, widths and weights are all fitted.
+    """Fit a mixture of components with places, widths and weights of their own.
 
     Products of von Mises distributions with a concentration an angle on torus and Klein bottle, von
     Mises-Fisher on sphere and projective plane (Banerjee et al., Clustering on the unit hypersphere
-    using von Mises-Fisher distributions, 2005), summed over the group. Few imaginary points hold each
+    using von Mises-Fisher distributions, 2005), summed over the group. A few prior points hold each
     concentration finite.
 
     Args:
-        train: canonical points (N, d), N >= components. On tori, angles may be missing (NaN): such a
+        space: The space.
+        train: Canonical points (N, d), N >= components. On tori, angles may be missing (NaN): such a
             row counts by its marginal likelihood (Ghahramani and Jordan, Supervised learning from
             incomplete data via an EM approach, 1994). As many rows as components are whole.
-        components: their number.
-        iterations: of EM at most.
-        narrowest: concentration at most.
-        generator: of the start (k-means++).
-        row_weights: of the points (N,), of mean 1; default equal.
+        components: The number of components.
+        iterations: Maximum number of iterations of EM.
+        narrowest: The largest concentration.
+        generator: The source of the start (k-means++).
+        row_weights: Weights of the points (N,), of mean 1; default: equal.
     """
     absent = train.isnan()
     whole = ~absent.any(dim=1)
@@ -96,7 +97,7 @@ def fit_mixture(
 def _spread_out(
     images: Tensor, count: int, generator: torch.Generator, row_weights: Tensor | None
 ) -> Tensor:
-    """Features (K, m) of points far from each other over their images (E, N, m): k-means++."""
+    """Return features (K, m) of points far from each other over their images (E, N, m): k-means++."""
     own = images[0]
     weights = 1.0 if row_weights is None else row_weights
     if row_weights is None:
@@ -117,7 +118,7 @@ def _expectation(
     kappa: Tensor,
     weights: Tensor,
 ) -> tuple[Tensor, Tensor, Tensor, float]:
-    """What belongs to each component, and the log-likelihood.
+    """Return what belongs to each component, and the log-likelihood.
 
     Args:
         blocks: features of points, 0 where they are missing, their weights, and what is missing.
@@ -151,7 +152,7 @@ def _expectation(
 
 
 def _directions(space: Space, total: Tensor) -> tuple[Tensor, Tensor]:
-    """Unit vectors of sums (K, m), and their lengths: of the whole, or an angle each."""
+    """Return unit vectors of sums (K, m), and their lengths: of the whole, or of each angle."""
     parts = total[:, None] if space.is_round else torch.stack(total.chunk(2, dim=1), dim=-1)
     length = linalg.vector_norm(parts, dim=-1)
     unit = parts / length.clamp_min(1e-300)[..., None]
@@ -159,7 +160,7 @@ def _directions(space: Space, total: Tensor) -> tuple[Tensor, Tensor]:
 
 
 def _round_concentration(resultant: Tensor) -> Tensor:
-    """kappa of mean cosines coth(kappa) - 1 / kappa: Banerjee et al. (2005), then Newton."""
+    """Return kappa of mean cosines coth(kappa) - 1 / kappa: Banerjee et al. (2005), then Newton."""
     r = resultant.clamp(1e-4, 1 - 1e-8)
     kappa = r * (3 - r**2) / (1 - r**2)
     for _ in range(4):
@@ -169,7 +170,7 @@ def _round_concentration(resultant: Tensor) -> Tensor:
 
 
 def _points(space: Space, mean: Tensor) -> Tensor:
-    """Chart points of features (K, m)."""
+    """Return chart points of features (K, m)."""
     if isinstance(space, RoundSpace):
         return space.vectors_to_chart(mean.numpy())
     cos, sin = mean.chunk(2, dim=1)

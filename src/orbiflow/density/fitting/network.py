@@ -23,42 +23,42 @@ from orbiflow.density.models import (
 from orbiflow.density.spaces import Torus
 
 MOST_PARENTS = 3
-"""Of an angle."""
+"""The most parents of an angle."""
 
 PROPOSED = 2
-"""Angles that are tried as a further parent: those that seem to say most."""
+"""Number of angles that are tried as a further parent."""
 
 SIZES = (4, 8, 16, 32, 64, 128)
-"""Components of a factor."""
+"""Numbers of components of a factor."""
 
 FIRST = 16
-"""Components with which parents are chosen, where there are rows for as many."""
+"""Components with which parents are chosen, if there are rows for as many."""
 
 PER_COMPONENT = 20
 """Rows that each component must have on average."""
 
 WORTHWHILE = 0.005
-"""Nats that a parent, or twice as many components, must bring."""
+"""Nats that a parent, or twice as many components, must gain."""
 
 SEARCHED = 4_000
-"""Rows by which the arrows are chosen, at most."""
+"""The most rows by which the arrows are chosen."""
 
 ITERATIONS, IDLE = 40, 1e-3
-"""Of EM at most; it ends where five bring fewer nats than the latter."""
+"""Maximum iterations of EM; it ends when five gain fewer nats than the latter."""
 
 HARMONICS, RIDGE = 4, 1e-3
 """Waves of each angle by which dependence is screened, and what is added to their variances."""
 
 
 class Shape(NamedTuple):
-    """Of a factor: its angles, the parents before their child, and the components of its mixture."""
+    """The shape of a factor: its angles, parents before their child, and its number of components."""
 
     axes: tuple[int, ...]
     components: int
 
 
 def network_shapes(rows: Rows, held: Rows, generator: torch.Generator) -> Iterator[Shape]:
-    """Factors one after the other, chosen by rows held out; parents before their children.
+    """Yield factors one after the other, chosen by held-out rows; parents before their children.
 
     The order is that of Prim's algorithm on the angles' dependence (as Chow and Liu, 1968), parents
     are taken one by one as long as they gain.
@@ -78,7 +78,7 @@ def fit_network(
     generator: torch.Generator,
     starts: int = 1,
 ) -> VonMisesNetwork:
-    """The factors of these shapes, each by EM from several starts whose mean it is."""
+    """Fit factors of these shapes, each the mean of EM from several starts."""
     return VonMisesNetwork(
         space,
         [
@@ -137,12 +137,12 @@ def _fitted(
 
 
 class Screen:
-    """How much angles seem to say of each other: Gaussian mutual information of their waves.
+    """How much angles seem to say about each other: Gaussian mutual information of their waves.
 
-    A bound from a few moments, for whatever the dependence: what it proposes is tried.
+    It uses a few moments only; what it proposes is then tried.
 
     Args:
-        points: (N, d) in turns.
+        points: Points (N, d) in turns.
     """
 
     def __init__(self, points: Tensor) -> None:
@@ -154,7 +154,10 @@ class Screen:
         self.covariance += RIDGE * torch.eye(len(self.covariance)).to(points)
 
     def order(self) -> list[int]:
-        """The angles: first that which says most of the others, then what those before say most of."""
+        """Return the angles in order: first the one that says most about the others.
+
+        Each following one is the one about which those before say most.
+        """
         pairs = torch.zeros(self.dim, self.dim, dtype=torch.float64)
         for i in range(self.dim):
             for j in range(i):
@@ -166,12 +169,12 @@ class Screen:
         return order
 
     def parents(self, axis: int, known: tuple[int, ...], before: list[int]) -> list[int]:
-        """Angles that come before, by what they say of one beyond those that are known."""
+        """Return the angles before an angle, by what they say about it beyond those that are known."""
         left = [i for i in before if i not in known]
         return sorted(left, key=lambda i: -self.between(axis, i, known))
 
     def between(self, one: int, other: int, known: tuple[int, ...] = ()) -> float:
-        """Nats that two angles say of each other, beyond those that are known."""
+        """Return the nats that two angles say about each other, beyond those that are known."""
         return 0.5 * (
             self._log_det(one, *known)
             + self._log_det(other, *known)

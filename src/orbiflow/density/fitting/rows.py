@@ -1,4 +1,4 @@
-"""Rows of data and what each weighs."""
+"""Rows of data, their weights, and angles that they lack."""
 
 from __future__ import annotations
 
@@ -27,7 +27,8 @@ from orbiflow.typed_torch import listed, unique
 class Rows:
     """Points (N, d) and their weights (N,), None where all weigh the same.
 
-    - `groups`: whole numbers (N,), from 0; rows of one are held out together. None: each by itself.
+    - `groups`: Whole numbers (N,), from 0; rows of one group are held out together. None: each row is a
+      group.
     """
 
     points: Tensor
@@ -43,12 +44,12 @@ class Rows:
         return Rows(self.points[chosen], weights, groups)
 
     def mean(self, values: Tensor) -> float:
-        """The mean of values (N,), as the rows weigh."""
+        """Return the mean of values (N,), weighted as the rows are."""
         return mean_of(values, self.weights)
 
 
 def mean_of(values: Tensor, weights: Tensor | None) -> float:
-    """The mean of values (N,), weighted.
+    """Return the weighted mean of values (N,).
 
     >>> mean_of(torch.tensor([1.0, 4.0]), torch.tensor([2.0, 1.0]))
     2.0
@@ -59,7 +60,7 @@ def mean_of(values: Tensor, weights: Tensor | None) -> float:
 
 
 def effective_rows(weights: Tensor) -> float:
-    """How many rows of equal weight say as much (Kish, Survey Sampling, 1965, 11.7).
+    """Return the number of rows of equal weight that say as much (Kish, 1965, section 11.7).
 
     >>> effective_rows(torch.tensor([1.0, 1.0, 0.0, 0.0]))
     2.0
@@ -68,7 +69,7 @@ def effective_rows(weights: Tensor) -> float:
 
 
 def weights_of(weights: Any, known: Tensor) -> Tensor:
-    """Weights of the rows that are `known` (N,).
+    """Return the weights of the rows that are `known` (N,).
 
     Raises:
         OrbiflowError: for another number of weights than rows.
@@ -82,7 +83,7 @@ def weights_of(weights: Any, known: Tensor) -> Tensor:
 
 
 def group_numbers(labels: ArrayLike, rows: int) -> NDArray[np.int64]:
-    """The group (N,) of each row as a whole number from 0, from a label a row, of any kind.
+    """Return the group (N,) of each row as a whole number from 0, from labels of any kind.
 
     Raises:
         OrbiflowError: for another number of labels.
@@ -101,7 +102,7 @@ def group_numbers(labels: ArrayLike, rows: int) -> NDArray[np.int64]:
 
 
 def weighed(points: Tensor, weights: Any, groups: Tensor | None = None) -> Rows:
-    """Rows with a weight, and their weights of mean 1: only their ratios count.
+    """Return the rows that have a weight, with weights of mean 1: only their ratios count.
 
     Rows of weight 0 are left out; equal weights are none.
 
@@ -131,7 +132,7 @@ def weighed(points: Tensor, weights: Any, groups: Tensor | None = None) -> Rows:
 
 
 def weights_note(rows: Rows) -> list[str]:
-    """What to say of the weights of the rows."""
+    """Return what the report says about the weights of the rows."""
     if rows.weights is None:
         return []
     effective = effective_rows(rows.weights)
@@ -143,22 +144,23 @@ def weights_note(rows: Rows) -> list[str]:
 
 
 MISSING = ("refuse", "marginalise")
-"""What is done with rows that lack an angle."""
+"""What can be done with rows that lack an angle."""
 
 MARGINAL_PARTS = ("kernels", "mixture")
-"""Parts that can be fitted to such rows."""
+"""Components that can be fitted to such rows."""
 
 MOST_SPREAD = 4_000
-"""Rows that lack angles whose weights are spread over kernels at most: they stand for the others."""
+"""The most rows that lack angles whose weights are spread over kernels."""
 
 BLOCK_ENTRIES = 2_000_000
-"""Of a table of rows against kernels at a time."""
+"""Entries of a table of rows against kernels worked on at a time."""
 
 
 def check_missing(missing: Any) -> str:
-    """
+    """Return what is done with rows that lack an angle.
+
     Raises:
-        OrbiflowError: for what is not of `MISSING`.
+        OrbiflowError: for what is not one of `MISSING`.
     """
     if not isinstance(missing, str) or missing not in MISSING:
         raise OrbiflowError(f"missing must be one of {', '.join(MISSING)}, got {missing!r}")
@@ -166,7 +168,7 @@ def check_missing(missing: Any) -> str:
 
 
 def observed_points(space: Space, points: Any) -> tuple[Tensor, Tensor]:
-    """Canonical points (N, d) of a torus with what is missing (NaN), and which rows know anything.
+    """Return canonical points (N, d) of a torus, and which rows have an angle at all.
 
     Raises:
         OrbiflowError: for another space or shape, infinite angles, or what is no `Space`.
@@ -183,12 +185,12 @@ def observed_points(space: Space, points: Any) -> tuple[Tensor, Tensor]:
 
 
 def is_whole(rows: Rows) -> Tensor:
-    """Which rows (N,) lack nothing."""
+    """Return which rows (N,) lack nothing."""
     return ~rows.points.isnan().any(dim=1)
 
 
 def missing_notes(rows: Rows, empty: int) -> list[str]:
-    """What to say of rows that lack angles, and of `empty` ones that were left out."""
+    """Return what the report says about rows that lack angles, and `empty` ones that were left out."""
     lacking = len(rows) - int(is_whole(rows).sum())
     notes: list[str] = []
     if lacking:
@@ -206,23 +208,23 @@ def missing_notes(rows: Rows, empty: int) -> list[str]:
     return notes
 
 
-def log_prob_of_rows(part: Density, points: Tensor) -> Tensor:
-    """Log density (N,) of a part at points that may lack angles, of those that they have."""
+def log_prob_of_rows(density: Density, points: Tensor) -> Tensor:
+    """Return log densities (N,) at points that may lack angles, of the angles that they have."""
     if not bool(points.isnan().any()):
-        return part.log_prob(points)
-    return at_observed(part, points)
+        return density.log_prob(points)
+    return at_observed(density, points)
 
 
 def with_incomplete(kernels: AdaptiveKernels, rows: Rows, total: float) -> AdaptiveKernels:
-    """Kernels about whole rows whose weights follow the rows that lack angles, too.
+    """Return kernels about whole rows whose weights follow the rows that lack angles, too.
 
     Each such row shares its weight out among the kernels as they explain the angles that it has: one
     step of EM, from kernels of the whole rows' weights.
 
     Args:
-        kernels: about whole rows.
-        rows: that lack angles.
-        total: weight of the whole rows.
+        kernels: Kernels about whole rows.
+        rows: The rows that lack angles.
+        total: The weight of the whole rows.
     """
     some = rows[:MOST_SPREAD]
     lacking = float(len(rows)) if rows.weights is None else float(rows.weights.sum())
@@ -239,7 +241,7 @@ def with_incomplete(kernels: AdaptiveKernels, rows: Rows, total: float) -> Adapt
 
 
 def _patterns(rows: Rows) -> Iterator[tuple[list[int], Rows]]:
-    """The angles that rows have, and the rows that have just these."""
+    """Yield the angles that rows have, and the rows that have just these."""
     kinds, number = unique(~rows.points.isnan(), dim=0, return_inverse=True)
     for k, kind in enumerate(kinds):
         yield listed(torch.nonzero(kind)[:, 0]), rows[number == k]

@@ -11,17 +11,17 @@ from torch import Tensor
 from orbiflow.density.fitting.rows import effective_rows, mean_of
 
 TOLERANCE = 1e-4
-"""Nats by which the weights may be off the best ones."""
+"""Nats by which the weights may be worse than the best ones."""
 
 ITERATIONS, EVERY = 3_000, 25
-"""Of EM at most, and between looks at how far it is."""
+"""Maximum iterations of EM, and iterations between checks of convergence."""
 
 NEGLIGIBLE = 3e-3
-"""Weights below are dropped."""
+"""Weights below this are dropped."""
 
 
 SURE = 2.0
-"""Standard errors by which a gain must be above nothing, of what else would be seen for nothing."""
+"""Standard errors by which a gain must exceed 0 to be no accident."""
 
 
 class Gain(NamedTuple):
@@ -37,7 +37,7 @@ class Gain(NamedTuple):
 
 
 def gain_of(better: Tensor, worse: Tensor, row_weights: Tensor | None = None) -> Gain:
-    """Of two log densities (N,) at the same rows, which may be weighted."""
+    """Return the gain of one log density (N,) over another at the same rows, which may be weighted."""
     difference = better - worse
     if row_weights is not None:
         mean = mean_of(difference, row_weights)
@@ -49,12 +49,14 @@ def gain_of(better: Tensor, worse: Tensor, row_weights: Tensor | None = None) ->
 
 
 def stacked(table: Tensor, weights: Tensor) -> Tensor:
-    """Log density (N,) of the mixture of densities in proportions (P,), from a table (P, N)."""
+    """Return log densities (N,) of the mixture in proportions (P,), from a table (P, N)."""
     return (table + weights.log()[:, None]).logsumexp(dim=0)
 
 
 def stacking_weights(table: Tensor, row_weights: Tensor | None = None) -> Tensor:
-    """Proportions (P,) that give held-out rows the greatest mean log density, from a table (P, N).
+    """Return proportions (P,) with the greatest mean log density of held-out rows.
+
+    It is found from a table (P, N) of log densities.
 
     The problem is concave; EM finds its only optimum (Smyth and Wolpert, Linearly combining density
     estimators via stacking, 1999). The largest mean ratio of a density to the mixture, less 1, bounds
@@ -78,7 +80,7 @@ def stacking_weights(table: Tensor, row_weights: Tensor | None = None) -> Tensor
 
 
 def supported_weights(table: Tensor, always: Tensor, row_weights: Tensor | None = None) -> Tensor:
-    """As `sparse_weights`, without spikes that few rows speak for.
+    """Return weights as `sparse_weights` does, without spikes that only a few rows support.
 
     Two rows that happen to be close give kernels as narrow as that a weight of about two rows, and
     pictures a spike at every row. So what is worse by itself than what is `always` there must gain
@@ -97,7 +99,7 @@ def supported_weights(table: Tensor, always: Tensor, row_weights: Tensor | None 
 
 
 def sparse_weights(table: Tensor, always: Tensor, row_weights: Tensor | None = None) -> Tensor:
-    """As `stacking_weights`, without those that are `NEGLIGIBLE`; but `always` (P,) has a little.
+    """Return weights as `stacking_weights` does, without `NEGLIGIBLE` ones; `always` (P,) has some.
 
     The least weight of what must be there is half a row's: nothing is impossible that as many rows
     could not rule out.

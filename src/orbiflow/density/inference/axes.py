@@ -1,4 +1,4 @@
-"""Which angles of a torus are kept, which are given, and which are integrated out."""
+"""Which angles of a torus users mean: kept, given or missing, by number or by name."""
 
 from __future__ import annotations
 
@@ -18,9 +18,10 @@ from orbiflow.errors import OrbiflowError
 
 
 def check_torus(space: Space, what: str) -> Torus:
-    """
+    """Return the space if it is a torus.
+
     Raises:
-        OrbiflowError: unless `space` is a torus; says why others have no `what`.
+        OrbiflowError: if it is not; the message says why others have no `what`.
     """
     if isinstance(space, Torus):
         return space
@@ -35,10 +36,10 @@ def check_torus(space: Space, what: str) -> Torus:
 
 
 def kept_axes(axes: Iterable[int] | int, dim: int) -> tuple[int, ...]:
-    """Numbers of the angles to keep, 0 to dim - 1, each once.
+    """Return the numbers of the angles to keep, 0 to dim - 1, each once.
 
     Raises:
-        OrbiflowError: for others, or none.
+        OrbiflowError: for other numbers, or none.
     """
     listed: Any = [axes] if isinstance(axes, numbers.Integral) else axes
     try:
@@ -51,13 +52,13 @@ def kept_axes(axes: Iterable[int] | int, dim: int) -> tuple[int, ...]:
 
 
 def given_axes(given: Mapping[int, float], dim: int) -> tuple[tuple[int, ...], tuple[float, ...]]:
-    """Numbers of the angles that are known, and where.
+    """Return the numbers of the angles that are known, and their values.
 
     Raises:
         OrbiflowError: if there are none or no others, or for values that are not finite.
     """
     if not is_a(given, Mapping) or not given:
-        raise OrbiflowError(f"given must say what is known, such as {{1: 0.25}}, got {given!r}")
+        raise OrbiflowError(f"given must hold known angles, such as {{1: 0.25}}, got {given!r}")
     axes = tuple(_axis(axis, dim) for axis in given)
     if len(axes) == dim:
         raise OrbiflowError(f"all {dim} angles are given: nothing is left to have a density")
@@ -76,7 +77,7 @@ def _axis(axis: Any, dim: int) -> int:
 
 
 def axes_named(wanted: Sequence[str | int], names: Sequence[str]) -> list[int]:
-    """Numbers, from 0, of angles by their columns' names, or by those numbers.
+    """Return the numbers, from 0, of angles that are given by column names or by those numbers.
 
     Raises:
         OrbiflowError: for a name that no column has, or several.
@@ -104,7 +105,7 @@ def _named_axis(wanted: Any, names: list[str]) -> int:
 def given_named(
     space: Space, given: Iterable[tuple[str | int, float]], names: Sequence[str]
 ) -> dict[int, float]:
-    """What `conditional` takes: values in turns by numbers, from values in the space's unit by columns.
+    """Return values in turns by numbers of angles, from values in the space's unit by columns.
 
     Raises:
         OrbiflowError: for another space, unknown columns, one that is given twice, or values that are
@@ -124,7 +125,7 @@ def given_named(
 
 
 def chart_of_observed(space: Space, data: ArrayLike) -> Tensor:
-    """Angles (N, k) in the space's unit, missing ones NaN, to canonical points (N, k) of the torus.
+    """Return angles (N, k) in the space's unit, missing ones NaN, as points (N, k) of the torus.
 
     Raises:
         OrbiflowError: for another space or shape, or infinite angles.

@@ -6,8 +6,9 @@ from .chains import chained as chained
 from .density import Density as Density
 from .density import Restriction as Restriction
 from .density import Split as Split
-from .density import kl_by_quadrature as kl_by_quadrature
-from .density import midpoints as midpoints
+from .evaluation import kl_by_quadrature as kl_by_quadrature
+from .evaluation import log_density_gradient as log_density_gradient
+from .evaluation import midpoints as midpoints
 from .files import density_to_bytes as density_to_bytes
 from .files import read_density as read_density
 from .flow import MOST_DIM as MOST_DIM

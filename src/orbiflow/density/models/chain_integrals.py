@@ -17,49 +17,50 @@ SCALES = (1.0, 4.0, 16.0)
 """A component's concentrations are divided by these, each with its own weight: heavy tails."""
 
 REACH = 7.0
-"""Deviations from its mean at which an angle is not looked at any more."""
+"""Deviations from its mean beyond which an angle has no nodes."""
 
 STEP = 0.9
-"""Deviations between nodes: the trapezoidal rule is then off by exp(-2 pi^2 / STEP^2)."""
+"""Deviations between nodes, with which the trapezoidal rule is off by exp(-2 pi^2 / STEP^2)."""
 
 FEWEST = 12
-"""Nodes of an angle."""
+"""The fewest nodes of an angle."""
 
 MOST, MOST_ALONE = 1024, 16_384
-"""Nodes of several hidden angles of a chain together, and of one. Where several need more, as many are
-quasi-random."""
+"""The most nodes of several hidden angles of a chain together, and of one. Where several need more,
+the nodes are quasi-random."""
 
 TABLE = 2048
-"""Points of the distribution function that is inverted for quasi-random nodes."""
+"""Points of the distribution function whose inverse gives quasi-random nodes."""
 
 
 @dataclass(frozen=True)
 class Nodes:
-    """Of C components: `log_weights` (C, Q) whose exponentials sum to 1, offsets (C, Q) by axis."""
+    """Nodes of C components: log weights (C, Q) of sum 1, and offsets (C, Q) by axis."""
 
     log_weights: Tensor
     offsets: dict[int, Tensor]
 
     @property
     def count(self) -> int:
-        """Nodes Q of a component."""
+        """The number Q of nodes of a component."""
         return self.log_weights.shape[1]
 
 
 def nodes_of(
     means: Tensor, kappa: Tensor, hidden: tuple[int, ...], observed: tuple[int, ...], seed: int = 0
 ) -> Iterator[tuple[Tensor, Nodes]]:
-    """Numbers of components, and their nodes; components that need as many come together.
+    """Yield the numbers of components, and their nodes; those that need as many come together.
 
     The trapezoidal rule over each hidden angle, as fine as it and the angles after it are sharp: to
     analytic functions it converges exponentially (Trefethen and Weideman, 2014).
 
     Args:
-        means: (C, d, 1 + 2 d), see `VonMisesChains`.
-        kappa: concentrations (C, d).
-        hidden: axes that are integrated out.
-        observed: axes that are not; those before a hidden one do not depend on it, with slopes of 0.
-        seed: of quasi-random nodes.
+        means: Means (C, d, 1 + 2 d), see `VonMisesChains`.
+        kappa: Concentrations (C, d).
+        hidden: The axes that are integrated out.
+        observed: The axes that are not; those before a hidden one do not depend on it, with slopes
+            of 0.
+        seed: Seed of quasi-random nodes.
     """
     count, d = kappa.shape
     if not hidden:
@@ -83,7 +84,7 @@ def nodes_of(
 def _sharpness(
     means: Tensor, kappa: Tensor, hidden: tuple[int, ...], observed: tuple[int, ...], d: int
 ) -> Tensor:
-    """Concentrations (C, H) of the integrand in each hidden angle: its own and those bent by it."""
+    """Return concentrations (C, H) of the integrand in each hidden angle, which bends others."""
     after = list(hidden + observed)
     columns: list[Tensor] = []
     for axis in hidden:
@@ -93,7 +94,7 @@ def _sharpness(
 
 
 def _trapezoidal(kappa: Tensor, reach: Tensor, sizes: list[int]) -> tuple[Tensor, list[Tensor]]:
-    """A product of rules: log weights (C, Q) and offsets (C, Q) an axis."""
+    """Return a product of rules: log weights (C, Q), and offsets (C, Q) for each axis."""
     logs: list[Tensor] = []
     offsets: list[Tensor] = []
     for i, size in enumerate(sizes):
@@ -113,7 +114,7 @@ def _trapezoidal(kappa: Tensor, reach: Tensor, sizes: list[int]) -> tuple[Tensor
 
 
 def _sobol(kappa: Tensor, seed: int) -> tuple[Tensor, list[Tensor]]:
-    """`MOST` quasi-random nodes of equal weights, by quantiles of the von Mises distributions."""
+    """Return `MOST` quasi-random nodes of equal weights, by von Mises quantiles."""
     count, axes = kappa.shape
     engine = torch.quasirandom.SobolEngine(axes, scramble=True, seed=seed)
     even = engine.draw(MOST, dtype=torch.float64)
@@ -122,7 +123,7 @@ def _sobol(kappa: Tensor, seed: int) -> tuple[Tensor, list[Tensor]]:
 
 
 def quantiles(kappa: Tensor, even: Tensor) -> Tensor:
-    """Von Mises quantiles (C, Q) of probabilities (Q,), by interpolation of a table."""
+    """Return von Mises quantiles (C, Q) of probabilities (Q,), by interpolation of a table."""
     reach = (REACH / kappa.clamp_min(1e-12).sqrt()).clamp_max(math.pi)[:, None]
     edge = torch.linspace(-1, 1, TABLE + 1, dtype=kappa.dtype) * reach
     middle = (edge[:, 1:] + edge[:, :-1]) / 2
@@ -137,7 +138,7 @@ def quantiles(kappa: Tensor, even: Tensor) -> Tensor:
 
 
 BLOCK_ENTRIES = 2_000_000
-"""Of the table of points, components and nodes worked on at a time."""
+"""Entries of the table of points, components and nodes worked on at a time."""
 
 
 @dataclass(frozen=True)
@@ -163,7 +164,7 @@ class ChainTensors(NamedTuple):
 
 
 def chains_at(chains: ChainTensors, points: Tensor, observed: list[int], seed: int = 0) -> Tensor:
-    """Log density (N,) of the `observed` angles alone, at points (N, len(observed)).
+    """Return log densities (N,) of the `observed` angles alone, at points (N, len(observed)).
 
     Angles that come before others and are not observed are integrated out at `nodes_of` them, spread
     about their means, which makes a mixture that is normalised however many nodes there are; `seed` is
@@ -190,7 +191,7 @@ def _groups(chains: ChainTensors, observed: list[int]) -> Iterator[_Group]:
 
 
 def _group_at(chains: ChainTensors, group: _Group, angle: Tensor, seed: int) -> Tensor:
-    """Logs (N, C) of weight times density of the group's components, each at every scale."""
+    """Return log weight plus log density (N, C) of the group's components, each at every scale."""
     scale = torch.tensor(SCALES, dtype=torch.float64)
     means = chains.means[group.components].repeat_interleave(len(SCALES), dim=0)
     kappa = (chains.concentrations[group.components][:, None] / scale[:, None]).flatten(0, 1)
@@ -208,7 +209,7 @@ def _group_at(chains: ChainTensors, group: _Group, angle: Tensor, seed: int) -> 
 
 
 def _walked(angle: Tensor, means: Tensor, kappa: Tensor, group: _Group, nodes: Nodes) -> Tensor:
-    """Logs (N, C) of the observed angles' factors, less their constants, summed over the nodes."""
+    """Return logs (N, C) of the observed angles' factors without constants, summed over the nodes."""
     d = angle.shape[1]
     seen = torch.zeros(1 + 2 * d, dtype=angle.dtype)
     seen[[0, *(1 + j for j in group.observed), *(1 + d + j for j in group.observed)]] = 1
@@ -236,5 +237,5 @@ def _walked(angle: Tensor, means: Tensor, kappa: Tensor, group: _Group, nodes: N
 
 
 def waves(angle: Tensor) -> Tensor:
-    """1, sin and cos of angles (N, d) in radians: (N, 1 + 2 d)."""
+    """Return 1, sin and cos of angles (N, d) in radians: (N, 1 + 2 d)."""
     return torch.cat([torch.ones_like(angle[:, :1]), angle.sin(), angle.cos()], dim=1)

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import copy
 import math
-import numbers
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol, Self, runtime_checkable
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 
 import torch
-from torch import Tensor, nn
+from torch import Tensor
 from torch.distributions import Distribution, constraints
 
-from orbiflow.density.arguments import check_kind, check_range, float_tensor, points_tensor
+from orbiflow.density.arguments import check_kind, points_tensor
+from orbiflow.density.models.devices import destination, moved, shape_of, source_of
 from orbiflow.density.spaces import CHART, Space, Torus, check_measure
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import one_thread
@@ -157,7 +157,7 @@ class Density(Distribution):
         return Restriction([], [(0.0, self)])
 
     def is_costly(self, split: Split) -> bool:
-        """Whether each value of the density of the angles kept takes an integral of its own."""
+        """Return whether each value of the density of the angles kept takes an integral of its own."""
         del split
         return False
 
@@ -244,7 +244,7 @@ class Density(Distribution):
         self, sample_shape: Any = (), generator: torch.Generator | None = None
     ) -> Tensor:
         """Return samples as `sample` does, differentiable in the parameters of a flow."""
-        shape, source = _shape_of(sample_shape), _source_of(generator)
+        shape, source = shape_of(sample_shape), source_of(generator)
         if not shape.numel():
             return torch.empty(*shape, self.space.dim, dtype=self.dtype, device=self.device)
         drawn = self.draw(shape.numel(), source).to(dtype=self.dtype, device=self.device)
@@ -292,7 +292,9 @@ class Density(Distribution):
         device, dtype = destination(*wanted)
         new = copy.copy(self)
         for name, value in vars(self).items():
-            setattr(new, name, moved(value, device, dtype))
+            is_density = isinstance(value, Density)
+            own = value.to(device, dtype) if is_density else moved(value, device, dtype)
+            setattr(new, name, own)
         if dtype is not None:
             new._dtype = dtype
         return new
@@ -360,107 +362,3 @@ def log_area_factor(space: Space, measure: str) -> float:
     volume = math.log(space.volume)
     natural = 0.0 if space.is_round else -volume
     return natural + (volume if measure == "uniform" else 0.0)
-
-
-@runtime_checkable
-class _Movable(Protocol):
-    def to(self, device: torch.device, /) -> Any: ...
-
-
-def destination(*wanted: Any) -> tuple[torch.device | None, torch.dtype | None]:
-    """Return a device and a dtype from what `torch.Tensor.to` takes: either, both, or a tensor.
-
-    Raises:
-        OrbiflowError: for another thing, a device that torch does not know, or a dtype that is not
-            floating.
-
-    >>> destination("cpu", torch.float32)
-    (device(type='cpu'), torch.float32)
-    """
-    device: torch.device | None = None
-    dtype: torch.dtype | None = None
-    for one in wanted:
-        if isinstance(one, torch.dtype):
-            dtype = one
-        elif isinstance(one, Tensor):
-            device, dtype = one.device, one.dtype
-        elif one is not None:
-            device = _device(one)
-    if dtype is not None and not dtype.is_floating_point:
-        raise OrbiflowError(f"a density is evaluated in floating-point numbers, not in {dtype}")
-    return device, dtype
-
-
-def moved(value: Any, device: torch.device | None, dtype: torch.dtype | None = None) -> Any:
-    """Return a copy on the device of whatever can be moved; only modules change their dtype."""
-    if isinstance(value, nn.Module):  # which would move in place
-        return copy.deepcopy(value).to(device=device, dtype=dtype)
-    if isinstance(value, Density):
-        return value.to(device, dtype)
-    return value.to(device) if device is not None and isinstance(value, _Movable) else value
-
-
-def _device(wanted: Any) -> torch.device:
-    try:
-        return torch.device(wanted)
-    except (RuntimeError, TypeError) as error:
-        raise OrbiflowError(
-            f"expected a device or a dtype, such as 'cuda' or torch.float32, got {wanted!r}"
-        ) from error
-
-
-def _source_of(generator: torch.Generator | None) -> torch.Generator:
-    if generator is None:
-        return torch.default_generator
-    if generator.device.type != "cpu":
-        raise OrbiflowError(
-            f"samples are drawn on the CPU, the generator is on {generator.device}: give a "
-            "torch.Generator() without a device"
-        )
-    return generator
-
-
-def _shape_of(sample_shape: Any) -> torch.Size:
-    sizes = (int(sample_shape),) if isinstance(sample_shape, numbers.Integral) else sample_shape
-    try:
-        shape = torch.Size(sizes)
-    except TypeError as error:
-        raise OrbiflowError(f"expected a number or shape of samples: {error}") from error
-    if any(size < 0 for size in shape):
-        raise OrbiflowError(f"expected a number or shape of samples, got {tuple(shape)}")
-    return shape
-
-
-def midpoints(space: Space, resolution: int) -> Tensor:
-    """Return the midpoints (resolution^2, 2) of a grid on the canonical square, float64.
-
-    Raises:
-        OrbiflowError: if the space has another dimension than two, or for a resolution below 1.
-    """
-    check_range("resolution", resolution, 1, 1e6, integer=True)
-    if space.dim != 2:
-        raise OrbiflowError(f"a grid needs two dimensions, this {space.name} has {space.dim}")
-    t = (torch.arange(resolution, dtype=torch.float64) + 0.5) / resolution
-    return torch.stack(torch.meshgrid(t, t, indexing="ij"), dim=-1).reshape(-1, 2)
-
-
-def kl_by_quadrature(target: Tensor, log_density: Tensor) -> float:
-    """Return KL(p || p_hat) in nats from values on an even grid of the square.
-
-    Args:
-        target: The density p >= 0 (N,) on the square.
-        log_density: Values (N,) of log p_hat.
-
-    Raises:
-        OrbiflowError: for other shapes.
-    """
-    target, log_density = float_tensor(target, "target"), float_tensor(log_density, "log_density")
-    if target.dim() != 1 or target.shape != log_density.shape:
-        raise OrbiflowError(
-            f"expected two tables (N,), got {tuple(target.shape)} and {tuple(log_density.shape)}"
-        )
-    weight = target / target.sum()
-    live = weight > 0
-    log_target = (weight[live] * len(weight)).log()
-    value = (weight[live] * (log_target - log_density[live])).sum()
-    return float(value) if math.isfinite(float(value)) else math.inf

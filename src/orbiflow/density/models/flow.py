@@ -11,7 +11,8 @@ import torch
 from torch import Tensor
 
 from orbiflow.density.arguments import check_kind
-from orbiflow.density.models.density import Density, Split, midpoints
+from orbiflow.density.models.density import Density, Split
+from orbiflow.density.models.evaluation import midpoints
 from orbiflow.density.models.headers import (
     check_same_space,
     density_from,

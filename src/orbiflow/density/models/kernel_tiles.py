@@ -20,19 +20,19 @@ NODES = 28
 """Chebyshev points along a side of a tile."""
 
 ELLIPSES = (3.0, 5.0, 9.0)
-"""Sums of the half axes of the ellipses on which terms are bounded, in half sides."""
+"""Sums of the half axes of the ellipses on which terms are bounded, in half sides of the tile."""
 
 TURNS = 9
-"""Points of half an ellipse at which it is looked: what lies between is within `BETWEEN`."""
+"""Points of half an ellipse at which terms are bounded; between them they are within `BETWEEN`."""
 
 BETWEEN = 1.5
 """Logarithm of how much larger a term may be between those points."""
 
 ROUNDING = math.log(1e-15)
-"""Of the largest value, what the arithmetic of interpolation loses elsewhere in the tile."""
+"""Logarithm of the rounding error of interpolation, relative to the largest value in the tile."""
 
 POLE = 0.75
-"""Largest coordinate, beyond the reals too: the chart has poles at plus and minus i."""
+"""The largest coordinate, complex ones included: the chart has poles at plus and minus i."""
 
 
 class Tile:
@@ -45,7 +45,10 @@ class Tile:
         self.radius = self._away2(features).amax(dim=1).sqrt()
 
     def bounds(self, terms: Terms) -> tuple[Tensor, Tensor]:
-        """Least and largest logarithms (K,) of the terms in the tile, by the triangle inequality."""
+        """Return the least and largest logarithms (K,) of the terms in the tile.
+
+        They are bounds by the triangle inequality.
+        """
         away, radius = self._away2(terms.centers).sqrt_(), self.radius[:, None]
         nearest = (away - radius).clamp_min_(0).square_().mul_(terms.kappa)
         farthest = away.add_(radius).square_().mul_(terms.kappa)
@@ -55,12 +58,12 @@ class Tile:
         )
 
     def _away2(self, features: Tensor) -> Tensor:
-        """Squares (F, N) of distances from the middle."""
+        """Return squares (F, N) of distances from the middle."""
         return lengths2(features - self.middle[:, None], self.factors)
 
     @property
     def has_chart(self) -> bool:
-        """Whether `Chart` takes it: two dimensions at most, less than a third of a turn."""
+        """Whether it can have a `Chart`: two dimensions at most, less than a third of a turn."""
         dims = 2 if len(self.middle) > 2 * self.factors else self.factors
         return dims <= 2 and bool((self.radius < 0.85).all())
 
@@ -83,14 +86,15 @@ class Chart:
         self._t = (u - self.middle[:, None]) / self.half[:, None]
 
     def errors(self, terms: Terms, largest: Tensor) -> Tensor:
-        """Logarithms (K,) of what interpolation of each term may miss, at most.
+        """Return logarithms (K,) of bounds on the interpolation error of each term.
 
         Along an axis by 4 M rho^(1 - n) / (rho - 1), M the largest value on the ellipse of rho
         (Trefethen, Approximation Theory and Approximation Practice, 2013, theorem 8.2), times the
         Lebesgue constant of the other axis.
 
         Args:
-            largest: logarithms (K,) of each term in the tile.
+            terms: The terms.
+            largest: The largest logarithms (K,) of each term in the tile.
         """
         centers = self._turned(terms.centers)
         lebesgue = 1 + 2 / math.pi * math.log(NODES)
@@ -114,9 +118,9 @@ class Chart:
         return torch.maximum(worst + terms.peaks, largest + ROUNDING)
 
     def sum(self, terms: Terms, top: float, *, slope: bool) -> tuple[Tensor, Tensor | None]:
-        """The sum (N,) of terms at the tile's points, over exp(top), and its gradient (m, N) if asked.
+        """Return the sum (N,) of terms at the tile's points over exp(top), and its gradient (m, N).
 
-        The gradient is that of some continuation beyond the spheres.
+        The gradient, None unless `slope`, is that of some continuation beyond the spheres.
         """
         nodes = _nodes()
         sides = self.middle[:, None] + self.half[:, None] * nodes
@@ -137,7 +141,7 @@ class Chart:
         return values, self._in_features(torch.stack(rated) / self.half[:, None])
 
     def _in_features(self, slope: Tensor) -> Tensor:
-        """A gradient (D, N) in the coordinates as one in the features, (m, N)."""
+        """Return a gradient (D, N) in the coordinates as one in the features, (m, N)."""
         found: list[Tensor] = []
         parts = torch.split(slope, len(slope) // self.factors)
         for frame, local, part in zip(self._frame, self._local, parts, strict=True):
@@ -148,7 +152,7 @@ class Chart:
         return torch.stack(found, dim=1).flatten(0, 1)
 
     def _product(self, terms: Terms, top: float, sides: Tensor) -> Tensor:
-        """Values (n, n) at the nodes of terms that are products of functions of the two coordinates."""
+        """Return values (n, n) at the nodes of terms that are products over the two coordinates."""
         first, second = (
             _exponents(center, kappa, _sphere(side[None])).clamp_min_(-WIDE).exp_()
             for center, kappa, side in zip(
@@ -158,7 +162,7 @@ class Chart:
         return (first * (terms.peaks - top).exp()) @ second.mT
 
     def _dense(self, terms: Terms, top: float, sides: Tensor) -> Tensor:
-        """Values (n, n), or (n, 1) on a circle, at the nodes."""
+        """Return values (n, n), or (n, 1) on a circle, at the nodes."""
         grid = torch.stack(torch.meshgrid(*sides, indexing="ij")).flatten(1)
         local, found = _sphere(grid), 0.0
         block = max(1, BLOCK_ENTRIES // local.shape[1])
@@ -176,21 +180,22 @@ class Chart:
         return found.reshape(NODES, -1)
 
     def _nearest2(self, terms: Terms, factor: int) -> Tensor:
-        """kappa times the squared distance (K,) of centers to the tile in one factor."""
+        """Return kappa times the squared distance (K,) of centers to the tile in one factor."""
         middle = self._tile.middle.reshape(-1, self.factors)[:, factor, None]
         centers = terms.centers.reshape(-1, self.factors, terms.size)[:, factor]
         away = ((centers - middle) ** 2).sum(dim=0).sqrt_().sub_(self._tile.radius[factor])
         return away.clamp_min_(0).square_().mul_(terms.kappa[factor])
 
     def _turned(self, features: Tensor) -> list[Tensor]:
-        """Features of each factor (s, N) in its frame: along the pole, then across."""
+        """Return features of each factor (s, N) in its frame: along the pole, then across."""
         split = features.reshape(-1, self.factors, features.shape[1]).unbind(dim=1)
         return [frame @ part for frame, part in zip(self._frame, split, strict=True)]
 
     def _ellipse(self, axis: int, rho: float, centers: Tensor) -> Tensor | None:
-        """Largest real part (K,) of cosines to centers (s, K): one coordinate runs along an ellipse.
+        """Return the largest real part (K,) of cosines to centers (s, K) along an ellipse.
 
-        The other one is real. None where the ellipse comes near the chart's poles.
+        One coordinate runs along the ellipse, the other one is real. None if the ellipse comes near the
+        poles of the chart.
         """
         if float(self.middle[axis].abs() + self.half[axis] * (rho + 1 / rho) / 2) > POLE:
             return None
@@ -205,14 +210,14 @@ class Chart:
 
 
 def _sphere(u: Tensor) -> Tensor:
-    """Unit vectors (D + 1, N) of stereographic coordinates (D, N), complex ones too."""
+    """Return unit vectors (D + 1, N) of stereographic coordinates (D, N), complex ones too."""
     square = (u * u).sum(dim=0, keepdim=True)
     return torch.cat([1 - square, 2 * u]) / (1 + square)
 
 
 @lru_cache(maxsize=len(ELLIPSES))
 def _ellipse(rho: float) -> Tensor:
-    """Half of an ellipse (T,) about -1 and 1, complex."""
+    """Return half of an ellipse (T,) about -1 and 1, complex."""
     with torch.inference_mode(False):
         angle = torch.linspace(0, math.pi, TURNS, dtype=torch.float64)
         turned = torch.polar(torch.full_like(angle, rho), angle)
@@ -220,7 +225,7 @@ def _ellipse(rho: float) -> Tensor:
 
 
 def _exponents(centers: Tensor, kappa: Tensor, local: Tensor) -> Tensor:
-    """(n, K): kappa (cos - 1) of unit vectors (s, K) and (s, n)."""
+    """Return kappa (cos - 1), (n, K), of unit vectors (s, K) and (s, n)."""
     # about the nodes' middle, see `Terms.log_sum`
     middle = local.mean(dim=1, keepdim=True)
     offset, near = centers - middle, local - middle
@@ -229,7 +234,7 @@ def _exponents(centers: Tensor, kappa: Tensor, local: Tensor) -> Tensor:
 
 
 def _frame(pole: Tensor) -> Tensor:
-    """(F, s, s): rows are the pole (s, F) of each factor and unit vectors across."""
+    """Return frames (F, s, s): rows are the pole (s, F) of each factor and unit vectors across."""
     if len(pole) == 2:
         x, y = pole
         return torch.stack([torch.stack([x, y], dim=1), torch.stack([-y, x], dim=1)], dim=1)
@@ -243,14 +248,14 @@ def _frame(pole: Tensor) -> Tensor:
 
 @lru_cache(maxsize=1)
 def _nodes() -> Tensor:
-    """Chebyshev points (n,) of [-1, 1]."""
+    """Return the Chebyshev points (n,) of [-1, 1]."""
     with torch.inference_mode(False):
         return torch.cos(math.pi * (torch.arange(NODES, dtype=torch.float64) + 0.5) / NODES)
 
 
 @lru_cache(maxsize=1)
 def _transform() -> Tensor:
-    """(n, n): Chebyshev coefficients from values at the nodes."""
+    """Return the matrix (n, n) that makes Chebyshev coefficients from values at the nodes."""
     angle = math.pi * (torch.arange(NODES, dtype=torch.float64) + 0.5) / NODES
     with torch.inference_mode(False):
         matrix = torch.cos(torch.arange(NODES, dtype=torch.float64)[:, None] * angle)
@@ -259,7 +264,7 @@ def _transform() -> Tensor:
 
 
 def _lagrange(t: Tensor, slope: bool) -> tuple[Tensor, Tensor | None]:
-    """(N, n): weights of the values at the nodes for the polynomial's values at t (N,), and slopes."""
+    """Return weights (N, n) of values at the nodes for a polynomial's values and slopes at t (N,)."""
     values, rates = [torch.ones_like(t), t], [torch.zeros_like(t), torch.ones_like(t)]
     for _ in range(NODES - 2):
         values.append(2 * t * values[-1] - values[-2])

@@ -1,4 +1,4 @@
-"""Sums of many kernels at many points: tile by tile, without what is too far to be felt."""
+"""Sums of many kernels at many points: tile by tile, without what is too far to count."""
 
 from __future__ import annotations
 
@@ -14,42 +14,47 @@ from orbiflow.density.models.terms import Terms
 from orbiflow.typed_torch import applied
 
 TOLERANCE = 1e-12
-"""Of a sum: what is left out, and what interpolation misses, at most."""
+"""The share of a sum that may be left out, and that interpolation may miss."""
 
 FEW_POINTS, FEW_PAIRS = 256, 200_000
-"""Tiles are not parted further with fewer points, or fewer points times terms."""
+"""Tiles with fewer points, or fewer points times terms, are not divided further."""
 
 WORTH_FLAT, WORTH_ROUND = 500, 2_000
-"""Points of a tile from which on smooth terms are interpolated."""
+"""The fewest points of a tile for which smooth terms are interpolated, flat and round."""
 
 WORTH_TERMS = 200
-"""And terms."""
+"""The fewest terms for which they are."""
 
 LESS, IDLE = 0.9, 3
-"""Tiles are parted so often in a row though more than that share of the terms stays."""
+"""A tile is divided at most `IDLE` times in a row while more than the share `LESS` of terms stays."""
 
 LEAST = 1e-290
-"""Interpolated sums relative to their largest value are no less."""
+"""The least interpolated sum, relative to the largest value."""
 
-HOPELESS = 60.0
-"""Concentration times squared radius from which on terms are never smooth across a tile."""
+SMOOTH_AT_MOST = 60.0
+"""Concentration times squared radius of a tile above which terms are never smooth across it."""
 
 
 def near_log_sum(
     terms: Terms, features: Tensor, floor: float = -math.inf, tolerance: float = TOLERANCE
 ) -> Tensor:
-    """Logarithm (N,) of the sum of terms at features (m, N), within twice `tolerance` and rounding.
+    """Return the logarithm (N,) of a sum of terms at features (m, N).
 
-    Points are parted into tiles. Terms whose largest values in a tile cannot be felt beside the least
+    It is exact within twice `tolerance` and rounding.
+
+    Points are divided into tiles. Terms whose largest values in a tile are negligible beside the least
     sum there are left out; those that are smooth across the tile are summed at few places and
     interpolated; the rest is summed point by point, once tiles are small.
 
     Args:
-        floor: logarithm of what is added to the sum elsewhere: errors may be as large relative to
-            both. Not in the result.
+        terms: The terms.
+        features: The features.
+        floor: Logarithm of what the caller adds to the sum, to which errors are relative as well. It is
+            not in the result.
+        tolerance: The relative error that is allowed.
 
     Differentiable in the features: the gradient in closed form, as fast as the sum; higher
-    derivatives by autograd through the terms that can be felt.
+    derivatives by autograd through the terms that count.
     """
     if not (features.requires_grad and torch.is_grad_enabled()):
         return _Walk(features, terms, floor, tolerance).done()
@@ -79,9 +84,9 @@ class _NearLogSum(torch.autograd.Function):
 
 
 class _Part(NamedTuple):
-    """Points by their numbers (N,), their features (m, N), the terms that may be felt there.
+    """Points by their numbers (N,), their features (m, N), and the terms that count there.
 
-    - `idle`: how often in a row nothing was left out.
+    - `idle`: How often in a row nothing was left out.
     """
 
     numbers: np.ndarray
@@ -91,7 +96,7 @@ class _Part(NamedTuple):
 
 
 class _Walk:
-    """Sums as they grow, and their gradients in the features if asked."""
+    """Sums as they grow, and their gradients in the features if they are wanted."""
 
     def __init__(
         self,
@@ -114,7 +119,7 @@ class _Walk:
         self.sums: list[Tensor] = []
 
     def done(self) -> Tensor:
-        """Logarithms (N,) of the sums."""
+        """Return the logarithms (N,) of the sums."""
         stack = [_Part(np.arange(len(self.log_sum)), self.features.detach(), self.terms, 0)]
         while stack and len(self.log_sum):
             stack += self.step(stack.pop())
@@ -165,11 +170,11 @@ class _Walk:
     def _interpolated(
         self, part: _Part, tile: Tile, least: Tensor, largest: Tensor, bottom: float
     ) -> Terms:
-        """Adds terms that are smooth across the tile to the sums; returns the others."""
+        """Add terms that are smooth across the tile to the sums, and return the others."""
         terms = part.terms
         if len(part.numbers) < self.worth or terms.size < WORTH_TERMS or not tile.has_chart:
             return terms
-        wide = (terms.kappa * tile.radius[:, None] ** 2).amax(dim=0) < HOPELESS
+        wide = (terms.kappa * tile.radius[:, None] ** 2).amax(dim=0) < SMOOTH_AT_MOST
         if int(wide.sum()) < WORTH_TERMS:
             return terms
         chart = Chart(part.features, tile)
@@ -179,7 +184,7 @@ class _Walk:
             return terms
         top = float(largest[smooth].max())
         values, slope = chart.sum(terms.only(smooth), top, slope=self.slope is not None)
-        values.clamp_min_(LEAST)  # what cannot be felt beside others may come out below 0
+        values.clamp_min_(LEAST)  # what is negligible beside others may come out below 0
         if slope is not None:
             slope = slope / values
         self._add(torch.as_tensor(part.numbers), values.log() + top, slope)
@@ -187,14 +192,14 @@ class _Walk:
 
 
 def _worth(terms: Terms) -> float:
-    """Points of a tile from which on interpolation may pay."""
+    """Return the number of points of a tile from which on interpolation may pay."""
     if terms.factors > 1:
         return WORTH_FLAT if terms.factors == 2 else math.inf
     return WORTH_ROUND if len(terms.centers) > 2 else WORTH_FLAT
 
 
 def _halves(features: Tensor, tile: Tile) -> tuple[np.ndarray, np.ndarray]:
-    """Numbers of the points in both halves, across the tile's longest side."""
+    """Return the numbers of the points in both halves, across the tile's longest side."""
     along = features[int(tile.sides.argmax())].numpy()
     order = np.argpartition(along, len(along) // 2)
     return order[: len(along) // 2], order[len(along) // 2 :]

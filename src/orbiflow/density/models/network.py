@@ -26,17 +26,17 @@ DRAWS = 4096
 """Quasi-random draws of the hidden angles."""
 
 AT_ONCE = 2**17
-"""Points times draws that are worked on at a time."""
+"""Points times draws worked on at a time."""
 
 ROWS, ENTRIES = 256, 2**18
 """Rows of angles, and terms of a sum, at a time: few enough for the cache."""
 
 
 class Factor(NamedTuple):
-    """An angle given others, its parents: a mixture of all of them over its marginal of the parents.
+    """An angle given others, its parents: a mixture over all of them, divided by that of the parents.
 
-    - `axes`: numbers of the parents, and of the angle, last.
-    - `chains`: on the torus of those, in this order.
+    - `axes`: The numbers of the parents, and of the angle, last.
+    - `chains`: The mixture, on the torus of those angles, in this order.
     """
 
     axes: tuple[int, ...]
@@ -52,8 +52,8 @@ class VonMisesNetwork(Density, kind="network"):
     1. So the product is exact and normalised.
 
     Args:
-        space: a `Torus`.
-        factors: one for each angle, parents before their children.
+        space: A `Torus`.
+        factors: One for each angle, parents before their children.
 
     Raises:
         OrbiflowError: for another space, angles without a factor or with two, or parents after a child.
@@ -209,18 +209,18 @@ class VonMisesNetwork(Density, kind="network"):
 
 
 def log_conditional(chains: VonMisesChains, points: Tensor) -> Tensor:
-    """Log density (N,) of the last angle given those before it, at points (N, d) of all."""
+    """Return log densities (N,) of the last angle given those before it, at points (N, d) of all."""
     before, own = _terms(chains, points)
     return log_sum_exp((before + own).flatten(1)) - log_sum_exp(before.flatten(1))
 
 
 def log_of_parents(chains: VonMisesChains, points: Tensor) -> Tensor:
-    """Log (N, L, K) of the density of all but the last angle, and of being that scale and component."""
+    """Return log densities (N, L, K) of all but the last angle, for each scale and component."""
     return _terms(chains, points)[0]
 
 
 def _terms(chains: VonMisesChains, points: Tensor) -> tuple[Tensor, Tensor]:
-    """Logs (N, L, K): of weight times the parents' density, and of the last angle's given them."""
+    """Return logs (N, L, K) of weight times parents' density, and of the last angle given them."""
     kappa = chains.concentrations.to(points)
     scale = points.new_tensor(SCALES)[:, None]
     fit = (chains.residuals(points).cos() - 1) * kappa
@@ -231,16 +231,16 @@ def _terms(chains: VonMisesChains, points: Tensor) -> tuple[Tensor, Tensor]:
 
 
 def _drawn(chains: VonMisesChains, angle: Tensor, generator: torch.Generator) -> Tensor:
-    """A component and scale (N,) for each row, K * len(SCALES) + L, given the parents in it."""
+    """Draw a component and scale (N,) for each row, K * len(SCALES) + L, given the parents in it."""
     shares = shares_of(log_of_parents(chains, angle / (2 * math.pi)).mT.flatten(1))
     return torch.multinomial(shares, 1, generator=generator)[:, 0]
 
 
 def averaged_networks(networks: Sequence[VonMisesNetwork]) -> VonMisesNetwork:
-    """Of networks with the same arrows: that whose factors' mixtures are the means of theirs.
+    """Return the network whose factors are the means of those of networks with the same arrows.
 
     Raises:
-        OrbiflowError: for other arrows.
+        OrbiflowError: if the arrows differ.
     """
     first = networks[0]
     if len({tuple(axes for axes, _ in one.factors) for one in networks}) > 1:
@@ -272,7 +272,7 @@ class _Mixture:
         return cls(logs, means, kappa)
 
     def log_prob(self, angle: Tensor) -> Tensor:
-        """(N, Q) at angles (N, 1) in turns; equal ones are worked on once."""
+        """Return log densities (N, Q) at angles (N, 1) in turns; equal ones are evaluated once."""
         own, place = unique(angle[:, 0], return_inverse=True)
         rows = torch.split(2 * math.pi * own[:, None, None], max(1, ENTRIES // self.logs.numel()))
         found = [
@@ -315,7 +315,7 @@ class _Once:
         return cls(left, at, total, mixtures)
 
     def weighted(self, points: dict[int, Tensor], even: dict[int, Tensor]) -> Tensor:
-        """Log density of what is seen, given what is drawn: (N, Q), or what broadcasts to it."""
+        """Return log densities of the observed angles given the draws, which broadcast to (N, Q)."""
         at, total = {**self.at, **points}, self.total
         for axes, chains in self.factors:
             axis = axes[-1]
@@ -331,7 +331,7 @@ class _Once:
 def _along(
     function: Callable[[Tensor], Tensor], axes: tuple[int, ...], at: dict[int, Tensor]
 ) -> Tensor:
-    """A function of points (R, len(axes)), at angles whose shapes broadcast: in their common one."""
+    """Return a function of points (R, len(axes)) at angles whose shapes broadcast, in their shape."""
     own = broadcast(*[at[axis] for axis in axes])
     rows = torch.stack(own, dim=-1).flatten(0, 1)
     value = torch.cat([function(block) for block in torch.split(rows, ROWS)])
@@ -341,7 +341,7 @@ def _along(
 def _drawn_at(
     chains: VonMisesChains, axes: tuple[int, ...], at: dict[int, Tensor], even: Tensor
 ) -> Tensor:
-    """The last of the angles, (N, Q) or (1, Q), given its parents, at probabilities (Q, 2)."""
+    """Draw the last angle, (N, Q) or (1, Q), given its parents, by probabilities (Q, 2)."""
     around = {**at, axes[-1]: even.new_zeros(1, 1)}
     shares = _along(lambda p: shares_of(log_of_parents(chains, p).mT.flatten(1)), axes, around)
     rows = len(shares)

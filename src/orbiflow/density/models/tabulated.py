@@ -1,4 +1,4 @@
-"""A density read off a table: evaluation a hundred times faster, with its error stated."""
+"""A density read off a table: a hundred times faster, with a stated error."""
 
 from __future__ import annotations
 
@@ -14,13 +14,9 @@ from orbiflow.density.arguments import (
     check_range,
     points_tensor,
 )
-from orbiflow.density.models.density import (
-    Density,
-    destination,
-    log_area_factor,
-    midpoints,
-    moved,
-)
+from orbiflow.density.models.density import Density, log_area_factor
+from orbiflow.density.models.devices import destination, moved
+from orbiflow.density.models.evaluation import midpoints
 from orbiflow.density.models.kernels import AdaptiveKernels
 from orbiflow.density.spaces import CHART, rectangle
 from orbiflow.errors import OrbiflowError
@@ -40,10 +36,10 @@ BLOCK = 16384
 
 
 CELLS = 4.0
-"""Deviations, in cells of the table, of the narrowest kernels that it can follow."""
+"""Deviation, in cells of the table, of the narrowest kernels that it can follow."""
 
 LOOSE = 1e-7
-"""Of the density, what is left out of the sum of narrower ones, at most."""
+"""The share of the density that may be left out of the sum of narrower kernels."""
 
 
 class TabulatedDensity:
@@ -54,13 +50,13 @@ class TabulatedDensity:
     to rounding, only to `error`.
 
     Args:
-        density: in two dimensions, on a rectangular lattice.
-        resolution: grid points along a side of the square.
-        seed: of the points of comparison.
+        density: A density in two dimensions, on a rectangular lattice.
+        resolution: Grid points along a side of the square.
+        seed: Seed of the points at which the table is compared with the density.
 
     Attributes:
-        error: the root mean square difference of log densities at samples of the density, in nats.
-        largest: the largest at those samples and as many uniform points.
+        error: The root mean square difference of log densities at samples of the density, in nats.
+        largest: The largest difference at those samples and as many uniform points.
 
     Raises:
         OrbiflowError: for another dimension or a resolution out of range.
@@ -123,7 +119,7 @@ class TabulatedDensity:
         return fft.ifft2(spectrum).real.contiguous()
 
     def to(self, device: torch.device | str) -> TabulatedDensity:
-        """A copy on a device; it stays in float64."""
+        """Return a copy on a device; it stays in float64."""
         new, (to, _) = copy.copy(self), destination(device)
         for name, value in vars(self).items():
             setattr(new, name, moved(value, to))
@@ -131,7 +127,7 @@ class TabulatedDensity:
 
     @one_thread()
     def log_prob(self, points: Tensor, *, measure: str = CHART) -> Tensor:
-        """Log densities (...,) at chart points (..., 2), interpolated; see `error`.
+        """Return interpolated log densities (...,) at chart points (..., 2); see `error`.
 
         Differentiable once in the points.
 
@@ -162,7 +158,7 @@ class TabulatedDensity:
 
 
 def _wide(kernels: AdaptiveKernels, resolution: int) -> Tensor:
-    """Which kernels (N,) a table of this resolution can follow along both axes."""
+    """Return which kernels (N,) a table of this resolution can follow along both axes."""
     space = kernels.space
     if space.is_round:  # the chart is conformal
         scale = (space.log_area(kernels.centers) / 2).exp()[:, None]

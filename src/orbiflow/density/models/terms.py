@@ -13,20 +13,20 @@ import torch
 from torch import Tensor
 
 FAINT = -80.0
-"""Logarithm, less the largest, of terms that no sum in double precision can feel."""
+"""Logarithm, relative to the largest, of terms that no sum in double precision can feel."""
 
 
 def log_sum_exp(table: Tensor) -> Tensor:
-    """`torch.logsumexp` over the last dimension, ten times as fast where most terms are faint.
+    """Return `torch.logsumexp` over the last dimension, ten times as fast if most terms are faint.
 
     Exponentials that underflow take a slow path of the processor. Each is raised to `FAINT` instead,
     which changes nothing: the largest term counts 1.
 
     Args:
-        table: (..., n), n > 0.
+        table: Logarithms (..., n), n > 0.
 
     Returns:
-        (...). Where all terms are 0 the lowest number of the dtype, not -inf.
+        Logarithms (...). Where all terms are 0, the lowest number of the dtype rather than -inf.
 
     >>> log_sum_exp(torch.tensor([[0.0, 0.0], [-1e9, 3.0]]))
     tensor([0.6931, 3.0000])
@@ -36,26 +36,26 @@ def log_sum_exp(table: Tensor) -> Tensor:
 
 
 def shares_of(table: Tensor) -> Tensor:
-    """`torch.softmax` over the last dimension, of logarithms (..., n); none is below e^-80 / n."""
+    """Return `torch.softmax` of logarithms (..., n) over the last dimension, none below e^-80 / n."""
     terms, _ = _terms(table)
     return terms / terms.sum(dim=-1, keepdim=True)
 
 
 def _terms(table: Tensor) -> tuple[Tensor, Tensor]:
-    """Exponentials (..., n) relative to the largest, and its logarithm (..., 1)."""
+    """Return exponentials (..., n) relative to the largest, and its logarithm (..., 1)."""
     top = table.amax(dim=-1, keepdim=True).clamp_min(torch.finfo(table.dtype).min)
     # in place: at this size, fresh memory costs more than the arithmetic
     return (table - top).clamp_min_(FAINT).exp_(), top
 
 
 WIDE = 600.0
-"""Logarithm of the ratios that exponentials bear without help."""
+"""Logarithm of the largest ratio that exponentials can hold without rescaling."""
 
 PLAIN_ENTRIES = 2**24
-"""The same for processors that do nothing but arithmetic."""
+"""The same where arithmetic is cheap and memory is not."""
 
 BLOCK_ENTRIES = 250_000
-"""Of the table of points against terms worked on at a time: few enough for the cache."""
+"""Entries of the table of points against terms worked on at a time: few enough for the cache."""
 
 
 class Terms(NamedTuple):
@@ -79,21 +79,22 @@ class Terms(NamedTuple):
         return len(self.kappa)
 
     def to(self, device: torch.device) -> Terms:
-        """The same on a device."""
+        """Return the same terms on a device."""
         return Terms(*(t.to(device) for t in self))
 
     def only(self, which: Tensor) -> Terms:
-        """Those of a mask (K,)."""
+        """Return the terms of a mask (K,)."""
         at = which.nonzero()[:, 0]
         return Terms(*(t.index_select(-1, at) for t in self))
 
     def log_sum(self, features: Tensor, middle: Tensor, spread: float) -> Tensor:
-        """Logarithm (N,) of the sum at features (m, N), differentiable.
+        """Return the logarithm (N,) of the sum at features (m, N), differentiable.
 
         Args:
-            middle: (m,) near the features. About it little cancels: at a concentration of 1e7 the
+            features: The features.
+            middle: Features (m,) near them. About it little cancels: at a concentration of 1e7 the
                 cosine of the whole angle would lose half of all digits.
-            spread: logarithm of the ratio of the largest peak to the least sum.
+            spread: Logarithm of the ratio of the largest peak to the least sum.
         """
         rows, bias = self._about(middle[:, None])
         top = float(self.peaks.max())
@@ -113,7 +114,7 @@ class Terms(NamedTuple):
     def log_sum_and_slope(
         self, features: Tensor, middle: Tensor, spread: float
     ) -> tuple[Tensor, Tensor]:
-        """As `log_sum`, and its gradient (m, N) in the features; not differentiable."""
+        """Return what `log_sum` does, and its gradient (m, N) in the features; not differentiable."""
         rows, bias = self._about(middle[:, None])
         bias = bias - self.peaks.max()
         offset = features - middle[:, None]
@@ -132,9 +133,9 @@ class Terms(NamedTuple):
         return torch.cat(values) + self.peaks.max(), linear + 2 * repeated * offset
 
     def plain_log_sum(self, features: Tensor) -> Tensor:
-        """Logarithm (N,) of the sum at features (m, N), term by term; differentiable.
+        """Return the logarithm (N,) of the sum at features (m, N), term by term; differentiable.
 
-        Nothing cancels, nothing is looked at in between: for devices where arithmetic is all but free.
+        Nothing cancels and no result is needed in between: for devices where arithmetic is cheap.
         """
         block = max(1, PLAIN_ENTRIES // self.size)
         return torch.cat([self._plain(part) for part in torch.split(features, block, dim=1)])
@@ -146,7 +147,7 @@ class Terms(NamedTuple):
         return table.logsumexp(dim=1)
 
     def _about(self, middle: Tensor) -> tuple[Tensor, Tensor]:
-        """Rows (m + F, K) and bias (K,): exponents are linear in offsets and their squares."""
+        """Return rows (m + F, K) and bias (K,): exponents are linear in offsets and their squares."""
         offset, half = self.centers - middle, self.kappa / 2
         bias = self.peaks - (half * lengths2(offset, self.factors)).sum(dim=0)
         repeated = self.kappa.repeat(len(middle) // self.factors, 1)
@@ -154,5 +155,5 @@ class Terms(NamedTuple):
 
 
 def lengths2(offset: Tensor, factors: int) -> Tensor:
-    """Squares (F, N) of the lengths of vectors (m, N) in each factor."""
+    """Return squares (F, N) of the lengths of vectors (m, N) in each factor."""
     return (offset**2).reshape(-1, factors, offset.shape[1]).sum(dim=0)

@@ -31,10 +31,11 @@ class UniformDensity(Density, kind="uniform"):
 
     def log_density(self, points: Tensor, beside: float = -math.inf) -> Tensor:
         del beside
-        return points.new_full((), self.log_floor).expand(points.shape[:-1])
+        return self.log_floor + 0 * points[..., 0]  # which has gradients
 
     def log_chart(self, points: Tensor) -> Tensor:
-        return self.space.log_area(points) - math.log(self.space.volume)
+        values = self.log_density(points)
+        return self.space.log_area(points) + values if self.space.is_round else values
 
     def draw(self, count: int, generator: torch.Generator) -> Tensor:
         return self.space.uniform(count, generator)
