@@ -292,9 +292,7 @@ class Density(Distribution):
         device, dtype = destination(*wanted)
         new = copy.copy(self)
         for name, value in vars(self).items():
-            is_density = isinstance(value, Density)
-            own = value.to(device, dtype) if is_density else moved(value, device, dtype)
-            setattr(new, name, own)
+            setattr(new, name, moved(value, device, dtype))
         if dtype is not None:
             new._dtype = dtype
         return new
