@@ -39,6 +39,8 @@ from .inference.derived import log_prob_observed as log_prob_observed
 from .inference.derived import marginal as marginal
 from .models.chains import VonMisesChains as VonMisesChains
 from .models.density import Density as Density
+from .models.evaluation import CHECKED as CHECKED
+from .models.evaluation import TabulatedDensity as TabulatedDensity
 from .models.evaluation import kl_by_quadrature as kl_by_quadrature
 from .models.evaluation import log_density_gradient as log_density_gradient
 from .models.evaluation import midpoints as midpoints
@@ -49,8 +51,6 @@ from .models.kernels import AdaptiveKernels as AdaptiveKernels
 from .models.mixture import Mixture as Mixture
 from .models.network import Factor as Factor
 from .models.network import VonMisesNetwork as VonMisesNetwork
-from .models.tabulated import CHECKED as CHECKED
-from .models.tabulated import TabulatedDensity as TabulatedDensity
 from .models.uniform import UniformDensity as UniformDensity
 from .models.uniform import VonMisesDensity as VonMisesDensity
 from .pictures.axes import space_title as space_title

@@ -14,10 +14,10 @@ from orbiflow.density.arguments import (
     check_kind,
     silent,
 )
-from orbiflow.density.fitting.assembly import assembled
 from orbiflow.density.fitting.budget import Budget, training
 from orbiflow.density.fitting.evidence import (
     Candidates,
+    assembled,
     candidates_of,
     judged,
     without_idle,

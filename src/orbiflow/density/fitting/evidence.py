@@ -1,4 +1,4 @@
-"""What held-out rows say of families of densities: weights and gains."""
+"""What held-out rows say of families of densities, and the mixture that they choose."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from orbiflow.density.fitting.weights import (
     stacked,
     stacking_weights,
 )
-from orbiflow.density.models import Density, UniformDensity
+from orbiflow.density.models import Density, Mixture, UniformDensity, mixture_of
 from orbiflow.density.spaces import Space
 from orbiflow.typed_torch import listed
 
@@ -162,3 +162,44 @@ def judged(candidates: Candidates, weights: Tensor) -> list[ComponentEvidence]:
         above = mean_of(alone - uniform, own_weights)
         found.append(ComponentEvidence(name, share, above, gain.nats, gain.error, table.shape[1]))
     return found
+
+
+def assembled(
+    space: Space,
+    families: list[Family[Any]],
+    candidates: Candidates,
+    weights: Tensor,
+    rows: Rows,
+    flow: Density | None,
+    share: float,
+) -> Mixture:
+    """Return the candidates in proportions (P,), made final with all rows, beside a flow.
+
+    Args:
+        space: The space of all.
+        families: The families that the candidates belong to.
+        candidates: The candidates.
+        weights: Their proportions.
+        rows: All rows.
+        flow: A flow's density; None for none.
+        share: The weight of the flow.
+    """
+    found: list[tuple[float, Density]] = []
+    for family in families:
+        chosen = [
+            (name, float(weight))
+            for own, name, weight in zip(
+                candidates.families, candidates.names, weights, strict=True
+            )
+            if own == family.name and weight > 0
+        ]
+        final = family.final(rows, candidates.fitted[family.name], [name for name, _ in chosen])
+        found += [(weight, part) for (_, weight), part in zip(chosen, final, strict=True)]
+    floor = float(weights[candidates.floor].sum())
+    # the order of components is that in which samples are drawn: kernels before the floor
+    found.sort(key=lambda part: part[1].kernel_part is None)
+    kernels = sum(part.kernel_part is not None for _, part in found)
+    found.insert(kernels, (floor, UniformDensity(space)))
+    total = sum(weight for weight, _ in found)
+    others = [((1 - share) * weight / total, part) for weight, part in found]
+    return mixture_of(others if flow is None else [(share, flow), *others])

@@ -51,7 +51,7 @@ def marginal(density: Density, axes: Iterable[int] | int) -> Mixture:
     >>> from orbiflow.density import DensityEstimator
     >>> import numpy as np
     >>> rng = np.random.default_rng(0)
-    >>> fit = DensityEstimator("torus", parts="kernels").fit(rng.vonmises(0, 4, (60, 2)))
+    >>> fit = DensityEstimator("torus", components="kernels").fit(rng.vonmises(0, 4, (60, 2)))
     >>> marginal(fit.density_, [0]).space
     Torus(dim=1, unit='radians')
     """

@@ -6,6 +6,8 @@ from .chains import chained as chained
 from .density import Density as Density
 from .density import Restriction as Restriction
 from .density import Split as Split
+from .evaluation import CHECKED as CHECKED
+from .evaluation import TabulatedDensity as TabulatedDensity
 from .evaluation import kl_by_quadrature as kl_by_quadrature
 from .evaluation import log_density_gradient as log_density_gradient
 from .evaluation import midpoints as midpoints
@@ -23,8 +25,6 @@ from .network import VonMisesNetwork as VonMisesNetwork
 from .network import averaged_networks as averaged_networks
 from .network import log_conditional as log_conditional
 from .network import log_of_parents as log_of_parents
-from .tabulated import CHECKED as CHECKED
-from .tabulated import TabulatedDensity as TabulatedDensity
 from .terms import FAINT as FAINT
 from .terms import log_sum_exp as log_sum_exp
 from .terms import shares_of as shares_of

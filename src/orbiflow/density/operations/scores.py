@@ -16,9 +16,8 @@ from torch import Tensor
 from orbiflow.arrays import Array
 from orbiflow.density.comparing import scores_of
 from orbiflow.density.fitting import mean_of, weighed
-from orbiflow.density.gradients import log_density_gradient
 from orbiflow.density.inference import chart_of_observed, log_prob_observed
-from orbiflow.density.models import CHECKED, Density, TabulatedDensity
+from orbiflow.density.models import CHECKED, Density, TabulatedDensity, log_density_gradient
 from orbiflow.density.regions import DensityLevels, resolvable_masses, samples_for
 from orbiflow.density.tables import TableRows
 from orbiflow.runtime import Cancel, Progress, Sink

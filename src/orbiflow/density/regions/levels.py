@@ -194,7 +194,7 @@ def highest_density_region(
 
     >>> rng = np.random.default_rng(0)
     >>> angles = rng.vonmises([0.0, 1.0], 4.0, (200, 2))
-    >>> fitted = DensityEstimator("torus", parts="kernels").fit(angles)
+    >>> fitted = DensityEstimator("torus", components="kernels").fit(angles)
     >>> region = highest_density_region(fitted, 0.5)
     >>> region.contains([[0.0, 1.0], [3.0, -2.0]]).tolist()
     [True, False]
