@@ -37,7 +37,7 @@ from orbiflow.tiles import (
     OccupancySearch,
     OverlapSearch,
     Pins,
-    Settings,
+    SearchMethod,
     Target,
     figure_files,
     fill_run,
@@ -160,7 +160,7 @@ def _class_names(classes: tuple[str, ...] | None) -> list[str]:
     return list(dict.fromkeys(isohedral_class(name).name for name in classes))
 
 
-def _settings(request: EscherizeRequest) -> Settings:
+def _settings(request: EscherizeRequest) -> SearchMethod:
     asked = given(request, ("max_frequency", "turns", "iterations"))
     if request.method == "occupancy":
         return OccupancySearch(seed=request.seed, **asked)

@@ -30,7 +30,7 @@ from orbiflow.tiles.result_file import RESULT, folder_names
 from orbiflow.tiles.search import (
     ClassFailure,
     LikenessSearch,
-    Settings,
+    SearchMethod,
     report,
 )
 from orbiflow.tiles.silhouette import Target
@@ -145,7 +145,7 @@ def write_run(
     results: Sequence[EscherTile],
     target: Target,
     out: str | Path,
-    settings: Settings | None = None,
+    settings: SearchMethod | None = None,
     *,
     failures: Sequence[ClassFailure] = (),
     figures: bool = False,
