@@ -23,7 +23,7 @@ from orbiflow.tiles import (
     EscherTile,
     OverlapSearch,
     Target,
-    escherize,
+    search_classes,
 )
 
 DISTORTED = {"octpus_94": "octpus", "penguin_60": "penguin2", "squirrel1_60": "squirrel"}
@@ -40,7 +40,7 @@ def target_of(name: str, distorted: bool) -> Target:
 def search(target: Target, effort: str, seed: int) -> tuple[list[EscherTile], float]:
     """Certified tiles of all classes, largest IoU first, and the seconds that they took."""
     begin = time.perf_counter()
-    results, failures = escherize(
+    results, failures = search_classes(
         target,
         CLASSES,
         OverlapSearch.for_effort(effort, seed=seed),

@@ -20,7 +20,7 @@ from orbiflow.tiles import (
     EscherTile,
     OccupancySearch,
     Target,
-    escherize,
+    search_classes,
 )
 
 IMAGES = [
@@ -53,7 +53,7 @@ def main() -> None:
     for image in images:
         target = Target.read(image)
         begin = time.perf_counter()
-        results, failures = escherize(target, CLASSES, settings, workers=options.workers)
+        results, failures = search_classes(target, CLASSES, settings, workers=options.workers)
         seconds = time.perf_counter() - begin
         print(f"\n{image.name}: {settings.iterations} iterations, {seconds:.0f} s wall")
         print(head + "  core s")

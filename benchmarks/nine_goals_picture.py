@@ -28,7 +28,7 @@ from orbiflow.tiles import (
     EscherTile,
     OverlapSearch,
     Target,
-    escherize,
+    search_classes,
 )
 
 BEST = {
@@ -56,7 +56,7 @@ def fitted(file: str, effort: str, seed: int) -> Found:
     name, isohedral = BEST[file]
     target = goal(file)
     settings = OverlapSearch.for_effort(effort, seed=seed)
-    results, failures = escherize(target, [isohedral], settings)
+    results, failures = search_classes(target, [isohedral], settings)
     assert not failures, failures
     assert results[0].certificate.valid
     return name, target, results[0]

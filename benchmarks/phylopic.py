@@ -21,8 +21,8 @@ from orbiflow.tiles import (
     EscherTile,
     OverlapSearch,
     Target,
-    escherize,
     overlay_png,
+    search_classes,
     tiling_png,
 )
 
@@ -66,7 +66,7 @@ def main() -> None:
     for path in files:
         target = Target.read(path)
         begin = time.perf_counter()
-        results, failures = escherize(target, CLASSES, settings, workers=os.cpu_count() or 1)
+        results, failures = search_classes(target, CLASSES, settings, workers=os.cpu_count() or 1)
         seconds = time.perf_counter() - begin
         best = results[0]
         found.append((path.stem, target, best))

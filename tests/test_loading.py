@@ -96,7 +96,7 @@ def test_a_run_and_its_tiles(folders: Path, tmp_path: Path) -> None:
     moved = tile.bending.forward(tile.frame.to_normal([[90.0, 100.0]]))
     assert moved.shape == (1, 2)
     assert found.best.tile.group.order > 1
-    export(found.best, tmp_path / "cut.svg", ExportSettings.preset("laser", tile_size=40))
+    export(found.best, tmp_path / "cut.svg", ExportSettings(purpose="laser", tile_size=40))
     assert (tmp_path / "cut.svg").stat().st_size > 500
     with pytest.raises(OrbiflowError, match="holds no tile 'IH1'; there are IH"):
         _ = found["IH1"]

@@ -1,8 +1,11 @@
 """The operations of orbiflow by name, and where each is: "module:function"."""
 
 OPERATIONS = {
-    "escherize": "orbiflow.derived.tiles:escherize",
-    "export": "orbiflow.derived.tiles:export",
+    "escherize": "orbiflow.tiles.operations:escherize",
+    "export": "orbiflow.tiles.operations:export",
+    "art": "orbiflow.tiles.operations:art",
+    "animate": "orbiflow.tiles.operations:animate",
+    "classes": "orbiflow.tiles.operations:classes",
     "density fit": "orbiflow.derived.density:fit",
 }
 

@@ -13,13 +13,13 @@ from typing import get_type_hints
 
 import numpy as np
 import pytest
+from orbiflow.cli.escherize import escherize
 from PIL import Image
 
 from jobs.batches import rows, write_boot
 from jobs.searches import ENDLESS
 from orbiflow.cli.batch import batch
 from orbiflow.cli.density_batch import batch as density_batch
-from orbiflow.cli.escherize import escherize
 from orbiflow.jobs import BatchRequest
 
 QUICK = [

@@ -9,14 +9,10 @@ import typer
 from rich.markup import escape
 
 from orbiflow import __version__
-from orbiflow.cli.animate import animate
-from orbiflow.cli.art import art
+from orbiflow.cli import commands
 from orbiflow.cli.batch import batch
-from orbiflow.cli.classes import classes
 from orbiflow.cli.console import errors
 from orbiflow.cli.density import density
-from orbiflow.cli.escherize import escherize
-from orbiflow.cli.export import export
 from orbiflow.errors import OrbiflowError
 from orbiflow.jobs import RecordError
 
@@ -31,12 +27,7 @@ app = typer.Typer(
     rich_markup_mode="rich",
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-app.command()(escherize)
 app.command()(batch)
-app.command()(export)
-app.command()(art)
-app.command()(animate)
-app.command()(classes)
 app.add_typer(density)
 
 
@@ -54,17 +45,15 @@ def _global(
 
 def _option(field: str) -> str:
     """What a field of a request is called here."""
-    return {
-        "count": "-n",
-        "purpose": "--for",
-        "eyes": "--eye",
-        "animation": "--kind",
-        "models": "--model",
-    }.get(field, "--" + field.replace("_", "-"))
+    return {"count": "-n", "models": "--model"}.get(field, "--" + field.replace("_", "-"))
 
 
 def main() -> None:
     """Run the command line: exit status 0, 1 (no tile found), 2 (a user's mistake) or 130 (Ctrl-C)."""
+    if not sys.argv[2:] and sys.argv[1:2] in ([], ["--help"], ["-h"]):
+        commands.main()
+    if sys.argv[1:2] in ([name] for name in ("escherize", "export", "art", "animate", "classes")):
+        commands.main()
     try:
         app()
     except OrbiflowError as error:

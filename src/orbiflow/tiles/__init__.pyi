@@ -13,7 +13,6 @@ from .exporting.scene import Layer as Layer
 from .exporting.scene import Scene as Scene
 from .exporting.scene import Style as Style
 from .exporting.scene import Uses as Uses
-from .exporting.settings import FORMATS as FORMATS
 from .exporting.settings import ExportSettings as ExportSettings
 from .exporting.svg import tile_svg as tile_svg
 from .exporting.svg import tiling_svg as tiling_svg
@@ -66,14 +65,13 @@ from .likeness.thinnest import hair_share as hair_share
 from .likeness.thinnest import narrowest_neck as narrowest_neck
 from .likeness.thinnest import narrowest_slit as narrowest_slit
 from .likeness.thinnest import slit_share as slit_share
-from .motion.animations import AnimationSettings as AnimationSettings
 from .motion.animations import animate as animate
 from .motion.animations import animation as animation
+from .motion.settings import AnimationSettings as AnimationSettings
 from .pages.index import index_page as index_page
 from .pages.overview import is_poor as is_poor
 from .pages.overview import overview_png as overview_png
 from .pages.run_folder import OVERVIEW as OVERVIEW
-from .pages.run_folder import fill_run as fill_run
 from .pages.run_folder import write_gallery as write_gallery
 from .pages.run_folder import write_run as write_run
 from .pages.run_folder import written_files as written_files
@@ -103,6 +101,10 @@ from .search.candidates import Fit as Fit
 from .search.certifying import ClassFailure as ClassFailure
 from .search.certifying import certified_tiles as certified_tiles
 from .search.descent_fit import fit_descent as fit_descent
+from .search.escherize_settings import EscherizeSettings as EscherizeSettings
+from .search.escherize_settings import SearchSettings as SearchSettings
+from .search.escherizing import SearchResult as SearchResult
+from .search.escherizing import escherize as escherize
 from .search.likeness_search import LikenessSearch as LikenessSearch
 from .search.method import SearchMethod as SearchMethod
 from .search.model import TileModel as TileModel
@@ -113,9 +115,9 @@ from .search.occupancy_search import OccupancySearch as OccupancySearch
 from .search.overlap_search import OverlapSearch as OverlapSearch
 from .search.reports import report as report
 from .search.searching import Event as Event
-from .search.searching import escherize as escherize
 from .search.searching import escherize_class as escherize_class
 from .search.searching import fit_tile as fit_tile
+from .search.searching import search_classes as search_classes
 from .search.storage import as_map as as_map
 from .search.storage import as_model as as_model
 from .search.storage import load_model as load_model

@@ -10,7 +10,7 @@ import pytest
 from orbiflow.errors import OrbiflowError
 from orbiflow.fields import FourierField
 from orbiflow.runtime import Cancel
-from orbiflow.tiles import CLASSES, EscherTile, Fit, Pins, Target, escherize, report
+from orbiflow.tiles import CLASSES, EscherTile, Fit, Pins, Target, report, search_classes
 from orbiflow.tiles.search import BothSearch, Goal, SearchMethod
 from orbiflow.tiles.search.candidates import WAVES, Progress, StillTiles
 from orbiflow.tiles.search.starts import template_starts
@@ -47,7 +47,7 @@ class TemplateSearch(SearchMethod):
 @pytest.mark.parametrize("workers", [1, 2])
 def test_a_method_of_one_s_own_is_searched_with(workers: int) -> None:
     method = TemplateSearch()
-    tiles, failures = escherize(BOOT, ["IH4", "IH6"], method, workers=workers)
+    tiles, failures = search_classes(BOOT, ["IH4", "IH6"], method, workers=workers)
     assert failures == []
     assert {tile.isohedral_class for tile in tiles} == {"IH4", "IH6"}
     assert all(isinstance(tile, EscherTile) and tile.certificate.valid for tile in tiles)
@@ -59,7 +59,7 @@ def test_a_method_of_one_s_own_is_searched_with(workers: int) -> None:
 def test_what_it_does_not_take_is_refused() -> None:
     pins = Pins.at(BOOT, [(0.2, 0.2)])
     with pytest.raises(OrbiflowError, match="pins"):
-        escherize(BOOT, "IH4", TemplateSearch(), pins=pins)
+        search_classes(BOOT, "IH4", TemplateSearch(), pins=pins)
     with pytest.raises(OrbiflowError, match="fits twice"):
         BothSearch().fit(Goal(BOOT), CLASSES["IH4"])
 

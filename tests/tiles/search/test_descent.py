@@ -20,11 +20,11 @@ from orbiflow.tiles import (
     as_map,
     as_model,
     certify,
-    escherize,
     escherize_class,
     fit_descent,
     iou,
     isohedral_class,
+    search_classes,
 )
 from orbiflow.tiles.likeness import boundary_iou
 from orbiflow.tiles.search.boundary import extract_tile
@@ -164,7 +164,7 @@ def test_the_same_seed_gives_the_same_tile() -> None:
 
 
 def test_several_tiles_of_a_class_are_not_twins() -> None:
-    results, failures = escherize(TARGET, ["IH4", "IH6"], QUICK, per_class=3)
+    results, failures = search_classes(TARGET, ["IH4", "IH6"], QUICK, per_class=3)
     assert not failures
     assert [r.score for r in results] == sorted((r.score for r in results), reverse=True)
     for name in ("IH4", "IH6"):
@@ -181,7 +181,9 @@ def test_a_first_tile_comes_at_once_and_survives_an_interrupt() -> None:
         if event.preview is None:
             cancel.cancel()
 
-    results, failures = escherize(TARGET, ["IH4", "IH6"], QUICK, watch=interrupt, cancel=cancel)
+    results, failures = search_classes(
+        TARGET, ["IH4", "IH6"], QUICK, watch=interrupt, cancel=cancel
+    )
     assert [r.name for r in results] == ["IH6"]
     assert results[0].certificate.valid
     assert {f.name for f in failures} == {"IH4", "IH6"}

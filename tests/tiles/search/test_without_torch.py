@@ -7,7 +7,7 @@ import sys
 
 SEARCH = """
 import sys
-from orbiflow.tiles import LikenessSearch, Target, escherize
+from orbiflow.tiles import LikenessSearch, Target, search_classes
 from orbiflow.tiles.search import searching
 
 boot = Target.from_polygon([[0, 0], [3, 0], [3.4, 1.2], [2.2, 1.5], [2, 2.8], [0.8, 2.5]])
@@ -21,7 +21,7 @@ def work_on(*arguments):
 
 searching._work_on = work_on
 if __name__ == "__main__":
-    tiles, failures = escherize(boot, ["IH4", "IH6"], few, workers=WORKERS)
+    tiles, failures = search_classes(boot, ["IH4", "IH6"], few, workers=WORKERS)
     assert len(tiles) == 2 and not failures, failures
     assert all(tile.certificate.valid for tile in tiles)
     tiles[0].save(sys.argv[1])

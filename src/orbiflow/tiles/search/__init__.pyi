@@ -3,6 +3,10 @@ from .candidates import Fit as Fit
 from .certifying import ClassFailure as ClassFailure
 from .certifying import certified_tiles as certified_tiles
 from .descent_fit import fit_descent as fit_descent
+from .escherize_settings import EscherizeSettings as EscherizeSettings
+from .escherize_settings import SearchSettings as SearchSettings
+from .escherizing import SearchResult as SearchResult
+from .escherizing import escherize as escherize
 from .likeness_search import LikenessSearch as LikenessSearch
 from .matching import matched as matched
 from .method import Goal as Goal
@@ -16,9 +20,9 @@ from .overlap_search import OverlapSearch as OverlapSearch
 from .own_frame import OwnFrame as OwnFrame
 from .reports import report as report
 from .searching import Event as Event
-from .searching import escherize as escherize
 from .searching import escherize_class as escherize_class
 from .searching import fit_tile as fit_tile
+from .searching import search_classes as search_classes
 from .storage import as_map as as_map
 from .storage import as_model as as_model
 from .storage import load_model as load_model

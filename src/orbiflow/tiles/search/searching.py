@@ -54,7 +54,7 @@ Outcome = EscherTile | ClassFailure
 
 @dataclass(frozen=True)
 class Event:
-    """News from a search, told in the thread that called `escherize`, in this order:
+    """News from a search, told in the thread that called `search_classes`, in this order:
 
     1. at most one event with a `preview`;
     2. of each class, any number of events whose `share` never falls, then exactly one with its
@@ -78,7 +78,7 @@ class Event:
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """What is to be done for each class: arguments as in `escherize`."""
+    """What is to be done for each class: arguments as in `search_classes`."""
 
     goal: Goal
     method: SearchMethod
@@ -168,7 +168,7 @@ def _checked(method: SearchMethod | None, pins: Pins | None) -> SearchMethod:
     return method
 
 
-def escherize(
+def search_classes(
     target: Target,
     classes: ClassName | Iterable[ClassName] = tuple(CLASSES),
     method: SearchMethod | None = None,
@@ -181,7 +181,7 @@ def escherize(
     watch: Watcher | None = None,
     cancel: Cancel | None = None,
 ) -> tuple[list[EscherTile], list[ClassFailure]]:
-    """Fit a tile of each class to the target.
+    """Fit a tile of each class to the target, with knobs of one's own; see `escherize`.
 
     Args:
         target: the silhouette.
@@ -257,7 +257,7 @@ def escherize_class(
     watch: Watcher | None = None,
     cancel: Cancel | None = None,
 ) -> Outcome:
-    """Fit and certify one class in this process, on one thread; arguments as in `escherize`.
+    """Fit and certify one class in this process, on one thread; arguments as in `search_classes`.
 
     Raises:
         Cancelled: if it was told to stop.
