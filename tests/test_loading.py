@@ -130,7 +130,8 @@ def test_a_tile_does_its_own_work(folders: Path, tmp_path: Path) -> None:
     assert isinstance(tile, EscherTile)
     assert tile.export(tmp_path / "a.svg").files == (tmp_path / "a.svg",)
     assert tile.draw(width_px=60).startswith(b"\x89PNG")
-    assert tile.draw_art(tmp_path / "a.png", ArtSettings(size=(90, 60))).is_file()
+    assert tile.draw_art(tmp_path / "a.png", ArtSettings(size=(90, 60))).page.width == 90
+    assert (tmp_path / "a.png").is_file()
     small = AnimationSettings(seconds=0.5, fps=4, size=64)
     assert tile.animate(tmp_path / "a.gif", small).is_file()
     assert tile.model().isohedral_class.name == "IH6"

@@ -120,7 +120,7 @@ def escherize(
         tiles,
         failures,
         relay.found,
-        settings.search_method,
+        method,
         emphasis,
         pins,
         seconds,
