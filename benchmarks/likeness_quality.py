@@ -21,9 +21,9 @@ from likeness_methods import silhouette
 from orbiflow.tiles import (
     Event,
     LikenessSearch,
-    search_classes,
     hair_share,
     narrowest_neck,
+    search_classes,
     slit_share,
 )
 

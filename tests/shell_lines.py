@@ -20,6 +20,8 @@ from unittest import mock
 
 import pytest
 
+from orbiflow.runtime import Outcome
+
 ROOT = Path(__file__).parents[1]
 
 ELSEWHERE = {".", "awk", "cd", "dask", "git", "gh", "ogr2ogr", "open", "python3.11", "twine"}
@@ -128,8 +130,10 @@ def refusal_by_orbiflow(words: Sequence[str]) -> Refusal | None:
     class Accepted(Exception):
         """The command would now begin its work."""
 
+    if words and words[0] in ("escherize", "export", "art", "animate", "classes"):
+        return _refusal_by_operation(words)
     command = typer.main.get_command(app)
-    work = {"orbiflow.cli.work": "_run", "orbiflow.cli.classes_run": "run"}
+    work = {"orbiflow.cli.work": "_run"}
     with pytest.MonkeyPatch.context() as patch:
         for module, function in work.items():
             begun = mock.Mock(side_effect=Accepted)
@@ -148,6 +152,24 @@ def refusal_by_orbiflow(words: Sequence[str]) -> Refusal | None:
             missing = type(error).__name__ in ("MissingParameter", "NoArgsIsHelpError")
             return Refusal(message(), incomplete=missing)
     return None  # such as --help and --version, which are done by now
+
+
+def _refusal_by_operation(words: Sequence[str]) -> Refusal | None:
+    """Read and check the words of a derived command."""
+    from cyclopts import CycloptsError, MissingArgumentError
+
+    from orbiflow.cli import commands
+    from orbiflow.errors import OrbiflowError
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("orbiflow.runtime.Call.run", mock.Mock(return_value=Outcome()))
+        try:
+            commands.app_for(words)(list(words))
+        except CycloptsError as error:
+            return Refusal(str(error), incomplete=isinstance(error, MissingArgumentError))
+        except OrbiflowError as error:
+            return Refusal(str(error))
+    return None
 
 
 def _refusal_by_make(words: Sequence[str]) -> Refusal | None:

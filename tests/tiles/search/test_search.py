@@ -22,9 +22,9 @@ from orbiflow.tiles import (
     OverlapSearch,
     Target,
     TileModel,
-    search_classes,
     escherize_class,
     isohedral_class,
+    search_classes,
 )
 from orbiflow.tiles.likeness import mutual_iou
 from orbiflow.tiles.search import occupancy
@@ -171,7 +171,9 @@ def test_cancelling_keeps_what_was_finished(workers: int) -> None:
         if event.outcome is not None:
             cancel.cancel()
 
-    results, failures = search_classes(TARGET, NAMES, SHORT, workers=workers, watch=watch, cancel=cancel)
+    results, failures = search_classes(
+        TARGET, NAMES, SHORT, workers=workers, watch=watch, cancel=cancel
+    )
     checked(events, NAMES)
     # what workers had in hand when they were told may have been finished, too
     assert 1 <= len(results) < len(NAMES)
