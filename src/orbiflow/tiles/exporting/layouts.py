@@ -9,6 +9,7 @@ import shapely
 
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
+from orbiflow.symmetry import rotation_matrix
 from orbiflow.tiles.exporting.outlines import Outline, outline
 from orbiflow.tiles.exporting.scene import Box, PlacedTile
 from orbiflow.tiles.exporting.settings import ExportSettings
@@ -48,7 +49,7 @@ MANY = 1000
 
 
 def layout(tile: Tile, settings: ExportSettings, *, y_down: bool) -> Layout:
-    """Scale the tile and put it on the page, the way up it has.
+    """Scale the tile and put it on the page, the way up it has, turned as the settings say.
 
     In the middle; where tiles are not cut at the page's edge, nearby, so that most are whole.
 
@@ -62,7 +63,8 @@ def layout(tile: Tile, settings: ExportSettings, *, y_down: bool) -> Layout:
     width, height = settings.page
     box = Box(0.0, 0.0, width, height - (STRIP if settings.calibrate else 0.0))
     scale = settings.tile_size / longer_side(tile.polygon)
-    linear = scale * np.diag([1.0, 1.0 if y_down else -1.0])
+    turn = rotation_matrix(-np.radians(settings.rotate))  # y points down on the page
+    linear = scale * turn @ np.diag([1.0, 1.0 if y_down else -1.0])
     middle = np.array([(box.left + box.right) / 2, (box.top + box.bottom) / 2])
     placed = tile.transformed(linear, middle - linear @ tile.center)
     if settings.cut != "pieces":
