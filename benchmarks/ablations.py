@@ -20,7 +20,7 @@ from orbiflow.tiles import (
     ClassFailure,
     OccupancySearch,
     OverlapSearch,
-    Settings,
+    SearchMethod,
     SoftTarget,
     escherize_class,
     isohedral_class,
@@ -34,7 +34,7 @@ NORMAL = OverlapSearch()
 
 
 def measured(
-    settings: Settings, goals: tuple[str, ...], classes: tuple[str, ...]
+    settings: SearchMethod, goals: tuple[str, ...], classes: tuple[str, ...]
 ) -> tuple[list[float], float]:
     """Best IoU of each goal, and the mean seconds of a class."""
     best, seconds, failed = [], [], 0
@@ -54,7 +54,7 @@ def measured(
 
 def ablations(goals: tuple[str, ...], classes: tuple[str, ...]) -> None:
     """One row for each change of the normal effort."""
-    rows: dict[str, Settings] = {
+    rows: dict[str, SearchMethod] = {
         "normal": NORMAL,
         "lattice freedom off": replace(NORMAL, lattice=False),
         "starts: template turned, stretched": replace(NORMAL, starts="template"),
@@ -80,7 +80,7 @@ def ablations(goals: tuple[str, ...], classes: tuple[str, ...]) -> None:
 def curve(goals: tuple[str, ...], classes: tuple[str, ...]) -> None:
     """IoU against seconds: the descent's efforts and the occupancy method's iterations."""
     print("\nIoU against seconds       " + "".join(f"{name:>11}" for name in goals) + "  s a class")
-    steps: dict[str, Settings] = {
+    steps: dict[str, SearchMethod] = {
         "descent, starts only": replace(NORMAL, stages=((1, 1),), reach=(1e-6, 1e-6)),
         "descent, fast": OverlapSearch.for_effort("fast"),
         "descent, normal": NORMAL,

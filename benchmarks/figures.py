@@ -38,7 +38,7 @@ def main() -> None:
     )
     given = parser.parse_args()
     target = Target.read(given.silhouette)
-    results, _ = search_classes(target, settings=LikenessSearch.for_effort("fast"), workers=1)
+    results, _ = search_classes(target, method=LikenessSearch.for_effort("fast"), workers=1)
     colours = [colouring(result.tile) for result in results]
     both = list(zip(results, colours, strict=True))
     print(f"{len(results)} tiles of {target.source}; CPU seconds for all of them")

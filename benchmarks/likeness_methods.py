@@ -98,7 +98,7 @@ def _first(
     """The first tile of one method laid on the target, or nothing."""
     outline = np.asarray(target.normal)
     if method == "overlap":
-        results, _ = search_classes(target, settings=OverlapSearch.for_effort(effort))
+        results, _ = search_classes(target, method=OverlapSearch.for_effort(effort))
         return results[0].normal_tile.polygon.tolist() if results else []
     if method == "likeness":
         tiles = kept(folder, name, effort, lambda: likeness_tiles(target, effort))

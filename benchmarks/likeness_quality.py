@@ -59,7 +59,7 @@ def main() -> None:
                 first.append(time.perf_counter() - began)
 
         settings = LikenessSearch.for_effort(options.effort)
-        results, _ = search_classes(target, settings=settings, workers=options.workers, watch=watch)
+        results, _ = search_classes(target, method=settings, workers=options.workers, watch=watch)
         seconds = time.perf_counter() - began
         best = results[0]
         assert all(result.certificate.valid for result in results)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -53,7 +54,8 @@ class DirichletDomain:
     def locate(self, points: Points) -> tuple[Points, Array]:
         """Return the points wrapped to the lattice cell, and the nearest image of the site."""
         wrapped = self.group.wrap(points)
-        plain = wrapped.detach().cpu().numpy() if is_tensor(wrapped) else wrapped
+        own: Any = wrapped
+        plain: Array = own.detach().cpu().numpy() if is_tensor(own) else own
         flat = np.asarray(plain, dtype=np.float64).reshape(-1, self.group.dim)
         nearest = np.empty(len(flat), dtype=np.int64)
         for start in range(0, len(flat), 65536):  # bounds the distance table

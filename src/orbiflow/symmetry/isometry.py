@@ -37,7 +37,7 @@ def cast_like(array: Array, like: Points) -> Points:
 
         if not like.is_floating_point():
             raise GroupError(f"expected points of a floating-point dtype, got {like.dtype}")
-        return torch.tensor(array, dtype=like.dtype, device=like.device)
+        return cast(Points, torch.tensor(array, dtype=like.dtype, device=like.device))
     return cast(Points, array)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 import xml.etree.ElementTree as ET
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -14,6 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from exported import dxf_lines, polygons, svg_lines, tile_of, tiles
+from orbiflow.errors import OrbiflowError
 from orbiflow.tiles import (
     CLASSES,
     EscherTile,
@@ -38,9 +39,9 @@ def text_of(tile: Tile | EscherTile, **options) -> str:
 
 
 @settings(max_examples=15, deadline=None)
-@given(tiles, st.floats(25, 60), st.booleans())
-def test_tiles_cover_the_page_once(tile: Tile, size: float, dxf: bool) -> None:
-    options = {"tile_size": size, "area": (120.0, 90.0), "clip": True}
+@given(tiles, st.floats(25, 60), st.booleans(), st.just(0.0) | st.floats(-180, 180))
+def test_tiles_cover_the_page_once(tile: Tile, size: float, dxf: bool, angle: float) -> None:
+    options = {"tile_size": size, "area": (120.0, 90.0), "clip": True, "rotate": angle}
     page = shapely.box(0, 0, 120, 90)
     tolerance = ExportSettings(tile_size=size).deviation
     if dxf:
@@ -58,6 +59,28 @@ def test_tiles_cover_the_page_once(tile: Tile, size: float, dxf: bool) -> None:
     width = tolerance / 2 if dxf else 2e-3
     assert abs(missing) <= edge * width
     assert shapely.area(pieces).sum() - (page.area - missing) <= edge * width
+
+
+@pytest.mark.parametrize("cut", ["none", "skeleton"])
+def test_a_tiling_is_turned_counterclockwise_on_the_page(cut: Literal["none", "skeleton"]) -> None:
+    (straight,), _ = scenes(tile_of("IH4"), ExportSettings(cut=cut))
+    (turned,), _ = scenes(tile_of("IH4"), ExportSettings(cut=cut, rotate=30))
+    assert straight.prototile is not None
+    assert turned.prototile is not None
+    step, other = (scene.prototile[1] - scene.prototile[0] for scene in (straight, turned))
+    # y points down: what points right turns up
+    before, after = complex(step[0], -step[1]), complex(other[0], -other[1])
+    assert after == pytest.approx(before * np.exp(1j * np.radians(30)))
+    first, second = (
+        {tuple(tile.linear.round(9).ravel()) for tile in scene.tiles}
+        for scene in (straight, turned)
+    )
+    assert first == second  # half turns stay half turns
+
+
+def test_pieces_are_not_turned() -> None:
+    with pytest.raises(OrbiflowError, match="rotate applies only to cut none or skeleton"):
+        ExportSettings(cut="pieces", rotate=30)
 
 
 @pytest.mark.parametrize("name", CLASSES)

@@ -10,7 +10,17 @@ import pytest
 from orbiflow.errors import OrbiflowError
 from orbiflow.fields import FourierField
 from orbiflow.runtime import Cancel
-from orbiflow.tiles import CLASSES, EscherTile, Fit, Pins, Target, report, search_classes
+from orbiflow.tiles import (
+    CLASSES,
+    EscherizeSettings,
+    EscherTile,
+    Fit,
+    Pins,
+    Target,
+    escherize,
+    report,
+    search_classes,
+)
 from orbiflow.tiles.search import BothSearch, Goal, SearchMethod
 from orbiflow.tiles.search.candidates import WAVES, Progress, StillTiles
 from orbiflow.tiles.search.starts import template_starts
@@ -47,11 +57,12 @@ class TemplateSearch(SearchMethod):
 @pytest.mark.parametrize("workers", [1, 2])
 def test_a_method_of_one_s_own_is_searched_with(workers: int) -> None:
     method = TemplateSearch()
-    tiles, failures = search_classes(BOOT, ["IH4", "IH6"], method, workers=workers)
-    assert failures == []
-    assert {tile.isohedral_class for tile in tiles} == {"IH4", "IH6"}
-    assert all(isinstance(tile, EscherTile) and tile.certificate.valid for tile in tiles)
-    document = report(BOOT, tiles, failures, method, seconds=1.0, workers=workers)
+    settings = EscherizeSettings(classes=("IH4", "IH6"), workers=workers)
+    found = escherize(BOOT, settings, method=method)
+    assert found.failures == []
+    assert {tile.isohedral_class for tile in found.tiles} == {"IH4", "IH6"}
+    assert all(isinstance(tile, EscherTile) and tile.certificate.valid for tile in found.tiles)
+    document = report(found)
     assert (document["method"], document["objective"]) == ("template", "overlap")
     assert document["settings"] == {"turns": 5, "seed": 0}
 

@@ -1,8 +1,4 @@
-<<<<<<<< HEAD:src/orbiflow/density/models/tabulated.py
-"""A density read off a table: a hundred times faster, with a stated error."""
-========
 """Densities on grids and off tables, integrals, and gradients in the data's own coordinates."""
->>>>>>>> mixture:src/orbiflow/density/models/evaluation.py
 
 from __future__ import annotations
 
@@ -15,21 +11,10 @@ import torch
 from numpy.typing import ArrayLike
 from torch import Tensor
 
-<<<<<<<< HEAD:src/orbiflow/density/models/tabulated.py
-from orbiflow.density.arguments import (
-    check_kind,
-    check_range,
-    points_tensor,
-)
-from orbiflow.density.models.density import Density, log_area_factor
-from orbiflow.density.models.devices import destination, moved
-from orbiflow.density.models.evaluation import midpoints
-========
 from orbiflow.arrays import Array
 from orbiflow.density.arguments import check_kind, check_range, float_tensor, points_tensor
 from orbiflow.density.models.density import Density, log_area_factor
 from orbiflow.density.models.devices import destination, moved
->>>>>>>> mixture:src/orbiflow/density/models/evaluation.py
 from orbiflow.density.models.kernels import AdaptiveKernels
 from orbiflow.density.spaces import CHART, Space, rectangle
 from orbiflow.errors import OrbiflowError

@@ -10,6 +10,7 @@ import shapely
 from orbiflow.arrays import Array
 from orbiflow.drawing import palette
 from orbiflow.errors import OrbiflowError
+from orbiflow.symmetry import rotation_matrix
 from orbiflow.tiles.exporting.outlines import Outline, outline
 from orbiflow.tiles.exporting.scene import Box, Layer, PlacedTile, Scene, Style, Uses, rectangle
 from orbiflow.tiles.exporting.settings import ExportSettings
@@ -45,7 +46,7 @@ MOST_TILES_TO_SHIFT = 1000
 
 
 def layout(tile: Tile, settings: ExportSettings, *, y_down: bool) -> Layout:
-    """Scale the tile and put it on the page, the same way up.
+    """Scale the tile and put it on the page, the way up it has, turned as the settings say.
 
     It lies in the middle; where tiles are not cut at the page's edge, it lies nearby, so that as many
     as possible are whole.
@@ -61,7 +62,8 @@ def layout(tile: Tile, settings: ExportSettings, *, y_down: bool) -> Layout:
     width, height = settings.page
     box = Box(0.0, 0.0, width, height - (STRIP if settings.calibrate else 0.0))
     scale = settings.tile_size / longer_side(tile.polygon)
-    linear = scale * np.diag([1.0, 1.0 if y_down else -1.0])
+    turn = rotation_matrix(-np.radians(settings.rotate))  # y points down on the page
+    linear = scale * turn @ np.diag([1.0, 1.0 if y_down else -1.0])
     middle = np.array([(box.left + box.right) / 2, (box.top + box.bottom) / 2])
     placed = tile.transformed(linear, middle - linear @ tile.center)
     if settings.cut != "pieces":

@@ -15,6 +15,7 @@ from orbiflow.settings import (
     Option,
     Range,
     SettingError,
+    Unit,
 )
 from orbiflow.units import COLUMNS, Colour, Length, LengthOrZero, PageSize, Size
 
@@ -50,6 +51,14 @@ class ExportSettings(FileSettings, group="Page and file"):
     cut: Literal["none", "skeleton", "pieces"] = "none"
     """With none, every tile is drawn; with skeleton, each shared edge once; with pieces, tiles
     apart."""
+
+    rotate: Annotated[
+        float,
+        Range(-360, 360),
+        Unit("degrees"),
+        OnlyWith(cut=("none", "skeleton"), because="pieces are turned to fill the page"),
+    ] = 0.0
+    """Turn the tiling on the page by this angle, counterclockwise."""
 
     clip: Annotated[
         bool,

@@ -6,7 +6,7 @@ import math
 import re
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple, overload
+from typing import Any, NamedTuple, cast, overload
 
 import numpy as np
 
@@ -93,7 +93,8 @@ def pentagon(gauge: PentagonGauge, shape: Points) -> Points:
     def turn(degrees: float, vector: Points) -> Points:
         matrix = rotation_matrix(math.radians(degrees))
         if not is_tensor(vector):  # rounded as torch rounds it, so that both give the same template
-            return vector[..., :1] * matrix[:, 0] + vector[..., 1:] * matrix[:, 1]
+            turned = vector[..., :1] * matrix[:, 0] + vector[..., 1:] * matrix[:, 1]
+            return cast(Points, turned)
         return vector @ cast_like(matrix, shape).T
 
     functions = _functions(shape)
