@@ -140,7 +140,9 @@ def placed_best(bent: Bent, overlap: Overlap) -> PlacedBent:
     rest, points = bent.hand.fine.rest, bent.points
     center = points.mean()
     ring = bent.points[: bent.hand.fine.size] - center
-    factor, middle, _ = best_overlay(ring, overlap, complex(best_similarity(points, rest)), rest.mean())
+    factor, middle, _ = best_overlay(
+        ring, overlap, complex(best_similarity(points, rest)), rest.mean()
+    )
     return PlacedBent(bent, factor, complex(middle - factor * center))
 
 
