@@ -143,7 +143,7 @@ def test_no_file_to_read(tmp_path: Path) -> None:
         read_outline(tmp_path / "missing.png")
     with pytest.raises(InputFileError, match="is a directory"):
         read_outline(tmp_path)
-    with pytest.raises(OrbiflowError, match="must be a path"):
+    with pytest.raises(OrbiflowError, match="file must be a path"):
         read_outline("a\0b.png")
     os.mkfifo(tmp_path / "pipe.png")
     with pytest.raises(InputFileError, match="not a regular file"):

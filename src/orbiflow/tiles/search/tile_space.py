@@ -94,7 +94,7 @@ class TileSpace:
         self.turns = np.asarray(turns, dtype=np.float64)
         unit, orbits = np.exp(1j * self.turns)[:, None], self._orbits
         # the group's linear parts in the placed frame
-        self._factor = np.where(orbits.flips, orbits.factor * unit**2, orbits.factor)
+        self._factor: Complex = np.where(orbits.flips, orbits.factor * unit**2, orbits.factor)
         self._columns = _columns(self.kind, orbits, self._factor, unit)
         pulled = _unturn(self._factor, orbits.flips, self._columns)
         self._means = self._orbit_means(pulled)
