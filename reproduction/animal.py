@@ -51,9 +51,7 @@ OMEGA = 5
 
 def animal_tile(name: str, omega: int, affine: int, iterations: int) -> EscherTile | ClassFailure:
     """Search the tile of one class: an affine phase, then the flow of a field, with occupancy loss."""
-    settings = OccupancySearch(
-        max_frequency=omega, affine_iterations=affine, iterations=iterations
-    )
+    settings = OccupancySearch(max_frequency=omega, affine_iterations=affine, iterations=iterations)
     return escherize_class(animal(), name, settings)
 
 

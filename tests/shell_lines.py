@@ -20,8 +20,6 @@ from unittest import mock
 
 import pytest
 
-from orbiflow.runtime import Outcome
-
 ROOT = Path(__file__).parents[1]
 
 ELSEWHERE = {".", "awk", "cd", "dask", "git", "gh", "ogr2ogr", "open", "python3.11", "twine"}
