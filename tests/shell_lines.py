@@ -6,7 +6,6 @@ Nothing of what a line asks for is done: `refusal` reads the words of a command 
 from __future__ import annotations
 
 import argparse
-import importlib
 import itertools
 import re
 import runpy
@@ -16,9 +15,12 @@ import tomllib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from unittest import mock
 
 import pytest
+
+from orbiflow.cli import app
+from orbiflow.operations import OPERATIONS
+from orbiflow.runtime import Call, Outcome, find
 
 ROOT = Path(__file__).parents[1]
 
@@ -115,70 +117,42 @@ def refusal(words: Sequence[str]) -> Refusal | None:
 
 
 def refusal_by_orbiflow(words: Sequence[str]) -> Refusal | None:
-    """Return why the command line refuses words after `orbiflow`, or None if it accepts them.
+    """Return why the command line refuses words after `orbiflow`, or None if it accepts them."""
+    read = call_by_orbiflow(words)
+    return read if isinstance(read, Refusal) else None
 
-    This is the one place that knows which library reads the command line. Everything is read and
-    checked as when the command is run, up to the point where its work would begin.
+
+def call_by_orbiflow(words: Sequence[str]) -> Call | Refusal | None:
+    """Return the call that words after `orbiflow` ask for, or why they are refused.
+
+    Everything is read and checked as when the command is run, up to the point where its work would
+    begin. There is no call where none is needed, as for `--help`.
     """
-    import typer
-
-    from orbiflow.cli.app import DERIVED, app
-    from orbiflow.errors import OrbiflowError
-
-    if " ".join(words[:2]) in DERIVED:
-        return _refusal_by_operation(words)
-
-    class Accepted(Exception):
-        """The command would now begin its work."""
-
-    if words and words[0] in ("escherize", "export", "art", "animate", "classes"):
-        return _refusal_by_operation(words)
-    command = typer.main.get_command(app)
-    work = {"orbiflow.cli.work": "_run"}
-    with pytest.MonkeyPatch.context() as patch:
-        for module, function in work.items():
-            begun = mock.Mock(side_effect=Accepted)
-            patch.setattr(importlib.import_module(module), function, begun)
-        try:
-            command.main(list(words), prog_name="orbiflow", standalone_mode=False)
-        except Accepted:
-            return None
-        except OrbiflowError as error:
-            return Refusal(str(error))
-        except Exception as error:
-            # typer brings its own copy of click, whose classes are private
-            message = getattr(error, "format_message", None)
-            if message is None:
-                raise
-            missing = type(error).__name__ in ("MissingParameter", "NoArgsIsHelpError")
-            return Refusal(message(), incomplete=missing)
-    return None  # such as --help and --version, which are done by now
-
-
-def _refusal_by_operation(words: Sequence[str]) -> Refusal | None:
-    """Return why a command that is derived from its operation refuses the words."""
-    from orbiflow.cli import commands
-    from orbiflow.runtime import Call, find
-
-    class Accepted(Exception):
-        """The command would now begin its work."""
-
     # what is missing is told first, and a line may leave it out: an unknown option must not pass
-    options = [entry.option for entry in find(" ".join(words[:2])).fields]
-    known = {"--help", *(name for option in options for name in (*option.names, option.off))}
-    for word in words[2:]:
-        if word.startswith("--") and word.partition("=")[0] not in known:
-            return Refusal(f"unknown option {word}")
+    for count in (1, 2):
+        name = " ".join(words[:count])
+        if name in OPERATIONS and (unknown := _unknown(words[count:], name)):
+            return Refusal(f"unknown option {unknown}")
+    calls: list[Call] = []
+
+    def kept(call: Call, *_: object) -> Outcome:
+        calls.append(call)
+        return Outcome()
+
     told: list[str] = []
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Call, "run", mock.Mock(side_effect=Accepted))
-        patch.setattr(commands.errors, "print", lambda text, **_: told.append(text))
-        try:
-            if commands.run(list(words)) == 0:  # such as --help, which is done by now
-                return None
-        except Accepted:
-            return None
-    return Refusal(told[-1], incomplete="is missing; give" in told[-1])
+        patch.setattr(Call, "run", kept)
+        patch.setattr(app, "_to_standard_error", told.append)
+        if app.run(list(words)):
+            return Refusal(told[-1], incomplete="is missing; give" in told[-1])
+    return calls[0] if calls else None
+
+
+def _unknown(words: Sequence[str], operation: str) -> str | None:
+    options = [entry.option for entry in find(operation).fields]
+    known = {"--help", *(name for option in options for name in (*option.names, option.off))}
+    names = (word.partition("=")[0] for word in words if word.startswith("--"))
+    return next((name for name in names if name not in known), None)
 
 
 def _refusal_by_make(words: Sequence[str]) -> Refusal | None:

@@ -10,14 +10,15 @@ from pathlib import Path
 
 from gallery_page import PAGE, compress, contact_sheet, page, shown
 from gallery_table import HERE, ROOT, Entry, read_table
-from orbiflow.cli.app import app
+from orbiflow.cli.app import run
 
 
 def make(entry: Entry) -> None:
     """Run an entry's commands and keep their pictures."""
     for words in entry.commands():
         print(shown(words), flush=True)
-        app(words, standalone_mode=False)
+        if run(words):
+            sys.exit(f"no picture of {entry.name}")
     compress(ROOT / entry.made, entry)
     if entry.svg:
         shutil.copy(Path(entry.made).with_suffix(".svg"), entry.picture.with_suffix(".svg"))

@@ -69,9 +69,9 @@ WRONG: dict[str, tuple[Callable[[], Any], str]] = {
     "to_base": (lambda: a_density().to_base(torch.rand(5)), r"got .*\(5,\)"),
     "from_base": (lambda: a_density().from_base(torch.rand(5, 4)), r"got .*\(5, 4\)"),
     "measure": (
-        lambda: a_density().log_prob(POINTS, measure=3),
+        lambda: a_density().log_prob(POINTS, measure=3),  # type: ignore[arg-type]
         "measure must be natural, square or uniform",
-    ),  # type: ignore[arg-type]
+    ),
     "sample text": (lambda: a_density().sample("five"), "a number or shape of samples"),
     "sample less": (lambda: a_density().sample(-1), "a number or shape of samples"),
     "midpoints": (lambda: midpoints(torus, 2.5), "resolution must be a whole number"),  # type: ignore[arg-type]
@@ -122,13 +122,13 @@ WRONG: dict[str, tuple[Callable[[], Any], str]] = {
     ),
     "fit: four angles": (lambda: fit_density(Torus(4), torch.rand(30, 4)), "3 dimensions at most"),
     "max_frequency": (
-        lambda: FlowSettings(max_frequency=2.5),
+        lambda: FlowSettings(max_frequency=2.5),  # type: ignore[arg-type]
         "max_frequency must be a whole number from 1 to 64",
-    ),  # type: ignore[arg-type]
+    ),
     "frequency text": (
-        lambda: FlowSettings(max_frequency="8"),
+        lambda: FlowSettings(max_frequency="8"),  # type: ignore[arg-type]
         "max_frequency must be a whole number",
-    ),  # type: ignore[arg-type]
+    ),
     "seed": (lambda: FlowSettings(seed=None), "seed must be a whole number"),  # type: ignore[arg-type]
     "roughness": (lambda: FlowSettings(roughness=1e-3), "roughness must be a list"),  # type: ignore[arg-type]
     "weights": (lambda: FlowSettings(roughness=("a",)), "roughness: entry 1: must be a number"),  # type: ignore[arg-type]

@@ -176,9 +176,9 @@ def test_few_points(count: int) -> None:
 
 def test_what_cannot_be_chosen_is_refused() -> None:
     with pytest.raises(OrbiflowError, match=r"components.* must be flow, kernels"):
-        DensitySettings(components=("trees",))
+        DensitySettings(components=("trees",))  # type: ignore[arg-type]
     with pytest.raises(OrbiflowError, match="repeats must be"):
-        DensitySettings(repeats="noise")
+        DensitySettings(repeats="noise")  # type: ignore[arg-type]
     with pytest.raises(OrbiflowError, match=r"Sphere.* cannot be made of chains alone"):
         fit_automatic(
             make_space("sphere"), smooth("sphere"), DensitySettings(components=("chains",))

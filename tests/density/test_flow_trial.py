@@ -24,6 +24,7 @@ from orbiflow.density.fitting.flow_trial import (
 )
 from orbiflow.density.fitting.folds import Folds, folds_of
 from orbiflow.density.fitting.report import ComponentEvidence
+from orbiflow.density.fitting.settings import Component
 from orbiflow.density.fitting.weights import (
     Gain,
     stacked,
@@ -73,7 +74,7 @@ def test_progress_goes_on_from_one_tenth_to_the_next(
 
 
 @pytest.mark.parametrize("parts", [COMPONENTS, COMPONENTS[1:], ("kernels",)])
-def test_no_step_of_a_fit_is_half_of_it(parts: tuple[str, ...]) -> None:
+def test_no_step_of_a_fit_is_half_of_it(parts: tuple[Component, ...]) -> None:
     rng, shares = np.random.default_rng(0), [0.0]
     points = SPACE.project(torch.tensor(0.1 * rng.normal(size=(700, 2))))
     settings = DensitySettings(components=parts, **(QUICK if "flow" in parts else {}))

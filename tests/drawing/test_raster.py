@@ -21,7 +21,7 @@ from orbiflow.tiles import (
     overlay_png,
     tiling_png,
 )
-from orbiflow.tiles.pictures.tilings import (
+from orbiflow.tiles.pictures.overlays import (
     ADDED,
     COMMON,
     MISSING,

@@ -72,13 +72,13 @@ def points(count: int, dim: int = 2) -> torch.Tensor:
 
 def corner(dim: int, sheet: Sheet) -> Picture:
     density = UniformDensity(Torus(dim))
-    names = [f"a long name {k}" for k in range(dim)]
+    names = tuple(f"a long name {k}" for k in range(dim))
     settings = PlotSettings(names=names)
     return corner_picture(density, points(40, dim), points(30, dim), settings, sheet=sheet)
 
 
 def test_the_narrowest_figure_has_room() -> None:
-    names = ["a rather long name of an angle", "ψ"]
+    names = ("a rather long name of an angle", "ψ")
     for measure, scale in (("uniform", "linear"), ("natural", "log")):
         settings = PlotSettings(names=names, measure=measure, scale=scale)  # pyright: ignore
         sheet = Sheet.column(NARROWEST)
@@ -89,7 +89,7 @@ def test_the_narrowest_figure_has_room() -> None:
 @every_width
 def test_density_figures_have_room_and_letters_of_7_to_8_points(space: Any, width: Any) -> None:
     density, sheet = example(space), Sheet.column(width)
-    names = ["a rather long name of an angle", "ψ"] if space.unit else None
+    names = ("a rather long name of an angle", "ψ") if space.unit else None
     made = [
         density_picture(
             density, points(50), PlotSettings(measure="uniform", names=names), sheet=sheet

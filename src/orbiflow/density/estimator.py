@@ -163,6 +163,10 @@ class DensityEstimator(Parameters):
         defaults = {entry.name: entry.default for entry in fields_of(DensitySettings)}
         vars(self).update({**defaults, **settings})
 
+    if TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any: ...  # each setting, by its name
+
     def fit(
         self,
         X: ArrayLike,

@@ -70,7 +70,7 @@ def test_a_folder_holds_the_pictures_of_one_plot(tmp_path: Path) -> None:
 
 def test_one_pdf_has_a_page_a_figure(tmp_path: Path) -> None:
     out = tmp_path / "plots.pdf"
-    plotted = plot_density(example(), out, PlotSettings(width="double"), data=DATA)
+    plotted = plot_density(example(), out, PlotSettings(width=180.0), data=DATA)
     assert plotted.files == (out,)
     assert out.is_file()
     document = pypdfium2.PdfDocument(out)
@@ -99,7 +99,7 @@ def test_densities_from_wherever_they_are(tmp_path: Path) -> None:
     density, model = example(), tmp_path / "model"
     model.mkdir()
     (model / MODEL).write_bytes(density_to_bytes(density, columns=["phi", "psi"]))
-    settings = PlotSettings(format="pdf", names=["phi", "psi"])
+    settings = PlotSettings(format="pdf", names=("phi", "psi"))
     made = []
     for k, source in enumerate((density, model, str(model / MODEL))):
         plot_density(source, tmp_path / f"{k}.pdf", settings, data=DATA)
@@ -139,10 +139,10 @@ def test_what_does_not_fit_the_density_is_refused_before_anything_is_written(
 ) -> None:
     out = tmp_path / "plots"
     for space, settings, message in (
-        (Torus(2), PlotSettings(coastlines="lines.csv"), "coastlines apply to the sphere"),
+        (Torus(2), PlotSettings(coastlines=Path("lines.csv")), "coastlines apply to the sphere"),
         (Torus(9), PlotSettings(), "has 9 angles"),
-        (Torus(2), PlotSettings(names=["one"]), "2 names of columns"),
-        (Sphere(), PlotSettings(center=[0.0, 0.0, 0.0]), "a latitude and a longitude"),
+        (Torus(2), PlotSettings(names=("one",)), "2 names of columns"),
+        (Sphere(), PlotSettings(center=(0.0, 0.0, 0.0)), "a latitude and a longitude"),
         (Torus(2), PlotSettings(projection="lambert"), "projection applies to maps"),
         (Torus(2), PlotSettings(radius=20), "radius applies to maps"),
     ):

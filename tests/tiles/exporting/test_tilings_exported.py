@@ -67,7 +67,7 @@ def test_a_tiling_is_turned_counterclockwise_on_the_page(cut: Literal["none", "s
     (turned,), _ = scenes(tile_of("IH4"), ExportSettings(cut=cut, rotate=30))
     assert straight.prototile is not None
     assert turned.prototile is not None
-    step, other = (scene.prototile[1] - scene.prototile[0] for scene in (straight, turned))
+    step, other = (ring[1] - ring[0] for ring in (straight.prototile, turned.prototile))
     # y points down: what points right turns up
     before, after = complex(step[0], -step[1]), complex(other[0], -other[1])
     assert after == pytest.approx(before * np.exp(1j * np.radians(30)))
