@@ -32,12 +32,7 @@ from orbiflow.density import (
     make_space,
     midpoints,
 )
-from reproduction.density_fits import (
-    FIT_SETTINGS,
-    TargetMeasure,
-    drawn,
-    weighted,
-)
+from reproduction.density_fits import FIT_SETTINGS, TargetMeasure, drawn, weighted
 from reproduction.published import KL
 
 BARS = {"4-gaussian": 0.01, "6-gaussian": 0.02, "checkerboard": 0.08}

@@ -22,11 +22,7 @@ from density_data import Data, splits
 from density_unoriented_data import AXES, KLEIN, known, load
 from density_unoriented_kde import Kernel, UnorientedKernelDensity, tuned
 
-from orbiflow.density import (
-    Density,
-    DensityEstimator,
-    Mixture,
-)
+from orbiflow.density import Density, DensityEstimator, Mixture
 
 QUERIES, KERNEL_QUERIES = 100_000, 5_000
 """Points that evaluation is timed on; kernels are so slow that fewer are taken, and scaled up."""

@@ -18,13 +18,7 @@ import numpy as np
 import torch
 from common import DATA, GOALS, goal, needed, published
 
-from orbiflow.tiles import (
-    CLASSES,
-    EscherTile,
-    OverlapSearch,
-    Target,
-    search_classes,
-)
+from orbiflow.tiles import CLASSES, EscherTile, OverlapSearch, Target, search_classes
 
 DISTORTED = {"octpus_94": "octpus", "penguin_60": "penguin2", "squirrel1_60": "squirrel"}
 
@@ -41,10 +35,7 @@ def search(target: Target, effort: str, seed: int) -> tuple[list[EscherTile], fl
     """Certified tiles of all classes, largest IoU first, and the seconds that they took."""
     begin = time.perf_counter()
     results, failures = search_classes(
-        target,
-        CLASSES,
-        OverlapSearch.for_effort(effort, seed=seed),
-        workers=os.cpu_count() or 1,
+        target, CLASSES, OverlapSearch.for_effort(effort, seed=seed), workers=os.cpu_count() or 1
     )
     assert not failures, failures
     assert all(result.certificate.valid for result in results)

@@ -12,13 +12,7 @@ import time
 
 import numpy as np
 
-from orbiflow.tiles import (
-    ExportSettings,
-    Tile,
-    isohedral_class,
-    scenes,
-    write_scene,
-)
+from orbiflow.tiles import ExportSettings, Tile, isohedral_class, scenes, write_scene
 
 SIDE = 20.0  # of a tile, in mm
 

@@ -170,10 +170,7 @@ def products(
     weights = weights.reshape(-1, weights.shape[-1])
     table = torch.rand(weights.shape[1], POINTS, dtype=dtype)
     dual = torch.rand(weights.shape[0], POINTS, dtype=dtype)
-    return (
-        lambda: weights @ table,
-        lambda: (weights @ table, dual @ table.T, weights.T @ dual),
-    )
+    return (lambda: weights @ table, lambda: (weights @ table, dual @ table.T, weights.T @ dual))
 
 
 class Timing(NamedTuple):
@@ -195,10 +192,7 @@ def measure(calls: dict[str, Callable[[], object]], rounds: int) -> Timing:
     """The quick forms take many turns with each other, the slow one few with `ours`."""
     quick = in_turns({name: calls[name] for name in ("ours", "separable", "product")}, 5 * rounds)
     slow = in_turns({name: calls[name] for name in ("ours", "per mode")}, rounds)
-    return Timing(
-        {**slow.seconds, **quick.seconds},
-        {**slow.ratios, **quick.ratios},
-    )
+    return Timing({**slow.seconds, **quick.seconds}, {**slow.ratios, **quick.ratios})
 
 
 def in_turns(calls: dict[str, Callable[[], object]], rounds: int) -> Timing:

@@ -25,13 +25,7 @@ from orbiflow.runtime import one_blas_thread
 from orbiflow.tiles import CLASSES, LikenessSearch, fidelity
 from orbiflow.tiles.likeness.faithful import USUAL_VALUES
 from orbiflow.tiles.search import bending, corner_shifts
-from orbiflow.tiles.search.co_deformation import (
-    FIRM,
-    SOFT,
-    TIGHTER,
-    drawn_to_tiles,
-    hands,
-)
+from orbiflow.tiles.search.co_deformation import FIRM, SOFT, TIGHTER, drawn_to_tiles, hands
 
 NAMES = ("bat_60", "camel_60", "octpus_94", "squirrel1_60")
 KINDS = ("IH4", "IH5", "IH6")

@@ -25,13 +25,7 @@ from common import DATA, GOALS, LikenessTile, Ring, goal, likeness_tiles, needed
 from likeness_methods import kept
 from numpy.typing import NDArray
 
-from orbiflow.tiles import (
-    complex_points,
-    orient,
-    plane_points,
-    ring_length,
-    signed_area,
-)
+from orbiflow.tiles import complex_points, orient, plane_points, ring_length, signed_area
 from orbiflow.tiles.likeness import Elastic, Stiffness
 from orbiflow.tiles.silhouette import triangulate
 

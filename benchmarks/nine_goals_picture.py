@@ -17,19 +17,9 @@ import torch
 from common import goal
 
 from orbiflow.arrays import Window
-from orbiflow.drawing import (
-    blank_figure,
-    fill_rings,
-    plane_axes,
-    png_bytes,
-)
+from orbiflow.drawing import blank_figure, fill_rings, plane_axes, png_bytes
 from orbiflow.runtime import write_atomic
-from orbiflow.tiles import (
-    EscherTile,
-    OverlapSearch,
-    Target,
-    search_classes,
-)
+from orbiflow.tiles import EscherTile, OverlapSearch, Target, search_classes
 
 BEST = {
     "bat_60": ("bat", "IH6"),

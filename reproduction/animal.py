@@ -7,12 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from orbiflow.arrays import Array
-from orbiflow.drawing import (
-    draw_flow,
-    draw_magnitude,
-    mark_symmetry,
-    outline_cell,
-)
+from orbiflow.drawing import draw_flow, draw_magnitude, mark_symmetry, outline_cell
 from orbiflow.tiles import (
     CLASSES,
     ClassFailure,
@@ -35,13 +30,7 @@ from reproduction.drawing import (
     tiny,
     window_of,
 )
-from reproduction.exhibit import (
-    Exhibit,
-    Extent,
-    Findings,
-    Table,
-    Work,
-)
+from reproduction.exhibit import Exhibit, Extent, Findings, Table, Work
 from reproduction.nested import equivariance_error
 from reproduction.published import animal
 

@@ -7,12 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from orbiflow.symmetry import CrystallographicGroup, symmetry_elements
-from orbiflow.tiles import (
-    CLASSES,
-    IsohedralClass,
-    draw_template,
-    signed_area,
-)
+from orbiflow.tiles import CLASSES, IsohedralClass, draw_template, signed_area
 from reproduction.drawing import (
     FAINT,
     INK,
@@ -24,12 +19,7 @@ from reproduction.drawing import (
     text_size,
     tiny,
 )
-from reproduction.exhibit import (
-    Exhibit,
-    Extent,
-    Findings,
-    Table,
-)
+from reproduction.exhibit import Exhibit, Extent, Findings, Table
 from reproduction.published import GROUPS
 
 if TYPE_CHECKING:

@@ -9,22 +9,8 @@ import numpy as np
 from orbiflow.arrays import Array
 from orbiflow.drawing import fill_rings
 from orbiflow.tiles import ShapeMetrics, compare
-from reproduction.drawing import (
-    EDGE,
-    GOAL,
-    INK,
-    Canvas,
-    panel,
-    text_size,
-    window_of,
-)
-from reproduction.exhibit import (
-    Exhibit,
-    Extent,
-    Findings,
-    Table,
-    Work,
-)
+from reproduction.drawing import EDGE, GOAL, INK, Canvas, panel, text_size, window_of
+from reproduction.exhibit import Exhibit, Extent, Findings, Table, Work
 from reproduction.goal_fits import GoalTile, goal_work
 from reproduction.published import Goal, goals
 

@@ -18,13 +18,7 @@ from orbiflow.density import (
     mean_field,
 )
 from orbiflow.drawing import draw_flow, draw_magnitude
-from reproduction.density_fits import (
-    TARGETS,
-    Fitted,
-    fit_work,
-    kl_of_uniform,
-    target,
-)
+from reproduction.density_fits import TARGETS, Fitted, fit_work, kl_of_uniform, target
 from reproduction.drawing import (
     INK,
     SAMPLES,
@@ -36,13 +30,7 @@ from reproduction.drawing import (
     text_size,
     tiny,
 )
-from reproduction.exhibit import (
-    Exhibit,
-    Extent,
-    Findings,
-    Table,
-    Work,
-)
+from reproduction.exhibit import Exhibit, Extent, Findings, Table, Work
 from reproduction.nested import equivariance_error
 from reproduction.published import KL
 from reproduction.spaces import TITLES

@@ -9,20 +9,8 @@ import numpy as np
 from orbiflow.density import COLOURS, PlotSettings, density_page
 from reproduction.densities import NAMES, square_values
 from reproduction.density_fits import TARGETS, fit_work
-from reproduction.drawing import (
-    INK,
-    Canvas,
-    caption,
-    draw_surface,
-    grid_box,
-    text_size,
-)
-from reproduction.exhibit import (
-    Exhibit,
-    Extent,
-    Findings,
-    Work,
-)
+from reproduction.drawing import INK, Canvas, caption, draw_surface, grid_box, text_size
+from reproduction.exhibit import Exhibit, Extent, Findings, Work
 from reproduction.spaces import TITLES
 
 EMBEDDED = ("torus", "sphere")

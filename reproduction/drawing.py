@@ -13,15 +13,7 @@ from PIL import Image
 
 from orbiflow.arrays import Array, Window
 from orbiflow.density import Space, immersion, viewpoint
-from orbiflow.drawing import (
-    DPI,
-    PALETTES,
-    Palette,
-    blank_figure,
-    fill_rings,
-    plane_axes,
-    png_bytes,
-)
+from orbiflow.drawing import DPI, PALETTES, Palette, blank_figure, fill_rings, plane_axes, png_bytes
 from orbiflow.runtime import write_atomic
 from orbiflow.tiles import Tile, colouring, copies_meeting
 

@@ -13,24 +13,8 @@ from orbiflow.drawing import fill_rings
 from orbiflow.fields import FourierField
 from orbiflow.tiles import CLASSES, EscherTile
 from reproduction.animal import animal_work
-from reproduction.drawing import (
-    EDGE,
-    GOAL,
-    INK,
-    TILE,
-    Box,
-    Canvas,
-    panel,
-    text_size,
-    window_of,
-)
-from reproduction.exhibit import (
-    Exhibit,
-    Extent,
-    Findings,
-    Table,
-    Work,
-)
+from reproduction.drawing import EDGE, GOAL, INK, TILE, Box, Canvas, panel, text_size, window_of
+from reproduction.exhibit import Exhibit, Extent, Findings, Table, Work
 from reproduction.published import animal
 
 if TYPE_CHECKING:

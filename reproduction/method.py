@@ -11,28 +11,10 @@ import torch
 from orbiflow.arrays import Array
 from orbiflow.drawing import fill_rings
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles import (
-    CLASSES,
-    EscherTile,
-    OccupancySamples,
-    TileModel,
-    occupancy_loss,
-)
+from orbiflow.tiles import CLASSES, EscherTile, OccupancySamples, TileModel, occupancy_loss
 from reproduction.animal import OMEGA, animal_work
-from reproduction.drawing import (
-    Canvas,
-    caption,
-    draw_over,
-    grid_box,
-    panel,
-    window_of,
-)
-from reproduction.exhibit import (
-    Exhibit,
-    Extent,
-    Findings,
-    Work,
-)
+from reproduction.drawing import Canvas, caption, draw_over, grid_box, panel, window_of
+from reproduction.exhibit import Exhibit, Extent, Findings, Work
 from reproduction.published import animal
 
 if TYPE_CHECKING:

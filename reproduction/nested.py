@@ -9,17 +9,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from orbiflow.fields import (
-    FourierField,
-    VectorField,
-    periodic_operator,
-    symmetrize,
-)
-from orbiflow.symmetry import (
-    CrystallographicGroup,
-    Isometry,
-    identity,
-)
+from orbiflow.fields import FourierField, VectorField, periodic_operator, symmetrize
+from orbiflow.symmetry import CrystallographicGroup, Isometry, identity
 
 Operator = tuple[Isometry, int]
 """A generator g and the number K of terms: V -> sum over k < K of g^-k o V o g^k."""

@@ -10,14 +10,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from orbiflow.errors import OrbiflowError
-from orbiflow.runtime import (
-    Cancel,
-    Cancelled,
-    one_blas_thread,
-    one_thread,
-    process_context,
-    work,
-)
+from orbiflow.runtime import Cancel, Cancelled, one_blas_thread, one_thread, process_context, work
 from reproduction import (
     animal,
     classes,
@@ -33,14 +26,7 @@ from reproduction import (
     tilings,
 )
 from reproduction.drawing import Canvas, Picture
-from reproduction.exhibit import (
-    Draw,
-    Exhibit,
-    Extent,
-    Findings,
-    Shown,
-    Work,
-)
+from reproduction.exhibit import Draw, Exhibit, Extent, Findings, Shown, Work
 
 EXHIBITS: tuple[Exhibit, ...] = (
     square.EXHIBIT,

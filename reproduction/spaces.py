@@ -7,29 +7,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from orbiflow.arrays import Array
-from orbiflow.density import (
-    SPACES,
-    Space,
-    edge_pairs,
-    make_space,
-)
+from orbiflow.density import SPACES, Space, edge_pairs, make_space
 from orbiflow.drawing import mark_symmetry
 from orbiflow.symmetry import IDENTIFICATION_SPACES, CrystallographicGroup
-from reproduction.drawing import (
-    Canvas,
-    around,
-    caption,
-    draw_surface,
-    grid_box,
-    panel,
-    tiny,
-)
-from reproduction.exhibit import (
-    Exhibit,
-    Extent,
-    Findings,
-    Table,
-)
+from reproduction.drawing import Canvas, around, caption, draw_surface, grid_box, panel, tiny
+from reproduction.exhibit import Exhibit, Extent, Findings, Table
 from reproduction.nested import nested_error, terms
 
 if TYPE_CHECKING:

@@ -10,21 +10,10 @@ import torch
 
 from orbiflow.arrays import Array
 from orbiflow.drawing import fill_rings
-from orbiflow.fields import (
-    FourierField,
-    VectorField,
-    symmetrize,
-)
+from orbiflow.fields import FourierField, VectorField, symmetrize
 from orbiflow.flows import Flow
 from orbiflow.symmetry import CrystallographicGroup, identification_group
-from reproduction.drawing import (
-    INK,
-    Canvas,
-    around,
-    grid_box,
-    panel,
-    tiny,
-)
+from reproduction.drawing import INK, Canvas, around, grid_box, panel, tiny
 from reproduction.exhibit import Exhibit, Extent, Findings
 
 if TYPE_CHECKING:

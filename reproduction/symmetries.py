@@ -9,42 +9,12 @@ import numpy as np
 import torch
 
 from orbiflow.arrays import Array
-from orbiflow.drawing import (
-    CENTER_COLOURS,
-    LINE_COLOUR,
-    center_sign,
-    evaluate,
-    plane_axes,
-)
+from orbiflow.drawing import CENTER_COLOURS, LINE_COLOUR, center_sign, evaluate, plane_axes
 from orbiflow.fields import VectorField, periodic_operator
-from orbiflow.symmetry import (
-    Isometry,
-    Line,
-    identity,
-    rotation,
-    transflection,
-    translation,
-)
-from reproduction.drawing import (
-    INK,
-    Canvas,
-    around,
-    caption,
-    grid_box,
-    text_size,
-    tiny,
-)
-from reproduction.exhibit import (
-    Exhibit,
-    Extent,
-    Findings,
-    Table,
-)
-from reproduction.nested import (
-    Operator,
-    nested,
-    unit_field,
-)
+from orbiflow.symmetry import Isometry, Line, identity, rotation, transflection, translation
+from reproduction.drawing import INK, Canvas, around, caption, grid_box, text_size, tiny
+from reproduction.exhibit import Exhibit, Extent, Findings, Table
+from reproduction.nested import Operator, nested, unit_field
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

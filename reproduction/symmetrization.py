@@ -9,31 +9,12 @@ import torch
 from torch import Tensor
 
 from orbiflow.arrays import Array
-from orbiflow.fields import (
-    FourierField,
-    VectorField,
-    periodic_operator,
-    symmetrize,
-)
+from orbiflow.fields import FourierField, VectorField, periodic_operator, symmetrize
 from orbiflow.symmetry import rotation_matrix
-from orbiflow.tiles import (
-    CLASSES,
-    IsohedralClass,
-    signed_area,
-)
+from orbiflow.tiles import CLASSES, IsohedralClass, signed_area
 from reproduction.drawing import Canvas, tiny
-from reproduction.exhibit import (
-    Exhibit,
-    Extent,
-    Findings,
-    Table,
-)
-from reproduction.nested import (
-    equivariance_error,
-    nested_error,
-    terms,
-    unit_field,
-)
+from reproduction.exhibit import Exhibit, Extent, Findings, Table
+from reproduction.nested import equivariance_error, nested_error, terms, unit_field
 
 OMEGA = 5
 TURN = 0.5

@@ -6,12 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from orbiflow.drawing import (
-    CENTER_COLOURS,
-    LINE_COLOUR,
-    cell_ring,
-    center_sign,
-)
+from orbiflow.drawing import CENTER_COLOURS, LINE_COLOUR, cell_ring, center_sign
 from orbiflow.symmetry import (
     CrystallographicGroup,
     Isometry,
@@ -21,21 +16,8 @@ from orbiflow.symmetry import (
     transflection,
 )
 from orbiflow.tiles import CLASSES, draw_tiling
-from reproduction.drawing import (
-    INK,
-    Canvas,
-    around,
-    caption,
-    grid_box,
-    panel,
-    text_size,
-)
-from reproduction.exhibit import (
-    Exhibit,
-    Extent,
-    Findings,
-    Table,
-)
+from reproduction.drawing import INK, Canvas, around, caption, grid_box, panel, text_size
+from reproduction.exhibit import Exhibit, Extent, Findings, Table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

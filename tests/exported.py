@@ -13,11 +13,7 @@ from hypothesis import strategies as st
 from bent_tiles import bent_tile
 from orbiflow.arrays import Array
 from orbiflow.symmetry import rotation_matrix
-from orbiflow.tiles import (
-    CLASSES,
-    Tile,
-    isohedral_class,
-)
+from orbiflow.tiles import CLASSES, Tile, isohedral_class
 
 
 class Line(NamedTuple):

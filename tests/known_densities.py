@@ -9,12 +9,7 @@ import numpy as np
 import torch
 from numpy.typing import ArrayLike
 
-from orbiflow.density import (
-    AdaptiveKernels,
-    Mixture,
-    Space,
-    UniformDensity,
-)
+from orbiflow.density import AdaptiveKernels, Mixture, Space, UniformDensity
 
 FLOOR = 1e-9
 

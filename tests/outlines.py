@@ -20,11 +20,7 @@ from orbiflow.tiles import (
     signed_area,
 )
 from orbiflow.tiles.search.bending import Bent, bent_tiles
-from orbiflow.tiles.search.bending_fit import (
-    PlacedBent,
-    placed_best,
-    prototile,
-)
+from orbiflow.tiles.search.bending_fit import PlacedBent, placed_best, prototile
 from orbiflow.tiles.search.boundary import extract_tile
 from orbiflow.tiles.search.co_deformation import Hand, hands
 

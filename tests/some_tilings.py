@@ -20,12 +20,7 @@ from orbiflow.symmetry import (
     symmetry_elements,
     wallpaper_group,
 )
-from orbiflow.tiles import (
-    Tiling,
-    dirichlet_tiling,
-    isohedral_class,
-    orient,
-)
+from orbiflow.tiles import Tiling, dirichlet_tiling, isohedral_class, orient
 from strategies import lattices, seeds, wallpaper_groups
 
 Field: TypeAlias = Callable[[Array], Array]

@@ -6,12 +6,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 from orbiflow.symmetry import rotation_matrix
-from orbiflow.tiles import (
-    CLASSES,
-    Tile,
-    certify,
-    isohedral_class,
-)
+from orbiflow.tiles import CLASSES, Tile, certify, isohedral_class
 
 
 def swirled_tile(name: str, seed: int, strength: float, *, per_edge: int = 24) -> Tile:

@@ -121,11 +121,7 @@ REFUSED: list[tuple[Call, Any, str]] = [
     (lambda k: Tile(SQUARE, GROUP, k), KIND, 'give its name, "IH4"'),
     (lambda c: Tile(SQUARE, GROUP, "", c), (0, 9), "from 0 to 3, got 9"),
     (lambda c: Tile(SQUARE, GROUP, "", c), (0.5,), "whole number"),
-    (
-        tiles.certify,
-        SQUARE,
-        r"the tile must be a Tile or a Tiling, got an array of shape \(4, 2\)",
-    ),
+    (tiles.certify, SQUARE, r"the tile must be a Tile or a Tiling, got an array of shape \(4, 2\)"),
     (tiles.neighbours, SQUARE, "must be a Tile"),
     (tiles.colouring, SQUARE, "must be a Tile"),
     (lambda t: patch(t, (0, 0, 1, 1)), SQUARE, "must be a Tile"),

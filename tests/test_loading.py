@@ -12,12 +12,7 @@ import pytest
 
 import orbiflow
 from orbiflow.density import DensityEstimator
-from orbiflow.errors import (
-    CertificationError,
-    InputFileError,
-    OrbiflowError,
-    OutputError,
-)
+from orbiflow.errors import CertificationError, InputFileError, OrbiflowError, OutputError
 from orbiflow.loading import LoadedRun
 from orbiflow.runtime import find
 from orbiflow.tiles import (

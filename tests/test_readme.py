@@ -7,12 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from orbiflow.tiles import (
-    EscherTile,
-    LikenessSearch,
-    Target,
-    escherize_class,
-)
+from orbiflow.tiles import EscherTile, LikenessSearch, Target, escherize_class
 
 README_PATH = Path(__file__).parents[1] / "README.md"
 README = README_PATH.read_text(encoding="utf-8")

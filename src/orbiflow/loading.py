@@ -9,18 +9,8 @@ from pathlib import Path
 from typing import Any, TypeAlias, cast
 
 from orbiflow.arguments import path as as_path
-from orbiflow.density import (
-    MODEL,
-    REPORT,
-    DensityEstimator,
-    read_density,
-    report_from_json,
-)
-from orbiflow.errors import (
-    CertificationError,
-    InputFileError,
-    OrbiflowError,
-)
+from orbiflow.density import MODEL, REPORT, DensityEstimator, read_density, report_from_json
+from orbiflow.errors import CertificationError, InputFileError, OrbiflowError
 from orbiflow.runtime import is_list
 from orbiflow.tiles import (
     RESULT,

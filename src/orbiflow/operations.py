@@ -20,9 +20,7 @@ OPERATIONS = {
     "density batch": "orbiflow.density.operations.batches:batch",
 }
 
-WORK = {
-    "density fold": "orbiflow.density.cross_validation.operations:fold",
-}
+WORK = {"density fold": "orbiflow.density.cross_validation.operations:fold"}
 """Operations that others give to workers, and that are no commands."""
 
 RUN_FOLDERS = {

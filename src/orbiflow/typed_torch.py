@@ -49,11 +49,7 @@ class _Transform(Protocol):
 
 class _Fft(Protocol):
     def fft(
-        self,
-        input: Tensor,
-        n: int | None = None,
-        dim: int = -1,
-        norm: Normalisation | None = None,
+        self, input: Tensor, n: int | None = None, dim: int = -1, norm: Normalisation | None = None
     ) -> Tensor: ...
 
     fft2: _Transform

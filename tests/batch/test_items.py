@@ -12,11 +12,7 @@ from hypothesis import strategies as st
 from orbiflow.batch.folder import RESERVED
 from orbiflow.batch.items import content, folder_names, listed
 from orbiflow.batch.journal import Entry, Journal
-from orbiflow.errors import (
-    InputFileError,
-    OrbiflowError,
-    OutputError,
-)
+from orbiflow.errors import InputFileError, OrbiflowError, OutputError
 from orbiflow.runtime import stays_inside
 
 letters = st.text("aAbB .-é/", min_size=1, max_size=5)

@@ -41,12 +41,7 @@ def made_fixture(tmp_path_factory: pytest.TempPathFactory) -> Path:
     made = tmp_path_factory.mktemp("made")
     write(made / "good.csv", "phi,psi", angles(0))
     write(made / "poor.csv", "psi,phi", angles(1, kappa=0.5)[:, ::-1])
-    write(
-        made / "held.csv",
-        "name,psi,phi",
-        angles(2)[:, ::-1],
-        [f"p{k % 30}" for k in range(120)],
-    )
+    write(made / "held.csv", "name,psi,phi", angles(2)[:, ::-1], [f"p{k % 30}" for k in range(120)])
     for name in ("good", "poor"):
         fit = ("density", "fit", made / f"{name}.csv", "--space", "torus", "--unit", "degrees")
         assert call_main(lambda: ("", ""), *fit, *KERNELS, "--out", made / name).status == 0

@@ -7,12 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orbiflow.density import (
-    DensityEstimator,
-    DensityLevels,
-    density_to_bytes,
-    read_density,
-)
+from orbiflow.density import DensityEstimator, DensityLevels, density_to_bytes, read_density
 
 
 @pytest.fixture(name="folder", scope="module")
@@ -79,10 +74,7 @@ def test_lines_far_out(folder: Path, orbiflow) -> None:
         ("region --mass 0.000001 --samples 20000", "cannot be told from 0 with 20000 samples"),
         ("region --mass 0.99999999", "too near to 1: take one from 1e-06 to 0.999999"),
         ("region --samples 10", "--samples must be from 1000 to 1e+07, got 10"),
-        (
-            "score data.csv --samples 20000",
-            "--samples needs --region; give both or neither",
-        ),
+        ("score data.csv --samples 20000", "--samples needs --region; give both or neither"),
         (
             "score data.csv --region --samples 20",
             "--samples must be from 1000 to 10000000, got '20'",

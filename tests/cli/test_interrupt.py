@@ -63,11 +63,7 @@ def running(tmp_path: Path, *, before: str = "") -> Iterator[subprocess.Popen[st
     command += ["--method", "occupancy", "--turns", "1", "--max-frequency", "3"]
     command += ["--iterations", str(ENDLESS)]
     with subprocess.Popen(
-        command,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
     ) as process:
         try:
             yield process

@@ -9,12 +9,7 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from orbiflow.density import (
-    FlowDensity,
-    FlowSettings,
-    fit_density,
-    make_space,
-)
+from orbiflow.density import FlowDensity, FlowSettings, fit_density, make_space
 from orbiflow.density.fitting.budget import Budget, Spent
 from orbiflow.density.fitting.likelihood import EVERY, refine
 from orbiflow.fields import SplineField

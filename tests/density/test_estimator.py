@@ -9,11 +9,7 @@ import torch
 from sklearn.base import clone
 from sklearn.model_selection import GridSearchCV
 
-from orbiflow.density import (
-    DensityEstimator,
-    Sphere,
-    midpoints,
-)
+from orbiflow.density import DensityEstimator, Sphere, midpoints
 from orbiflow.errors import OrbiflowError
 
 

@@ -11,25 +11,13 @@ from orbiflow.density import DensitySettings, FlowSettings, Torus, fit_automatic
 from orbiflow.density.fitting import COMPONENTS, flow_trial
 from orbiflow.density.fitting.automatic import BEFORE_END
 from orbiflow.density.fitting.budget import Budget
-from orbiflow.density.fitting.evidence import (
-    Candidates,
-    candidates_of,
-    judged,
-)
+from orbiflow.density.fitting.evidence import Candidates, candidates_of, judged
 from orbiflow.density.fitting.families import KernelFamily
-from orbiflow.density.fitting.flow_trial import (
-    FIRST,
-    TriedFlow,
-    try_flow,
-)
+from orbiflow.density.fitting.flow_trial import FIRST, TriedFlow, try_flow
 from orbiflow.density.fitting.folds import Folds, folds_of
 from orbiflow.density.fitting.report import ComponentEvidence
 from orbiflow.density.fitting.settings import Component
-from orbiflow.density.fitting.weights import (
-    Gain,
-    stacked,
-    supported_weights,
-)
+from orbiflow.density.fitting.weights import Gain, stacked, supported_weights
 
 QUICK: dict[str, Any] = {
     "max_frequency": 2, "segments": 2, "iterations": 10, "roughness": (1e-3,)

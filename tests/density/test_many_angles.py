@@ -6,13 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from orbiflow.density import (
-    DensityEstimator,
-    Mixture,
-    Torus,
-    density_to_bytes,
-    read_density,
-)
+from orbiflow.density import DensityEstimator, Mixture, Torus, density_to_bytes, read_density
 from orbiflow.errors import InputFileError, OrbiflowError
 
 

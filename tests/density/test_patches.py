@@ -10,12 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from orbiflow.density import KleinBottle, from_klein, to_klein
-from orbiflow.density.spaces.patches import (
-    DCT_BASIS,
-    dct_to_pixels,
-    klein_patch,
-    pixels_to_dct,
-)
+from orbiflow.density.spaces.patches import DCT_BASIS, dct_to_pixels, klein_patch, pixels_to_dct
 from orbiflow.errors import OrbiflowError
 
 NATURAL = Path(__file__).parents[3] / "shared/data/density/klein/nk15c30Dct.mat"
@@ -81,11 +76,7 @@ def test_nothing_on_the_surface_is_nearer(seed: int) -> None:
     np.testing.assert_allclose(np.linalg.norm(units - foot, axis=1), distances, atol=1e-12)
 
 
-@given(
-    seed=seeds,
-    scale=st.floats(-100, 100).map(lambda p: 10.0**p),
-    offset=st.floats(-1e3, 1e3),
-)
+@given(seed=seeds, scale=st.floats(-100, 100).map(lambda p: 10.0**p), offset=st.floats(-1e3, 1e3))
 def test_brightness_contrast_and_basis_do_not_matter(seed: int, scale, offset) -> None:
     patches = np.random.default_rng(seed).normal(size=(5, 9))
     expected = to_klein(patches)

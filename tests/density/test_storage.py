@@ -25,11 +25,7 @@ from orbiflow.density import (
     read_density,
 )
 from orbiflow.errors import InputFileError, OrbiflowError
-from orbiflow.fields import (
-    FourierField,
-    InvariantField,
-    SplineField,
-)
+from orbiflow.fields import FourierField, InvariantField, SplineField
 from orbiflow.flows import Flow
 from orbiflow.symmetry import CrystallographicGroup, wallpaper_group
 from strategies import seeds
@@ -60,11 +56,7 @@ def plain(*fields: InvariantField, space=None, base=None) -> Density:
     name=st.sampled_from(SPACES),
     seed=seeds,
     segments=st.lists(
-        st.tuples(
-            st.sampled_from([FourierField, SplineField]),
-            st.integers(1, 3),
-            st.floats(0, 4),
-        ),
+        st.tuples(st.sampled_from([FourierField, SplineField]), st.integers(1, 3), st.floats(0, 4)),
         min_size=1,
         max_size=3,
     ),

@@ -8,11 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from orbiflow.density import (
-    append_column,
-    read_table,
-    to_csv,
-)
+from orbiflow.density import append_column, read_table, to_csv
 from orbiflow.density.tables import files, text
 from orbiflow.errors import InputFileError, OrbiflowError
 from table_files import PROPERTY, refuse, write

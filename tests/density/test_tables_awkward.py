@@ -5,11 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orbiflow.density import (
-    append_column,
-    is_identifier,
-    read_table,
-)
+from orbiflow.density import append_column, is_identifier, read_table
 from orbiflow.errors import InputFileError
 from table_files import write
 

@@ -4,13 +4,7 @@ import pytest
 import torch
 
 from density.blends import blended
-from orbiflow.density import (
-    AdaptiveKernels,
-    FlowDensity,
-    TabulatedDensity,
-    Torus,
-    make_space,
-)
+from orbiflow.density import AdaptiveKernels, FlowDensity, TabulatedDensity, Torus, make_space
 from orbiflow.errors import OrbiflowError
 from orbiflow.fields import SplineField
 from orbiflow.flows import Flow

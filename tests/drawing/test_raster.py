@@ -14,18 +14,8 @@ from orbiflow.arrays import Array
 from orbiflow.drawing import Sheet, field_picture, palette
 from orbiflow.drawing.fields import flow_lines, symmetric_seeds
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles import (
-    Tile,
-    classes_png,
-    isohedral_class,
-    overlay_png,
-    tiling_png,
-)
-from orbiflow.tiles.pictures.overlays import (
-    ADDED,
-    COMMON,
-    MISSING,
-)
+from orbiflow.tiles import Tile, classes_png, isohedral_class, overlay_png, tiling_png
+from orbiflow.tiles.pictures.overlays import ADDED, COMMON, MISSING
 
 
 def pixels(data: bytes) -> Array:

@@ -30,21 +30,12 @@ from orbiflow.density import (
     flow_picture,
     samples_picture,
 )
-from orbiflow.drawing import (
-    Picture,
-    Sheet,
-    field_picture,
-    pdf_pages,
-)
+from orbiflow.drawing import Picture, Sheet, field_picture, pdf_pages
 from orbiflow.drawing.sheet import NARROWEST
 from orbiflow.errors import OrbiflowError
 from orbiflow.fields import FourierField
 from orbiflow.flows import Flow
-from orbiflow.tiles import (
-    bending_picture,
-    overlay_picture,
-    tiling_picture,
-)
+from orbiflow.tiles import bending_picture, overlay_picture, tiling_picture
 from orbiflow.tiles.pictures import tiling_raster
 from printed import check_inside, letters
 

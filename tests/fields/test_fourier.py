@@ -14,11 +14,7 @@ from hypothesis import strategies as st
 from orbiflow.errors import OrbiflowError
 from orbiflow.fields import FourierField, symmetrize
 from orbiflow.fields.invariants import frequency_set
-from orbiflow.symmetry import (
-    WALLPAPER_GROUPS,
-    CrystallographicGroup,
-    wallpaper_group,
-)
+from orbiflow.symmetry import WALLPAPER_GROUPS, CrystallographicGroup, wallpaper_group
 from orbiflow.tiles import CLASSES
 from strategies import (
     SMALL_SPACE_GROUPS,

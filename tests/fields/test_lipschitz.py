@@ -11,11 +11,7 @@ from hypothesis import strategies as st
 
 from orbiflow.fields import FourierField, group_factor, steepness
 from orbiflow.flows import METHODS
-from orbiflow.symmetry import (
-    WALLPAPER_GROUPS,
-    CrystallographicGroup,
-    wallpaper_group,
-)
+from orbiflow.symmetry import WALLPAPER_GROUPS, CrystallographicGroup, wallpaper_group
 from strategies import SMALL_SPACE_GROUPS, groups, random_field, random_tensor, seeds, space_group
 
 NINE = ("p1", "p2", "p3", "p4", "p6", "pg", "pgg")

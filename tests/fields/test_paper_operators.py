@@ -170,9 +170,7 @@ def test_pushing_the_vector_forward_keeps_every_symmetry(name, angle):
     plain = pulled_back(random_field(group, 3, 0), matrix, offset)
     forward = torch.tensor(matrix)
     error = equivariance_error(
-        lambda z: plain(z) @ forward.mT,
-        group.conjugate(matrix, offset),
-        random_tensor(0, 40, 2),
+        lambda z: plain(z) @ forward.mT, group.conjugate(matrix, offset), random_tensor(0, 40, 2)
     )
     assert error < 1e-11
 

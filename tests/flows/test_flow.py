@@ -13,11 +13,7 @@ from scipy.integrate import solve_ivp
 from torch import nn
 
 from orbiflow.errors import OrbiflowError
-from orbiflow.fields import (
-    FourierField,
-    neural_field,
-    symmetrize,
-)
+from orbiflow.fields import FourierField, neural_field, symmetrize
 from orbiflow.flows import METHODS, Flow
 from orbiflow.symmetry import wallpaper_group
 from strategies import (

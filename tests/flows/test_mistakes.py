@@ -18,11 +18,7 @@ from orbiflow.fields import (
     symmetrize,
 )
 from orbiflow.flows import Flow
-from orbiflow.symmetry import (
-    IDENTIFICATION_SPACES,
-    identification_group,
-    wallpaper_group,
-)
+from orbiflow.symmetry import IDENTIFICATION_SPACES, identification_group, wallpaper_group
 from strategies import groups, random_tensor
 
 P4 = wallpaper_group("p4")

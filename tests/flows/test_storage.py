@@ -16,29 +16,10 @@ from hypothesis import strategies as st
 from safetensors.torch import load, save
 from torch import Tensor, nn
 
-from orbiflow.errors import (
-    InputFileError,
-    OrbiflowError,
-    OutputError,
-)
-from orbiflow.fields import (
-    FourierField,
-    SplineField,
-    neural_field,
-    symmetrize,
-    time_dependent,
-)
-from orbiflow.flows import (
-    METHODS,
-    Flow,
-    load_flow,
-    save_flow,
-)
-from orbiflow.symmetry import (
-    CrystallographicGroup,
-    identification_group,
-    wallpaper_group,
-)
+from orbiflow.errors import InputFileError, OrbiflowError, OutputError
+from orbiflow.fields import FourierField, SplineField, neural_field, symmetrize, time_dependent
+from orbiflow.flows import METHODS, Flow, load_flow, save_flow
+from orbiflow.symmetry import CrystallographicGroup, identification_group, wallpaper_group
 from strategies import groups, random_tensor, seeds, space_group
 
 one_folder = settings(
@@ -199,10 +180,7 @@ def test_what_cannot_be_saved_is_named(tmp_path: Path) -> None:
 def good(tmp_path: Path) -> tuple[dict[str, Any], dict[str, Tensor]]:
     """Header and tensors of a file with a field of every kind."""
     group = identification_group("torus")
-    fields = [
-        filled(FourierField(group, 2), 1),
-        filled(neural_field(group, hidden=(4,)), 2),
-    ]
+    fields = [filled(FourierField(group, 2), 1), filled(neural_field(group, hidden=(4,)), 2)]
     data = save_flow(Flow(fields, steps=2), tmp_path / "good").read_bytes()
     length = int.from_bytes(data[:8], "little")
     return json.loads(json.loads(data[8 : 8 + length])["__metadata__"]["orbiflow"]), load(data)

@@ -9,11 +9,7 @@ import torch
 from hypothesis import given, settings
 from torch import Tensor, nn
 
-from orbiflow.fields import (
-    FourierField,
-    symmetrize,
-    time_dependent,
-)
+from orbiflow.fields import FourierField, symmetrize, time_dependent
 from orbiflow.flows import METHODS, Flow
 from orbiflow.symmetry import CrystallographicGroup, wallpaper_group
 from strategies import (

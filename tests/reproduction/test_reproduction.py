@@ -15,15 +15,7 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import Cancel, Cancelled
 from reproduction.__main__ import main
 from reproduction.drawing import Canvas
-from reproduction.exhibit import (
-    FAST,
-    Exhibit,
-    Extent,
-    Findings,
-    Shown,
-    Table,
-    Work,
-)
+from reproduction.exhibit import FAST, Exhibit, Extent, Findings, Shown, Table, Work
 from reproduction.page import paper_page, write_page, written_files
 from reproduction.reproduction import EXHIBITS, reproduce
 

@@ -10,15 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from orbiflow.runtime import (
-    ClassFailed,
-    Event,
-    Failed,
-    Finished,
-    Progress,
-    TileFound,
-    start,
-)
+from orbiflow.runtime import ClassFailed, Event, Failed, Finished, Progress, TileFound, start
 from runtime.searches import ENDLESS, boot_call, check_order
 
 

@@ -37,10 +37,7 @@ EVENTS = st.one_of(
     st.builds(Started, words),
     st.builds(Note, words, st.booleans()),
     st.builds(
-        Table,
-        words,
-        st.lists(words).map(tuple),
-        st.lists(st.lists(words).map(tuple)).map(tuple),
+        Table, words, st.lists(words).map(tuple), st.lists(st.lists(words).map(tuple)).map(tuple)
     ),
     st.builds(
         Progress, numbers, words, st.none() | words, st.none() | numbers, st.none() | numbers

@@ -132,11 +132,7 @@ def test_alone_it_prints_its_help(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_exit_statuses(monkeypatch: pytest.MonkeyPatch) -> None:
-    outcomes = {
-        0: Outcome(),
-        1: Outcome(state="nothing found"),
-        130: Outcome(state="cancelled"),
-    }
+    outcomes = {0: Outcome(), 1: Outcome(state="nothing found"), 130: Outcome(state="cancelled")}
     for status, outcome in outcomes.items():
         monkeypatch.setattr(Operation, "run", lambda *_, outcome=outcome: outcome)
         assert app.run(["export", "X"]) == status

@@ -9,11 +9,7 @@ from hypothesis import given, settings
 from orbiflow.errors import GroupError, OrbiflowError
 from orbiflow.fields import symmetrize
 from orbiflow.flows import Flow
-from orbiflow.symmetry import (
-    EquivarianceError,
-    assert_equivariant,
-    wallpaper_group,
-)
+from orbiflow.symmetry import EquivarianceError, assert_equivariant, wallpaper_group
 from strategies import groups, plane_groups, random_field, random_tensor, seeds, several
 
 

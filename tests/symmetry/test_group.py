@@ -8,12 +8,7 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from orbiflow.errors import (
-    GroupError,
-    LatticeMismatchError,
-    NotAnIsometryError,
-    NotDiscreteError,
-)
+from orbiflow.errors import GroupError, LatticeMismatchError, NotAnIsometryError, NotDiscreteError
 from orbiflow.symmetry import (
     CrystallographicGroup,
     Isometry,

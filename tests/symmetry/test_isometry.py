@@ -7,11 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from orbiflow.errors import GroupError, NotAnIsometryError
-from orbiflow.symmetry import (
-    Isometry,
-    identity,
-    translation,
-)
+from orbiflow.symmetry import Isometry, identity, translation
 from strategies import isometries, random_points, seeds
 
 dims = st.sampled_from((1, 2, 3, 5))

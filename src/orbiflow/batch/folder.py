@@ -16,13 +16,7 @@ from orbiflow.batch.journal import Entry, Journal
 from orbiflow.batch.kinds import Kind
 from orbiflow.batch.overview import PAGE, TABLE, ContactSheet, Overview
 from orbiflow.errors import OrbiflowError, OutputError
-from orbiflow.runtime import (
-    LITTER,
-    ResultFolder,
-    make_folder,
-    write_atomic,
-    write_set,
-)
+from orbiflow.runtime import LITTER, ResultFolder, make_folder, write_atomic, write_set
 
 THUMBNAILS, LOCK = "thumbnails", ".batch.lock"
 RESERVED = (ContactSheet.journal, TABLE, PAGE, THUMBNAILS, LOCK)

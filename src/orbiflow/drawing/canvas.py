@@ -10,11 +10,7 @@ import numpy as np
 
 from orbiflow.arrays import Array, Window
 from orbiflow.errors import OrbiflowError
-from orbiflow.symmetry import (
-    CrystallographicGroup,
-    reduced_basis,
-    symmetry_elements,
-)
+from orbiflow.symmetry import CrystallographicGroup, reduced_basis, symmetry_elements
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

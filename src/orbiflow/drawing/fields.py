@@ -9,11 +9,7 @@ import numpy as np
 import torch
 
 from orbiflow.arrays import Array, Window
-from orbiflow.drawing.canvas import (
-    mark_symmetry,
-    outline_cell,
-    plane_axes,
-)
+from orbiflow.drawing.canvas import mark_symmetry, outline_cell, plane_axes
 from orbiflow.drawing.sheet import Picture, Sheet
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import CrystallographicGroup, reduced_basis

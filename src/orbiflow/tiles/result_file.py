@@ -16,18 +16,10 @@ from orbiflow.arguments import path as as_path
 from orbiflow.arrays import Array
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.runtime import ResultFolder, is_list, is_object, make_folder, write_atomic
-from orbiflow.symmetry import (
-    CrystallographicGroup,
-    Isometry,
-    checked_lattice,
-)
+from orbiflow.symmetry import CrystallographicGroup, Isometry, checked_lattice
 from orbiflow.tiles.likeness import Fidelity, Recognisability, ShapeMetrics, Thinnest
 from orbiflow.tiles.tile import EscherTile
-from orbiflow.tiles.tilings import (
-    CLASSES,
-    Tile,
-    isohedral_class,
-)
+from orbiflow.tiles.tilings import CLASSES, Tile, isohedral_class
 
 RESULT, TILE_MODEL = "result.json", "model.safetensors"
 MOST_BYTES = 256 * 2**20

@@ -5,11 +5,7 @@ import pytest
 import torch
 
 from orbiflow.density import KleinBottle, ProjectivePlane, Sphere, Torus
-from orbiflow.density.pictures.axes import (
-    angle_axis,
-    angle_text,
-    view_of,
-)
+from orbiflow.density.pictures.axes import angle_axis, angle_text, view_of
 from orbiflow.density.pictures.scale import (
     DARK_SHARE,
     Shade,

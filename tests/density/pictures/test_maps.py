@@ -30,11 +30,7 @@ from orbiflow.density import (
 )
 from orbiflow.density.pictures.maps import Map, pixels_of
 from orbiflow.density.pictures.projections import EqualEarth, Lambert, PlateCarree
-from orbiflow.density.pictures.values import (
-    chosen_scale,
-    density_at,
-    density_on_map,
-)
+from orbiflow.density.pictures.values import chosen_scale, density_at, density_on_map
 from orbiflow.drawing import Sheet
 from orbiflow.drawing.sheet import NARROWEST
 from orbiflow.errors import OrbiflowError
@@ -83,9 +79,7 @@ def test_a_map_has_the_peak_where_it_is_and_all_the_mass(space: RoundSpace, kapp
 
 
 @every_space
-def test_kernels_are_summed_as_finely_as_a_picture_needs(
-    space: RoundSpace,
-) -> None:
+def test_kernels_are_summed_as_finely_as_a_picture_needs(space: RoundSpace) -> None:
     rng = np.random.default_rng(1)
     count = 200
     centers = space.to_chart(
@@ -126,8 +120,7 @@ def test_maps_have_room_and_letters_of_7_to_8_points(space: Any, width: Any) -> 
 
 def test_what_is_outside_the_outline_is_paper_and_inside_is_colour() -> None:
     picture = map_picture(
-        peaked(ROUND[0], (0, 0), 2.0),
-        settings=PlotSettings(projection="mollweide", scale="linear"),
+        peaked(ROUND[0], (0, 0), 2.0), settings=PlotSettings(projection="mollweide", scale="linear")
     )
     image = np.asarray(Image.open(io.BytesIO(picture.file())).convert("RGB")).astype(int)
     axes = picture.figure.axes[1] if len(picture.figure.axes) > 1 else picture.figure.axes[0]

@@ -31,11 +31,7 @@ from orbiflow.density import (
 )
 from orbiflow.density.models import identity_flow
 from orbiflow.density.pictures import square as density_square
-from orbiflow.density.pictures.axes import (
-    angle_axis,
-    axis_label,
-    view_of,
-)
+from orbiflow.density.pictures.axes import angle_axis, axis_label, view_of
 from orbiflow.density.pictures.flow import few_colours
 from orbiflow.density.pictures.scale import shading
 from orbiflow.density.pictures.surfaces import boy_surface, mesh

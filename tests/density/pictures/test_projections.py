@@ -13,13 +13,7 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from orbiflow.density import (
-    PlotSettings,
-    ProjectivePlane,
-    Sphere,
-    Torus,
-    to_vectors,
-)
+from orbiflow.density import PlotSettings, ProjectivePlane, Sphere, Torus, to_vectors
 from orbiflow.density.pictures.map_axes import meridian, parallel
 from orbiflow.density.pictures.map_choice import chosen_map
 from orbiflow.density.pictures.maps import pixels_of, places_on

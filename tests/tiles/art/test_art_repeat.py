@@ -10,12 +10,7 @@ import pytest
 from artworks import checkerboard, squirrel
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import rotation_matrix
-from orbiflow.tiles import (
-    CLASSES,
-    ArtSettings,
-    artwork,
-    render_artwork,
-)
+from orbiflow.tiles import CLASSES, ArtSettings, artwork, render_artwork
 from orbiflow.tiles.art.making import render_on
 from orbiflow.tiles.art.page import rectangle, spread_page
 

@@ -10,19 +10,9 @@ from scipy.ndimage import binary_erosion
 
 from artworks import EYE, checkerboard, face, flat, picture, size_of, squirrel, upside_down
 from orbiflow.drawing import palette
-from orbiflow.tiles import (
-    CLASSES,
-    ArtSettings,
-    Artwork,
-    artwork,
-    render_artwork,
-)
+from orbiflow.tiles import CLASSES, ArtSettings, Artwork, artwork, render_artwork
 from orbiflow.tiles.art.making import raster_grid
-from orbiflow.tiles.art.raster import (
-    NOWHERE,
-    runs,
-    triangle_sides,
-)
+from orbiflow.tiles.art.raster import NOWHERE, runs, triangle_sides
 from orbiflow.tiles.art.source import _places, covered_area, silhouette_outline
 from orbiflow.tiles.silhouette import triangulate
 

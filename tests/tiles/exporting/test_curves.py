@@ -10,12 +10,7 @@ from hypothesis import strategies as st
 
 from exported import tile_of, tiles
 from orbiflow.tiles import CLASSES, Curve, Tile
-from orbiflow.tiles.exporting.outlines import (
-    CORNER,
-    fitted,
-    outline,
-    turning,
-)
+from orbiflow.tiles.exporting.outlines import CORNER, fitted, outline, turning
 
 
 def polyline(seed: int, count: int, rough: float) -> np.ndarray:
@@ -27,12 +22,7 @@ def polyline(seed: int, count: int, rough: float) -> np.ndarray:
 
 
 @settings(max_examples=60, deadline=None)
-@given(
-    st.integers(0, 2**32 - 1),
-    st.integers(1, 60),
-    st.floats(0, 1.0),
-    st.floats(1e-3, 0.3),
-)
+@given(st.integers(0, 2**32 - 1), st.integers(1, 60), st.floats(0, 1.0), st.floats(1e-3, 0.3))
 def test_fits_keep_their_tolerance(seed, count, rough, tolerance) -> None:
     points = polyline(seed, count, rough)
     curve = fitted(points, tolerance)

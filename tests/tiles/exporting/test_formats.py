@@ -14,15 +14,7 @@ from PIL import Image
 
 from exported import dxf_lines, tile_of
 from orbiflow.errors import CertificationError, OrbiflowError
-from orbiflow.tiles import (
-    EscherTile,
-    ExportSettings,
-    Tile,
-    edges,
-    export,
-    scenes,
-    write_scene,
-)
+from orbiflow.tiles import EscherTile, ExportSettings, Tile, edges, export, scenes, write_scene
 
 TILE = tile_of("IH3")
 

@@ -12,12 +12,7 @@ import pytest
 from PIL import Image
 
 from artworks import squirrel, write_run
-from orbiflow.errors import (
-    CertificationError,
-    InputFileError,
-    OrbiflowError,
-    OutputError,
-)
+from orbiflow.errors import CertificationError, InputFileError, OrbiflowError, OutputError
 from orbiflow.tiles import (
     AnimationSettings,
     ArtSettings,

@@ -10,11 +10,7 @@ from hypothesis import strategies as st
 
 from exported import dxf_lines, tile_of
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles import (
-    ExportSettings,
-    scenes,
-    write_scene,
-)
+from orbiflow.tiles import ExportSettings, scenes, write_scene
 from orbiflow.tiles.exporting.sheets import ARM, OVERLAP
 
 TILE = tile_of("IH7")

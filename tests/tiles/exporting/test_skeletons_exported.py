@@ -13,15 +13,7 @@ from hypothesis import strategies as st
 from exported import Line, dxf_lines, svg_lines, tile_of, tiles
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import wallpaper_group
-from orbiflow.tiles import (
-    CLASSES,
-    ExportSettings,
-    Scene,
-    Tile,
-    edges,
-    scenes,
-    write_scene,
-)
+from orbiflow.tiles import CLASSES, ExportSettings, Scene, Tile, edges, scenes, write_scene
 
 AREA = (150.0, 110.0)
 # svgelements takes an inch for 25.39998 mm: 2e-4 in these tests

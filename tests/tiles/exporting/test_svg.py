@@ -11,15 +11,7 @@ import pytest
 
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles import (
-    CLASSES,
-    Tile,
-    colouring,
-    default_window,
-    patch,
-    tile_svg,
-    tiling_svg,
-)
+from orbiflow.tiles import CLASSES, Tile, colouring, default_window, patch, tile_svg, tiling_svg
 
 SVG = "{http://www.w3.org/2000/svg}"
 

@@ -15,15 +15,7 @@ from hypothesis import strategies as st
 
 from exported import dxf_lines, polygons, svg_lines, tile_of, tiles
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles import (
-    CLASSES,
-    EscherTile,
-    ExportSettings,
-    Tile,
-    colouring,
-    scenes,
-    write_scene,
-)
+from orbiflow.tiles import CLASSES, EscherTile, ExportSettings, Tile, colouring, scenes, write_scene
 from orbiflow.tiles.exporting import longer_side
 
 INKSCAPE = "{http://www.inkscape.org/namespaces/inkscape}"

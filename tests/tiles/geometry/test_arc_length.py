@@ -7,13 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles import (
-    points_along,
-    resampled,
-    resampled_with_corners,
-    ring_length,
-    signed_area,
-)
+from orbiflow.tiles import points_along, resampled, resampled_with_corners, ring_length, signed_area
 from strategies import dyadic_rings
 
 

@@ -8,14 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from orbiflow.symmetry import CrystallographicGroup
-from orbiflow.tiles import (
-    Tile,
-    centroid,
-    orient,
-    reverse,
-    signed_area,
-    subdivided,
-)
+from orbiflow.tiles import Tile, centroid, orient, reverse, signed_area, subdivided
 from strategies import dyadic_rings
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])

@@ -4,11 +4,7 @@ import numpy as np
 import pytest
 import shapely
 
-from orbiflow.tiles import (
-    arc_lengths,
-    plane_points,
-    resampled,
-)
+from orbiflow.tiles import arc_lengths, plane_points, resampled
 from orbiflow.tiles.likeness import Elastic, Pinned, bent_onto, mutual_iou
 from orbiflow.tiles.likeness.bending_onto import _separated, corresponding
 from outlines import animal

@@ -10,13 +10,7 @@ from hypothesis import strategies as st
 from shapely.geometry import MultiPolygon, Polygon, box
 
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles import (
-    compare,
-    dice,
-    hausdorff,
-    iou,
-    pixel_accuracy,
-)
+from orbiflow.tiles import compare, dice, hausdorff, iou, pixel_accuracy
 from orbiflow.tiles.likeness.metrics import default_window
 
 SQUARE = np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]])

@@ -8,11 +8,7 @@ from numpy.typing import NDArray
 from shapely.geometry import Polygon, box
 
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles import (
-    diverse,
-    rank_score,
-    tile_similarity,
-)
+from orbiflow.tiles import diverse, rank_score, tile_similarity
 from orbiflow.tiles.likeness.ranking import OTHER_CLASS_FACTOR
 
 SHARES = st.floats(0, 1)

@@ -29,12 +29,7 @@ from orbiflow.tiles import (
     escherize_class,
 )
 from orbiflow.tiles.motion.animations import motion
-from orbiflow.tiles.motion.kinds import (
-    eased,
-    frames,
-    morph,
-    progress,
-)
+from orbiflow.tiles.motion.kinds import eased, frames, morph, progress
 from orbiflow.tiles.motion.writers import picture
 from orbiflow.tiles.pictures import BendingWay
 from swirled_tiles import is_sound, swirled, swirled_tile

@@ -11,11 +11,7 @@ from PIL import Image
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.pictures import FrontPoint, front_png
-from orbiflow.tiles.pictures.front import (
-    COLOURS,
-    PALE,
-    _apart,
-)
+from orbiflow.tiles.pictures.front import COLOURS, PALE, _apart
 
 HOUSE = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [1.0, 3.0], [0.0, 2.0]])
 

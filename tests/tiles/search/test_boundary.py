@@ -9,10 +9,7 @@ import torch
 from orbiflow.errors import CertificationError
 from orbiflow.tiles import CLASSES, TileModel, certify
 from orbiflow.tiles.search import boundary
-from orbiflow.tiles.search.boundary import (
-    converge,
-    extract_tile,
-)
+from orbiflow.tiles.search.boundary import converge, extract_tile
 from orbiflow.tiles.search.polygons import DENSE, TOLERANCES
 
 

@@ -47,10 +47,7 @@ def test_what_the_methods_of_their_own_give() -> None:
     descent, occupancy = SETTINGS["descent"], SETTINGS["occupancy"]
     assert isinstance(descent, OverlapSearch)
     assert isinstance(occupancy, OccupancySearch)
-    for found in (
-        fit_descent(TARGET, "IH4", descent),
-        fit_occupancy(TARGET, "IH4", occupancy),
-    ):
+    for found in (fit_descent(TARGET, "IH4", descent), fit_occupancy(TARGET, "IH4", occupancy)):
         tiles = certified_tiles(TARGET, found)
         assert tiles[0].certificate.valid
         scores = [tile.score for tile in tiles]

@@ -11,13 +11,7 @@ from hypothesis import strategies as st
 from orbiflow.errors import OrbiflowError
 from orbiflow.flows import Flow
 from orbiflow.symmetry import CrystallographicGroup
-from orbiflow.tiles import (
-    CLASSES,
-    IsohedralClass,
-    Tile,
-    TileModel,
-    certify,
-)
+from orbiflow.tiles import CLASSES, IsohedralClass, Tile, TileModel, certify
 from orbiflow.tiles.search.boundary import extract_tile
 from strategies import largest, random_field, random_points, random_tensor, seeds
 
@@ -187,10 +181,7 @@ def test_rotating_inside_the_field_breaks_glides(name: str, angle: float) -> Non
     boundary = (corners[:, None] + share * (corners.roll(-1, 0) - corners)[:, None]).flatten(0, 1)
     turn = model.linear().detach()[0]
     mixed = Flow(lambda z: field(z @ torch.linalg.inv(turn).T))
-    polygons = {
-        "composed": Flow(field)(boundary) @ turn.T,
-        "mixed": mixed(boundary @ turn.T),
-    }
+    polygons = {"composed": Flow(field)(boundary) @ turn.T, "mixed": mixed(boundary @ turn.T)}
     certificates = {
         how: certify(Tile(polygon.detach().numpy(), model.placed_group(), name))
         for how, polygon in polygons.items()

@@ -10,14 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from orbiflow.arrays import Array
-from orbiflow.tiles import (
-    CLASSES,
-    Target,
-    Tile,
-    TileModel,
-    certify,
-    resampled,
-)
+from orbiflow.tiles import CLASSES, Target, Tile, TileModel, certify, resampled
 from orbiflow.tiles.search.placements import (
     Placements,
     _compositions,
@@ -26,11 +19,7 @@ from orbiflow.tiles.search.placements import (
     edge_lengths,
 )
 from orbiflow.tiles.search.prototiles import Prototiles
-from orbiflow.tiles.search.starts import (
-    mirror_closed,
-    outline_starts,
-    template_starts,
-)
+from orbiflow.tiles.search.starts import mirror_closed, outline_starts, template_starts
 from orbiflow.tiles.search.tile_space import nearest_tiles
 
 BOOT = np.array([[0, 0], [3, 0], [3.4, 1.2], [2.2, 1.5], [2.0, 2.8], [0.8, 2.5], [-0.3, 1.2]])

@@ -7,14 +7,7 @@ import pytest
 import shapely
 
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles import (
-    Emphasis,
-    EscherTile,
-    LikenessSearch,
-    OverlapSearch,
-    Pins,
-    search_classes,
-)
+from orbiflow.tiles import Emphasis, EscherTile, LikenessSearch, OverlapSearch, Pins, search_classes
 from outlines import animal
 
 SQUIRREL = animal("squirrel.dat")

@@ -9,11 +9,7 @@ from awkward import NOT_SIMPLE, STRANGE
 from orbiflow.arguments import numbers
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles import (
-    orient,
-    resampled,
-    signed_area,
-)
+from orbiflow.tiles import orient, resampled, signed_area
 from orbiflow.tiles.silhouette import Mesh, triangulate
 from outlines import ANIMALS, SHAPES, animal, comb, disc, dumbbell, slit_square, star, unit
 from strategies import dyadic_rings

@@ -10,11 +10,7 @@ import pytest
 
 from orbiflow.arrays import Array
 from orbiflow.symmetry import CrystallographicGroup, Isometry
-from orbiflow.tiles import (
-    CLASSES,
-    IsohedralClass,
-    Tile,
-)
+from orbiflow.tiles import CLASSES, IsohedralClass, Tile
 
 MakeTile: TypeAlias = Callable[..., Tile]
 
@@ -65,10 +61,7 @@ def make_tile(
     linear = kind.stretch(rng.uniform(-stretch, stretch, kind.stretch_dim))
     polygon = (polygon + bend * field(polygon)) @ linear.T
     return Tile(
-        polygon,
-        kind.group().conjugate(linear),
-        kind.name,
-        tuple(range(0, len(polygon), per_edge)),
+        polygon, kind.group().conjugate(linear), kind.name, tuple(range(0, len(polygon), per_edge))
     )
 
 

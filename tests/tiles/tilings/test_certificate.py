@@ -13,18 +13,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from orbiflow.errors import CertificationError
-from orbiflow.symmetry import (
-    CrystallographicGroup,
-    rotation,
-    rotation_matrix,
-)
-from orbiflow.tiles import (
-    IsohedralClass,
-    Tile,
-    certify,
-    isohedral_class,
-    signed_area,
-)
+from orbiflow.symmetry import CrystallographicGroup, rotation, rotation_matrix
+from orbiflow.tiles import IsohedralClass, Tile, certify, isohedral_class, signed_area
 
 
 def square(side: float = 1.0) -> Tile:

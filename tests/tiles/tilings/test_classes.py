@@ -11,13 +11,7 @@ import torch
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import identity
-from orbiflow.tiles import (
-    CLASSES,
-    EdgeIdentification,
-    IsohedralClass,
-    isohedral_class,
-    signed_area,
-)
+from orbiflow.tiles import CLASSES, EdgeIdentification, IsohedralClass, isohedral_class, signed_area
 from orbiflow.tiles.tilings.tiling import coset_and_cell
 
 GROUP_ORDERS = {"p1": 1, "p2": 2, "pg": 2, "pgg": 4, "p3": 3, "p4": 4, "p6": 6}

@@ -11,14 +11,7 @@ from hypothesis import strategies as st
 
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import CrystallographicGroup, translation
-from orbiflow.tiles import (
-    IsohedralClass,
-    Tile,
-    colouring,
-    isohedral_class,
-    neighbours,
-    patch,
-)
+from orbiflow.tiles import IsohedralClass, Tile, colouring, isohedral_class, neighbours, patch
 from orbiflow.tiles.tilings.colourings import colour_graph
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])

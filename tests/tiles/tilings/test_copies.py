@@ -9,15 +9,7 @@ from hypothesis import strategies as st
 
 from exported import tile_of, tiles
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles import (
-    CLASSES,
-    Tile,
-    colouring,
-    copies_inside,
-    copies_meeting,
-    edges,
-    patch,
-)
+from orbiflow.tiles import CLASSES, Tile, colouring, copies_inside, copies_meeting, edges, patch
 from orbiflow.tiles.tilings.tiling import coset_and_cell
 
 

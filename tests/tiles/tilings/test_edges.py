@@ -8,12 +8,7 @@ import pytest
 from exported import tile_of
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import wallpaper_group
-from orbiflow.tiles import (
-    CLASSES,
-    IsohedralClass,
-    Tile,
-    edges,
-)
+from orbiflow.tiles import CLASSES, IsohedralClass, Tile, edges
 
 
 def test_the_templates(kind: IsohedralClass) -> None:

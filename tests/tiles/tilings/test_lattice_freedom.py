@@ -8,11 +8,7 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from orbiflow.symmetry import (
-    WALLPAPER_GROUPS,
-    CrystallographicGroup,
-    rotation_matrix,
-)
+from orbiflow.symmetry import WALLPAPER_GROUPS, CrystallographicGroup, rotation_matrix
 from orbiflow.tiles import CLASSES
 from orbiflow.tiles.tilings.isohedral import commutant, stretch_matrix
 from strategies import random_tensor, seeds, wallpaper_groups

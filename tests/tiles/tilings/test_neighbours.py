@@ -7,11 +7,7 @@ from typing import Any
 import numpy as np
 
 from orbiflow.symmetry import CrystallographicGroup, identity
-from orbiflow.tiles import (
-    IsohedralClass,
-    Tile,
-    neighbours,
-)
+from orbiflow.tiles import IsohedralClass, Tile, neighbours
 
 CORNER_NEIGHBOURS = {"IH21": 3, "IH28": 2}  # across the 6-fold, and across the two 4-fold centres
 

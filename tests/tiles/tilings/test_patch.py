@@ -10,13 +10,7 @@ import shapely
 
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import identity, translation
-from orbiflow.tiles import (
-    IsohedralClass,
-    Tile,
-    aspects,
-    isohedral_class,
-    patch,
-)
+from orbiflow.tiles import IsohedralClass, Tile, aspects, isohedral_class, patch
 
 WINDOW = (-4.0, -3.0, 5.0, 2.5)
 

@@ -10,11 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from exported import tiles
-from orbiflow.tiles import (
-    copies_meeting,
-    edges,
-    skeleton,
-)
+from orbiflow.tiles import copies_meeting, edges, skeleton
 
 
 @settings(max_examples=30, deadline=None)

@@ -11,11 +11,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from orbiflow.errors import OrbiflowError
-from orbiflow.symmetry import (
-    WALLPAPER_GROUPS,
-    identity,
-    wallpaper_group,
-)
+from orbiflow.symmetry import WALLPAPER_GROUPS, identity, wallpaper_group
 from orbiflow.tiles import (
     Placed,
     Prototile,

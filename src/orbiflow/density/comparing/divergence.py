@@ -15,11 +15,7 @@ from orbiflow.arrays import Array
 from orbiflow.density.arguments import silent
 from orbiflow.density.comparing.resampling import Groups, resampled_sums
 from orbiflow.density.comparing.settings import ComparisonSettings
-from orbiflow.density.fitting import (
-    DensitySettings,
-    Progress,
-    fit_automatic,
-)
+from orbiflow.density.fitting import DensitySettings, Progress, fit_automatic
 from orbiflow.density.models import Mixture
 from orbiflow.density.spaces import Space
 from orbiflow.errors import OrbiflowError

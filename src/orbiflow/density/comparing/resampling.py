@@ -99,12 +99,7 @@ MAX_FOLDS = 1000
 
 
 def cross_validation_folds(
-    rows: int,
-    folds: int = 10,
-    *,
-    together: ArrayLike | None = None,
-    seed: int = 0,
-    split: int = 0,
+    rows: int, folds: int = 10, *, together: ArrayLike | None = None, seed: int = 0, split: int = 0
 ) -> NDArray[np.int64]:
     """Return the random fold (N,) of each row, from 0; each row is held out once.
 

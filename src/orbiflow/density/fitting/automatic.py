@@ -10,10 +10,7 @@ import torch
 from numpy.typing import ArrayLike
 from torch import Tensor
 
-from orbiflow.density.arguments import (
-    check_kind,
-    silent,
-)
+from orbiflow.density.arguments import check_kind, silent
 from orbiflow.density.fitting.budget import Budget, training
 from orbiflow.density.fitting.evidence import (
     Candidates,
@@ -29,18 +26,8 @@ from orbiflow.density.fitting.families import (
     MixtureFamily,
     NetworkFamily,
 )
-from orbiflow.density.fitting.flow_trial import (
-    TriedFlow,
-    flow_settings,
-    try_flow,
-)
-from orbiflow.density.fitting.folds import (
-    LEAST_PLACES,
-    Folds,
-    Repeats,
-    folds_of,
-    repeats_of,
-)
+from orbiflow.density.fitting.flow_trial import TriedFlow, flow_settings, try_flow
+from orbiflow.density.fitting.folds import LEAST_PLACES, Folds, Repeats, folds_of, repeats_of
 from orbiflow.density.fitting.kernels import NARROWEST
 from orbiflow.density.fitting.report import (
     ComponentEvidence,
@@ -69,11 +56,7 @@ from orbiflow.density.fitting.settings import COMPONENTS, DensitySettings
 from orbiflow.density.fitting.weights import stacked, supported_weights
 from orbiflow.density.inference import at_observed
 from orbiflow.density.models import MOST_DIM, Mixture
-from orbiflow.density.spaces import (
-    Space,
-    Torus,
-    whole_turn,
-)
+from orbiflow.density.spaces import Space, Torus, whole_turn
 from orbiflow.errors import OrbiflowError
 
 LEAST_FLOW_ROWS = 300

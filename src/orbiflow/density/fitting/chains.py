@@ -9,13 +9,7 @@ from torch import Tensor
 
 from orbiflow.density.fitting.budget import Budget
 from orbiflow.density.fitting.rows import Rows
-from orbiflow.density.models import (
-    SCALES,
-    VonMisesChains,
-    chained,
-    shares_of,
-    waves,
-)
+from orbiflow.density.models import SCALES, VonMisesChains, chained, shares_of, waves
 from orbiflow.density.spaces import Space
 from orbiflow.typed_torch import linalg, special
 

@@ -14,11 +14,7 @@ from orbiflow.density.fitting.budget import Budget
 from orbiflow.density.fitting.families import Family
 from orbiflow.density.fitting.folds import Folds
 from orbiflow.density.fitting.report import ComponentEvidence, Progress
-from orbiflow.density.fitting.rows import (
-    Rows,
-    log_prob_of_rows,
-    mean_of,
-)
+from orbiflow.density.fitting.rows import Rows, log_prob_of_rows, mean_of
 from orbiflow.density.fitting.weights import (
     NEGLIGIBLE,
     Gain,

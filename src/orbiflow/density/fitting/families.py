@@ -12,22 +12,10 @@ from torch import Tensor
 
 from orbiflow.density.fitting.budget import Budget
 from orbiflow.density.fitting.chains import fit_chain_mixture, spread_chains
-from orbiflow.density.fitting.kernels import (
-    NARROWEST,
-    kernel_estimates,
-)
+from orbiflow.density.fitting.kernels import NARROWEST, kernel_estimates
 from orbiflow.density.fitting.mixtures import fit_mixture
-from orbiflow.density.fitting.network import (
-    Shape,
-    fit_network,
-    network_shapes,
-)
-from orbiflow.density.fitting.rows import (
-    Rows,
-    is_whole,
-    log_prob_of_rows,
-    with_incomplete,
-)
+from orbiflow.density.fitting.network import Shape, fit_network, network_shapes
+from orbiflow.density.fitting.rows import Rows, is_whole, log_prob_of_rows, with_incomplete
 from orbiflow.density.fitting.weights import gain_of
 from orbiflow.density.models import (
     AdaptiveKernels,

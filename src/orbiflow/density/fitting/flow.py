@@ -12,11 +12,7 @@ from orbiflow.density.arguments import check_kind, silent
 from orbiflow.density.fitting.budget import Budget, training
 from orbiflow.density.fitting.flow_matching import coupled, match_flow
 from orbiflow.density.fitting.kernels import blend_kernels
-from orbiflow.density.fitting.likelihood import (
-    Refinement,
-    merged,
-    refine,
-)
+from orbiflow.density.fitting.likelihood import Refinement, merged, refine
 from orbiflow.density.fitting.report import (
     MASS_TOLERANCE,
     MOST_REPORTED,
@@ -32,20 +28,9 @@ from orbiflow.density.fitting.report import (
     step_error,
     steps_note,
 )
-from orbiflow.density.fitting.rows import (
-    Rows,
-    effective_rows,
-    weighed,
-    weights_note,
-)
+from orbiflow.density.fitting.rows import Rows, effective_rows, weighed, weights_note
 from orbiflow.density.fitting.settings import FlowSettings
-from orbiflow.density.models import (
-    MOST_DIM,
-    Density,
-    FlowDensity,
-    UniformDensity,
-    VonMisesDensity,
-)
+from orbiflow.density.models import MOST_DIM, Density, FlowDensity, UniformDensity, VonMisesDensity
 from orbiflow.density.spaces import Space
 from orbiflow.errors import OrbiflowError
 from orbiflow.fields import SplineField
@@ -261,12 +246,7 @@ def _start(
     chosen = _matched(train, generator)
     start, move = coupled(space, base.sample(len(chosen), generator), chosen)
     match_flow(
-        segments,
-        space,
-        start.to(dtype),
-        move.to(dtype),
-        ridge=settings.ridge,
-        generator=generator,
+        segments, space, start.to(dtype), move.to(dtype), ridge=settings.ridge, generator=generator
     )
     return FlowDensity(space, Flow(segments, steps=settings.steps, warn=False), base)
 

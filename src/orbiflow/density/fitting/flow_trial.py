@@ -16,12 +16,7 @@ from orbiflow.density.fitting.folds import Folds
 from orbiflow.density.fitting.report import ComponentEvidence, FitReport
 from orbiflow.density.fitting.rows import Rows, mean_of
 from orbiflow.density.fitting.settings import FlowSettings
-from orbiflow.density.fitting.weights import (
-    Gain,
-    gain_of,
-    stacked,
-    stacking_weights,
-)
+from orbiflow.density.fitting.weights import Gain, gain_of, stacked, stacking_weights
 from orbiflow.density.models import MOST_DIM, Density
 from orbiflow.density.spaces import Space
 

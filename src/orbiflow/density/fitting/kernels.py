@@ -14,12 +14,7 @@ from orbiflow.density.arguments import check_kind, points_tensor
 from orbiflow.density.fitting.budget import training
 from orbiflow.density.fitting.folds import places
 from orbiflow.density.fitting.rows import mean_of
-from orbiflow.density.models import (
-    AdaptiveKernels,
-    Density,
-    Mixture,
-    UniformDensity,
-)
+from orbiflow.density.models import AdaptiveKernels, Density, Mixture, UniformDensity
 from orbiflow.density.spaces import Space
 from orbiflow.errors import OrbiflowError
 from orbiflow.typed_torch import unique

@@ -201,11 +201,7 @@ class _Descent:
     """The iterates of a descent: every `EVERY`-th is scored, and so is the last."""
 
     def __init__(
-        self,
-        objective: Objective,
-        validation: Tensor,
-        weights: Tensor | None,
-        watch: Watch | None,
+        self, objective: Objective, validation: Tensor, weights: Tensor | None, watch: Watch | None
     ) -> None:
         self.objective, self.validation, self.watch = objective, validation, watch
         self.weights = _even(validation) if weights is None else weights

@@ -9,22 +9,10 @@ import torch
 from torch import Tensor
 
 from orbiflow.density.fitting.budget import training
-from orbiflow.density.fitting.chains import (
-    PRIOR,
-    PRIOR_RESULTANT,
-    concentration,
-)
+from orbiflow.density.fitting.chains import PRIOR, PRIOR_RESULTANT, concentration
 from orbiflow.density.fitting.kernels import NARROWEST, WIDEST
-from orbiflow.density.models import (
-    FAINT,
-    AdaptiveKernels,
-    kernel_rows,
-)
-from orbiflow.density.spaces import (
-    RoundSpace,
-    Space,
-    rectangle,
-)
+from orbiflow.density.models import FAINT, AdaptiveKernels, kernel_rows
+from orbiflow.density.spaces import RoundSpace, Space, rectangle
 from orbiflow.typed_torch import linalg, special
 
 CONVERGED = 1e-4

@@ -91,12 +91,7 @@ def fit_network(
 
 
 def _factor_shape(
-    axis: int,
-    before: list[int],
-    seen: Screen,
-    rows: Rows,
-    held: Rows,
-    generator: torch.Generator,
+    axis: int, before: list[int], seen: Screen, rows: Rows, held: Rows, generator: torch.Generator
 ) -> Shape:
     most = max(SIZES[0], len(rows) // PER_COMPONENT)
     first = max(size for size in SIZES if size <= min(FIRST, most))

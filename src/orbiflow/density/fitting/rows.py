@@ -13,10 +13,7 @@ from torch import Tensor
 
 from orbiflow.arguments import described
 from orbiflow.density.arguments import check_kind, float_tensor
-from orbiflow.density.inference import (
-    at_observed,
-    check_torus,
-)
+from orbiflow.density.inference import at_observed, check_torus
 from orbiflow.density.models import AdaptiveKernels, Density
 from orbiflow.density.spaces import Space, row_count
 from orbiflow.errors import OrbiflowError

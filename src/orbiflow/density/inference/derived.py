@@ -60,9 +60,7 @@ def marginal(density: Density, axes: Iterable[int] | int) -> Mixture:
 
 
 def conditional(
-    density: Density,
-    given: Mapping[int, float],
-    axes: Iterable[int] | int | None = None,
+    density: Density, given: Mapping[int, float], axes: Iterable[int] | int | None = None
 ) -> Mixture:
     """Return the density of a torus' other angles where some are known.
 

@@ -252,11 +252,7 @@ class Density(Distribution):
 
     @torch.no_grad()
     def entropy(
-        self,
-        count: int = 16384,
-        *,
-        measure: str = CHART,
-        generator: torch.Generator | None = None,
+        self, count: int = 16384, *, measure: str = CHART, generator: torch.Generator | None = None
     ) -> Tensor:
         """Return a Monte Carlo estimate of -E[log p] in nats, from `count` samples.
 

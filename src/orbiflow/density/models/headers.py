@@ -13,11 +13,7 @@ from torch import Tensor
 from orbiflow.density.models.density import KINDS, Density
 from orbiflow.density.spaces import Space
 from orbiflow.errors import OrbiflowError
-from orbiflow.fields import (
-    FourierField,
-    InvariantField,
-    SplineField,
-)
+from orbiflow.fields import FourierField, InvariantField, SplineField
 from orbiflow.flows import Flow
 from orbiflow.runtime import is_list
 from orbiflow.symmetry import CrystallographicGroup, group_header

@@ -8,12 +8,7 @@ from functools import lru_cache
 import torch
 from torch import Tensor
 
-from orbiflow.density.models.terms import (
-    BLOCK_ENTRIES,
-    WIDE,
-    Terms,
-    lengths2,
-)
+from orbiflow.density.models.terms import BLOCK_ENTRIES, WIDE, Terms, lengths2
 from orbiflow.typed_torch import broadcast, linalg
 
 NODES = 28

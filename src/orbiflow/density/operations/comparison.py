@@ -10,16 +10,7 @@ from orbiflow.density.comparing import ComparisonSettings
 from orbiflow.density.operations.drawing import require_ending
 from orbiflow.density.tables import TableSettings
 from orbiflow.errors import OrbiflowError, SettingError
-from orbiflow.runtime import (
-    Cancel,
-    Note,
-    Outcome,
-    Progress,
-    Sink,
-    Written,
-    ignore,
-    operation,
-)
+from orbiflow.runtime import Cancel, Note, Outcome, Progress, Sink, Written, ignore, operation
 from orbiflow.settings import DefaultText, Option, Repeated
 
 if TYPE_CHECKING:

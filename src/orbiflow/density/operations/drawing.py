@@ -10,16 +10,7 @@ from orbiflow.density.pictures import PlotSettings
 from orbiflow.density.regions import RegionSettings
 from orbiflow.density.tables import TableSettings, check_table_name
 from orbiflow.errors import OrbiflowError, SettingError
-from orbiflow.runtime import (
-    Cancel,
-    Note,
-    Outcome,
-    Progress,
-    Sink,
-    Written,
-    ignore,
-    operation,
-)
+from orbiflow.runtime import Cancel, Note, Outcome, Progress, Sink, Written, ignore, operation
 from orbiflow.settings import DefaultText, Option, Range
 
 if TYPE_CHECKING:

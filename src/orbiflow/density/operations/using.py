@@ -9,15 +9,7 @@ from typing import Annotated, Literal
 from orbiflow.density.tables import RowSettings, check_table_name
 from orbiflow.errors import literal
 from orbiflow.runtime import Cancel, Note, Outcome, Progress, Sink, Written, ignore, operation
-from orbiflow.settings import (
-    DefaultText,
-    Needs,
-    NotWith,
-    Option,
-    Range,
-    SettingError,
-    Settings,
-)
+from orbiflow.settings import DefaultText, Needs, NotWith, Option, Range, SettingError, Settings
 
 Model = Annotated[Path, Option("--model", "-m")]
 Out = Annotated[Path, Option("--out", "-o")]
@@ -79,11 +71,7 @@ def score(
     if may_lack:
         settings.check_whole_rows()
 
-    from orbiflow.density.operations.saved import (
-        check_fits,
-        model_at,
-        with_columns_of,
-    )
+    from orbiflow.density.operations.saved import check_fits, model_at, with_columns_of
     from orbiflow.density.operations.scores import score_rows
     from orbiflow.density.tables import append_columns, read_rows
     from orbiflow.runtime import check_output_file, one_thread, write_atomic

@@ -13,20 +13,12 @@ from torch import Tensor
 
 from orbiflow.arguments import as_whole
 from orbiflow.arrays import Array
-from orbiflow.density.models import (
-    Density,
-    FlowDensity,
-)
+from orbiflow.density.models import Density, FlowDensity
 from orbiflow.density.pictures.axes import INK, require_plane, space_title, view_of
 from orbiflow.density.pictures.frame import Room, colour_bar, make_frame, printed_room
 from orbiflow.density.pictures.ground import COLOURS
 from orbiflow.density.pictures.settings import PlotSettings
-from orbiflow.drawing import (
-    Picture,
-    Sheet,
-    draw_flow,
-    draw_magnitude,
-)
+from orbiflow.drawing import Picture, Sheet, draw_flow, draw_magnitude
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import CrystallographicGroup
 
@@ -149,11 +141,7 @@ def mean_field(density: Density, points: Tensor) -> Tensor:
 
 
 def draw_cells(
-    axes: Axes,
-    group: CrystallographicGroup,
-    window: Any,
-    *,
-    pen: Callable[[float], float] = float,
+    axes: Axes, group: CrystallographicGroup, window: Any, *, pen: Callable[[float], float] = float
 ) -> None:
     """Draw the images of the canonical square in a window, a letter F in each, the square outlined."""
     thin = pen(0.7)

@@ -122,12 +122,7 @@ class _Labels:
     """The degrees beside the lines of a graticule, none of which touch."""
 
     def __init__(
-        self,
-        axes: Axes,
-        projection: Projection,
-        sheet: Sheet,
-        side: float,
-        light: bool,
+        self, axes: Axes, projection: Projection, sheet: Sheet, side: float, light: bool
     ) -> None:
         self.axes, self.projection, self.sheet, self.light = axes, projection, sheet, light
         self.size = 72 * side / float(np.ptp(projection.outline()[:, 0]))  # points a unit

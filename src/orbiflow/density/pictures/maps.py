@@ -38,13 +38,7 @@ from orbiflow.density.pictures.regions import log_natural, region_lines
 from orbiflow.density.pictures.scale import shading
 from orbiflow.density.pictures.settings import PlotSettings
 from orbiflow.density.pictures.values import chosen_scale, density_on_map, is_sharp
-from orbiflow.density.spaces import (
-    RoundSpace,
-    Space,
-    checked_table,
-    to_latlon,
-    to_vectors,
-)
+from orbiflow.density.spaces import RoundSpace, Space, checked_table, to_latlon, to_vectors
 from orbiflow.drawing import Picture, Sheet
 
 if TYPE_CHECKING:

@@ -9,16 +9,7 @@ from typing import Annotated, Literal
 from orbiflow.density.regions import Mass, SampleCount, samples_for
 from orbiflow.drawing import NARROWEST, WIDEST, FigureFormat, Sheet, column_width
 from orbiflow.errors import OrbiflowError, SettingError
-from orbiflow.settings import (
-    DefaultText,
-    Group,
-    Hidden,
-    Needs,
-    Parsed,
-    Range,
-    Settings,
-    Unit,
-)
+from orbiflow.settings import DefaultText, Group, Hidden, Needs, Parsed, Range, Settings, Unit
 
 MAX_REGIONS = 4
 """Number of styles of lines that can be told apart."""

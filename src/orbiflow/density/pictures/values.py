@@ -10,11 +10,7 @@ import torch
 from torch import Tensor
 
 from orbiflow.arrays import Array
-from orbiflow.density.models import (
-    AdaptiveKernels,
-    Density,
-    midpoints,
-)
+from orbiflow.density.models import AdaptiveKernels, Density, midpoints
 from orbiflow.density.pictures.scale import DARK_SHARE, dark_share
 from orbiflow.density.pictures.surfaces import off_cones
 from orbiflow.density.spaces import rectangle

@@ -8,11 +8,7 @@ from numpy.typing import NDArray
 
 from orbiflow.arrays import Array
 from orbiflow.density.regions.contours import filled
-from orbiflow.density.regions.grid import (
-    Function,
-    LevelGrid,
-    Seeds,
-)
+from orbiflow.density.regions.grid import Function, LevelGrid, Seeds
 from orbiflow.typed_shapely import ufuncs
 
 PARTS = 12

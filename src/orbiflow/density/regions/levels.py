@@ -86,11 +86,7 @@ class DensityLevels:
     @one_thread()
     @torch.no_grad()
     def __init__(
-        self,
-        density: Density | DensityEstimator,
-        *,
-        samples: int = SAMPLES,
-        seed: int = 0,
+        self, density: Density | DensityEstimator, *, samples: int = SAMPLES, seed: int = 0
     ) -> None:
         self.density = density_of(density)
         count = as_whole(samples, "samples", MIN_SAMPLES, MAX_SAMPLES)
@@ -143,15 +139,7 @@ class DensityLevels:
             ends = tuple(self._threshold(min(1.0, max(0.0, mass + s))) for s in (spread, -spread))
         size, size_error = self._size(level)
         return DensityRegion(
-            self.density,
-            mass,
-            held,
-            error,
-            level,
-            ends[0],
-            ends[1],
-            size,
-            size_error,
+            self.density, mass, held, error, level, ends[0], ends[1], size, size_error
         )
 
     def _size(self, level: float) -> tuple[float, float]:

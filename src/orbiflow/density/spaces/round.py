@@ -15,11 +15,7 @@ from torch import Tensor
 from orbiflow.arguments import as_choice, as_instance
 from orbiflow.arrays import Array
 from orbiflow.density.spaces import uniformization
-from orbiflow.density.spaces.space import (
-    Space,
-    checked_table,
-    row_count,
-)
+from orbiflow.density.spaces.space import Space, checked_table, row_count
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import CrystallographicGroup, identification_group
 from orbiflow.typed_torch import linalg
@@ -57,8 +53,7 @@ def to_vectors(data: ArrayLike) -> Array:
         lambda row: f"latitude {table[row, 0]:g} is beyond 90 degrees: are the columns lat, lon?",
     )
     _refuse(
-        abs(table[:, 1]) > 360,
-        lambda row: f"longitude {table[row, 1]:g} is beyond 360 degrees",
+        abs(table[:, 1]) > 360, lambda row: f"longitude {table[row, 1]:g} is beyond 360 degrees"
     )
     lat, lon = np.radians(table.T)
     return np.stack([np.cos(lat) * np.cos(lon), np.cos(lat) * np.sin(lon), np.sin(lat)], axis=-1)

@@ -195,10 +195,7 @@ class Space(ABC):
         diagonal = math.sqrt(self.dim)
         center = np.full(self.dim, 0.5)
         elements = self.group.elements_near(center, 2 * diagonal, source=center)
-        return (
-            np.stack([g.linear for g in elements]),
-            np.stack([g.translation for g in elements]),
-        )
+        return (np.stack([g.linear for g in elements]), np.stack([g.translation for g in elements]))
 
     def _images_of(self, points: Tensor) -> Tensor:
         """Return all images (E, ..., d) of canonical points that can be nearest to one of the cube."""

@@ -17,12 +17,7 @@ from orbiflow.density.tables.binary import (
     read_parquet,
 )
 from orbiflow.density.tables.table import Reading, Table, find
-from orbiflow.density.tables.text import (
-    layout_of,
-    read_text,
-    split_line,
-    text_lines,
-)
+from orbiflow.density.tables.text import layout_of, read_text, split_line, text_lines
 from orbiflow.errors import InputFileError
 
 MAX_BYTES = 2 * 2**30

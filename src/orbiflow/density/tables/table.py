@@ -66,10 +66,7 @@ class MissingCellsError(TableError):
 
 
 def choose(
-    path: Path,
-    names: Sequence[str],
-    numeric: Sequence[bool],
-    reading: Reading,
+    path: Path, names: Sequence[str], numeric: Sequence[bool], reading: Reading
 ) -> tuple[list[int], list[str]]:
     """Return the numbers, from 0, of the columns that are read, and notes."""
     columns, width = reading.columns, reading.width

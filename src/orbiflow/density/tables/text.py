@@ -96,14 +96,7 @@ def read_text(path: Path, reading: Reading) -> Table:
     if comments:
         notes.append(f"skipped {comments} comment line{'s' * (comments > 1)}")
     return Table(
-        rows,
-        names,
-        at,
-        tuple(notes),
-        layout.header,
-        layout.delimiter,
-        layout.decimal,
-        dropped,
+        rows, names, at, tuple(notes), layout.header, layout.delimiter, layout.decimal, dropped
     )
 
 

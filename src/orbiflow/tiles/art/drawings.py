@@ -16,14 +16,7 @@ from orbiflow.arrays import Array
 from orbiflow.errors import InputFileError
 from orbiflow.tiles.art.raster import Grid, Paint
 from orbiflow.tiles.art.source import SAME_ASPECT, Picture, covered_area, read_picture
-from orbiflow.tiles.exporting import (
-    INK,
-    Curve,
-    Motif,
-    Part,
-    Style,
-    curves_path,
-)
+from orbiflow.tiles.exporting import INK, Curve, Motif, Part, Style, curves_path
 from orbiflow.tiles.geometry import orient, polygons_in
 from orbiflow.tiles.silhouette import (
     MAX_BYTES,

@@ -16,12 +16,7 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.art.raster import Grid
 from orbiflow.tiles.art.settings import Strokes
 from orbiflow.tiles.art.source import silhouette_outline
-from orbiflow.tiles.exporting import (
-    INK,
-    Curve,
-    Part,
-    Style,
-)
+from orbiflow.tiles.exporting import INK, Curve, Part, Style
 from orbiflow.tiles.geometry import (
     arc_lengths,
     best_similarity,

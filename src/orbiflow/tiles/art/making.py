@@ -12,19 +12,10 @@ from orbiflow.runtime import Cancel
 from orbiflow.tiles.art.drawings import paint_motif
 from orbiflow.tiles.art.engraving import engraved, eyes
 from orbiflow.tiles.art.page import ArtPage, art_page
-from orbiflow.tiles.art.raster import (
-    Grid,
-    Paint,
-    render_page,
-)
+from orbiflow.tiles.art.raster import Grid, Paint, render_page
 from orbiflow.tiles.art.settings import ArtSettings
 from orbiflow.tiles.art.source import Picture, carried_picture, with_map
-from orbiflow.tiles.exporting import (
-    Curve,
-    Motif,
-    Part,
-    Style,
-)
+from orbiflow.tiles.exporting import Curve, Motif, Part, Style
 from orbiflow.tiles.tile import EscherTile, TileSource
 
 TEXELS_PER_PIXEL = 1.5

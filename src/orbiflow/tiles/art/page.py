@@ -14,12 +14,7 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.art.settings import ArtSettings, check_size
 from orbiflow.tiles.exporting import longer_side
 from orbiflow.tiles.tile import EscherTile
-from orbiflow.tiles.tilings import (
-    Copies,
-    Tile,
-    colouring,
-    copies_meeting,
-)
+from orbiflow.tiles.tilings import Copies, Tile, colouring, copies_meeting
 
 USUAL_TILES = 25
 """Number of tiles on a page if no size of a tile is given."""

@@ -14,13 +14,7 @@ from orbiflow.drawing import palette
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import Cancel, Progress, Sink, ignore, write_atomic
 from orbiflow.tiles.art.drawings import Over, read_over
-from orbiflow.tiles.art.making import (
-    Artwork,
-    artwork,
-    picture_paint,
-    raster_grid,
-    render_artwork,
-)
+from orbiflow.tiles.art.making import Artwork, artwork, picture_paint, raster_grid, render_artwork
 from orbiflow.tiles.art.settings import ArtSettings
 from orbiflow.tiles.art.source import with_map
 from orbiflow.tiles.exporting import (

@@ -103,8 +103,7 @@ class ArtSettings(Settings, group="Picture"):
 
     eyes: Annotated[
         tuple[
-            Annotated[tuple[float, ...], Parsed(eye_numbers, "x,y or x,y,radius", "X,Y[,R]")],
-            ...,
+            Annotated[tuple[float, ...], Parsed(eye_numbers, "x,y or x,y,radius", "X,Y[,R]")], ...
         ],
         Repeated(),
         Option("--eye"),

@@ -37,9 +37,7 @@ class Arrangement:
         """Return the arrangement with the pieces' middles moved by the linear map `stretch` (2, 2)."""
         centers = self.linear @ middle + self.offsets
         return Arrangement(
-            stretch @ self.lattice,
-            self.linear,
-            self.offsets + centers @ (stretch - np.eye(2)).T,
+            stretch @ self.lattice, self.linear, self.offsets + centers @ (stretch - np.eye(2)).T
         )
 
     def turned(self, angle: float) -> Arrangement:

@@ -11,13 +11,7 @@ import shapely
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.exporting.scene import Curve
-from orbiflow.tiles.tilings import (
-    EdgeImage,
-    Edges,
-    Tile,
-    edge_classes,
-    edges,
-)
+from orbiflow.tiles.tilings import EdgeImage, Edges, Tile, edge_classes, edges
 
 CORNER = np.radians(30.0)
 """The angle in radians by which a polyline turns at a vertex that stays a corner."""

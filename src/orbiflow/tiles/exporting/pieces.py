@@ -11,25 +11,11 @@ import shapely
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.exporting.layouts import Layout, line_style, rectangle_sides
-from orbiflow.tiles.exporting.nesting import (
-    Placed,
-    dense_arrangements,
-    on_sheet,
-)
+from orbiflow.tiles.exporting.nesting import Placed, dense_arrangements, on_sheet
 from orbiflow.tiles.exporting.outlines import fitted, turning
-from orbiflow.tiles.exporting.scene import (
-    Box,
-    Curve,
-    Layer,
-    PlacedTile,
-    Scene,
-)
+from orbiflow.tiles.exporting.scene import Box, Curve, Layer, PlacedTile, Scene
 from orbiflow.tiles.geometry import polygons_in
-from orbiflow.tiles.likeness import (
-    Thinnest,
-    narrowest_neck,
-    narrowest_slit,
-)
+from orbiflow.tiles.likeness import Thinnest, narrowest_neck, narrowest_slit
 
 MITRE = 4.0
 """The greatest reach of a sharp corner of a cut, in offsets."""

@@ -17,16 +17,7 @@ import numpy as np
 from orbiflow.arrays import Array, Window
 from orbiflow.drawing import DEFAULT_PALETTE, Palette, palette
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles.exporting.scene import (
-    Box,
-    Curve,
-    Layer,
-    Motif,
-    Scene,
-    Style,
-    Uses,
-    rectangle,
-)
+from orbiflow.tiles.exporting.scene import Box, Curve, Layer, Motif, Scene, Style, Uses, rectangle
 from orbiflow.tiles.pictures import default_window
 from orbiflow.tiles.tilings import Colouring, Tile, Tiles, as_tiling, colouring, patch
 

@@ -18,12 +18,7 @@ from orbiflow.tiles.exporting.settings import ExportSettings
 from orbiflow.tiles.exporting.sheets import calibrated, split
 from orbiflow.tiles.exporting.skeletons import skeleton_scene
 from orbiflow.tiles.exporting.svg import write_svg
-from orbiflow.tiles.exporting.writers import (
-    write_dxf,
-    write_json,
-    write_pdf,
-    write_png,
-)
+from orbiflow.tiles.exporting.writers import write_dxf, write_json, write_pdf, write_png
 from orbiflow.tiles.likeness import narrowest_neck
 from orbiflow.tiles.tile import EscherTile, TileSource
 from orbiflow.tiles.tilings import Certificate, colouring

@@ -10,12 +10,7 @@ from orbiflow.drawing import palette
 from orbiflow.runtime import Cancel, Note, Progress, Sink, ignore, write_atomic
 from orbiflow.tiles.motion.kinds import Motion, bend, frames, grow, morph
 from orbiflow.tiles.motion.settings import AnimationSettings
-from orbiflow.tiles.motion.writers import (
-    require_ffmpeg,
-    write_gif,
-    write_motion_svg,
-    write_mp4,
-)
+from orbiflow.tiles.motion.writers import require_ffmpeg, write_gif, write_motion_svg, write_mp4
 from orbiflow.tiles.tile import EscherTile, TileSource
 from orbiflow.tiles.tilings import colouring
 

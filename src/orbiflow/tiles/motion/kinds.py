@@ -12,19 +12,10 @@ from numpy.typing import NDArray
 from orbiflow.arrays import Array, Window
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.motion.morph import Morph
-from orbiflow.tiles.pictures import (
-    ASPECT,
-    BendingWay,
-    default_window,
-)
+from orbiflow.tiles.pictures import ASPECT, BendingWay, default_window
 from orbiflow.tiles.search import OwnFrame
 from orbiflow.tiles.tile import EscherTile
-from orbiflow.tiles.tilings import (
-    Copies,
-    Tile,
-    colouring,
-    copies_meeting,
-)
+from orbiflow.tiles.tilings import Copies, Tile, colouring, copies_meeting
 
 
 class Places(NamedTuple):

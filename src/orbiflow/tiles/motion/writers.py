@@ -16,21 +16,9 @@ import numpy as np
 from PIL import Image
 
 from orbiflow.arrays import Array
-from orbiflow.drawing import (
-    Palette,
-    Raster,
-    limited,
-)
+from orbiflow.drawing import Palette, Raster, limited
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles.motion.kinds import (
-    MOVE,
-    REST,
-    SHOW,
-    Frame,
-    Motion,
-    Places,
-    eased,
-)
+from orbiflow.tiles.motion.kinds import MOVE, REST, SHOW, Frame, Motion, Places, eased
 
 OUTLINE = 0.0016
 """Width of outlines, as a share of the picture's."""

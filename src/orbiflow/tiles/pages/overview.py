@@ -10,16 +10,8 @@ from typing import NamedTuple
 from PIL import Image, ImageDraw
 
 from orbiflow.arrays import Window
-from orbiflow.drawing import (
-    Raster,
-    font,
-    window_of,
-)
-from orbiflow.tiles.pictures import (
-    bending_raster,
-    overlay_raster,
-    tiling_raster,
-)
+from orbiflow.drawing import Raster, font, window_of
+from orbiflow.tiles.pictures import bending_raster, overlay_raster, tiling_raster
 from orbiflow.tiles.search import ClassFailure
 from orbiflow.tiles.silhouette import Target
 from orbiflow.tiles.tile import EscherTile

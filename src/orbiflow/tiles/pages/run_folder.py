@@ -141,11 +141,7 @@ def result_folder(out: str | Path) -> ResultFolder:
 
 
 def write_run(
-    result: SearchResult,
-    out: str | Path,
-    *,
-    figures: bool = False,
-    on_event: Sink = ignore,
+    result: SearchResult, out: str | Path, *, figures: bool = False, on_event: Sink = ignore
 ) -> list[Path]:
     """Write what a search found as a result folder: a folder a class, overviews, `result.json`.
 

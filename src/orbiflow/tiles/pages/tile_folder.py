@@ -5,11 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from orbiflow.drawing import (
-    Picture,
-    Sheet,
-    field_picture,
-)
+from orbiflow.drawing import Picture, Sheet, field_picture
 from orbiflow.runtime import make_folder, write_atomic
 from orbiflow.tiles.exporting import tile_svg, tiling_svg
 from orbiflow.tiles.pictures import (

@@ -22,14 +22,7 @@ from orbiflow.drawing import (
     plane_axes,
     png_bytes,
 )
-from orbiflow.tiles.tilings import (
-    CLASSES,
-    EdgeIdentification,
-    IsohedralClass,
-    Tile,
-    aspects,
-    patch,
-)
+from orbiflow.tiles.tilings import CLASSES, EdgeIdentification, IsohedralClass, Tile, aspects, patch
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -11,11 +11,7 @@ from numpy.typing import NDArray
 
 from orbiflow.arrays import Array, Complex
 from orbiflow.runtime import Cancel
-from orbiflow.tiles.geometry import (
-    best_similarity,
-    plane_points,
-    signed_area,
-)
+from orbiflow.tiles.geometry import best_similarity, plane_points, signed_area
 from orbiflow.tiles.likeness import (
     Elastic,
     Fidelity,
@@ -32,11 +28,7 @@ from orbiflow.tiles.search.co_deformation import (
     drawn_to_tiles,
     held_on_tiles,
 )
-from orbiflow.tiles.search.corner_shifts import (
-    Drawn,
-    Stage,
-    shifted,
-)
+from orbiflow.tiles.search.corner_shifts import Drawn, Stage, shifted
 from orbiflow.tiles.search.likeness_search import LikenessSearch
 from orbiflow.tiles.search.placements import Placements, best_placements
 from orbiflow.tiles.search.starts import mirror_closed
@@ -137,11 +129,7 @@ def bent_tiles(
 
 
 def _finalists(
-    hand: Hand,
-    stiffness: Stiffness,
-    kind: IsohedralClass,
-    settings: LikenessSearch,
-    cancel: Cancel,
+    hand: Hand, stiffness: Stiffness, kind: IsohedralClass, settings: LikenessSearch, cancel: Cancel
 ) -> tuple[list[Bent], int]:
     """The best of one hand and stiffness worked out, and how many of them cross themselves."""
     bodies = hand.bodies(stiffness)

@@ -12,11 +12,7 @@ from orbiflow.arrays import Array, Complex
 from orbiflow.errors import CertificationError
 from orbiflow.runtime import Cancel, one_blas_thread
 from orbiflow.tiles.geometry import best_similarity, plane_points
-from orbiflow.tiles.likeness import (
-    Overlap,
-    best_overlay,
-    least_neck,
-)
+from orbiflow.tiles.likeness import Overlap, best_overlay, least_neck
 from orbiflow.tiles.search.bending import Bent, bent_tiles
 from orbiflow.tiles.search.candidates import Fit, Progress, StillTiles, silent
 from orbiflow.tiles.search.co_deformation import Hand
@@ -97,12 +93,7 @@ def _fit(
     enough = 1 if per_class == 1 else 3 * per_class
     settings = replace(settings, min_neck=least_neck(target.normal, settings.min_neck))
     found, dropped = bent_tiles(
-        both,
-        kind,
-        settings,
-        lambda share: told(0.9 * share, float("nan")),
-        cancel,
-        wanted=enough,
+        both, kind, settings, lambda share: told(0.9 * share, float("nan")), cancel, wanted=enough
     )
     if not found:
         raise CertificationError("all tiles near the silhouette cross themselves")

@@ -11,14 +11,7 @@ import shapely
 from orbiflow.arguments import instance
 from orbiflow.errors import CertificationError, OrbiflowError
 from orbiflow.runtime import one_thread
-from orbiflow.tiles.likeness import (
-    Pinned,
-    Recogniser,
-    compare,
-    iou,
-    least_neck,
-    narrowest_neck,
-)
+from orbiflow.tiles.likeness import Pinned, Recogniser, compare, iou, least_neck, narrowest_neck
 from orbiflow.tiles.search.bending_fit import PlacedBent
 from orbiflow.tiles.search.bent_map import map_of_bent
 from orbiflow.tiles.search.candidates import Candidates, Fit
@@ -39,12 +32,7 @@ class ClassFailure:
 
 
 def best_tiles(
-    target: Target,
-    fit: Fit,
-    *,
-    seconds: float = 0.0,
-    force: bool = False,
-    min_neck: float = 0.0,
+    target: Target, fit: Fit, *, seconds: float = 0.0, force: bool = False, min_neck: float = 0.0
 ) -> list[EscherTile]:
     """Turn finalists into polygons and certify them, best first, until there are enough.
 

@@ -17,23 +17,12 @@ import numpy as np
 import scipy.linalg
 
 from orbiflow.arrays import Array, Complex
-from orbiflow.tiles.likeness import (
-    Elastic,
-    Pinned,
-    Stiffness,
-)
+from orbiflow.tiles.likeness import Elastic, Pinned, Stiffness
 from orbiflow.tiles.search.likeness_search import LikenessSearch
 from orbiflow.tiles.search.method import Goal
 from orbiflow.tiles.search.placements import Placements
 from orbiflow.tiles.search.tile_space import TileSpace
-from orbiflow.tiles.silhouette import (
-    Emphasis,
-    Pins,
-    Samples,
-    Target,
-    sampled,
-    triangulate,
-)
+from orbiflow.tiles.silhouette import Emphasis, Pins, Samples, Target, sampled, triangulate
 from orbiflow.tiles.tilings import IsohedralClass
 
 TIGHTER = tuple(np.geomspace(1.2, 3000.0, 9))

@@ -18,11 +18,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from orbiflow.arrays import (
-    Array,
-    Complex,
-    Integers,
-)
+from orbiflow.arrays import Array, Complex, Integers
 from orbiflow.runtime import Cancel
 from orbiflow.tiles.geometry import plane_points, signed_area
 from orbiflow.tiles.likeness import Elastic

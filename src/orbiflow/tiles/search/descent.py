@@ -15,11 +15,7 @@ import torch
 from torch import Tensor
 
 from orbiflow.arrays import Array
-from orbiflow.fields import (
-    FourierField,
-    group_factor,
-    steepness,
-)
+from orbiflow.fields import FourierField, group_factor, steepness
 from orbiflow.flows import METHODS
 from orbiflow.tiles.search.model import TileModel
 from orbiflow.tiles.search.overlap_search import OverlapSearch

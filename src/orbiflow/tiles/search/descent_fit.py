@@ -11,27 +11,14 @@ import torch
 from orbiflow.arguments import instance
 from orbiflow.arrays import Array
 from orbiflow.runtime import Cancel, one_thread
-from orbiflow.tiles.likeness import (
-    Recogniser,
-    boundary_iou,
-    prepared_region,
-    rank_score,
-)
-from orbiflow.tiles.search.candidates import (
-    Fit,
-    Progress,
-    silent,
-)
+from orbiflow.tiles.likeness import Recogniser, boundary_iou, prepared_region, rank_score
+from orbiflow.tiles.search.candidates import Fit, Progress, silent
 from orbiflow.tiles.search.descent import Descent
 from orbiflow.tiles.search.model import TileModel
 from orbiflow.tiles.search.overlap_search import OverlapSearch
 from orbiflow.tiles.search.polish import polish
 from orbiflow.tiles.search.prototiles import Prototiles
-from orbiflow.tiles.search.starts import (
-    Starts,
-    outline_starts,
-    template_starts,
-)
+from orbiflow.tiles.search.starts import Starts, outline_starts, template_starts
 from orbiflow.tiles.silhouette import Emphasis, SoftTarget, Target
 from orbiflow.tiles.tilings import IsohedralClass, isohedral_class
 

@@ -8,16 +8,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from orbiflow.settings import (
-    DefaultText,
-    Group,
-    Needs,
-    OnlyWith,
-    Parsed,
-    Range,
-    Repeated,
-    Settings,
-)
+from orbiflow.settings import DefaultText, Group, Needs, OnlyWith, Parsed, Range, Repeated, Settings
 
 if TYPE_CHECKING:
     from orbiflow.tiles.search.method import SearchMethod

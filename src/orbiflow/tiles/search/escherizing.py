@@ -7,16 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from orbiflow.arguments import instance
-from orbiflow.runtime import (
-    Cancel,
-    ClassFailed,
-    Note,
-    Preview,
-    Progress,
-    Sink,
-    TileFound,
-    ignore,
-)
+from orbiflow.runtime import Cancel, ClassFailed, Note, Preview, Progress, Sink, TileFound, ignore
 from orbiflow.tiles.search.certifying import ClassFailure
 from orbiflow.tiles.search.escherize_settings import EscherizeSettings
 from orbiflow.tiles.search.likeness_search import LikenessSearch
@@ -116,15 +107,7 @@ def escherize(
     )
     seconds = time.perf_counter() - begin
     return SearchResult(
-        target,
-        tiles,
-        failures,
-        relay.found,
-        method,
-        emphasis,
-        pins,
-        seconds,
-        workers,
+        target, tiles, failures, relay.found, method, emphasis, pins, seconds, workers
     )
 
 

@@ -143,23 +143,9 @@ class LikenessSearch(SearchMethod):
         return replace(self, finalists=finalists, starts=max(self.starts, 2 * finalists))
 
 
-FAST = {
-    "placements": 80,
-    "held": 20,
-    "starts": 8,
-    "share": 0.15,
-    "finalists": 2,
-    "rounds": 12,
-}
+FAST = {"placements": 80, "held": 20, "starts": 8, "share": 0.15, "finalists": 2, "rounds": 12}
 NORMAL = {name: getattr(LikenessSearch(), name) for name in FAST}
-BEST = {
-    "placements": 1500,
-    "held": 300,
-    "starts": 128,
-    "share": 1.0,
-    "finalists": 12,
-    "rounds": 40,
-}
+BEST = {"placements": 1500, "held": 300, "starts": 128, "share": 1.0, "finalists": 12, "rounds": 40}
 
 BENDING_EFFORTS: dict[str, dict[str, Any]] = {
     "fast": FAST,

@@ -8,17 +8,8 @@ from scipy.sparse.linalg import spsolve
 
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles.geometry import (
-    arc_lengths,
-    orient,
-    points_along,
-)
-from orbiflow.tiles.silhouette import (
-    Bending,
-    Mesh,
-    triangulate,
-    unfolded,
-)
+from orbiflow.tiles.geometry import arc_lengths, orient, points_along
+from orbiflow.tiles.silhouette import Bending, Mesh, triangulate, unfolded
 
 TILE, SILHOUETTE = 240, 480
 """Points along the two outlines that are matched."""

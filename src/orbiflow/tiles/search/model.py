@@ -11,13 +11,7 @@ import torch
 from numpy.typing import ArrayLike
 from torch import Tensor, nn
 
-from orbiflow.arguments import (
-    instance,
-    is_a,
-    number,
-    numbers,
-    whole,
-)
+from orbiflow.arguments import instance, is_a, number, numbers, whole
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.fields import FourierField

@@ -14,10 +14,7 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor
 
-from orbiflow.arguments import (
-    instance,
-    whole,
-)
+from orbiflow.arguments import instance, whole
 from orbiflow.runtime import Cancel
 from orbiflow.tiles.search.candidates import Progress, silent
 from orbiflow.tiles.search.model import TileModel
@@ -25,11 +22,7 @@ from orbiflow.tiles.search.occupancy_search import OccupancySearch
 from orbiflow.tiles.search.starts import initial_poses, template_symmetries
 from orbiflow.tiles.silhouette import Target, signed_distance
 from orbiflow.tiles.tilings import IsohedralClass, isohedral_class
-from orbiflow.typed_torch import (
-    adam,
-    linalg,
-    listed,
-)
+from orbiflow.typed_torch import adam, linalg, listed
 
 SHAPE_PENALTY = 0.02
 """Factor of the squared displacement of a pentagon's free vertex: keeps the template simple."""
@@ -223,12 +216,7 @@ def _between(ends: tuple[float, float], share: float) -> float:
 
 @torch.no_grad()
 def _ranked(
-    model: TileModel,
-    samples: OccupancySamples,
-    hardness: float,
-    *,
-    keep: int,
-    affine: bool = False,
+    model: TileModel, samples: OccupancySamples, hardness: float, *, keep: int, affine: bool = False
 ) -> TileModel:
     points, inside = samples.points[::4], samples.inside[::4]
     loss = occupancy_loss(model, points, inside, hardness, affine=affine)

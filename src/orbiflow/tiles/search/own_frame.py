@@ -10,11 +10,7 @@ import numpy as np
 from orbiflow.arguments import instance
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles.tilings import (
-    IsohedralClass,
-    Tile,
-    isohedral_class,
-)
+from orbiflow.tiles.tilings import IsohedralClass, Tile, isohedral_class
 
 TOLERANCE = 1e-6
 """How far corresponding vertices of identified edges may lie apart, in square roots of the area."""

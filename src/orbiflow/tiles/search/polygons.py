@@ -10,11 +10,7 @@ import shapely
 from orbiflow.arrays import Array
 from orbiflow.errors import CertificationError
 from orbiflow.tiles.geometry import subdivided
-from orbiflow.tiles.tilings import (
-    EdgeIdentification,
-    IsohedralClass,
-    Tile,
-)
+from orbiflow.tiles.tilings import EdgeIdentification, IsohedralClass, Tile
 
 DENSE = (960, 4320)
 """Least number of samples around the tile from which vertices are chosen; the second if need be."""

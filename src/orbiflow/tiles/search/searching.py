@@ -11,36 +11,18 @@ from typing import Any
 
 import numpy as np
 
-from orbiflow.arguments import (
-    described,
-    instance,
-    is_a,
-)
+from orbiflow.arguments import described, instance, is_a
 from orbiflow.errors import CertificationError, OrbiflowError
-from orbiflow.runtime import (
-    Cancel,
-    Cancelled,
-    one_thread,
-    process_context,
-    work,
-)
+from orbiflow.runtime import Cancel, Cancelled, one_thread, process_context, work
 from orbiflow.tiles.likeness import diverse, mutual_iou
 from orbiflow.tiles.search.both_search import ALIKE
 from orbiflow.tiles.search.candidates import Fit, Progress
 from orbiflow.tiles.search.certifying import HOW, ClassFailure, best_tiles
 from orbiflow.tiles.search.likeness_search import LikenessSearch
 from orbiflow.tiles.search.method import Goal, SearchMethod
-from orbiflow.tiles.silhouette import (
-    Emphasis,
-    Pins,
-    Target,
-)
+from orbiflow.tiles.silhouette import Emphasis, Pins, Target
 from orbiflow.tiles.tile import EscherTile
-from orbiflow.tiles.tilings import (
-    CLASSES,
-    IsohedralClass,
-    isohedral_class,
-)
+from orbiflow.tiles.tilings import CLASSES, IsohedralClass, isohedral_class
 
 INTERRUPTED = "interrupted"
 """The reason given for a class that was left undone."""

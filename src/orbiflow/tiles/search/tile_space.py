@@ -15,11 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from orbiflow.arrays import (
-    Array,
-    Complex,
-    Integers,
-)
+from orbiflow.arrays import Array, Complex, Integers
 from orbiflow.symmetry import Isometry
 from orbiflow.tiles.search.placements import Placements
 from orbiflow.tiles.tilings import IsohedralClass
@@ -331,10 +327,7 @@ CHUNK = 4000
 
 
 def nearest_tiles(
-    kind: IsohedralClass,
-    outline: Complex,
-    placements: Placements,
-    weights: Array | None = None,
+    kind: IsohedralClass, outline: Complex, placements: Placements, weights: Array | None = None
 ) -> NearestTiles:
     """Project an outline onto the tiles of a class, for every placement (see `tile_space`).
 
