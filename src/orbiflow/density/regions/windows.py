@@ -12,7 +12,6 @@ from torch import Tensor
 from orbiflow.arrays import Array
 from orbiflow.density.spaces import RoundSpace, Space, to_latlon, to_vectors, whole_turn
 from orbiflow.errors import OrbiflowError
-from orbiflow.typed_shapely import ufuncs
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +40,7 @@ class Window:
         On the globe it is in steradians, and sides are straight in longitude and latitude.
         """
         if not self.on_globe:
-            return float(ufuncs.area(shape))
+            return float(shapely.area(shape))
         return sum(_steradians(part) for part in shapely.get_parts(shape))
 
 
