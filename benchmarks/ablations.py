@@ -18,9 +18,9 @@ from common import goal
 
 from orbiflow.tiles import (
     ClassFailure,
-    DescentSettings,
-    OccupancySettings,
-    Settings,
+    OccupancySearch,
+    OverlapSearch,
+    SearchMethod,
     SoftTarget,
     escherize_class,
     isohedral_class,
@@ -30,11 +30,11 @@ from orbiflow.tiles.search.starts import outline_starts
 
 GOALS = ("bat_60", "beetle_60", "octpus_94")
 CLASSES = ("IH4", "IH6", "IH7")
-NORMAL = DescentSettings()
+NORMAL = OverlapSearch()
 
 
 def measured(
-    settings: Settings, goals: tuple[str, ...], classes: tuple[str, ...]
+    settings: SearchMethod, goals: tuple[str, ...], classes: tuple[str, ...]
 ) -> tuple[list[float], float]:
     """Best IoU of each goal, and the mean seconds of a class."""
     best, seconds, failed = [], [], 0
@@ -54,7 +54,7 @@ def measured(
 
 def ablations(goals: tuple[str, ...], classes: tuple[str, ...]) -> None:
     """One row for each change of the normal effort."""
-    rows: dict[str, Settings] = {
+    rows: dict[str, SearchMethod] = {
         "normal": NORMAL,
         "lattice freedom off": replace(NORMAL, lattice=False),
         "starts: template turned, stretched": replace(NORMAL, starts="template"),
@@ -63,7 +63,7 @@ def ablations(goals: tuple[str, ...], classes: tuple[str, ...]) -> None:
         "Omega 5": replace(NORMAL, max_frequency=5),
         "Omega 20": replace(NORMAL, max_frequency=20),
         "one resolution (60)": replace(NORMAL, resolutions=(60,)),
-        "effort fast": DescentSettings.for_effort("fast"),
+        "effort fast": OverlapSearch.for_effort("fast"),
     }
     print("\nablation" + " " * 30 + "".join(f"{name:>11}" for name in goals) + "  s a class")
     for name, settings in rows.items():
@@ -71,7 +71,7 @@ def ablations(goals: tuple[str, ...], classes: tuple[str, ...]) -> None:
         print(f"{name:38}" + "".join(f"{b:11.4f}" for b in best) + f"{seconds:11.2f}", flush=True)
         if name == "normal":
             share = max(1, round(200 * seconds / 12))  # as many steps as take about that long
-            equal = OccupancySettings(iterations=share, affine_iterations=max(1, share // 2))
+            equal = OccupancySearch(iterations=share, affine_iterations=max(1, share // 2))
             best, own = measured(equal, goals, classes)
             row = "".join(f"{b:11.4f}" for b in best)
             print(f"{'occupancy loss, about equal time':38}{row}{own:11.2f}", flush=True)
@@ -80,13 +80,13 @@ def ablations(goals: tuple[str, ...], classes: tuple[str, ...]) -> None:
 def curve(goals: tuple[str, ...], classes: tuple[str, ...]) -> None:
     """IoU against seconds: the descent's efforts and the occupancy method's iterations."""
     print("\nIoU against seconds       " + "".join(f"{name:>11}" for name in goals) + "  s a class")
-    steps: dict[str, Settings] = {
+    steps: dict[str, SearchMethod] = {
         "descent, starts only": replace(NORMAL, stages=((1, 1),), reach=(1e-6, 1e-6)),
-        "descent, fast": DescentSettings.for_effort("fast"),
+        "descent, fast": OverlapSearch.for_effort("fast"),
         "descent, normal": NORMAL,
-        "occupancy, 20 steps": OccupancySettings(iterations=20, affine_iterations=20),
-        "occupancy, 100 steps": OccupancySettings(iterations=100),
-        "occupancy, 200 steps": OccupancySettings(),
+        "occupancy, 20 steps": OccupancySearch(iterations=20, affine_iterations=20),
+        "occupancy, 100 steps": OccupancySearch(iterations=100),
+        "occupancy, 200 steps": OccupancySearch(),
     }
     for name, settings in steps.items():
         best, seconds = measured(settings, goals, classes)
@@ -128,7 +128,7 @@ def memory() -> None:
     """Peak memory of a best run of one class."""
     torch.set_num_threads(1)
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-    outcome = escherize_class(goal("octpus_94"), "IH4", DescentSettings.for_effort("best"))
+    outcome = escherize_class(goal("octpus_94"), "IH4", OverlapSearch.for_effort("best"))
     after = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     print(f"\nmemory: {before:.0f} MiB after imports, peak {after:.0f} MiB in a best run of IH4")
     if not isinstance(outcome, ClassFailure):

@@ -36,13 +36,13 @@ def main() -> None:
     options = parser.parse_args()
     torch.set_num_threads(1)
     tile = with_map(read_result(options.result, options.tile))
-    render_artwork(artwork(tile, ArtSettings(size=(60, 40), engrave="hatch")))  # imports
+    render_artwork(artwork(tile, ArtSettings(size=(60, 40), strokes="hatch")))  # imports
     board = checkerboard(tile)
     print(f"{'':34} {'tiles':>6} {'prepare s':>9} {'render s':>9} {'PNG s':>6} {'MB':>6}")
     for size in (3000, 1000, 400, 100):
         row(tile, f"picture, tiles of {size} px", ArtSettings(tile_size=size), board)
     for strokes in ("hatch", "echoes", "feathers"):
-        row(tile, strokes, ArtSettings(tile_size=600, engrave=strokes))
+        row(tile, strokes, ArtSettings(tile_size=600, strokes=strokes))
     row(tile, "repeat", ArtSettings(tile_size=600, repeat=True, tolerance=0.05), board)
 
 

@@ -14,7 +14,7 @@ import shapely
 from numpy.typing import NDArray
 
 from orbiflow.runtime import one_blas_thread
-from orbiflow.tiles import CLASSES, BendingSettings, Target, orient, plane_points
+from orbiflow.tiles import CLASSES, LikenessSearch, Target, orient, plane_points
 from orbiflow.tiles.likeness import least_neck
 from orbiflow.tiles.search.bending import bent_tiles
 from orbiflow.tiles.search.co_deformation import hands
@@ -77,7 +77,7 @@ class LikenessTile(NamedTuple):
 
 def likeness_tiles(target: Target, effort: str) -> list[LikenessTile]:
     """Tiles of all classes by the search for likeness, best first: the only place that calls it."""
-    settings = BendingSettings.for_effort(effort)
+    settings = LikenessSearch.for_effort(effort)
     both = hands(target, settings)
     wide = least_neck(target.normal, settings.min_neck)
     found = []

@@ -20,10 +20,10 @@ from common import DATA, GOALS, goal, needed, published
 
 from orbiflow.tiles import (
     CLASSES,
-    DescentSettings,
     EscherTile,
+    OverlapSearch,
     Target,
-    escherize,
+    search_classes,
 )
 
 DISTORTED = {"octpus_94": "octpus", "penguin_60": "penguin2", "squirrel1_60": "squirrel"}
@@ -40,10 +40,10 @@ def target_of(name: str, distorted: bool) -> Target:
 def search(target: Target, effort: str, seed: int) -> tuple[list[EscherTile], float]:
     """Certified tiles of all classes, largest IoU first, and the seconds that they took."""
     begin = time.perf_counter()
-    results, failures = escherize(
+    results, failures = search_classes(
         target,
         CLASSES,
-        DescentSettings.for_effort(effort, seed=seed),
+        OverlapSearch.for_effort(effort, seed=seed),
         workers=os.cpu_count() or 1,
     )
     assert not failures, failures

@@ -14,12 +14,12 @@ from collections.abc import Callable
 from pathlib import Path
 
 from orbiflow.tiles import (
-    BendingSettings,
+    LikenessSearch,
     Target,
     TileMap,
     colouring,
-    escherize,
     overview_png,
+    search_classes,
     tile_svg,
     tiling_png,
     tiling_svg,
@@ -38,7 +38,7 @@ def main() -> None:
     )
     given = parser.parse_args()
     target = Target.read(given.silhouette)
-    results, _ = escherize(target, settings=BendingSettings.for_effort("fast"), workers=1)
+    results, _ = search_classes(target, method=LikenessSearch.for_effort("fast"), workers=1)
     colours = [colouring(result.tile) for result in results]
     both = list(zip(results, colours, strict=True))
     print(f"{len(results)} tiles of {target.source}; CPU seconds for all of them")

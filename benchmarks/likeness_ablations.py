@@ -22,7 +22,7 @@ import numpy as np
 from likeness_methods import silhouette
 
 from orbiflow.runtime import one_blas_thread
-from orbiflow.tiles import CLASSES, BendingSettings, fidelity
+from orbiflow.tiles import CLASSES, LikenessSearch, fidelity
 from orbiflow.tiles.likeness.faithful import USUAL
 from orbiflow.tiles.search import bending, corner_shifts
 from orbiflow.tiles.search.co_deformation import (
@@ -35,9 +35,9 @@ from orbiflow.tiles.search.co_deformation import (
 
 NAMES = ("bat_60", "camel_60", "octpus_94", "squirrel1_60")
 KINDS = ("IH4", "IH5", "IH6")
-PLAIN = BendingSettings()
+PLAIN = LikenessSearch()
 
-Change = tuple[BendingSettings, dict[str, Any]]
+Change = tuple[LikenessSearch, dict[str, Any]]
 
 
 def springs(stages: int) -> dict[str, Any]:

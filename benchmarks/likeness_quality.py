@@ -19,11 +19,11 @@ from common import GOALS, Ring
 from likeness_methods import silhouette
 
 from orbiflow.tiles import (
-    BendingSettings,
     Event,
-    escherize,
+    LikenessSearch,
     hair_share,
     narrowest_neck,
+    search_classes,
     slit_share,
 )
 
@@ -58,8 +58,8 @@ def main() -> None:
             if not first and (event.preview is not None or event.outcome is not None):
                 first.append(time.perf_counter() - began)
 
-        settings = BendingSettings.for_effort(options.effort)
-        results, _ = escherize(target, settings=settings, workers=options.workers, watch=watch)
+        settings = LikenessSearch.for_effort(options.effort)
+        results, _ = search_classes(target, method=settings, workers=options.workers, watch=watch)
         seconds = time.perf_counter() - began
         best = results[0]
         assert all(result.certificate.valid for result in results)

@@ -18,9 +18,9 @@ from orbiflow.tiles import (
     CLASSES,
     ClassFailure,
     EscherTile,
-    OccupancySettings,
+    OccupancySearch,
     Target,
-    escherize,
+    search_classes,
 )
 
 IMAGES = [
@@ -48,12 +48,12 @@ def main() -> None:
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
     options = parser.parse_args()
     images = options.images or IMAGES[: 1 if options.quick else None]
-    settings = OccupancySettings(iterations=60) if options.quick else OccupancySettings()
+    settings = OccupancySearch(iterations=60) if options.quick else OccupancySearch()
     head = "class group    IoU    Dice  Hausd.   mismatch    overlap  uncovered  cert.  starts  dropped"
     for image in images:
         target = Target.read(image)
         begin = time.perf_counter()
-        results, failures = escherize(target, CLASSES, settings, workers=options.workers)
+        results, failures = search_classes(target, CLASSES, settings, workers=options.workers)
         seconds = time.perf_counter() - begin
         print(f"\n{image.name}: {settings.iterations} iterations, {seconds:.0f} s wall")
         print(head + "  core s")

@@ -25,10 +25,10 @@ from orbiflow.drawing import (
 )
 from orbiflow.runtime import write_atomic
 from orbiflow.tiles import (
-    DescentSettings,
     EscherTile,
+    OverlapSearch,
     Target,
-    escherize,
+    search_classes,
 )
 
 BEST = {
@@ -55,8 +55,8 @@ def fitted(file: str, effort: str, seed: int) -> Found:
     """The goal's name, the goal, and its certified tile."""
     name, isohedral = BEST[file]
     target = goal(file)
-    settings = DescentSettings.for_effort(effort, seed=seed)
-    results, failures = escherize(target, [isohedral], settings)
+    settings = OverlapSearch.for_effort(effort, seed=seed)
+    results, failures = search_classes(target, [isohedral], settings)
     assert not failures, failures
     assert results[0].certificate.valid
     return name, target, results[0]

@@ -18,11 +18,11 @@ from PIL import Image, ImageDraw, ImageFont
 
 from orbiflow.tiles import (
     CLASSES,
-    DescentSettings,
     EscherTile,
+    OverlapSearch,
     Target,
-    escherize,
     overlay_png,
+    search_classes,
     tiling_png,
 )
 
@@ -60,13 +60,13 @@ def main() -> None:
     torch.set_num_threads(1)
     folder = needed(DATA / "silhouettes" / "phylopic", "the twenty PhyloPic silhouettes")
     files = sorted(folder.glob("*.png"))[: 2 if options.quick else None]
-    settings = DescentSettings.for_effort("fast" if options.quick else options.effort)
+    settings = OverlapSearch.for_effort("fast" if options.quick else options.effort)
     print("silhouette         vertices class     IoU   Dice  recog  certified  failed seconds")
     found: list[tuple[str, Target, EscherTile]] = []
     for path in files:
         target = Target.read(path)
         begin = time.perf_counter()
-        results, failures = escherize(target, CLASSES, settings, workers=os.cpu_count() or 1)
+        results, failures = search_classes(target, CLASSES, settings, workers=os.cpu_count() or 1)
         seconds = time.perf_counter() - begin
         best = results[0]
         found.append((path.stem, target, best))

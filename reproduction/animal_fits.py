@@ -6,7 +6,7 @@ from orbiflow.tiles import (
     CLASSES,
     ClassFailure,
     EscherTile,
-    OccupancySettings,
+    OccupancySearch,
     escherize_class,
 )
 from reproduction.exhibit import Work
@@ -19,9 +19,7 @@ OMEGA = 5
 
 def animal_tile(name: str, omega: int, affine: int, iterations: int) -> EscherTile | ClassFailure:
     """The tile of one class: affine phase, then the flow of one stationary field, occupancy loss."""
-    settings = OccupancySettings(
-        max_frequency=omega, affine_iterations=affine, iterations=iterations
-    )
+    settings = OccupancySearch(max_frequency=omega, affine_iterations=affine, iterations=iterations)
     return escherize_class(animal(), name, settings)
 
 

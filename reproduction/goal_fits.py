@@ -8,9 +8,9 @@ from typing import Literal, NamedTuple
 from orbiflow.arrays import Array
 from orbiflow.tiles import (
     CLASSES,
-    BendingSettings,
-    DescentSettings,
     EscherTile,
+    LikenessSearch,
+    OverlapSearch,
     Target,
     escherize_class,
 )
@@ -85,7 +85,7 @@ def _tiles(
     target: Target, objective: Objective, effort: str, classes: Sequence[str]
 ) -> list[EscherTile]:
     """Certified tiles, best first."""
-    kind = BendingSettings if objective == "likeness" else DescentSettings
+    kind = LikenessSearch if objective == "likeness" else OverlapSearch
     outcomes = [escherize_class(target, name, kind.for_effort(effort)) for name in classes]
     found = [one for one in outcomes if isinstance(one, EscherTile)]
     return sorted(found, key=lambda one: -_rank(one, objective))

@@ -11,7 +11,7 @@ import numpy as np
 from orbiflow.arrays import Array
 from orbiflow.tiles import (
     CLASSES,
-    BendingSettings,
+    LikenessSearch,
     Overlap,
     Target,
     Tile,
@@ -117,7 +117,7 @@ def animal(name: str) -> Target:
     return Target.read(FOLDER / name)
 
 
-SMALL = BendingSettings(placements=40, held=8, finalists=1, rounds=8, multiples=(4,))
+SMALL = LikenessSearch(placements=40, held=8, finalists=1, rounds=8, multiples=(4,))
 """A search of a fraction of a second a class."""
 
 

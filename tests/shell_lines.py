@@ -6,7 +6,8 @@ Nothing of what a line asks for is done: `refusal` reads the words of a command 
 from __future__ import annotations
 
 import argparse
-import importlib
+import contextlib
+import io
 import itertools
 import re
 import runpy
@@ -16,9 +17,11 @@ import tomllib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from unittest import mock
 
 import pytest
+
+from orbiflow.cli.app import run
+from orbiflow.runtime import Call
 
 ROOT = Path(__file__).parents[1]
 
@@ -120,63 +123,38 @@ def refusal_by_orbiflow(words: Sequence[str]) -> Refusal | None:
     This is the one place that knows which library reads the command line. Everything is read and
     checked as when the command is run, up to the point where its work would begin.
     """
-    import typer
+    found = call_by_orbiflow(words)
+    return found if isinstance(found, Refusal) else None
 
-    from orbiflow.cli.app import DERIVED, app
-    from orbiflow.errors import OrbiflowError
 
-    if " ".join(words[:2]) in DERIVED:
-        return _refusal_by_operation(words)
+def call_by_orbiflow(words: Sequence[str]) -> Call | Refusal | None:
+    """Return the call that words after `orbiflow` ask for, or why they are refused.
 
-    class Accepted(Exception):
+    There is none for --help and --version.
+    """
+
+    class Accepted(BaseException):
         """The command would now begin its work."""
 
-    command = typer.main.get_command(app)
-    work = {"orbiflow.cli.work": "_run", "orbiflow.cli.classes_run": "run"}
-    with pytest.MonkeyPatch.context() as patch:
-        for module, function in work.items():
-            begun = mock.Mock(side_effect=Accepted)
-            patch.setattr(importlib.import_module(module), function, begun)
+    def begin(call: Call, *_: object) -> None:
+        calls.append(call)
+        raise Accepted
+
+    calls: list[Call] = []
+    said = io.StringIO()
+    with (
+        pytest.MonkeyPatch.context() as patch,
+        contextlib.redirect_stderr(said),
+        contextlib.redirect_stdout(io.StringIO()),
+    ):
+        patch.setattr(Call, "run", begin)
         try:
-            command.main(list(words), prog_name="orbiflow", standalone_mode=False)
+            status = run(words)
         except Accepted:
-            return None
-        except OrbiflowError as error:
-            return Refusal(str(error))
-        except Exception as error:
-            # typer brings its own copy of click, whose classes are private
-            message = getattr(error, "format_message", None)
-            if message is None:
-                raise
-            missing = type(error).__name__ in ("MissingParameter", "NoArgsIsHelpError")
-            return Refusal(message(), incomplete=missing)
-    return None  # such as --help and --version, which are done by now
-
-
-def _refusal_by_operation(words: Sequence[str]) -> Refusal | None:
-    """Return why a command that is derived from its operation refuses the words."""
-    from orbiflow.cli import commands
-    from orbiflow.runtime import Call, find
-
-    class Accepted(Exception):
-        """The command would now begin its work."""
-
-    # what is missing is told first, and a line may leave it out: an unknown option must not pass
-    options = [entry.option for entry in find(" ".join(words[:2])).fields]
-    known = {"--help", *(name for option in options for name in (*option.names, option.off))}
-    for word in words[2:]:
-        if word.startswith("--") and word.partition("=")[0] not in known:
-            return Refusal(f"unknown option {word}")
-    told: list[str] = []
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Call, "run", mock.Mock(side_effect=Accepted))
-        patch.setattr(commands.errors, "print", lambda text, **_: told.append(text))
-        try:
-            if commands.run(list(words)) == 0:  # such as --help, which is done by now
-                return None
-        except Accepted:
-            return None
-    return Refusal(told[-1], incomplete="is missing; give" in told[-1])
+            return calls[0]
+    if status == 0:
+        return None
+    return Refusal(said.getvalue(), incomplete="is missing" in said.getvalue())
 
 
 def _refusal_by_make(words: Sequence[str]) -> Refusal | None:

@@ -24,8 +24,8 @@ GROUP = wallpaper_group("p1", 2 * np.eye(2))
 TILE = tiles.Tile(SQUARE, GROUP)
 BOOT = [[0, 0], [3, 0], [3.4, 1.2], [2.2, 1.5], [2.0, 2.8], [0.8, 2.5], [-0.3, 1.2]]
 TARGET = tiles.Target.from_polygon(BOOT)
-FAST = tiles.DescentSettings.for_effort("fast", stages=((2, 1),), polish=0)
-QUICK = tiles.OccupancySettings(
+FAST = tiles.OverlapSearch.for_effort("fast", stages=((2, 1),), polish=0)
+QUICK = tiles.OccupancySearch(
     max_frequency=1, turns=1, finalists=1, affine_iterations=1, iterations=1, points=30
 )
 Model: Any = tiles.TileModel
@@ -170,7 +170,7 @@ REFUSED: list[tuple[Call, Any, str]] = [
     (tiles.as_map, "IH4", "must be a TileModel"),
     (tiles.load_model, 3, "the model's file must be a path, got 3"),
     (lambda t: tiles.fit_descent(t, KIND, FAST), BOOT, "must be a Target, got a list of 7"),
-    (lambda s: tiles.fit_descent(TARGET, KIND, s), "fast", "must be a DescentSettings"),
+    (lambda s: tiles.fit_descent(TARGET, KIND, s), "fast", "must be an OverlapSearch"),
     (lambda t: tiles.OccupancySamples(t, 9, seed=0), BOOT, "must be a Target"),
     (lambda t: outline_starts(t, KIND, **FEW), BOOT, "must be a Target"),
     (lambda r: outline_starts(TARGET, KIND, resolutions=r, **FEW), (35,), "must divide vertices"),
@@ -203,7 +203,7 @@ def test_what_cannot_be_meant_is_refused(call: Call, argument: Any, message: str
 
 NO_WHOLE = ("3", 2.5, None, True, -1, [1], np.nan)
 BAD_SETTINGS: dict[type, dict[str, tuple[Any, ...]]] = {
-    tiles.DescentSettings: {
+    tiles.OverlapSearch: {
         **dict.fromkeys(("max_frequency", "turns", "finalists", "seed", "candidates"), NO_WHOLE),
         "stages": ((20, 12), (), ((1, 0),), ((1.5, 1),), "x"),
         "resolutions": (60, "60", (7,), (60, "x"), (np.nan,)),
@@ -214,7 +214,7 @@ BAD_SETTINGS: dict[type, dict[str, tuple[Any, ...]]] = {
         "boundary": (45, 100.0, "240"),
         "starts": (None, "anywhere"),
     },
-    tiles.OccupancySettings: {
+    tiles.OccupancySearch: {
         **dict.fromkeys(("max_frequency", "turns", "finalists", "seed", "points"), NO_WHOLE),
         "hardness": (3.0, (0.0, 1.0), "ab"),
         "learning_rate": (0, np.nan, None),

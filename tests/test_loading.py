@@ -96,7 +96,7 @@ def test_a_run_and_its_tiles(folders: Path, tmp_path: Path) -> None:
     moved = tile.bending.forward(tile.frame.to_normal([[90.0, 100.0]]))
     assert moved.shape == (1, 2)
     assert found.best.tile.group.order > 1
-    export(found.best, tmp_path / "cut.svg", ExportSettings.preset("laser", tile_size=40))
+    export(found.best, tmp_path / "cut.svg", ExportSettings(purpose="laser", tile_size=40))
     assert (tmp_path / "cut.svg").stat().st_size > 500
     with pytest.raises(OrbiflowError, match="holds no tile 'IH1'; there are IH"):
         _ = found["IH1"]
@@ -130,7 +130,8 @@ def test_a_tile_does_its_own_work(folders: Path, tmp_path: Path) -> None:
     assert isinstance(tile, EscherTile)
     assert tile.export(tmp_path / "a.svg").files == (tmp_path / "a.svg",)
     assert tile.draw(width_px=60).startswith(b"\x89PNG")
-    assert tile.draw_art(tmp_path / "a.png", ArtSettings(size=(90, 60))).is_file()
+    assert tile.draw_art(tmp_path / "a.png", ArtSettings(size=(90, 60))).page.width == 90
+    assert (tmp_path / "a.png").is_file()
     small = AnimationSettings(seconds=0.5, fps=4, size=64)
     assert tile.animate(tmp_path / "a.gif", small).is_file()
     assert tile.model().isohedral_class.name == "IH6"

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from orbiflow.tiles import (
-    BendingSettings,
     EscherTile,
+    LikenessSearch,
     Target,
     escherize_class,
 )
@@ -52,7 +52,7 @@ def test_the_first_screen_is_short():
 def test_the_model_snippet_maps_there_and_back(tmp_path, monkeypatch):
     (snippet,) = [s for s in SNIPPETS if "tile.forward" in s]
     target = Target.read(README_PATH.parent / "examples" / "silhouettes" / "turtle.png")
-    small = BendingSettings(placements=20, held=4, finalists=1, rounds=4)
+    small = LikenessSearch(placements=20, held=4, finalists=1, rounds=4)
     found = escherize_class(target, "IH4", small)
     assert isinstance(found, EscherTile)
     (tmp_path / "out").mkdir()

@@ -12,11 +12,12 @@ from .symmetry.catalogue import wallpaper_group as wallpaper_group
 from .symmetry.equivariance import assert_equivariant as assert_equivariant
 from .symmetry.group import CrystallographicGroup as CrystallographicGroup
 from .tiles.art.scene import draw_art as draw_art
-from .tiles.search.searching import escherize as escherize
-from .tiles.search.settings import BendingSettings as BendingSettings
-from .tiles.search.settings import DescentSettings as DescentSettings
-from .tiles.search.steps import certified_tiles as certified_tiles
-from .tiles.search.steps import fit_tile as fit_tile
+from .tiles.search.certifying import certified_tiles as certified_tiles
+from .tiles.search.escherize_settings import EscherizeSettings as EscherizeSettings
+from .tiles.search.escherizing import escherize as escherize
+from .tiles.search.likeness_search import LikenessSearch as LikenessSearch
+from .tiles.search.overlap_search import OverlapSearch as OverlapSearch
+from .tiles.search.searching import fit_tile as fit_tile
 from .tiles.silhouette.target import Target as Target
 from .tiles.tile import EscherTile as EscherTile
 from .tiles.tilings.certificate import certify as certify

@@ -20,7 +20,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import EllipsisType, UnionType
-from typing import TYPE_CHECKING, Any, TypeVar, cast
+from typing import TYPE_CHECKING, Any, TypeGuard, TypeVar, cast
 
 from orbiflow.errors import SettingError, literal
 
@@ -201,7 +201,7 @@ def as_array(values: Any, name: str, shape: Shape, *, finite: bool = True) -> ND
 
     sizes = ", ".join("..." if n is ... else str(n) for n in shape)
     wanted = f"real numbers of shape ({sizes}{',' * (len(shape) == 1)})"
-    if _is_tensor(values):
+    if is_tensor(values):
         values = values.detach().cpu()
         # NumPy has no bfloat16
         values = (values.double() if values.is_floating_point() else values).numpy()
@@ -261,7 +261,7 @@ def described(value: Any) -> str:
     >>> described("IH4"), described([[0, 1]])
     ("'IH4'", 'a list of 1')
     """
-    if _is_array(value) or _is_tensor(value):
+    if _is_array(value) or is_tensor(value):
         what = "an array" if _is_array(value) else "a tensor"
         return f"{what} of shape {tuple(value.shape)}"
     if is_a(value, list | tuple | dict | set):
@@ -317,7 +317,8 @@ def _is_array(value: object) -> bool:
     return numpy is not None and isinstance(value, numpy.ndarray)
 
 
-def _is_tensor(value: object) -> bool:
+def is_tensor(value: object) -> TypeGuard[Tensor]:
+    """Whether a value is a torch tensor, without importing torch, which a tensor's owner has done."""
     torch = sys.modules.get("torch")
     return torch is not None and isinstance(value, torch.Tensor)
 

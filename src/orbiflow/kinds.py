@@ -36,11 +36,16 @@ class Parsed:
     - `read`: The function; it raises an `OrbiflowError` for what it cannot read.
     - `wanted`: What the text must be, such as "a length such as 40mm".
     - `metavar`: What stands for it in the help, such as "LENGTH".
+    - `values`: Which values there are, for the help, such as "delft, ink, or your own".
+    - `needs`: Another field, whose value the function takes, too, such as "dpi". The text is then read
+      when all fields are known.
     """
 
-    read: Callable[[str], Any]
+    read: Callable[..., Any]
     wanted: str
     metavar: str = "TEXT"
+    values: str = ""
+    needs: str = ""
 
 
 @dataclass(frozen=True)
@@ -74,6 +79,7 @@ class Kind(ABC):
     metavar: str = "TEXT"
     choices: tuple[str, ...] = ()
     repeated: bool = False
+    needs: str = ""
 
     @property
     @abstractmethod
@@ -92,6 +98,10 @@ class Kind(ABC):
     def parse(self, text: str) -> Any:
         """Return a text of the command line as it will be used; raise `Refused` otherwise."""
         return self.read(text)
+
+    def finish(self, text: str, known: Any) -> Any:
+        """Return what a text means, given the value of the field that the kind `needs`."""
+        raise NotImplementedError
 
     def plain(self, value: Any) -> Any:
         """Return a value as JSON has it."""
@@ -239,6 +249,10 @@ class ListKind(Kind):
     repeated: bool = False
     may_be_empty: bool = True
 
+    def __post_init__(self) -> None:
+        if self.repeated:
+            object.__setattr__(self, "metavar", self.item.metavar)
+
     @property
     def wanted(self) -> str:
         entries = "" if self.may_be_empty else " of one or more entries"
@@ -353,7 +367,7 @@ class OptionalKind(Kind):
     inner: Kind
 
     def __post_init__(self) -> None:
-        for name in ("unit", "metavar", "choices", "repeated"):
+        for name in ("unit", "metavar", "choices", "repeated", "needs"):
             object.__setattr__(self, name, getattr(self.inner, name))
 
     @property
@@ -369,6 +383,9 @@ class OptionalKind(Kind):
 
     def parse(self, text: str) -> Any:
         return self.inner.parse(text)
+
+    def finish(self, text: str, known: Any) -> Any:
+        return self.inner.finish(text, known)
 
     def plain(self, value: Any) -> Any:
         return None if value is None else self.inner.plain(value)
@@ -388,21 +405,28 @@ class ParsedKind(Kind):
     def __post_init__(self) -> None:
         object.__setattr__(self, "unit", self.inner.unit)
         object.__setattr__(self, "metavar", self.parsed.metavar)
+        object.__setattr__(self, "needs", self.parsed.needs)
 
     @property
     def wanted(self) -> str:
-        return f"{self.parsed.wanted}{self.limits and ', ' + self.limits}"
+        return f"{self.parsed.wanted}{self.inner.limits and ', ' + self.inner.limits}"
 
     @property
     def limits(self) -> str:
-        return self.inner.limits
+        return self.parsed.values or self.inner.limits
 
     def read(self, value: Any) -> Any:
         return self.parse(value) if isinstance(value, str) else self.inner.read(value)
 
     def parse(self, text: str) -> Any:
+        return text if self.needs else self._meaning(text)
+
+    def finish(self, text: str, known: Any) -> Any:
+        return self._meaning(text, known)
+
+    def _meaning(self, text: str, *known: Any) -> Any:
         try:
-            value = self.parsed.read(text)
+            value = self.parsed.read(text, *known)
         except OrbiflowError as error:
             raise Refused(str(error)) from error
         return self.inner.read(value)

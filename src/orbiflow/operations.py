@@ -1,14 +1,25 @@
 """The operations of orbiflow by name, and where each is: "module:function"."""
 
 OPERATIONS = {
-    "escherize": "orbiflow.derived.tiles:escherize",
-    "export": "orbiflow.derived.tiles:export",
+    "escherize": "orbiflow.tiles.operations:escherize",
+    "batch": "orbiflow.tiles.batches:batch",
+    "export": "orbiflow.tiles.operations:export",
+    "art": "orbiflow.tiles.operations:art",
+    "animate": "orbiflow.tiles.operations:animate",
+    "classes": "orbiflow.tiles.operations:classes",
     "density fit": "orbiflow.density.operations.fitting:fit",
     "density score": "orbiflow.density.operations.using:score",
     "density sample": "orbiflow.density.operations.using:sample",
     "density marginal": "orbiflow.density.operations.using:marginal",
     "density conditional": "orbiflow.density.operations.using:conditional",
+    "density cv": "orbiflow.density.cross_validation.operations:cross_validate",
+    "density batch": "orbiflow.density.operations.batches:batch",
 }
+
+WORK = {
+    "density fold": "orbiflow.density.cross_validation.operations:fold",
+}
+"""Operations that others give to workers, and that are no commands."""
 
 RUN_FOLDERS = {
     "result.json": "orbiflow.tiles:written_files",

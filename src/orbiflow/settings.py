@@ -21,7 +21,9 @@ Types are those of `orbiflow.kinds` and `orbiflow.units`: `bool`, `int`, `float`
 - `OnlyWith(cut="pieces")`, `Needs("emphasis")`, `NotWith("parts")`: rules about other fields. They
   apply to fields that were given (`settings.fields_given`), so a default never offends.
   `because=...` adds a reason to the message, with names of fields in braces.
-- `Parsed(function, "a length such as 40mm")`: text is read by a function.
+- `Ending(".png", ".svg")`: what the name of a file must end in.
+- `Parsed(function, "a length such as 40mm")`: text is read by a function, with `needs="dpi"` when
+  the field `dpi` is known.
 
 What rules cannot say goes into a method `check`, which raises a `SettingError` with the names of
 fields in braces. A default that depends on other fields goes into a method `defaults`, which returns
@@ -43,6 +45,7 @@ import typing
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import MISSING, dataclass, field
 from functools import cache, cached_property
+from pathlib import Path
 from typing import Any, ClassVar, Self, cast, dataclass_transform
 
 from orbiflow.arguments import Range, described, meant, one_of, placeholder, refusal
@@ -51,7 +54,9 @@ from orbiflow.kinds import Kind, Parsed, Refused, Repeated, Unit, kind_of
 
 __all__ = [
     "DefaultText",
+    "Ending",
     "Field",
+    "FileSettings",
     "Group",
     "Hidden",
     "Needs",
@@ -170,7 +175,24 @@ class NotWith:
         return ""
 
 
-Rule = OnlyWith | Needs | NotWith
+class Ending:
+    """The endings that the name of a file may have."""
+
+    def __init__(self, *endings: str) -> None:
+        self.endings = endings
+
+    def check(self, name: str, values: Mapping[str, Any]) -> None:
+        """Refuse a file whose name ends in anything else."""
+        file: Path = values[name]
+        if file.suffix.lower() not in self.endings:
+            endings = one_of(list(filter(None, self.endings)))
+            raise refusal(name, f"a file that ends in {endings}", file.name)
+
+    def __str__(self) -> str:
+        return ""
+
+
+Rule = OnlyWith | Needs | NotWith | Ending
 
 
 @dataclass(frozen=True)
@@ -259,8 +281,21 @@ class Field:
         Raises:
             SettingError: If it is not allowed.
         """
+        return self._read(self.kind.parse if text else self.kind.read, value)
+
+    def finish(self, value: Any, values: Mapping[str, Any]) -> Any:
+        """Return the value of a text that could not be read without another field.
+
+        Raises:
+            SettingError: If it is not allowed.
+        """
+        if not isinstance(value, str):
+            return value
+        return self._read(lambda text: self.kind.finish(text, values[self.kind.needs]), value)
+
+    def _read(self, take: Callable[[Any], Any], value: Any) -> Any:
         try:
-            return self.kind.parse(value) if text else self.kind.read(value)
+            return take(value)
         except Refused as error:
             if error.reason:
                 raise SettingError(f"{placeholder(self.name)}: {literal(error.reason)}") from error
@@ -324,6 +359,10 @@ class Settings:
         for name, value in self.defaults().items():
             if name not in self.fields_given:
                 object.__setattr__(self, name, known[name].read(value))
+        for name, entry in known.items():
+            if entry.kind.needs:
+                value = entry.finish(getattr(self, name), vars(self))
+                object.__setattr__(self, name, value)
         check_rules(known.values(), vars(self), self.fields_given)
         self.check()
 
@@ -360,6 +399,45 @@ class Settings:
             SettingError: If a setting is unknown, missing or not allowed.
         """
         return cls(**document)
+
+
+class FileSettings(Settings):
+    """Settings of a file, whose `format` its ending decides if it is not given."""
+
+    @property
+    def usual_format(self) -> str:
+        """The format where neither the field nor an ending says one: the first."""
+        return self._formats[0]
+
+    @property
+    def file_format(self) -> str:
+        """The format that is written."""
+        return vars(self)["format"] or self.usual_format
+
+    @property
+    def _formats(self) -> tuple[str, ...]:
+        (found,) = (entry for entry in fields_of(type(self)) if entry.name == "format")
+        return found.kind.choices
+
+    def for_file(self, out: Path | None) -> Self:
+        """Return these settings with the format that a file's ending decides.
+
+        Raises:
+            SettingError: If the ending is that of another format than the one that was given, or none
+                was given and the ending is unknown.
+        """
+        given, formats = vars(self)["format"], self._formats
+        ending = out.suffix.lower().lstrip(".") if out else ""
+        if given is None and ending and ending not in formats:
+            raise SettingError(
+                f"{{out}} ends in .{literal(ending)}; give {{format}}, or end it in "
+                f"{one_of([f'.{name}' for name in formats])}"
+            )
+        if given is not None and ending in formats and given != ending:
+            raise SettingError(
+                f"{{out}} ends in .{ending} but {{format}} is {given}; make them the same"
+            )
+        return self.replace(format=given or ending or self.usual_format)
 
 
 @cache

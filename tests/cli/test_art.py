@@ -14,14 +14,7 @@ from PIL import Image
 
 from artworks import EYE, size_of, squirrel, write_run
 from orbiflow.drawing import PALETTES
-from orbiflow.jobs import (
-    ArtRequest,
-    Finished,
-    Note,
-    run,
-)
-from orbiflow.runtime import Cancel
-from orbiflow.runtime.events import Written
+from orbiflow.runtime import Cancel, Cancelled, Note, Written, find
 from orbiflow.tiles import Target
 from orbiflow.tiles.art.source import covered_area
 
@@ -87,33 +80,33 @@ def png_that_says(width: int, height: int) -> bytes:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (("--size", "0x100"), "a picture's side in pixels must be from 1 to 30000, got 0"),
-        (("--size", "30000x30000"), "is too large; at most 100 megapixels are made"),
-        (("--size", "999999999x2"), "must be from 1 to 30000"),
-        (("--size", "big"), "--size 'big' is not a width and a height"),
+        (("--size", "0x100"), "--size ... from 1 to 30000, got 0"),
+        (("--size", "30000x30000"), "is too large ... --size ... at most 100 megapixels are made"),
+        (("--size", "999999999x2"), "--size ... from 1 to 30000"),
+        (("--size", "big"), "--size ... 'big' is not a width and a height"),
         (("--size", "300.5x200"), "write two whole numbers, such as 3000x2000"),
-        (("--tile-size", "0"), "--tile-size '0' must be above 0"),
-        (("--tile-size", "1"), "tile_size must be from 8"),
+        (("--tile-size", "0"), "--tile-size ... '0' must be above 0"),
+        (("--tile-size", "1"), "--tile-size must be ... from 8"),
         (("--tile-size", "9", "--size", "9000x9000"), "the most is 20000: choose larger tiles"),
         (("--palette", "neon"), "unknown palette 'neon'; there are delft"),
-        (("--outline", "thick"), "--outline 'thick' is not a length"),
+        (("--outline", "thick"), "--outline ... 'thick' is not a length"),
         (("--eye", "5,5"), "the eye at 5,5 lies outside the silhouette, which reaches from"),
-        (("--eye", "here"), "--eye 'here' is no place; write x,y or x,y,radius"),
-        (("--eye", "nan,1"), "an eye's x must be"),
-        (("--eye", "210,190,-3"), "an eye's radius must be at least 0"),
-        (("--repeat", "--size", "30x30"), "--size is the page's; the cell of --repeat has its own"),
-        (("--tolerance", "0.1"), "--tolerance belongs to --repeat"),
-        (("--repeat", "--tolerance", "2"), "--tolerance must be from 0 to 0.2"),
+        (("--eye", "here"), "--eye ... 'here' is not x,y or x,y,radius"),
+        (("--eye", "nan,1"), "--eye ... must be a number, got nan"),
+        (("--eye", "210,190,-3"), "--eye ... radius ... got 210,190,-3"),
+        (("--repeat", "--size", "30x30"), "--size and --repeat exclude each other"),
+        (("--tolerance", "0.1"), "--tolerance ... --repeat"),
+        (("--repeat", "--tolerance", "2"), "--tolerance must be ... from 0 to 0.2"),
         (("--repeat", "--tile-size", "30000"), "the cell that repeats is too large"),
         (("--tile", "IH1"), "holds no tile of IH1"),
         (("--picture", "gone.png"), "gone.png: no such file"),
-        (("--dpi", "0"), "--dpi must be from 1 to 10000"),
+        (("--dpi", "0"), "--dpi must be ... from 1 to 10000"),
     ],
 )
 def test_mistakes(options, message: str, result: Path, tmp_path: Path, orbiflow) -> None:
     outcome = orbiflow("art", result, *options, "-o", tmp_path / "out.png")
     assert outcome.status == 2
-    assert message in outcome.err
+    assert all(part in outcome.err for part in message.split(" ... ")), outcome.err
     assert "Traceback" not in outcome.err
     assert list(tmp_path.iterdir()) == []
 
@@ -152,25 +145,26 @@ def test_a_picture_of_another_aspect(result: Path, tmp_path: Path, orbiflow) -> 
 def test_other_endings(out: str, result: Path, tmp_path: Path, orbiflow) -> None:
     outcome = orbiflow("art", result, "-o", tmp_path / out)
     assert outcome.status == 2
-    assert f"--out must end in .png or .svg, got {out}" in outcome.err
+    assert "--out must be a file that ends in .png or .svg" in outcome.err
+    assert out in outcome.err
 
 
-def test_the_job_tells_what_it_did(result: Path, tmp_path: Path) -> None:
+def test_the_operation_tells_what_it_did(result: Path, tmp_path: Path) -> None:
     events = []
-    request = ArtRequest(result=result, out=tmp_path / "a.png", size="60x40", tile_size="40")
-    finished = run(request, events.append)
-    assert isinstance(finished, Finished)
-    assert finished.summary["width"] == 60
-    assert finished.summary["class"] == "IH6"
+    given = {"result": result, "out": tmp_path / "a.png", "size": "60x40", "tile_size": "40"}
+    outcome = find("art").call(given).run(events.append)
+    assert outcome.summary["width"] == 60
+    assert outcome.summary["class"] == "IH6"
     assert [event.path for event in events if isinstance(event, Written)] == [tmp_path / "a.png"]
     assert any(isinstance(event, Note) for event in events)
 
 
-def test_a_cancelled_job_writes_nothing(result: Path, tmp_path: Path) -> None:
+def test_nothing_is_written_if_it_is_cancelled(result: Path, tmp_path: Path) -> None:
     cancel = Cancel()
     cancel.cancel()
-    request = ArtRequest(result=result, out=tmp_path / "a.png", size="60x40")
-    assert run(request, cancel=cancel).state == "cancelled"
+    call = find("art").call({"result": result, "out": tmp_path / "a.png", "size": "60x40"})
+    with pytest.raises(Cancelled):
+        call.run(cancel=cancel)
     assert list(tmp_path.iterdir()) == []
 
 

@@ -19,9 +19,9 @@ from PIL import Image, ImageDraw
 from orbiflow import __version__
 from orbiflow.tiles import CLASSES, Fit, Target, TileModel, load_model, write_tile_folder
 from orbiflow.tiles.pages.tile_folder import FIGURE_FILES
-from orbiflow.tiles.search import methods
+from orbiflow.tiles.search import occupancy
 from orbiflow.tiles.search.boundary import extract_tile
-from orbiflow.tiles.search.result import best_tiles
+from orbiflow.tiles.search.certifying import best_tiles
 
 DOCS = Path(__file__).parents[2] / "docs"
 FILES = {"tile.svg", "tiling.svg", "tiling.png", "overlay.png", "model.safetensors"}
@@ -165,7 +165,7 @@ def test_a_run_on_a_polygon_with_y_up(tmp_path: Path, orbiflow) -> None:
 def test_no_tile_is_status_one(tmp_path: Path, orbiflow, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "boot.json"
     path.write_text(json.dumps(BOOT))
-    monkeypatch.setattr(methods, "fit_occupancy", lambda *_, **__: crossed())
+    monkeypatch.setattr(occupancy, "fit_occupancy", lambda *_, **__: crossed())
     options = ["--classes", "IH21", "--workers", 1, *FEW]
     for _ in range(2):  # the second time there is a run without a tile to replace
         outcome = orbiflow("escherize", path, "-o", tmp_path / "o", *options)
@@ -240,7 +240,7 @@ def test_a_second_run_takes_the_place_of_the_first(
         "result.json",
     }
     before = (out / "result.json").read_bytes()
-    monkeypatch.setattr(methods, "fit_occupancy", lambda *_, **__: crossed())
+    monkeypatch.setattr(occupancy, "fit_occupancy", lambda *_, **__: crossed())
     none = orbiflow(*run, "-o", out, "--classes", "IH21")
     assert none.status == 1
     assert f"{out} still holds the tiles of an earlier run" in none.err

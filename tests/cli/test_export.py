@@ -13,12 +13,7 @@ import pypdfium2
 import pytest
 
 from exported import tile_of
-from orbiflow.jobs import (
-    ExportRequest,
-    Finished,
-    run,
-)
-from orbiflow.runtime.events import Written
+from orbiflow.runtime import Finished, Written, find
 from orbiflow.tiles.result_file import group_json
 
 
@@ -102,50 +97,53 @@ def test_the_neck_is_a_note_and_the_work_is_done(result: Path, tmp_path: Path, o
 
 def test_numbered_sheets_and_their_events(result: Path, tmp_path: Path) -> None:
     events: list[Any] = []
-    request = ExportRequest(
-        result=result,
-        out=tmp_path / "cut.svg",
-        cut="pieces",
-        copies=30,
-        bed="12x9cm",
-        calibrate=True,
+    given = {"cut": "pieces", "copies": 30, "bed": "12x9cm", "calibrate": True}
+    outcome = (
+        find("export")
+        .call({"result": result, "out": tmp_path / "cut.svg", **given})
+        .run(events.append)
     )
-    finished = run(request, events.append)
     names = sorted(path.name for path in tmp_path.iterdir())
     assert names == [f"cut-{k}.svg" for k in range(1, len(names) + 1)]
     assert [e.path.name for e in events if isinstance(e, Written)] == names
-    assert finished == events[-1]
-    assert isinstance(finished, Finished)
-    assert finished.summary["tiles"] == 30
+    assert isinstance(events[-1], Finished)
+    assert outcome.summary == events[-1].summary
+    assert outcome.summary["tiles"] == 30
     assert all("calibration" in (tmp_path / name).read_text() for name in names)
 
 
 MISTAKES: dict[str, tuple[list[str], str]] = {
-    "no unit": (["--tile-size", "40"], "--tile-size '40' has no unit; write 40mm, 40cm or 40in"),
-    "no unit of the area": (["--area", "300x200"], "--area '300x200' has no unit; write 300x200mm"),
-    "zero": (["--tile-size", "0mm"], "--tile-size '0mm' must be above 0"),
-    "one side": (["--bed", "300mm"], "--bed '300mm' is not a width and a height"),
+    "no unit": (
+        ["--tile-size", "40"],
+        "--tile-size ... '40' has no unit; write 40mm, 40cm or 40in",
+    ),
+    "no unit of the area": (["--area", "300x200"], "--area ... '300x200' has no unit"),
+    "zero": (["--tile-size", "0mm"], "--tile-size ... '0mm' must be above 0"),
+    "one side": (["--bed", "300mm"], "--bed ... '300mm' is not a width and a height"),
     "small page": (["--area", "10x10mm"], "does not fit on the page of 10 x 10 mm: it needs"),
-    "kerf of the skeleton": (["--for", "laser", "--kerf", "1mm"], "cannot be moved by half a kerf"),
+    "kerf of the skeleton": (["--for", "laser", "--kerf", "1mm"], "--kerf ... --cut pieces"),
     "wide kerf": (["--cut", "pieces", "--kerf", "5cm"], "wider than the piece's neck"),
     "many copies": (["--cut", "pieces", "--copies", "999"], "sheets are needed"),
-    "no copies": (["--cut", "pieces", "--copies", "0"], "--copies must be at least 1"),
+    "no copies": (["--cut", "pieces", "--copies", "0"], "--copies ... at least 1"),
     "class": (["--tile", "IH9"], "unknown isohedral class 'IH9'"),
     "class not there": (["--tile", "IH1"], "holds no tile of IH1; there are IH6, IH4, IH6"),
     "rank": (["--tile", "4"], "no tile of rank 4; there are 1 to 3"),
     "rank 0": (["--tile", "0"], "no tile of rank 0"),
     "ending": (["--format", "pdf"], "--out ends in .svg but --format is pdf"),
     "format": (["--format", "doc"], "--format"),
-    "dots": (["--dpi", "0"], "--dpi must be from 1 to 10000"),
-    "dots of no picture": (["--dpi", "600"], "--dpi belongs to --format png, not to svg"),
+    "dots": (["--dpi", "0"], "--dpi must be ... from 1 to 10000"),
+    "dots of no picture": (["--dpi", "600"], "--dpi ... --format png ... svg"),
     "colours of lines": (
         ["--for", "laser", "--palette", "sea"],
-        "--palette is of fills: it belongs to --cut none, not skeleton",
+        "--palette ... --cut none ... skeleton",
     ),
-    "colours of pieces": (["--cut", "pieces", "--palette", "sea"], "--cut none, not pieces"),
+    "colours of pieces": (
+        ["--cut", "pieces", "--palette", "sea"],
+        "--palette ... --cut none ... pieces",
+    ),
     "colours of a plotter": (
         ["--for", "plotter", "--cut", "none", "--palette", "sea"],
-        "--palette is of fills, and --for plotter has none",
+        "--palette has no effect ... --for plotter fills nothing",
     ),
     "tiny tiles": (["--tile-size", "0.5mm", "--tolerance", "0.01mm"], "the most is 20000"),
 }
@@ -156,7 +154,7 @@ def test_mistakes(case: str, result: Path, tmp_path: Path, orbiflow) -> None:
     options, message = MISTAKES[case]
     outcome = orbiflow("export", result, "--out", tmp_path / "a.svg", *options)
     assert outcome.status == 2
-    assert message in outcome.err
+    assert all(part in outcome.err for part in message.split(" ... ")), outcome.err
     assert "Traceback" not in outcome.err
     assert not list(tmp_path.iterdir())
 
@@ -252,6 +250,6 @@ def test_the_snippet_of_the_documentation(result: Path, tmp_path: Path, monkeypa
 def test_an_ending_of_no_format_needs_the_format(result: Path, tmp_path: Path, orbiflow) -> None:
     outcome = orbiflow("export", result, "--out", tmp_path / "boot.eps")
     assert outcome.status == 2
-    assert "--out ends in .eps; say --format, or end it in .svg" in " ".join(outcome.err.split())
+    assert "--out ends in .eps; give --format, or end it in .svg" in " ".join(outcome.err.split())
     assert not list(tmp_path.glob("boot*"))
     assert orbiflow("export", result, "--format", "svg", "--out", tmp_path / "boot.eps").status == 0

@@ -27,24 +27,24 @@ LAUNCH = (
 # the first class to be fitted is done after one step, the others never; both workers say so
 FIRST_IS_SHORT = (
     "import dataclasses\n"
-    "from orbiflow.escher import methods\n"
-    "whole = methods.fit_occupancy\n"
+    "from orbiflow.tiles.search import occupancy\n"
+    "whole = occupancy.fit_occupancy\n"
     "def fit(target, kind, settings, progress, **options):\n"
     "    steps = 1 if kind.name == 'IH1' else settings.iterations\n"
     "    own = dataclasses.replace(settings, iterations=steps)\n"
     "    return whole(target, kind, own, progress, **options)\n"
-    "methods.fit_occupancy = fit\n"
+    "occupancy.fit_occupancy = fit\n"
 )
 # workers that hear nothing, and all the time in the world for them; each says so in one write, or
 # two who speak at once would make one line
 DEAF = (
     "import os, time\n"
-    "from orbiflow.cancel import Cancel\n"
-    "from orbiflow import processes\nfrom orbiflow.escher import methods\n"
+    "from orbiflow.runtime import Cancel, processes\n"
+    "from orbiflow.tiles.search import occupancy\n"
     "def fit(*_, **__):\n"
     "    os.write(1, b'deaf\\n')\n"
     "    time.sleep(1e6)\n"
-    "methods.fit_occupancy, processes.GRACE = fit, 1e6\n"
+    "occupancy.fit_occupancy, processes.GRACE = fit, 1e6\n"
     "tell = Cancel.cancel\n"
     "def cancel(self):\n"
     "    tell(self)\n"
@@ -114,7 +114,7 @@ def test_a_second_one_ends_at_once(tmp_path: Path) -> None:
         os.killpg(process.pid, signal.SIGINT)
         _, errors = process.communicate()
     assert process.returncode == 130
-    assert errors == ""
+    assert errors == "interrupted\n"
 
 
 def test_the_token_of_ctrl_c() -> None:

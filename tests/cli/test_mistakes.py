@@ -107,57 +107,60 @@ def test_bad_inputs(case: str, tmp_path: Path, orbiflow) -> None:
 
 BAD_OPTIONS: dict[str, tuple[list[str], str]] = {
     "class": (["--classes", "IH4,IH8"], "unknown isohedral class 'IH8'"),
-    "no class": (["--classes", " , "], "--classes names no class"),
+    "no class": (["--classes", " , "], "--classes must be classes such as IH4"),
     "frequency -1": (
         ["--objective", "overlap", "--max-frequency", "-1"],
-        "max_frequency must be at least 0, got -1",
+        "--max-frequency ... from 0 to 60, got ... -1",
     ),
     "frequency 10000": (
         ["--objective", "overlap", "--max-frequency", "10000"],
-        "from 0 to 60, got 10000",
+        "--max-frequency ... from 0 to 60, got ... 10000",
     ),
-    "frequency of likeness": (["--max-frequency", "5"], "--max-frequency belongs to --objective"),
+    "frequency of likeness": (
+        ["--max-frequency", "5"],
+        "--max-frequency applies only to --objective",
+    ),
     "objective": (["--objective", "beauty"], "--objective"),
-    "neck": (["--min-neck", "3"], "--min-neck must be from 0 to 0.2, got 3"),
+    "neck": (["--min-neck", "3"], "--min-neck ... from 0 to 0.2, got ... 3"),
     "objective of occupancy": (
         ["--method", "occupancy", "--objective", "both"],
-        "--objective belongs to --method descent",
+        "--objective applies only to --method descent",
     ),
     "frequency 2.5": (["--max-frequency", "2.5"], "--max-frequency"),
-    "workers 0": (["--workers", "0"], "--workers must be at least 1, got 0"),
-    "workers -2": (["--workers", "-2"], "--workers must be at least 1, got -2"),
+    "workers 0": (["--workers", "0"], "--workers ... at least 1, got ... 0"),
+    "workers -2": (["--workers", "-2"], "--workers ... at least 1, got ... -2"),
     "iterations": (
         ["--method", "occupancy", "--iterations", "0"],
-        "iterations must be at least 1, got 0",
+        "--iterations ... at least 1, got ... 0",
     ),
-    "turns": (["--method", "occupancy", "--turns", "0"], "turns must be at least 1, got 0"),
-    "threshold 7": (["--threshold", "7"], "threshold must lie between 0 and 1, got 7"),
-    "threshold nan": (["--threshold", "nan"], "threshold must lie between 0 and 1, got nan"),
-    "seed": (["--seed", "-1"], "seed must be from 0 to 2^32 - 1, got -1"),
-    "seed 2^32": (["--seed", str(2**32)], f"got {2**32}"),
+    "turns": (["--method", "occupancy", "--turns", "0"], "--turns ... at least 1, got ... 0"),
+    "threshold 7": (["--threshold", "7"], "--threshold ... from 0 to 1, got ... 7"),
+    "threshold nan": (["--threshold", "nan"], "--threshold ... from 0 to 1, got ... nan"),
+    "seed": (["--seed", "-1"], "--seed ... from 0 to 2^32 - 1, got ... -1"),
+    "seed 2^32": (["--seed", str(2**32)], f"--seed ... {2**32}"),
     "method": (["--method", "magic"], "magic"),
     "effort": (["--effort", "heroic"], "heroic"),
-    "other method's option": (["--turns", "3"], "--turns belongs to --method occupancy"),
-    "per class": (["--per-class", "0"], "--per-class must be at least 1, got 0"),
+    "other method's option": (["--turns", "3"], "--turns applies only to --method occupancy"),
+    "per class": (["--per-class", "0"], "--per-class ... at least 1, got ... 0"),
     "emphasis": (["--emphasis", "nowhere.png"], "nowhere.png"),
     "emphasis for occupancy": (
         ["--method", "occupancy", "--emphasis", "m.png"],
-        "--emphasis belongs to --method descent",
+        "--emphasis applies only to --method descent",
     ),
     "effort of occupancy": (
         ["--method", "occupancy", "--effort", "fast"],
-        "--effort belongs to --method descent",
+        "--effort applies only to --method descent",
     ),
     "strength of nothing": (["--strength", "3"], "--strength needs --emphasis"),
     "pin outside": (["--pin", "5000,5000"], "the pin at 5000,5000 lies outside the silhouette"),
     "pin that is no file": (["--pin", "head.png"], "head.png"),
     "pins of overlap": (
         ["--objective", "overlap", "--pin", "9,9"],
-        "--pin belongs to --objective likeness or both",
+        "--pin applies only to --objective likeness or both",
     ),
     "pins of occupancy": (
         ["--method", "occupancy", "--pin", "9,9"],
-        "--pin belongs to --method descent",
+        "--pin applies only to --method descent",
     ),
     "angle of nothing": (["--pin-angle"], "--pin-angle needs --pin"),
     "no such option": (["--clases", "IH4"], "--clases"),
@@ -170,7 +173,7 @@ def test_bad_options(case: str, tmp_path: Path, orbiflow) -> None:
     out = tmp_path / "out"
     outcome = orbiflow("escherize", disc(tmp_path), "--out", out, *options)
     assert outcome.status == 2
-    assert message in outcome.err
+    assert all(part in outcome.err for part in message.split(" ... ")), outcome.err
     assert "Traceback" not in outcome.err
     assert not out.exists()
 
@@ -217,7 +220,7 @@ def test_a_mistake_in_a_process_of_its_own(tmp_path: Path, orbiflow_process) -> 
 def test_a_missing_argument(orbiflow) -> None:
     outcome = orbiflow("escherize")
     assert outcome.status == 2
-    assert "Missing argument" in outcome.err
+    assert "IMAGE is missing" in outcome.err
 
 
 def test_the_disc_is_a_good_input(tmp_path: Path) -> None:

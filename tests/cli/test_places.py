@@ -152,7 +152,8 @@ def test_an_ending_of_another_format_is_refused(
     before = contents(here)
     done = orbiflow(*words.split())
     assert done.status == 2
-    assert f"--out must end in {endings}, got '{words.split()[-1]}'" in done.err
+    assert "--out must" in done.err
+    assert all(part in done.err for part in (*endings.split(", "), words.split()[-1]))
     assert not done.out
     assert contents(here) == before
 

@@ -9,19 +9,15 @@ from hypothesis import given as drawn
 from hypothesis import strategies as st
 
 from orbiflow.errors import OrbiflowError
-from orbiflow.jobs import (
-    ArtRequest,
-    ExportRequest,
-    RecordError,
-)
+from orbiflow.jobs import EscherizeRequest, RecordError
 from orbiflow.jobs.asked import given, read_as
 from orbiflow.units import length
 
 
 def test_what_was_set_is_given_and_nothing_else() -> None:
-    request = ArtRequest(result=Path("out"), dpi=1.0, repeat=False)
-    found = given(request, ("dpi", "palette", "repeat"))
-    assert found == {"dpi": 1.0, "repeat": False}
+    request = EscherizeRequest(image=Path("x"), min_neck=0.1, figures=False)
+    found = given(request, ("min_neck", "effort", "figures"))
+    assert found == {"min_neck": 0.1, "figures": False}
 
 
 def test_a_text_is_read() -> None:
@@ -57,4 +53,4 @@ def test_other_errors_are_not_disguised() -> None:
 
 def test_a_field_that_the_request_has_not_is_a_mistake() -> None:
     with pytest.raises(AttributeError):
-        given(ExportRequest(result=Path("out")), ("eyes",))
+        given(EscherizeRequest(image=Path("out")), ("eyes",))

@@ -19,7 +19,7 @@ from orbiflow.jobs import (
     run,
 )
 from orbiflow.jobs.requests import request_from_json
-from orbiflow.tiles.search.front import MOST
+from orbiflow.tiles.search.both_search import MOST
 
 DOCS = Path(__file__).parents[2] / "docs"
 SQUIRREL = Path(__file__).parents[2] / "examples" / "silhouettes" / "squirrel.dat"

@@ -15,8 +15,6 @@ from hypothesis import strategies as st
 
 from orbiflow.errors import OrbiflowError
 from orbiflow.jobs import (
-    AnimateRequest,
-    ArtRequest,
     BatchRequest,
     DensityBatchRequest,
     DensityCompareRequest,
@@ -25,7 +23,6 @@ from orbiflow.jobs import (
     DensityPlotRequest,
     DensityRegionRequest,
     EscherizeRequest,
-    ExportRequest,
     PatchesRequest,
     RecordError,
     Request,
@@ -44,17 +41,6 @@ measures = st.sampled_from(["natural", "square", "uniform"])
 spaces = st.sampled_from(["torus", "sphere", "klein-bottle", "projective-plane"])
 
 REQUESTS = st.one_of(
-    st.builds(
-        AnimateRequest,
-        result=paths,
-        out=st.none() | st.sampled_from(["a.gif", "b.SVG", "c.mp4"]).map(Path),
-        tile=st.text(),
-        animation=st.sampled_from(["morph", "bend", "grow"]),
-        seconds=st.none() | st.floats(0.5, 120),
-        size=st.none() | st.integers(32, 2000).map(lambda half: 2 * half),
-        palette=st.none() | st.text(),
-        force=st.booleans(),
-    ),
     st.builds(
         EscherizeRequest,
         image=paths,
@@ -87,21 +73,6 @@ REQUESTS = st.one_of(
         method=st.just("occupancy"),
         turns=st.none() | st.integers(),
         iterations=st.none() | st.integers(),
-    ),
-    st.builds(
-        ArtRequest,
-        result=paths,
-        out=st.none() | names.map(lambda name: Path(name + ".png")),
-        tile=st.text(),
-        picture=st.none() | paths,
-        tile_size=st.none() | st.text(),
-        repeat=st.booleans(),
-        colour=st.sampled_from([None, "aspect", "neighbour", "one"]),
-        engrave=st.booleans(),
-        strokes=st.sampled_from([None, "hatch", "echoes", "feathers"]),
-        eyes=st.lists(st.text()).map(tuple),
-        dpi=st.none() | st.floats(1, 10_000),
-        force=st.booleans(),
     ),
     st.builds(
         DensityFitRequest,
@@ -145,19 +116,6 @@ REQUESTS = st.one_of(
         level=st.none() | st.lists(st.floats(-99, 99), min_size=1, max_size=9).map(tuple),
         samples=st.integers(1000, 10**7),
         seed=seeds,
-    ),
-    st.builds(
-        ExportRequest,
-        result=paths,
-        out=st.none() | paths,
-        tile=st.text(),
-        purpose=st.sampled_from([None, "laser", "print", "web", "plotter"]),
-        cut=st.sampled_from([None, "none", "skeleton", "pieces"]),
-        tile_size=st.none() | st.text(),
-        bed=st.none() | st.text(),
-        copies=st.none() | st.integers(1),
-        clip=st.none() | st.booleans(),
-        calibrate=st.booleans(),
     ),
     st.builds(
         BatchRequest,

@@ -37,7 +37,7 @@ LINES: dict[str, tuple[str, dict[str, Any]]] = {
     "repeated": ("escherize X --pin 1,2 --pin=-3,4,5", {"pin": ["1,2", "-3,4,5"]}),
     "all": ("escherize X --classes all", {"classes": None}),
     "commas": ("escherize X --classes IH4,IH6", {"classes": ["IH4", "IH6"]}),
-    "negative": ("escherize X --seed -1", {"seed": -1}),
+    "negative": ("escherize X --pin -1,2", {"pin": ["-1,2"]}),
     "group": ("density fit X --space torus --columns a,b", {"columns": ["a", "b"]}),
     "no header": ("density fit X --space torus --no-header", {"header": False}),
 }

@@ -14,6 +14,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from orbiflow.drawing import PALETTES
 from orbiflow.kinds import (
     ChoiceKind,
     EitherKind,
@@ -118,6 +119,8 @@ def values_of(kind: Kind) -> st.SearchStrategy[Any]:
         case ParsedKind(_, inner):
             if kind.metavar == "COLOUR":
                 return st.integers(0, 0xFFFFFF).map(lambda number: f"#{number:06x}")
+            if kind.metavar == "PALETTE":
+                return st.sampled_from(list(PALETTES))
             return values_of(inner)
         case PathKind():
             return WORD.map(Path)
@@ -184,6 +187,12 @@ def number_kinds() -> dict[str, tuple[Field, NumberKind]]:
     return found
 
 
+def read_whole(entry: Field, value: Any) -> Any:
+    """Read a value, and finish it if the field needs another."""
+    known = entry.read(value)
+    return entry.finish(known, {entry.kind.needs: 300.0}) if entry.kind.needs else known
+
+
 @pytest.mark.parametrize("name", number_kinds())
 def test_bounds_of_every_number(name: str) -> None:
     entry, kind = number_kinds()[name]
@@ -197,7 +206,7 @@ def test_bounds_of_every_number(name: str) -> None:
     wrong += [bound for bound in (bounds.above, bounds.below) if bound is not None]
     for value in wrong:
         with pytest.raises(SettingError) as error:
-            entry.read(value)
+            read_whole(entry, value)
         assert entry.name in error.value.names
 
 

@@ -68,6 +68,8 @@ class Terminal:
                 self._end_bar()
                 if self.job == "escherize":
                     _show_tiles(event)
+                elif self.job == "classes":
+                    _show_classes(event)
                 elif self.job in BATCHES:
                     _show_batch(event)
             case _:
@@ -145,6 +147,17 @@ def _show_batch(event: Finished) -> None:
             soft_wrap=True,
             highlight=False,
         )
+
+
+def _show_classes(event: Finished) -> None:
+    """The isohedral classes."""
+    rows, file = event.summary["classes"], event.summary["file"]
+    table = Table(*rows[0], title="The nine isohedral classes")
+    for row in rows:
+        table.add_row(*row.values())
+    output.print(table)
+    if file is not None:
+        output.print(f"drawn in {file}", soft_wrap=True)
 
 
 def _show_tiles(event: Finished) -> None:

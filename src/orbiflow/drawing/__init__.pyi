@@ -17,6 +17,7 @@ from .fields import field_png as field_png
 from .palettes import DEFAULT_PALETTE as DEFAULT_PALETTE
 from .palettes import PALETTES as PALETTES
 from .palettes import Palette as Palette
+from .palettes import PaletteName as PaletteName
 from .palettes import palette as palette
 from .raster import Raster as Raster
 from .raster import arrow as arrow

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import re
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 from orbiflow.errors import OrbiflowError
+from orbiflow.kinds import Parsed
 
 
 class Palette(NamedTuple):
@@ -99,9 +100,7 @@ def palette(name: str | Palette) -> Palette:
     if isinstance(name, Palette):
         return name
     given: object = name
-    if not isinstance(
-        given, str
-    ):  # without the import of `arguments`, and torch: for commands' help
+    if not isinstance(given, str):
         raise OrbiflowError(f"a palette must be a str, got {given!r}; a name or colours")
     if name in PALETTES:
         return PALETTES[name]
@@ -111,6 +110,24 @@ def palette(name: str | Palette) -> Palette:
         f"unknown palette {name[:60]!r}; there are {', '.join(PALETTES)}, and your own: colours such "
         "as e76f51,2a9d8f,outline=1b2f38,paper=fffdf8"
     )
+
+
+def palette_name(text: str) -> str:
+    """Return the text if `palette` can read it."""
+    palette(text)
+    return text
+
+
+PaletteName = Annotated[
+    str,
+    Parsed(
+        palette_name,
+        "a palette's name, or colours such as e76f51,2a9d8f,outline=1b2f38",
+        "PALETTE",
+        values=f"{', '.join(PALETTES)}, or colours such as e76f51,2a9d8f,outline=1b2f38",
+    ),
+]
+"""A palette, for settings classes: its name, or its colours."""
 
 
 def _spelt(text: str) -> Palette:

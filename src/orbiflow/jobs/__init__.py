@@ -20,12 +20,7 @@ from orbiflow.jobs.process import Job, start
 from orbiflow.jobs.request import Request
 from orbiflow.jobs.requests import request_from_json
 from orbiflow.jobs.run import Sink, run
-from orbiflow.jobs.tile_requests import (
-    AnimateRequest,
-    ArtRequest,
-    EscherizeRequest,
-    ExportRequest,
-)
+from orbiflow.jobs.tile_requests import EscherizeRequest
 from orbiflow.runtime import (
     Cancel,
     ClassFailed,
@@ -44,8 +39,6 @@ from orbiflow.runtime import (
 )
 
 __all__ = [
-    "AnimateRequest",
-    "ArtRequest",
     "BatchRequest",
     "Cancel",
     "ClassFailed",
@@ -58,7 +51,6 @@ __all__ = [
     "DensityRegionRequest",
     "EscherizeRequest",
     "Event",
-    "ExportRequest",
     "Failed",
     "Finished",
     "ItemDone",

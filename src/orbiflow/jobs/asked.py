@@ -15,9 +15,9 @@ Value = TypeVar("Value")
 def given(request: Request, names: Iterable[str]) -> dict[str, Any]:
     """The fields of these names that were set, by their names: the others keep their defaults.
 
-    >>> from orbiflow.jobs import AnimateRequest
-    >>> given(AnimateRequest(result="out", fps=12), ("seconds", "fps"))
-    {'fps': 12.0}
+    >>> from orbiflow.jobs import EscherizeRequest
+    >>> given(EscherizeRequest(image="a.png", strength=None, turns=None, seed=3), ("seed", "turns"))
+    {'seed': 3}
     """
     values = {name: getattr(request, name) for name in names}
     return {name: value for name, value in values.items() if value is not None}

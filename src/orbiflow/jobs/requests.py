@@ -14,21 +14,13 @@ from orbiflow.jobs.density_requests import (
     PatchesRequest,
 )
 from orbiflow.jobs.request import SCHEMA_VERSION, Request
-from orbiflow.jobs.tile_requests import (
-    AnimateRequest,
-    ArtRequest,
-    EscherizeRequest,
-    ExportRequest,
-)
+from orbiflow.jobs.tile_requests import EscherizeRequest
 from orbiflow.runtime import RecordError, is_object, kind_of
 
 REQUESTS: dict[str, type[Request]] = {
     kind.KIND: kind
     for kind in (
         EscherizeRequest,
-        ExportRequest,
-        ArtRequest,
-        AnimateRequest,
         DensityFitRequest,
         DensityPlotRequest,
         DensityCompareRequest,

@@ -23,9 +23,6 @@ Sink = Callable[[Event], None]
 # a module each, imported when it runs: requests can be made and checked without them
 _MODULES = {
     "escherize": "escherize",
-    "export": "export",
-    "art": "art",
-    "animate": "animate",
     "density-fit": "density_fit",
     "density-plot": "density_plot",
     "density-compare": "density_compare",

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import contextlib
 import multiprocessing
+import os
 import pickle
 import signal
+import sys
 import threading
 import time
 import traceback
@@ -15,8 +17,6 @@ from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection, wait
 from typing import Any
-
-import torch
 
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime.cancel import Cancel, Cancelled
@@ -50,12 +50,15 @@ class News:
 def process_context(preload: Sequence[str] = ("torch",)) -> Any:
     """How workers start: forked where that is safe, which saves them two seconds of imports.
 
-    A fork is safe as long as this process has no other thread and torch has not been allowed any.
+    A fork is safe as long as this process has no other thread and torch, if it was imported, has not
+    been allowed any.
     Elsewhere they are forked from a server, where there is one, which begins with importing the modules
     of `preload`; there is one server a process, and its first call decides.
     """
     methods = multiprocessing.get_all_start_methods()
-    if "fork" in methods and torch.get_num_threads() == 1 and threading.active_count() == 1:
+    torch = sys.modules.get("torch")
+    single = torch is None or torch.get_num_threads() == 1
+    if "fork" in methods and single and threading.active_count() == 1:
         return multiprocessing.get_context("fork")
     context = multiprocessing.get_context("forkserver" if "forkserver" in methods else "spawn")
     if context.get_start_method() == "forkserver":
@@ -239,7 +242,7 @@ def _serve(channel: Connection, inherited: Iterable[Connection], function: Funct
         signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
     for other in inherited:
         other.close()
-    torch.set_num_threads(1)
+    _limit_torch()
     cancel = _Asked(channel)
     with contextlib.suppress(EOFError, OSError, Cancelled):  # nobody listens any more
         while (order := channel.recv()) is not None:
@@ -253,6 +256,14 @@ def _serve(channel: Connection, inherited: Iterable[Connection], function: Funct
                     raise
                 answer = "raised", _portable(error)
             channel.send(answer)
+
+
+def _limit_torch() -> None:
+    """Let torch have one thread in this process, whether it is imported already or later."""
+    os.environ |= dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+    torch = sys.modules.get("torch")
+    if torch is not None:
+        torch.set_num_threads(1)
 
 
 def _portable(error: Exception) -> Exception:

@@ -7,11 +7,12 @@ busy machine a wait lasts as long as the scheduler likes: tens of times the work
 from __future__ import annotations
 
 import contextlib
+import sys
 import threading
 from collections.abc import Generator
+from typing import Any
 
 import threadpoolctl
-import torch
 
 _lock = threading.Lock()
 
@@ -20,21 +21,27 @@ _lock = threading.Lock()
 def one_thread() -> Generator[None]:
     """Run torch on one thread in this block, or function if used as a decorator.
 
-    Only the calling thread is limited. May be nested, and entered by any number of threads at once:
-    each has its own number of threads again when it leaves, and threads started meanwhile begin with
-    the process's. Free of charge where the caller's number is 1, else about 0.1 ms.
+    Import torch before the block: where nobody has, there is nothing to limit. Only the calling thread
+    is limited. Blocks may be nested, and entered by any number of threads at once: each has its own
+    number of threads again when it leaves, and threads started meanwhile begin with the process's. It
+    is free of charge where the caller's number is 1, and takes about 0.1 ms otherwise.
 
     A process that has used several threads before is no safer to fork inside the block.
 
+    >>> import torch
     >>> with one_thread():
     ...     torch.get_num_threads()
     1
     """
+    torch: Any = sys.modules.get("torch")
+    if torch is None:
+        yield
+        return
     with _lock:
         before = torch.get_num_threads()
         if before > 1:
             torch.set_num_threads(1)
-            _default_for_new_threads(before)
+            _default_for_new_threads(torch, before)
     try:
         yield
     finally:
@@ -42,7 +49,7 @@ def one_thread() -> Generator[None]:
             torch.set_num_threads(before)
 
 
-def _default_for_new_threads(count: int) -> None:
+def _default_for_new_threads(torch: Any, count: int) -> None:
     # torch.set_num_threads sets the calling thread's number and the one that new threads begin with;
     # called from a thread of its own, it leaves ours alone
     helper = threading.Thread(target=torch.set_num_threads, args=(count,))

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from functools import cached_property
+from typing import Any
 
 import numpy as np
-import torch
 from numpy.typing import ArrayLike
 
+from orbiflow.arguments import is_tensor
 from orbiflow.arrays import Array
 from orbiflow.errors import GroupError
 from orbiflow.symmetry.group import CrystallographicGroup
@@ -55,7 +56,8 @@ class DirichletDomain:
     def locate(self, points: Points) -> tuple[Points, Array]:
         """Points wrapped to the lattice cell, and the index of the nearest image of the site."""
         wrapped = self.group.wrap(points)
-        plain = wrapped.detach().cpu().numpy() if isinstance(wrapped, torch.Tensor) else wrapped
+        own: Any = wrapped
+        plain: Array = own.detach().cpu().numpy() if is_tensor(own) else own
         flat = np.asarray(plain, dtype=np.float64).reshape(-1, self.group.dim)
         nearest = np.empty(len(flat), dtype=np.int64)
         for start in range(0, len(flat), 65536):  # bounds the distance table

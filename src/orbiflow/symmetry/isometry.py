@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TypeVar, cast
+from typing import TYPE_CHECKING, TypeVar, cast
 
 import numpy as np
-import torch
 from numpy.typing import ArrayLike
 
-from orbiflow.arguments import is_a
+from orbiflow.arguments import is_a, is_tensor
 from orbiflow.arrays import Array
 from orbiflow.errors import GroupError, NotAnIsometryError
 
-Points = TypeVar("Points", Array, torch.Tensor)
+if TYPE_CHECKING:
+    import torch
+
+    Points = TypeVar("Points", Array, torch.Tensor)
+else:  # torch is imported by those who have tensors
+    Points = TypeVar("Points")
 
 TOLERANCE = 1e-9
 """Largest deviation from orthogonality, or from a lattice vector, that is read as rounding."""
@@ -26,10 +30,12 @@ def cast_like(array: Array, like: Points) -> Points:
     Raises:
         GroupError: for an integer tensor, in which a rotation would be truncated.
     """
-    if isinstance(like, torch.Tensor):
+    if is_tensor(like):
+        import torch
+
         if not like.is_floating_point():
             raise GroupError(f"expected points of a floating-point dtype, got {like.dtype}")
-        return torch.tensor(array, dtype=like.dtype, device=like.device)
+        return cast(Points, torch.tensor(array, dtype=like.dtype, device=like.device))
     return cast(Points, array)
 
 

@@ -7,18 +7,23 @@ leading axes are a stack of rings. What torch needs as well takes tensors and is
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
-import torch
 from numpy.typing import ArrayLike, NDArray
 from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
+from orbiflow.arguments import is_tensor
 from orbiflow.errors import OrbiflowError
 
 Ring = NDArray[Any]
-AnyRing = TypeVar("AnyRing", NDArray[Any], torch.Tensor)
+if TYPE_CHECKING:
+    import torch
+
+    AnyRing = TypeVar("AnyRing", NDArray[Any], torch.Tensor)
+else:  # torch is imported by those who have tensors
+    AnyRing = TypeVar("AnyRing")
 
 
 def signed_area(ring: AnyRing) -> AnyRing:
@@ -74,7 +79,9 @@ def subdivided(ring: AnyRing, pieces: int, phase: float = 0.0) -> AnyRing:
     [[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]]
     """
     shape = (*ring.shape[:-2], ring.shape[-2] * pieces, 2)
-    if isinstance(ring, torch.Tensor):
+    if is_tensor(ring):
+        import torch
+
         steps = torch.arange(pieces, dtype=ring.dtype, device=ring.device)
         sides = ring.roll(-1, dims=-2) - ring
     else:

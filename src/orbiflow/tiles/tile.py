@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from orbiflow.arrays import Array
-    from orbiflow.tiles.art import ArtSettings
+    from orbiflow.tiles.art import ArtSettings, Artwork
     from orbiflow.tiles.exporting import Exported, ExportSettings
     from orbiflow.tiles.motion import AnimationSettings
     from orbiflow.tiles.search import TileModel
@@ -298,7 +298,7 @@ class EscherTile:
         picture: str | Path | None = None,
         target: Target | None = None,
         force: bool = False,
-    ) -> Path:
+    ) -> Artwork:
         """Write a picture of the tiling with something on its tiles; see `orbiflow.draw_art`."""
         from orbiflow.tiles.art import draw_art
 

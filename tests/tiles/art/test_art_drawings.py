@@ -48,7 +48,7 @@ def svg_of(name: str, body: str, folder: Path) -> Path:
 def drawn(name: str, body: str, folder: Path, **options) -> Artwork:
     tile = squirrel(name)
     over = read_over(svg_of(name, body, folder), tile)
-    settings = ArtSettings(**{**PAGE.__dict__, **options})
+    settings = PAGE.replace(**options)
     return artwork(tile, settings, drawing=over.drawing, notes=over.notes)
 
 
@@ -128,9 +128,7 @@ def test_vector_and_raster_agree(name: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize("strokes", ["hatch", "echoes", "feathers"])
 def test_engraving_keeps_to_the_tile_and_off_the_eye(strokes) -> None:
     tile = squirrel("IH6")
-    settings = ArtSettings(
-        **{**PAGE.__dict__, "engrave": strokes, "eyes": (EYE,), "tile_size": 260}
-    )
+    settings = PAGE.replace(strokes=strokes, eyes=(EYE,), tile_size=260)
     art = artwork(tile, settings)
     ink = art.motif.parts[0]
     assert ink.style.fill == INK
@@ -144,7 +142,7 @@ def test_engraving_keeps_to_the_tile_and_off_the_eye(strokes) -> None:
     radius = np.hypot(*(eye - middle).T)
     np.testing.assert_allclose(radius, radius[0], rtol=1e-6)  # round
     assert np.hypot(*(points - middle).T).min() > 1.5 * radius[0]
-    plain = artwork(tile, ArtSettings(**{**PAGE.__dict__, "tile_size": 260}))
+    plain = artwork(tile, PAGE.replace(tile_size=260))
     assert (render_artwork(art) != render_artwork(plain)).any()
 
 

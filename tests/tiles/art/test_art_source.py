@@ -53,7 +53,7 @@ def test_without_a_map_or_silhouette_there_is_one_sentence(tmp_path: Path) -> No
     document["input"]["source"] = "gone.dat"
     (run / "result.json").write_text(json.dumps(document))
     tile = with_map(run)
-    assert artwork(tile, ArtSettings(size=(60, 40), engrave="hatch")).motif.parts
+    assert artwork(tile, ArtSettings(size=(60, 40), strokes="hatch")).motif.parts
     with pytest.raises(OrbiflowError, match=r"its silhouette gone\.dat is not there"):
         artwork(tile, ArtSettings(size=(60, 40), eyes=(EYE,)))
     document["input"]["source"] = str(FOLDER / "nagata" / "bat_60.dat")

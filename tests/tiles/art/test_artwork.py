@@ -31,7 +31,7 @@ PAGE = ArtSettings(size=(240, 160), tile_size=95, outline=0.0)
 
 
 def settings(**options) -> ArtSettings:
-    return ArtSettings(**{**PAGE.__dict__, **options})
+    return PAGE.replace(**options)
 
 
 def owners(art: Artwork, points: np.ndarray) -> np.ndarray:

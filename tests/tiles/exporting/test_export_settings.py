@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from exported import tile_of
-from orbiflow.errors import OrbiflowError
+from orbiflow.errors import OrbiflowError, SettingError
 from orbiflow.tiles import ExportSettings, scenes
 
 
@@ -14,48 +16,64 @@ from orbiflow.tiles import ExportSettings, scenes
     [
         ({"tile_size": 0.0}, "tile_size must be above 0"),
         ({"tile_size": float("nan")}, "tile_size must be"),
-        ({"area": (0.0, 100.0)}, "area must be above 0"),
-        ({"area": (100.0,)}, "area must be a width and a height"),
-        ({"area": 300}, "area must be a width and a height in mm, got 300"),
-        ({"area": "300x200mm"}, "area must be a width and a height in mm, got '300x200mm'"),
-        ({"area": (300, "200")}, "area must be a number above 0"),
-        ({"bed": {300, 200}}, "bed must be a width and a height in mm"),
-        ({"stroke": 5}, "stroke must be a colour such as #ff0000, got 5"),
-        ({"palette": 5}, "a palette must be a str, got 5; a name or colours"),
-        ({"bed": (100.0, -1.0)}, "bed must be above 0"),
-        ({"format": "bmp"}, "format must be one of svg, pdf, dxf, png, json, got 'bmp'"),
-        ({"cut": "half"}, "cut must be one of none, skeleton, pieces"),
-        ({"cut": "pieces", "copies": 0}, "copies must be at least 1"),
-        ({"copies": 3}, "copies belongs to cut pieces, not to cut none"),
-        ({"kerf": 0.1}, "kerf belongs to cut pieces"),
-        ({"cut": "skeleton", "clearance": 0.1}, "clearance belongs to cut pieces"),
-        ({"cut": "pieces", "clip": True}, "clip belongs to"),
-        ({"border": True}, "border belongs to cut skeleton with clip"),
+        ({"area": (0.0, 100.0)}, "area: entry 1: must be above 0"),
+        ({"area": (100.0,)}, "area must be a size"),
+        ({"area": 300}, "area must be a size .*got 300"),
+        ({"area": "300x200"}, "area: '300x200' has no unit"),
+        ({"area": (300, "200")}, "area: entry 2: must be a number above 0"),
+        ({"bed": {300, 200}}, "bed must be a size"),
+        ({"stroke": 5}, "stroke must be a colour .*got 5"),
+        ({"palette": 5}, "palette must be a palette's name, .*got 5"),
+        ({"bed": (100.0, -1.0)}, "bed: entry 2: must be above 0"),
+        ({"format": "bmp"}, "format must be svg, pdf, dxf, png or json, got 'bmp'"),
+        ({"cut": "half"}, "cut must be none, skeleton or pieces"),
+        ({"cut": "pieces", "copies": 0}, "copies must be .*at least 1"),
+        ({"copies": 3}, "copies applies only to cut pieces, not to none"),
+        ({"kerf": 0.1}, "kerf applies only to cut pieces"),
+        ({"cut": "skeleton", "clearance": 0.1}, "clearance applies only to cut pieces"),
+        ({"cut": "pieces", "clip": True}, "clip applies only to"),
+        ({"border": True}, "border applies only to cut skeleton"),
+        ({"border": True, "cut": "skeleton"}, "border applies only to clip"),
         ({"kerf": -1.0, "cut": "pieces"}, "kerf must be"),
-        ({"tolerance": 10.0}, "would not leave the shape of a tile of 40 mm; choose at most 2 mm"),
-        ({"palette": "neon"}, "unknown palette 'neon'"),
-        ({"stroke": "red"}, "a colour such as #ff0000"),
+        ({"tolerance": 10.0}, "tolerance of 10 mm .*tile of 40 mm; choose at most 2 mm"),
+        ({"palette": "neon"}, "palette: unknown palette 'neon'"),
+        ({"stroke": "red"}, "stroke: .*a colour"),
         ({"warn_neck": 0.0}, "warn_neck must be above 0"),
+        ({"dpi": 0.5}, "dpi must be .*from 1 to 10000"),
+        ({"dpi": 600.0, "format": "svg"}, "dpi applies only to format png"),
+        ({"purpose": "oven"}, "purpose must be laser"),
+        ({"purpose": "web", "colour": 3}, "no setting 'colour'"),
+        ({"filled": False, "palette": "sea"}, "palette has no effect: .*filled"),
     ],
 )
 def test_refused(options, message: str) -> None:
-    with pytest.raises(OrbiflowError, match=message):
+    with pytest.raises(SettingError, match=message):
         ExportSettings(**options)
 
 
-def test_presets() -> None:
-    laser = ExportSettings.preset("laser")
-    assert (laser.format, laser.cut, laser.clip) == ("svg", "skeleton", False)
+def test_purposes() -> None:
+    laser = ExportSettings(purpose="laser")
+    assert (laser.file_format, laser.cut, laser.clip) == ("svg", "skeleton", False)
     assert (laser.stroke, laser.stroke_width) == ("#ff0000", 0.01)
-    assert ExportSettings.preset("print").format == "pdf"
-    assert ExportSettings.preset("print").clip
-    assert ExportSettings.preset("print", cut="pieces", clearance=0.2).clip is False
-    assert ExportSettings.preset("web", clip=False).clip is False
-    assert ExportSettings.preset("plotter").stroke == "#000000"
-    with pytest.raises(OrbiflowError, match="unknown preset 'oven'"):
-        ExportSettings.preset("oven")
-    with pytest.raises(OrbiflowError, match="no export setting 'colour'"):
-        ExportSettings.preset("web", colour=3)
+    assert ExportSettings(purpose="print").file_format == "pdf"
+    assert ExportSettings(purpose="print").clip
+    assert ExportSettings(purpose="print", cut="pieces", clearance=0.2).clip is False
+    assert ExportSettings(purpose="web", clip=False).clip is False
+    assert ExportSettings(purpose="plotter").stroke == "#000000"
+
+
+def test_a_file_s_ending_goes_before_the_purpose_and_after_the_format() -> None:
+    paper = ExportSettings(purpose="paper")
+    assert paper.for_file(None).format == "pdf"
+    assert paper.for_file(Path("a.SVG")).format == "svg"
+    assert ExportSettings().for_file(Path("a")).format == "svg"
+    assert ExportSettings(format="png").for_file(Path("a.eps")).format == "png"
+    with pytest.raises(SettingError, match=r"out ends in \.svg but format is png"):
+        ExportSettings(format="png").for_file(Path("a.svg"))
+    with pytest.raises(SettingError, match=r"out ends in \.eps; give format"):
+        paper.for_file(Path("a.eps"))
+    with pytest.raises(SettingError, match="dpi applies only to format png, not to svg"):
+        ExportSettings(dpi=600).for_file(Path("a.svg"))
 
 
 def test_a_page_smaller_than_a_tile_says_what_is_needed() -> None:

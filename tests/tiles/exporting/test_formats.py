@@ -128,7 +128,7 @@ def test_json_says_where_every_tile_is() -> None:
 @pytest.mark.parametrize("form", ["svg", "pdf", "dxf", "json", "png"])
 def test_what_is_not_certified_is_refused_or_says_so(form, tmp_path) -> None:
     bad = EscherTile(Tile(1.01 * TILE.polygon, TILE.group, "IH3"), name="boot-IH3")
-    chosen = ExportSettings(format=form, dpi=50.0)
+    chosen = ExportSettings(format=form)
     with pytest.raises(CertificationError, match=r"boot-IH3 is not certified .*--force exports it"):
         export(bad, tmp_path / "x", chosen)
     assert not list(tmp_path.iterdir())

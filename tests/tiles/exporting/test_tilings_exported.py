@@ -143,5 +143,5 @@ def test_what_the_user_should_know_is_noted() -> None:
     few = ExportSettings(tile_size=20, area=(100, 80), palette="ff0000")
     assert "the palette has 1" in scenes(tile, few)[1][-1]
     assert scenes(tile, ExportSettings(tile_size=20, area=(100, 80)))[1] == ()
-    thin = ExportSettings.preset("laser", tile_size=20, area=(100, 80))
+    thin = ExportSettings(purpose="laser", tile_size=20, area=(100, 80))
     assert "0.01 mm hardly show" in scenes(tile, thin)[1][-1]

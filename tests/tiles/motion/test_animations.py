@@ -20,8 +20,8 @@ from orbiflow.drawing import palette
 from orbiflow.errors import CertificationError, OrbiflowError
 from orbiflow.tiles import (
     AnimationSettings,
-    BendingSettings,
     EscherTile,
+    LikenessSearch,
     Target,
     Tile,
     animate,
@@ -46,7 +46,7 @@ SMALL = {"seconds": 1.0, "fps": 10.0, "size": 120}
 
 @pytest.fixture(scope="module", name="bent")
 def bent_fixture() -> EscherTile:
-    small = BendingSettings(placements=20, held=4, finalists=1, rounds=4)
+    small = LikenessSearch(placements=20, held=4, finalists=1, rounds=4)
     found = escherize_class(Target.from_polygon(BOOT, y_down=True), "IH4", small)
     assert isinstance(found, EscherTile)
     return found
@@ -178,14 +178,14 @@ def test_what_cannot_be_animated_says_why(bent: EscherTile, monkeypatch) -> None
 @pytest.mark.parametrize(
     ("bad", "message"),
     [
-        ({"format": "webm"}, "format must be one of gif, mp4, svg"),
-        ({"kind": "jump"}, "kind must be one of"),
+        ({"format": "webm"}, "format must be gif, mp4 or svg"),
+        ({"kind": "jump"}, "kind must be morph, bend or grow"),
         ({"seconds": 0}, "seconds"),
         ({"fps": 1000}, "fps"),
         ({"size": 801}, "size must be even"),
         ({"size": 1.5}, "size"),
         ({"palette": "mud"}, "unknown palette"),
-        ({"seconds": 120, "fps": 60}, "more than 2400"),
+        ({"format": "gif", "seconds": 120, "fps": 60}, "more than 2400"),
     ],
 )
 def test_settings_that_cannot_be_used(bad, message: str) -> None:

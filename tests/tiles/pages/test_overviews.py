@@ -12,10 +12,10 @@ import pytest
 from PIL import Image
 
 from orbiflow.tiles import (
-    BendingSettings,
     ClassFailure,
     EscherTile,
-    OccupancySettings,
+    LikenessSearch,
+    OccupancySearch,
     Target,
     escherize_class,
     folder_names,
@@ -68,7 +68,7 @@ def target_fixture() -> Target:
 
 @pytest.fixture(scope="module", name="bent")
 def bent_fixture(target: Target) -> EscherTile:
-    small = BendingSettings(placements=20, held=4, finalists=1, rounds=4)
+    small = LikenessSearch(placements=20, held=4, finalists=1, rounds=4)
     found = escherize_class(target, "IH4", small)
     assert isinstance(found, EscherTile)
     return found
@@ -76,7 +76,7 @@ def bent_fixture(target: Target) -> EscherTile:
 
 @pytest.fixture(scope="module", name="flowed")
 def flowed_fixture(target: Target) -> EscherTile:
-    few = OccupancySettings(iterations=4, turns=1, max_frequency=2)
+    few = OccupancySearch(iterations=4, turns=1, max_frequency=2)
     found = escherize_class(target, "IH6", few)
     assert isinstance(found, EscherTile)
     return found

@@ -10,11 +10,10 @@ from orbiflow.errors import CertificationError
 from orbiflow.tiles import CLASSES, TileModel, certify
 from orbiflow.tiles.search import boundary
 from orbiflow.tiles.search.boundary import (
-    DENSE,
-    TOLERANCES,
     converge,
     extract_tile,
 )
+from orbiflow.tiles.search.polygons import DENSE, TOLERANCES
 
 
 def bent(name: str, rms: float = 0.15, seed: int = 0) -> TileModel:

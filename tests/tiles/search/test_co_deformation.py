@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from orbiflow.arrays import Array, Complex
 from orbiflow.tiles import (
     CLASSES,
-    BendingSettings,
+    LikenessSearch,
     certify,
     complex_points,
     plane_points,
@@ -126,9 +126,7 @@ def test_the_model_keeps_every_vertex() -> None:
 
 def test_finalists_are_in_order_and_told() -> None:
     told: list[float] = []
-    several = BendingSettings(
-        placements=40, held=12, finalists=3, rounds=8, multiples=(4,), below=1
-    )
+    several = LikenessSearch(placements=40, held=12, finalists=3, rounds=8, multiples=(4,), below=1)
     found, dropped = bent_tiles(squirrel_hands(), CLASSES["IH4"], several, told.append)
     assert told == sorted(told)
     assert told[-1] == pytest.approx(1.0)
@@ -150,10 +148,10 @@ def test_more_rounds_cost_no_more() -> None:
 @pytest.mark.parametrize("name", ["IH4", "IH21"])
 def test_more_effort_never_scores_less(name: str) -> None:
     found = [
-        bent_tiles(squirrel_hands(), CLASSES[name], BendingSettings.for_effort(effort))[0]
+        bent_tiles(squirrel_hands(), CLASSES[name], LikenessSearch.for_effort(effort))[0]
         for effort in ("fast", "normal")
     ]
-    fast, normal = ([bent.score(BendingSettings.min_neck) for bent in tiles] for tiles in found)
+    fast, normal = ([bent.score(LikenessSearch.min_neck) for bent in tiles] for tiles in found)
     assert normal[0] >= fast[0]
     assert normal == sorted(normal, reverse=True)
     assert len(normal) > len(fast)

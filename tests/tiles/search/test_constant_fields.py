@@ -7,9 +7,9 @@ import torch
 from orbiflow.tiles import (
     CLASSES,
     ClassFailure,
-    DescentSettings,
-    OccupancySettings,
-    Settings,
+    OccupancySearch,
+    OverlapSearch,
+    SearchMethod,
     Target,
     TileModel,
     as_map,
@@ -22,14 +22,14 @@ from orbiflow.tiles.search.boundary import extract_tile
 
 BOOT = [[0, 0], [3, 0], [3.4, 1.2], [2.2, 1.5], [2.0, 2.8], [0.8, 2.5], [-0.3, 1.2]]
 TARGET = Target.from_polygon(BOOT)
-SETTINGS: dict[str, Settings] = {
-    "descent": DescentSettings.for_effort(
+SETTINGS: dict[str, SearchMethod] = {
+    "descent": OverlapSearch.for_effort(
         "fast", max_frequency=0, stages=((6, 2), (6, 1)), polish=5, projected=100, measured=30
     ),
-    "descent from the template": DescentSettings.for_effort(
+    "descent from the template": OverlapSearch.for_effort(
         "fast", max_frequency=0, starts="template", stages=((8, 2), (8, 1)), polish=5
     ),
-    "occupancy": OccupancySettings(
+    "occupancy": OccupancySearch(
         max_frequency=0, turns=2, finalists=2, affine_iterations=20, iterations=10, points=200
     ),
 }

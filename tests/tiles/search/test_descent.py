@@ -11,32 +11,31 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import Cancel
 from orbiflow.tiles import (
     CLASSES,
-    DescentSettings,
     Event,
-    OccupancySettings,
+    OccupancySearch,
+    OverlapSearch,
     SoftTarget,
     Target,
     TileMap,
     as_map,
     as_model,
     certify,
-    escherize,
     escherize_class,
     fit_descent,
     iou,
     isohedral_class,
+    search_classes,
 )
 from orbiflow.tiles.likeness import boundary_iou
 from orbiflow.tiles.search.boundary import extract_tile
 from orbiflow.tiles.search.descent import CALM, Descent
-from orbiflow.tiles.search.methods import fit, method_name
-from orbiflow.tiles.search.settings import DESCENT_EFFORTS
+from orbiflow.tiles.search.method import Goal
+from orbiflow.tiles.search.overlap_search import DESCENT_EFFORTS
 from orbiflow.tiles.search.starts import template_starts
-from orbiflow.tiles.search.steps import quick_tile
 
 BOOT = [[0, 0], [3, 0], [3.4, 1.2], [2.2, 1.5], [2.0, 2.8], [0.8, 2.5], [-0.3, 1.2]]
 TARGET = Target.from_polygon(BOOT)
-QUICK = DescentSettings.for_effort(
+QUICK = OverlapSearch.for_effort(
     "fast", max_frequency=4, candidates=4, stages=((8, 2), (8, 1)), projected=100, measured=20
 )
 
@@ -46,7 +45,7 @@ def soft() -> SoftTarget:
     return SoftTarget(TARGET)
 
 
-def descent(name: str, settings: DescentSettings = QUICK) -> Descent:
+def descent(name: str, settings: OverlapSearch = QUICK) -> Descent:
     kind = isohedral_class(name)
     starts = template_starts(kind, turns=3, stretch=0.2, vertices=settings.boundary)
     return Descent(kind, starts, settings)
@@ -165,7 +164,7 @@ def test_the_same_seed_gives_the_same_tile() -> None:
 
 
 def test_several_tiles_of_a_class_are_not_twins() -> None:
-    results, failures = escherize(TARGET, ["IH4", "IH6"], QUICK, per_class=3)
+    results, failures = search_classes(TARGET, ["IH4", "IH6"], QUICK, per_class=3)
     assert not failures
     assert [r.score for r in results] == sorted((r.score for r in results), reverse=True)
     for name in ("IH4", "IH6"):
@@ -182,7 +181,9 @@ def test_a_first_tile_comes_at_once_and_survives_an_interrupt() -> None:
         if event.preview is None:
             cancel.cancel()
 
-    results, failures = escherize(TARGET, ["IH4", "IH6"], QUICK, watch=interrupt, cancel=cancel)
+    results, failures = search_classes(
+        TARGET, ["IH4", "IH6"], QUICK, watch=interrupt, cancel=cancel
+    )
     assert [r.name for r in results] == ["IH6"]
     assert results[0].certificate.valid
     assert {f.name for f in failures} == {"IH4", "IH6"}
@@ -190,16 +191,16 @@ def test_a_first_tile_comes_at_once_and_survives_an_interrupt() -> None:
 
 def test_a_preview_is_certified() -> None:
     for names in (["IH1"], ["IH28", "IH21"]):
-        tile = quick_tile(TARGET, names)
+        tile = QUICK.preview(Goal(TARGET), names)
         assert tile is not None
         assert tile.name in names
         assert tile.certificate.valid
 
 
 def test_methods_have_names() -> None:
-    assert method_name(QUICK) == "descent"
-    assert method_name(OccupancySettings()) == "occupancy"
-    assert fit(TARGET, isohedral_class("IH1"), QUICK, per_class=2).enough == 4
+    assert QUICK.method_name == "descent"
+    assert OccupancySearch().method_name == "occupancy"
+    assert QUICK.fit(Goal(TARGET), isohedral_class("IH1"), per_class=2).enough == 4
 
 
 def test_soft_target_agrees_with_the_polygon(soft: SoftTarget) -> None:
@@ -218,7 +219,7 @@ def test_soft_target_agrees_with_the_polygon(soft: SoftTarget) -> None:
 
 @pytest.mark.parametrize("effort", DESCENT_EFFORTS)
 def test_efforts_are_valid_settings(effort: str) -> None:
-    settings = DescentSettings.for_effort(effort, seed=7)
+    settings = OverlapSearch.for_effort(effort, seed=7)
     assert settings.seed == 7
     assert settings.with_survivors(9).stages[-1][1] >= 9
 
@@ -240,8 +241,8 @@ def test_efforts_are_valid_settings(effort: str) -> None:
 )
 def test_settings_are_checked(changes: dict[str, object], message: str) -> None:
     with pytest.raises(OrbiflowError, match=message):
-        DescentSettings(**changes)  # type: ignore[arg-type]
+        OverlapSearch(**changes)  # type: ignore[arg-type]
     with pytest.raises(OrbiflowError, match="effort must be one of fast, normal, best"):
-        DescentSettings.for_effort("heroic")
+        OverlapSearch.for_effort("heroic")
     with pytest.raises(OrbiflowError, match="unknown settings magic"):
-        DescentSettings.for_effort("fast", magic=1)
+        OverlapSearch.for_effort("fast", magic=1)

@@ -8,26 +8,26 @@ import torch
 
 from orbiflow.errors import CertificationError, OrbiflowError
 from orbiflow.tiles import (
-    BendingSettings,
-    BothSettings,
-    DescentSettings,
-    OccupancySettings,
+    BothSearch,
+    LikenessSearch,
+    OccupancySearch,
+    OverlapSearch,
     Target,
     TileModel,
     certified_tiles,
     certify,
-    escherize,
     fit_descent,
     fit_occupancy,
     fit_tile,
+    search_classes,
 )
 
 BOOT = [[0, 0], [3, 0], [3.4, 1.2], [2.2, 1.5], [2.0, 2.8], [0.8, 2.5], [-0.3, 1.2]]
 TARGET = Target.from_polygon(BOOT)
 SETTINGS = {
-    "bending": BendingSettings(placements=20, held=4, finalists=1, rounds=2),
-    "descent": DescentSettings.for_effort("fast", stages=((2, 2), (2, 1)), polish=0),
-    "occupancy": OccupancySettings(
+    "bending": LikenessSearch(placements=20, held=4, finalists=1, rounds=2),
+    "descent": OverlapSearch.for_effort("fast", stages=((2, 2), (2, 1)), polish=0),
+    "occupancy": OccupancySearch(
         max_frequency=3, turns=3, finalists=2, iterations=15, affine_iterations=20, points=200
     ),
 }
@@ -39,14 +39,14 @@ def test_the_two_steps_give_what_the_search_gives(method: str) -> None:
     found = fit_tile(TARGET, "IH4", settings)
     tiles = certified_tiles(TARGET, found)
     assert all(certify(tile.tile).valid for tile in tiles)
-    (best,), _ = escherize(TARGET, "IH4", settings)
+    (best,), _ = search_classes(TARGET, "IH4", settings)
     assert np.array_equal(tiles[0].tile.polygon, best.tile.polygon)
 
 
 def test_what_the_methods_of_their_own_give() -> None:
     descent, occupancy = SETTINGS["descent"], SETTINGS["occupancy"]
-    assert isinstance(descent, DescentSettings)
-    assert isinstance(occupancy, OccupancySettings)
+    assert isinstance(descent, OverlapSearch)
+    assert isinstance(occupancy, OccupancySearch)
     for found in (
         fit_descent(TARGET, "IH4", descent),
         fit_occupancy(TARGET, "IH4", occupancy),
@@ -83,8 +83,8 @@ def test_arguments_are_checked() -> None:
         fit_tile("boot", "IH4")  # pyright: ignore[reportArgumentType]
     with pytest.raises(OrbiflowError, match="unknown isohedral class 'IH8'"):
         fit_tile(TARGET, "IH8")
-    for wrong in ("fast", BothSettings()):
-        with pytest.raises(OrbiflowError, match="settings must be of one method, got"):
+    for wrong, message in (("fast", "the method must be a search"), (BothSearch(), "fits twice")):
+        with pytest.raises(OrbiflowError, match=message):
             fit_tile(TARGET, "IH4", wrong)  # pyright: ignore[reportArgumentType]
     with pytest.raises(OrbiflowError, match="what was found must be a Fit, got 3"):
         certified_tiles(TARGET, 3)  # pyright: ignore[reportArgumentType]

@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from orbiflow.tiles import CLASSES, BendingSettings, EscherTile
+from orbiflow.tiles import CLASSES, EscherTile, LikenessSearch
 from orbiflow.tiles.search.bending_fit import fit_bending
+from orbiflow.tiles.search.both_search import behind, deformation, front_list, measured
+from orbiflow.tiles.search.certifying import best_tiles
 from orbiflow.tiles.search.co_deformation import hands
-from orbiflow.tiles.search.front import behind, deformation, front_list, measured
-from orbiflow.tiles.search.result import best_tiles
 from outlines import animal
 
 SQUIRREL = animal("squirrel.dat")
-QUICK = BendingSettings(placements=60, held=10, starts=4, finalists=2, rounds=10, multiples=(4,))
+QUICK = LikenessSearch(placements=60, held=10, starts=4, finalists=2, rounds=10, multiples=(4,))
 HANDS = hands(SQUIRREL, QUICK)
 
 

@@ -16,21 +16,21 @@ from orbiflow.tiles import (
     CLASSES,
     Fit,
     OccupancySamples,
-    OccupancySettings,
+    OccupancySearch,
     Target,
     TileModel,
     fit_occupancy,
     occupancy_loss,
 )
+from orbiflow.tiles.search.certifying import best_tiles
+from orbiflow.tiles.search.method import MAX_FREQUENCY
 from orbiflow.tiles.search.occupancy import _distinct
-from orbiflow.tiles.search.result import best_tiles
-from orbiflow.tiles.search.settings import MAX_FREQUENCY
 from strategies import seeds
 
 SQUIRREL = Path(__file__).parents[3] / "examples" / "silhouettes" / "squirrel.dat"
 
 BOOT = [[0, 0], [3, 0], [3.4, 1.2], [2.2, 1.5], [2.0, 2.8], [0.8, 2.5], [-0.3, 1.2]]
-QUICK = OccupancySettings(
+QUICK = OccupancySearch(
     max_frequency=3, turns=3, finalists=2, iterations=15, affine_iterations=20, points=200
 )
 
@@ -153,11 +153,11 @@ def test_gradient_matches_differences(name: str, affine: bool) -> None:
 )
 def test_settings_out_of_range(setting: str, value: int, message: str) -> None:
     with pytest.raises(OrbiflowError, match=message):
-        replace(OccupancySettings(), **{setting: value})
+        replace(OccupancySearch(), **{setting: value})
 
 
 def test_largest_settings_are_taken() -> None:
-    assert OccupancySettings(max_frequency=MAX_FREQUENCY, seed=2**32 - 1).seed == 2**32 - 1
+    assert OccupancySearch(max_frequency=MAX_FREQUENCY, seed=2**32 - 1).seed == 2**32 - 1
 
 
 def parameters(model: TileModel) -> torch.Tensor:
@@ -221,7 +221,7 @@ def test_distinct_tells_mirror_images_apart() -> None:
 
 def test_a_real_silhouette() -> None:
     target = Target.read(SQUIRREL)
-    own = OccupancySettings(iterations=60, turns=8)
+    own = OccupancySearch(iterations=60, turns=8)
     model = fit_occupancy(target, CLASSES["IH5"], own)
     result = best_tiles(target, Fit(model, 16, 0, model.size))[0]
     assert result.certificate.valid

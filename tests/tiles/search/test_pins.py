@@ -8,18 +8,18 @@ import shapely
 
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles import (
-    BendingSettings,
-    DescentSettings,
     Emphasis,
     EscherTile,
+    LikenessSearch,
+    OverlapSearch,
     Pins,
-    escherize,
+    search_classes,
 )
 from outlines import animal
 
 SQUIRREL = animal("squirrel.dat")
 HEAD = (230, 190, 140)
-QUICK = BendingSettings(placements=80, held=12, starts=4, finalists=2, rounds=12, multiples=(4,))
+QUICK = LikenessSearch(placements=80, held=12, starts=4, finalists=2, rounds=12, multiples=(4,))
 CLASSES = ["IH4", "IH5"]
 
 
@@ -36,12 +36,12 @@ def head_misfit(result: EscherTile, pins: Pins) -> tuple[float, float]:
 
 @pytest.fixture(scope="module", name="free")
 def free_fixture() -> list[EscherTile]:
-    return escherize(SQUIRREL, CLASSES, QUICK)[0]
+    return search_classes(SQUIRREL, CLASSES, QUICK)[0]
 
 
 @pytest.fixture(scope="module", name="pinned")
 def pinned_fixture() -> list[EscherTile]:
-    return escherize(SQUIRREL, CLASSES, QUICK, pins=Pins.at(SQUIRREL, [HEAD]))[0]
+    return search_classes(SQUIRREL, CLASSES, QUICK, pins=Pins.at(SQUIRREL, [HEAD]))[0]
 
 
 def test_a_pinned_head_keeps_its_shape(free: list[EscherTile], pinned: list[EscherTile]) -> None:
@@ -74,7 +74,7 @@ def test_the_tile_itself_has_the_head(pinned: list[EscherTile]) -> None:
 
 def test_a_pinned_head_keeps_its_angle() -> None:
     pins = Pins.at(SQUIRREL, [HEAD], keep_angle=True)
-    held, _ = escherize(SQUIRREL, CLASSES, QUICK, pins=pins)
+    held, _ = search_classes(SQUIRREL, CLASSES, QUICK, pins=pins)
     assert len(held) == 2
     assert max(abs(head_misfit(result, pins)[1]) for result in held) < np.radians(5)
     assert all(result.pinned is not None and result.pinned < 0.02 for result in held)
@@ -85,7 +85,7 @@ def test_a_head_that_would_turn_does_not(name: str) -> None:
     turns = []
     for keep in (False, True):
         pins = Pins.at(SQUIRREL, [HEAD], keep_angle=keep)
-        (result,) = escherize(SQUIRREL, [name], replace(QUICK, starts=12), pins=pins)[0]
+        (result,) = search_classes(SQUIRREL, [name], replace(QUICK, starts=12), pins=pins)[0]
         turns.append(abs(head_misfit(result, pins)[1]))
     assert turns[0] > np.radians(5)
     assert turns[0] > 2 * turns[1]
@@ -94,9 +94,9 @@ def test_a_head_that_would_turn_does_not(name: str) -> None:
 def test_pins_need_a_search_where_something_bends() -> None:
     pins = Pins.at(SQUIRREL, [HEAD])
     with pytest.raises(OrbiflowError, match="pins belong to the search for likeness"):
-        escherize(SQUIRREL, ["IH4"], DescentSettings.for_effort("fast"), pins=pins)
+        search_classes(SQUIRREL, ["IH4"], OverlapSearch.for_effort("fast"), pins=pins)
     with pytest.raises(OrbiflowError, match="pins must be a Pins"):
-        escherize(SQUIRREL, ["IH4"], QUICK, pins=HEAD)  # pyright: ignore[reportArgumentType]
+        search_classes(SQUIRREL, ["IH4"], QUICK, pins=HEAD)  # pyright: ignore[reportArgumentType]
 
 
 @pytest.mark.parametrize("strength", [1.001, 100.0])
@@ -113,6 +113,6 @@ def test_emphasis_of_any_strength_can_be_searched_with(
         mask[3:] = 0
     low, high = target.normal.min(axis=0), target.normal.max(axis=0)
     emphasis = Emphasis(mask, (*low.tolist(), *high.tolist()), strength)
-    hasty = BendingSettings(placements=30, held=4, starts=1, finalists=1, rounds=6, multiples=(4,))
-    results, _ = escherize(target, ["IH4"], hasty, emphasis=emphasis)
+    hasty = LikenessSearch(placements=30, held=4, starts=1, finalists=1, rounds=6, multiples=(4,))
+    results, _ = search_classes(target, ["IH4"], hasty, emphasis=emphasis)
     assert all(result.certificate.valid for result in results)

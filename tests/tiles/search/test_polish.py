@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 
 from orbiflow.arrays import Array
 from orbiflow.tiles import (
-    DescentSettings,
     Overlap,
+    OverlapSearch,
     Target,
     TileModel,
     certify,
@@ -22,7 +22,7 @@ from orbiflow.tiles.search.polish import polish
 
 BOOT = [[0, 0], [3, 0], [3.4, 1.2], [2.2, 1.5], [2.0, 2.8], [0.8, 2.5], [-0.3, 1.2]]
 TARGET = Target.from_polygon(BOOT)
-ROUGH = DescentSettings.for_effort(
+ROUGH = OverlapSearch.for_effort(
     "fast", max_frequency=5, candidates=4, stages=((6, 2),), projected=100, measured=20
 )
 

@@ -5,15 +5,15 @@ import shapely
 
 from orbiflow.tiles import (
     ClassFailure,
-    DescentSettings,
     Overlap,
+    OverlapSearch,
     Target,
     escherize_class,
     prepared_region,
 )
 from orbiflow.tiles.likeness.overlap import MANY
 
-FAST = DescentSettings.for_effort("fast")
+FAST = OverlapSearch.for_effort("fast")
 
 
 def test_a_square_stays_a_square() -> None:

@@ -14,7 +14,14 @@ import pytest
 import shapely
 from shapely import affinity
 
-from orbiflow.tiles import ClassFailure, OccupancySettings, Target, escherize, report
+from orbiflow.tiles import (
+    ClassFailure,
+    OccupancySearch,
+    SearchResult,
+    Target,
+    report,
+    search_classes,
+)
 
 DOCS = Path(__file__).parents[3] / "docs"
 SCHEMA = json.loads((DOCS / "result.schema.json").read_text(encoding="utf-8"))
@@ -24,7 +31,7 @@ SNIPPET = re.findall(r"```python\n(.*?)```", (DOCS / "result.md").read_text("utf
 BOOT = 40 * np.array([[0, 0], [3, 0], [3.4, 1.2], [2.2, 1.5], [2, 2.8], [0.8, 2.5], [-0.3, 1.2]])
 BOOT += [700, 300]
 CLASSES = ["IH6", "IH21", "IH1"]
-QUICK = OccupancySettings(
+QUICK = OccupancySearch(
     max_frequency=3, turns=2, finalists=1, iterations=12, affine_iterations=20, points=200, seed=3
 )
 
@@ -33,10 +40,11 @@ QUICK = OccupancySettings(
 def case(request: pytest.FixtureRequest) -> tuple[Target, dict[str, Any]]:
     """A target and its document as read back from JSON."""
     target = Target.from_polygon(BOOT, y_down=request.param)
-    results, failures = escherize(target, CLASSES, QUICK)
+    results, failures = search_classes(target, CLASSES, QUICK)
     assert len(results) == 3
     failures = [*failures, ClassFailure("IH2", "the boundary crosses itself")]
-    document = report(target, results, failures, QUICK, seconds=12.3456, workers=2)
+    found = SearchResult(target, results, failures, method=QUICK, seconds=12.3456, workers=2)
+    document = report(found)
     return target, json.loads(json.dumps(document, allow_nan=False))
 
 
@@ -90,7 +98,7 @@ def test_documents_are_valid(case: tuple[Target, dict[str, Any]]) -> None:
 def test_a_document_without_tiles_is_valid() -> None:
     target = Target.from_polygon(BOOT)
     own = replace(QUICK, segments=2)
-    document = report(target, [], [ClassFailure("IH4", "no")], own, seconds=0.0, workers=1)
+    document = report(SearchResult(target, failures=[ClassFailure("IH4", "no")], method=own))
     document = json.loads(json.dumps(document))
     validator().validate(document)
     assert document["timings"]["core_seconds"] == 0

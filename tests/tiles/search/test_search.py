@@ -13,29 +13,29 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import Cancel, Cancelled
 from orbiflow.tiles import (
     CLASSES,
-    BendingSettings,
-    BothSettings,
+    BothSearch,
     ClassFailure,
-    DescentSettings,
     EscherTile,
     Event,
-    OccupancySettings,
+    LikenessSearch,
+    OccupancySearch,
+    OverlapSearch,
     Target,
     TileModel,
-    escherize,
     escherize_class,
     isohedral_class,
+    search_classes,
 )
 from orbiflow.tiles.likeness import mutual_iou
-from orbiflow.tiles.search import methods
-from orbiflow.tiles.search.steps import SKETCH
+from orbiflow.tiles.search import occupancy
+from orbiflow.tiles.search.likeness_search import SKETCH
 from outlines import animal
 
 BOOT = [[0, 0], [3, 0], [3.4, 1.2], [2.2, 1.5], [2.0, 2.8], [0.8, 2.5], [-0.3, 1.2]]
-QUICK = OccupancySettings(
+QUICK = OccupancySearch(
     max_frequency=3, turns=3, finalists=2, iterations=15, affine_iterations=20, points=200
 )
-BRIEF = DescentSettings.for_effort(
+BRIEF = OverlapSearch.for_effort(
     "fast", stages=((6, 2), (6, 1)), polish=5, projected=100, measured=30
 )
 TARGET = Target.from_polygon(BOOT, y_down=True)
@@ -51,7 +51,7 @@ def crossed(*_: object, **__: object) -> TileModel:
 
 def test_the_same_tiles_whatever_the_number_of_workers() -> None:
     events: list[Event] = []
-    here, none = escherize(TARGET, ["ih4", "28", "IH4"], QUICK, watch=events.append)
+    here, none = search_classes(TARGET, ["ih4", "28", "IH4"], QUICK, watch=events.append)
     assert none == []
     assert sorted(r.name for r in here) == ["IH28", "IH4"]
     assert here[0].metrics.iou > here[1].metrics.iou > 0.7
@@ -62,7 +62,7 @@ def test_the_same_tiles_whatever_the_number_of_workers() -> None:
         assert shares[-1] == 1.0
         assert isinstance(own[-1].outcome, EscherTile)
         assert all(event.outcome is None and math.isfinite(event.loss) for event in own[:-1])
-    elsewhere, none = escherize(TARGET, ["IH28", "IH4"], QUICK, workers=2)
+    elsewhere, none = search_classes(TARGET, ["IH28", "IH4"], QUICK, workers=2)
     assert none == []
     for one, other in zip(here, elsewhere, strict=True):
         assert one.name == other.name
@@ -96,14 +96,14 @@ def test_a_fit_that_runs_away_is_a_failure(force: bool) -> None:
 
 
 def test_a_class_whose_finalists_all_fold(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(methods, "fit_occupancy", crossed)
+    monkeypatch.setattr(occupancy, "fit_occupancy", crossed)
     events: list[Event] = []
-    results, failures = escherize(TARGET, ["IH21"], QUICK, watch=events.append)
+    results, failures = search_classes(TARGET, ["IH21"], QUICK, watch=events.append)
     assert results == []
     assert [f.name for f in failures] == ["IH21"]
     assert "crosses itself" in failures[0].reason
     assert events == [Event("IH21", 1.0, events[0].loss, failures[0])]
-    results, failures = escherize(TARGET, ["IH21"], QUICK, force=True)
+    results, failures = search_classes(TARGET, ["IH21"], QUICK, force=True)
     assert failures == []
     assert not results[0].certificate.valid
     assert "not simple" in results[0].certificate.reasons[0]
@@ -136,7 +136,7 @@ def test_events_come_in_order_and_in_this_thread(workers: int) -> None:
         events.append(event)
         threads.add(threading.get_ident())
 
-    escherize(TARGET, NAMES, QUICK, workers=workers, watch=watch)
+    search_classes(TARGET, NAMES, QUICK, workers=workers, watch=watch)
     checked(events, NAMES)
     assert threads == {threading.get_ident()}
     assert {event.share for event in events if event.outcome is not None} == {1.0}
@@ -157,7 +157,7 @@ def test_what_watch_raises_ends_the_search(
             raise error
 
     with pytest.raises(error):
-        escherize(TARGET, NAMES, QUICK, workers=workers, watch=watch)
+        search_classes(TARGET, NAMES, QUICK, workers=workers, watch=watch)
     assert sum((event.outcome is not None) == with_outcome for event in told) == 1
     assert multiprocessing.active_children() == []
 
@@ -171,7 +171,9 @@ def test_cancelling_keeps_what_was_finished(workers: int) -> None:
         if event.outcome is not None:
             cancel.cancel()
 
-    results, failures = escherize(TARGET, NAMES, SHORT, workers=workers, watch=watch, cancel=cancel)
+    results, failures = search_classes(
+        TARGET, NAMES, SHORT, workers=workers, watch=watch, cancel=cancel
+    )
     checked(events, NAMES)
     # what workers had in hand when they were told may have been finished, too
     assert 1 <= len(results) < len(NAMES)
@@ -189,7 +191,7 @@ def test_a_fit_is_left_between_two_steps(workers: int) -> None:
         cancel.cancel()
 
     endless = replace(QUICK, iterations=10**6, affine_iterations=1, turns=1)
-    results, failures = escherize(
+    results, failures = search_classes(
         TARGET, NAMES, endless, workers=workers, watch=watch, cancel=cancel
     )
     assert results == []
@@ -203,7 +205,7 @@ def test_a_search_may_be_cancelled_before_it_begins(workers: int) -> None:
     cancel = Cancel()
     cancel.cancel()
     events: list[Event] = []
-    results, failures = escherize(
+    results, failures = search_classes(
         TARGET, NAMES, QUICK, workers=workers, watch=events.append, cancel=cancel
     )
     assert results == []
@@ -220,49 +222,49 @@ def test_one_class_alone_is_cancelled_by_an_exception() -> None:
 
 def test_one_class_may_be_given_by_its_name() -> None:
     for given in ("IH4", 4, isohedral_class("ih4")):
-        results, failures = escherize(TARGET, given, QUICK)
+        results, failures = search_classes(TARGET, given, QUICK)
         assert [r.name for r in results] == ["IH4"]
         assert not failures
     with pytest.raises(OrbiflowError, match="unknown isohedral class 'IH8'"):
-        escherize(TARGET, "IH8", QUICK)
+        search_classes(TARGET, "IH8", QUICK)
     with pytest.raises(OrbiflowError, match='classes must be a name such as "IH4", or a list'):
-        escherize(TARGET, 1.5, QUICK)  # pyright: ignore[reportArgumentType]
+        search_classes(TARGET, 1.5, QUICK)  # pyright: ignore[reportArgumentType]
 
 
 def test_arguments_are_checked() -> None:
     with pytest.raises(OrbiflowError, match=r"unknown isohedral class 'IH8'; the nine are IH1, .*"):
-        escherize(TARGET, ["IH4", "IH8"], QUICK)
+        search_classes(TARGET, ["IH4", "IH8"], QUICK)
     with pytest.raises(OrbiflowError, match="no isohedral class was given"):
-        escherize(TARGET, [], QUICK)
+        search_classes(TARGET, [], QUICK)
     for workers in (0, -1):
         with pytest.raises(OrbiflowError, match=f"workers must be at least 1, got {workers}"):
-            escherize(TARGET, ["IH4"], QUICK, workers=workers)
+            search_classes(TARGET, ["IH4"], QUICK, workers=workers)
 
 
 @pytest.mark.parametrize("wrong", ["fast", 3, {"placements": 5}])
 def test_settings_of_no_method_are_refused(wrong: object) -> None:
-    with pytest.raises(OrbiflowError, match="settings must be of a method, got"):
-        escherize(TARGET, ["IH1"], wrong)  # pyright: ignore[reportArgumentType]
+    with pytest.raises(OrbiflowError, match=r"the method must be a search such as .*, got"):
+        search_classes(TARGET, ["IH1"], wrong)  # pyright: ignore[reportArgumentType]
     with pytest.raises(OrbiflowError, match="the target must be a Target"):
-        escherize("turtle.png", ["IH1"])  # pyright: ignore[reportArgumentType]
+        search_classes("turtle.png", ["IH1"])  # pyright: ignore[reportArgumentType]
 
 
 def test_of_both_objectives_one_may_fail() -> None:
     bar = Target.from_polygon([[0, 0], [60, 0], [60, 1], [0, 1]])
-    likeness = BendingSettings(placements=20, held=4, starts=1, finalists=1, rounds=4)
+    likeness = LikenessSearch(placements=20, held=4, starts=1, finalists=1, rounds=4)
     alone = escherize_class(bar, "IH7", likeness)
     assert isinstance(alone, ClassFailure)
-    both = escherize_class(bar, "IH7", BothSettings(likeness, BRIEF))
+    both = escherize_class(bar, "IH7", BothSearch(likeness, BRIEF))
     assert isinstance(both, EscherTile)
     assert {tile.objective for tile in both.family()} == {"overlap"}
     assert all(tile.deformation is not None for tile in both.family())
 
 
 def test_both_objectives_give_a_short_list_likeness_first() -> None:
-    likeness = BendingSettings(placements=40, held=8, starts=4, finalists=3, rounds=6)
-    settings = BothSettings(likeness, BRIEF)
+    likeness = LikenessSearch(placements=40, held=8, starts=4, finalists=3, rounds=6)
+    settings = BothSearch(likeness, BRIEF)
     events: list[Event] = []
-    results, failures = escherize(SQUIRREL, ["IH4", "IH6"], settings, watch=events.append)
+    results, failures = search_classes(SQUIRREL, ["IH4", "IH6"], settings, watch=events.append)
     assert not failures
     assert max(event.share for event in events) <= 1
     objectives = [r.objective for r in results]
@@ -289,13 +291,13 @@ def test_both_objectives_give_a_short_list_likeness_first() -> None:
 @pytest.mark.parametrize(
     "settings",
     [
-        BendingSettings(placements=80, held=20, starts=8, finalists=8, rounds=6, multiples=(4,)),
+        LikenessSearch(placements=80, held=20, starts=8, finalists=8, rounds=6, multiples=(4,)),
         BRIEF,
     ],
     ids=["likeness", "overlap"],
 )
-def test_several_of_a_class_differ(settings: BendingSettings | DescentSettings) -> None:
-    results, _ = escherize(SQUIRREL, ["IH4", "IH6"], settings, per_class=4)
+def test_several_of_a_class_differ(settings: LikenessSearch | OverlapSearch) -> None:
+    results, _ = search_classes(SQUIRREL, ["IH4", "IH6"], settings, per_class=4)
     for name in ("IH4", "IH6"):
         own = [r for r in results if r.name == name]
         assert 1 <= len(own) <= 4
@@ -309,7 +311,7 @@ def test_more_effort_never_scores_less() -> None:
     for per_class in (1, 2):
         scores = []
         for effort in ("fast", "normal"):
-            settings = BendingSettings.for_effort(effort)
+            settings = LikenessSearch.for_effort(effort)
             tile = escherize_class(SQUIRREL, "IH5", settings, per_class=per_class)
             assert isinstance(tile, EscherTile)
             scores.append(tile.score)
@@ -317,6 +319,6 @@ def test_more_effort_never_scores_less() -> None:
 
 
 def test_a_first_look_is_one_small_search() -> None:
-    own = replace(BendingSettings.for_effort("best"), **SKETCH)
+    own = replace(LikenessSearch.for_effort("best"), **SKETCH)
     assert own.searches() == (own,)
     assert own.finalists == own.starts == 1

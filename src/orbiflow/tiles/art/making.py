@@ -93,8 +93,8 @@ def artwork(
     page = art_page(tile, settings)
     parts: tuple[Part, ...] = () if drawing is None else drawing.parts
     around = eyes(tile, settings.eyes, palette(settings.palette))
-    if settings.engrave is not None:
-        parts += engraved(tile, settings.engrave, around)
+    if settings.strokes is not None:
+        parts += engraved(tile, settings.strokes, around)
     parts += tuple(part for eye in around for part in eye.parts)
     short = palette(settings.palette).shortage(page.count)
     said = (*tile.notes, *notes, *page.notes, *short)

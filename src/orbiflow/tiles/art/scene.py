@@ -12,7 +12,7 @@ from orbiflow import __version__
 from orbiflow.arguments import path as as_path
 from orbiflow.drawing import palette
 from orbiflow.errors import OrbiflowError
-from orbiflow.runtime import Cancel, write_atomic
+from orbiflow.runtime import Cancel, Progress, Sink, ignore, write_atomic
 from orbiflow.tiles.art.drawings import Over, read_over
 from orbiflow.tiles.art.making import (
     Artwork,
@@ -133,33 +133,46 @@ def draw_art(
     picture: str | Path | None = None,
     target: Target | None = None,
     force: bool = False,
-) -> Path:
-    """Write a picture of a tiling with something on its tiles.
+    on_event: Sink = ignore,
+    cancel: Cancel | None = None,
+) -> Artwork:
+    """Write a picture of a tiling with something on its tiles, and return what was drawn.
 
     Args:
-        tile: in memory, or a run's folder; see `with_map`.
-        out: the file, .png or .svg.
-        settings: see `ArtSettings`.
-        picture: file of a picture or drawing over the silhouette.
-        target: of a search in memory that left no map, such as one for overlap.
-        force: take a tile that is not certified.
+        tile: A tile in memory, or a run's folder; see `with_map`.
+        out: The file, .png or .svg.
+        settings: How it is drawn.
+        picture: The file of a picture or drawing over the silhouette.
+        target: The target of a search in memory that left no map, such as one for overlap.
+        force: Take a tile that is not certified.
+        on_event: Called with the `Progress`.
+        cancel: Stops the work; nothing is then written.
 
     Raises:
-        CertificationError: for a tile that is not certified.
-        InputFileError: for a picture that cannot be read.
-        OrbiflowError: for another ending, and as `artwork`.
-        OutputError: if the file cannot be written.
+        CertificationError: If the tile is not certified.
+        InputFileError: If the picture cannot be read.
+        OrbiflowError: For another ending, and as `artwork`.
+        OutputError: If the file cannot be written.
+        Cancelled: If it was cancelled.
     """
-    out = as_path(out, "the file to draw to")
+    out, cancel = as_path(out, "the file to draw to"), cancel or Cancel()
     if out.suffix.lower() not in (".png", ".svg"):
         raise OrbiflowError(f"artwork is written to a .png or .svg, got {out.name!r}")
     source = with_map(tile, target)
     source.require_certified(
         force=force, otherwise="so it is not exported; --force exports it, marked so"
     )
+    on_event(Progress(0.0, "laying out"))
+    if picture is not None:
+        source.require_map()
     over = Over() if picture is None else read_over(picture, source)
     made = artwork(source, settings, picture=over.picture, drawing=over.drawing, notes=over.notes)
-    return write_atomic(out, write_artwork(made, out.suffix))
+    cancel.check()
+    on_event(Progress(0.2, "drawing"))
+    content = write_artwork(made, out.suffix, cancel=cancel)
+    cancel.check()
+    write_atomic(out, content)
+    return made
 
 
 def png_of(pixels: np.ndarray, dpi: float) -> bytes:

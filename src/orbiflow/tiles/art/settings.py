@@ -2,91 +2,142 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, TypeAlias
 
-from orbiflow.arguments import number, whole
-from orbiflow.drawing import palette
+from orbiflow.drawing import PaletteName
 from orbiflow.errors import OrbiflowError
+from orbiflow.settings import (
+    DefaultText,
+    Hidden,
+    NotWith,
+    OnlyWith,
+    Option,
+    Parsed,
+    Range,
+    Repeated,
+    SettingError,
+    Settings,
+    Unit,
+)
+from orbiflow.units import pixel_size, pixels
 
-Colour = Literal["aspect", "neighbour", "one"]
-Strokes = Literal["hatch", "echoes", "feathers"]
-
-COLOURS: tuple[Colour, ...] = ("aspect", "neighbour", "one")
-STROKES: tuple[Strokes, ...] = ("hatch", "echoes", "feathers")
+Strokes: TypeAlias = Literal["hatch", "echoes", "feathers"]
 
 MOST_PIXELS = 100_000_000
+"""The largest number of pixels of a picture."""
+
 LONGEST = 30_000
-"""Of a picture, in all and along a side."""
+"""The longest side of a picture in pixels."""
 
 SMALLEST_TILE = 8.0
-"""In pixels: smaller ones show nothing."""
+"""The size of a tile in pixels below which it shows nothing."""
 
 
-@dataclass(frozen=True)
-class ArtSettings:
-    """All lengths in pixels.
+def eye_numbers(text: str) -> tuple[float, ...]:
+    """Return the numbers of an eye.
 
-    - `size`: width and height of the picture.
-    - `tile_size`: longer side of the tile's smallest rectangle; None for about 25 tiles on the page.
-    - `repeat`: make the cell that repeats without seams; `size` is then its own.
-    - `tolerance`: how much that cell may be stretched to be a rectangle, 0.02 for 2 %.
-    - `palette`, `colour`: tiles coloured by aspect, so that neighbours differ, or all alike.
-    - `outline`: width of the lines between tiles; None for 1/120 of the tile's size, 0 for none.
-    - `engrave`: the lines drawn inside the tile, None for none.
-    - `eyes`: (x, y) or (x, y, radius) in the silhouette's coordinates.
-    - `dpi`: pixels an inch, for files that say their size.
-    - `samples`: along each side of a pixel.
-
-    Raises:
-        OrbiflowError: for a setting that cannot be used, by its name.
+    >>> eye_numbers("120, 80,6")
+    (120.0, 80.0, 6.0)
     """
+    try:
+        return tuple(float(part) for part in text.split(","))
+    except ValueError:
+        raise OrbiflowError(f"{text!a:.60} is not x,y or x,y,radius") from None
 
-    size: tuple[int, int] = (3000, 2000)
-    tile_size: float | None = None
+
+def line_width(text: str, dpi: float) -> float:
+    """Return the width of a line in pixels; 0 for "none"."""
+    return 0.0 if text.strip().lower() == "none" else pixels(text, dpi, zero=True)
+
+
+class ArtSettings(Settings, group="Picture"):
+    """How a picture of a tiling is made; numbers of a length are pixels."""
+
+    size: Annotated[
+        tuple[Annotated[int, Range(1, LONGEST)], Annotated[int, Range(1, LONGEST)]],
+        Parsed(pixel_size, "a size such as 3000x2000 or 300x200mm", "SIZE", needs="dpi"),
+        NotWith("repeat", because="the cell that repeats has its own size"),
+        DefaultText("3000x2000"),
+    ] = (3000, 2000)
+    """Width and height of the picture: pixels such as 3000x2000, or lengths such as 300x200mm."""
+
+    tile_size: Annotated[
+        float | None,
+        Parsed(pixels, "pixels such as 400, or a length such as 40mm", "LENGTH", needs="dpi"),
+        Range(SMALLEST_TILE, 2 * LONGEST),
+        Unit("pixels"),
+        DefaultText("about 25 tiles on the page"),
+    ] = None
+    """Longer side of the tile's smallest rectangle: pixels, or a length such as 40mm."""
+
     repeat: bool = False
-    tolerance: float = 0.02
-    palette: str = "earth"
-    colour: Colour = "neighbour"
-    outline: float | None = None
-    engrave: Strokes | None = None
-    eyes: tuple[tuple[float, ...], ...] = ()
-    dpi: float = 300.0
-    samples: int = 3
+    """Make the cell that repeats without seams, instead of a page."""
 
-    def __post_init__(self) -> None:
+    tolerance: Annotated[float, Range(0, 0.2), OnlyWith(repeat=True)] = 0.02
+    """How much that cell may be stretched to be a rectangle; 0.02 is 2 %."""
+
+    palette: PaletteName = "earth"
+    """Colours of the tiles."""
+
+    colour: Literal["aspect", "neighbour", "one"] = "neighbour"
+    """With aspect, one colour for each way that tiles lie; with neighbour, neighbours differ; with
+    one, all are alike."""
+
+    outline: Annotated[
+        float | None,
+        Parsed(
+            line_width, "pixels such as 3, a length such as 0.3mm, or none", "LENGTH", needs="dpi"
+        ),
+        Range(0, 1000),
+        Unit("pixels"),
+        DefaultText("1/120 of the tile's size"),
+    ] = None
+    """Width of the lines between tiles: pixels, a length such as 0.3mm, or none."""
+
+    engrave: bool = False
+    """Draw lines inside the tile, as on a woodcut: hatching, where the strokes say nothing else."""
+
+    strokes: Strokes | None = None
+    """Engrave with hatching, echoes of the outline, or feathers."""
+
+    eyes: Annotated[
+        tuple[
+            Annotated[tuple[float, ...], Parsed(eye_numbers, "x,y or x,y,radius", "X,Y[,R]")],
+            ...,
+        ],
+        Repeated(),
+        Option("--eye"),
+    ] = ()
+    """An eye, in the silhouette's coordinates. May be repeated."""
+
+    dpi: Annotated[float, Range(1, 10_000)] = 300.0
+    """Pixels per inch."""
+
+    samples: Annotated[int, Range(1, 8), Hidden()] = 3
+    """Number of samples along each side of a pixel."""
+
+    def defaults(self) -> Mapping[str, Any]:
+        return {"strokes": "hatch"} if self.engrave else {}
+
+    def check(self) -> None:
         check_size(*self.size)
-        if self.tile_size is not None:
-            number(self.tile_size, "tile_size", SMALLEST_TILE, 2 * LONGEST)
-        number(self.tolerance, "tolerance", 0, 0.2)
-        palette(self.palette)
-        if self.colour not in COLOURS:
-            raise OrbiflowError(f"colour must be one of {', '.join(COLOURS)}, got {self.colour!r}")
-        if self.engrave is not None and self.engrave not in STROKES:
-            raise OrbiflowError(
-                f"engrave must be one of {', '.join(STROKES)}, got {self.engrave!r}"
-            )
-        if self.outline is not None:
-            number(self.outline, "outline", 0, 1000)
-        for eye in self.eyes:
-            if len(eye) not in (2, 3):
-                raise OrbiflowError(f"an eye is x, y or x, y, radius, got {eye!r}")
-            for part, name in zip(eye, ("x", "y", "radius"), strict=False):
-                number(part, f"an eye's {name}", *((0,) if name == "radius" else ()))
-        number(self.dpi, "dpi", 1, 10_000)
-        whole(self.samples, "samples", 1, 8)
+        for number, place in enumerate(self.eyes, 1):
+            if len(place) not in (2, 3) or min(place[2:], default=0) < 0:
+                raise SettingError(
+                    f"{{eyes}}: entry {number} must be x,y or x,y,radius in the silhouette's "
+                    f"coordinates, got {','.join(f'{part:g}' for part in place)}"
+                )
 
 
 def check_size(width: int, height: int) -> None:
-    """Nothing, if a picture may be as large.
+    """Check that a picture is not too large.
 
     Raises:
-        OrbiflowError: if it has no pixel or too many.
+        SettingError: If it has too many pixels.
     """
-    for side in (width, height):
-        whole(side, "a picture's side in pixels", 1, LONGEST)
-    if width * height > MOST_PIXELS:
-        raise OrbiflowError(
-            f"a picture of {width} x {height} pixels is too large; at most "
-            f"{MOST_PIXELS // 10**6} megapixels are made"
+    if max(width, height) > LONGEST or width * height > MOST_PIXELS:
+        raise SettingError(
+            f"a picture of {width} x {height} pixels is too large ({{size}}); at most "
+            f"{MOST_PIXELS // 10**6} megapixels are made, {LONGEST} along a side"
         )

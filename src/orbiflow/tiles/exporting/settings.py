@@ -2,145 +2,134 @@
 
 from __future__ import annotations
 
-import re
-from dataclasses import dataclass, fields
-from typing import Any, Literal
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
 
-import numpy as np
-
-from orbiflow.arguments import number, whole
-from orbiflow.drawing import (
-    COLUMNS,
-    DEFAULT_PALETTE,
-    palette,
+from orbiflow.drawing import DEFAULT_PALETTE, PaletteName
+from orbiflow.settings import (
+    DefaultText,
+    FileSettings,
+    Group,
+    Hidden,
+    OnlyWith,
+    Option,
+    Range,
+    SettingError,
 )
-from orbiflow.errors import OrbiflowError
+from orbiflow.units import COLUMNS, Colour, Length, LengthOrZero, PageSize, Size
 
-Format = Literal["svg", "pdf", "dxf", "png", "json"]
-Cut = Literal["none", "skeleton", "pieces"]
-
-FORMATS: tuple[Format, ...] = ("svg", "pdf", "dxf", "png", "json")
-CUTS: tuple[Cut, ...] = ("none", "skeleton", "pieces")
+PIECES = Group("Pieces")
 PAGE = (300.0, 200.0)
-"""The page in mm where none is asked for."""
-
-LARGEST = 20_000.0
-"""Longest side of a page, in mm."""
+"""Width and height of the page in mm where none is asked for."""
 
 
-@dataclass(frozen=True)
-class ExportSettings:
-    """All lengths in mm.
+class ExportSettings(FileSettings, group="Page and file"):
+    """How a tiling is drawn in real size; lengths in mm.
 
-    - `format`: of the file.
-    - `tile_size`: longer side of the tile's smallest rectangle.
-    - `area`: width and height of the page; None for the bed where there are pieces to fill it, else
-      `PAGE`.
-    - `cut`: "none" draws every tile, "skeleton" each shared edge once, "pieces" tiles apart.
-    - `kerf`, `clearance`, `spacing`: of pieces: what the tool burns away, the gap between pieces put
-      together, the least distance of their cuts on the sheet.
-    - `copies`: how many pieces; None for as many as the page holds.
-    - `clip`: cut tiles at the page's edge, or leave out those that are not whole.
-    - `border`: draw the page's border where `clip` cuts lines.
-    - `bed`: width and height of the machine; a larger page becomes several.
-    - `calibrate`: add a mark 100 mm long.
-    - `tolerance`: how far curves may be from the tile's polygon; None for 1/800 of the tile's size, at
-      least 0.05.
-    - `warn_neck`: width below which a neck is worth a note; None for never.
-    - `filled`, `palette`: fills of `cut` "none".
-    - `stroke`, `stroke_width`: of lines; None for what suits `cut`.
-    - `dpi`: of a PNG.
-
-    Raises:
-        OrbiflowError: for a setting that cannot be used, by its name.
-
-    >>> ExportSettings.preset("laser", kerf=0.1, cut="pieces").stroke_width
+    >>> ExportSettings(purpose="laser", kerf=0.1, cut="pieces").stroke_width
     0.01
     """
 
-    format: Format = "svg"
-    tile_size: float = 40.0
-    area: tuple[float, float] | None = None
-    cut: Cut = "none"
-    kerf: float = 0.0
-    clearance: float = 0.0
-    spacing: float = 1.0
-    copies: int | None = None
-    clip: bool = False
-    border: bool = False
-    bed: tuple[float, float] | None = None
-    calibrate: bool = False
-    tolerance: float | None = None
-    warn_neck: float | None = None
-    filled: bool = True
-    palette: str = DEFAULT_PALETTE
-    stroke: str | None = None
-    stroke_width: float | None = None
-    dpi: float = 300.0
+    purpose: Annotated[
+        Literal["laser", "print", "paper", "web", "plotter"] | None, Option("--for")
+    ] = None
+    """Settings that suit a purpose; other options go before them."""
 
-    def __post_init__(self) -> None:
-        _one_of(self.format, FORMATS, "format")
-        _one_of(self.cut, CUTS, "cut")
-        for name in ("tile_size", "dpi"):
-            number(getattr(self, name), name, 0, LARGEST, above=True)
-        for name in ("kerf", "clearance", "spacing"):
-            number(getattr(self, name), name, 0, LARGEST)
-        for name in ("tolerance", "warn_neck", "stroke_width"):
-            if getattr(self, name) is not None:
-                number(getattr(self, name), name, 0, LARGEST, above=True)
-        for name in ("area", "bed"):
-            if getattr(self, name) is not None:
-                self._check_sides(name)
-        if self.copies is not None:
-            whole(self.copies, "copies", 1)
-        palette(self.palette)
-        if self.stroke is not None and not re.fullmatch("#[0-9a-fA-F]{6}", str(self.stroke)):
-            raise OrbiflowError(f"stroke must be a colour such as #ff0000, got {self.stroke!r}")
+    format: Annotated[
+        Literal["svg", "pdf", "dxf", "png", "json"] | None,
+        DefaultText("the file's ending, or what suits the purpose"),
+    ] = None
+    """Format of the file."""
+
+    tile_size: Length = 40.0
+    """Longer side of the tile's smallest rectangle."""
+
+    area: Annotated[PageSize | None, DefaultText("300x200mm, or the bed for pieces")] = None
+    """Width and height of the page; also single or double, a journal's columns."""
+
+    cut: Literal["none", "skeleton", "pieces"] = "none"
+    """With none, every tile is drawn; with skeleton, each shared edge once; with pieces, tiles
+    apart."""
+
+    clip: Annotated[
+        bool,
+        Option("--clip", off="--whole"),
+        OnlyWith(cut=("none", "skeleton"), because="pieces are whole"),
+    ] = False
+    """Cut tiles at the page's edge, or leave out those that are not whole."""
+
+    border: Annotated[bool, OnlyWith(cut="skeleton", clip=True)] = False
+    """Cut the page's border, too."""
+
+    bed: Size | None = None
+    """Size of the machine's bed; a larger page becomes several files."""
+
+    calibrate: bool = False
+    """Add a mark of 100 mm on a layer of its own."""
+
+    tolerance: Annotated[
+        Length | None, DefaultText("1/800 of the tile's size, at least 0.05mm")
+    ] = None
+    """Largest distance of curves from the tile's outline."""
+
+    warn_neck: Length | None = None
+    """Say where the tile is thinner than this, such as 2mm."""
+
+    palette: Annotated[
+        PaletteName, OnlyWith(cut="none", because="only filled tiles have colours")
+    ] = DEFAULT_PALETTE
+    """Colours of the tiles."""
+
+    dpi: Annotated[float, Range(1, 10_000), OnlyWith(format=("png", None))] = 300.0
+    """Dots per inch of a PNG."""
+
+    kerf: Annotated[
+        LengthOrZero,
+        OnlyWith(cut="pieces", because="an edge that two tiles share is cut only once"),
+        PIECES,
+    ] = 0.0
+    """Width that the tool burns away."""
+
+    clearance: Annotated[LengthOrZero, OnlyWith(cut="pieces"), PIECES] = 0.0
+    """Gap between pieces put together, for a puzzle."""
+
+    spacing: Annotated[LengthOrZero, PIECES] = 1.0
+    """Gap between the cuts of different pieces."""
+
+    copies: Annotated[
+        int | None, Range(1), OnlyWith(cut="pieces"), PIECES, DefaultText("what the page holds")
+    ] = None
+    """Number of pieces."""
+
+    filled: Annotated[bool, Hidden()] = True
+    """Fill tiles with colours of the palette."""
+
+    stroke: Annotated[Colour | None, Hidden(), DefaultText("what suits the cut")] = None
+    """Colour of lines."""
+
+    stroke_width: Annotated[Length | None, Hidden(), DefaultText("what suits the cut")] = None
+    """Width of lines."""
+
+    def defaults(self) -> Mapping[str, Any]:
+        values = dict(PURPOSES[self.purpose]) if self.purpose else {}
+        if "cut" in self.fields_given and self.cut == "pieces":
+            values.pop("clip", None)
+        return values
+
+    def check(self) -> None:
         if self.tolerance is not None and self.tolerance > self.tile_size / 20:
-            raise OrbiflowError(
-                f"a tolerance of {self.tolerance:g} mm would not leave the shape of a tile of "
+            raise SettingError(
+                f"{{tolerance}} of {self.tolerance:g} mm would lose the shape of a tile of "
                 f"{self.tile_size:g} mm; choose at most {self.tile_size / 20:g} mm"
             )
-        self._check_cut()
+        if "palette" in self.fields_given and not self.filled:
+            what = f"{{purpose}} {self.purpose} fills nothing" if self.purpose else "no {filled}"
+            raise SettingError(f"{{palette}} has no effect: {what}; leave {{palette}} out")
 
-    def _check_sides(self, name: str) -> None:
-        sides: Any = getattr(self, name)
-        # neither text nor a set, which has no order
-        if not isinstance(sides, tuple | list | np.ndarray) or len(sides) != 2:
-            raise OrbiflowError(f"{name} must be a width and a height in mm, got {sides!r}")
-        for side in sides:
-            number(side, name, 0, LARGEST, above=True)
-
-    def _check_cut(self) -> None:
-        if self.cut == "skeleton" and self.kerf > 0:
-            raise OrbiflowError(
-                "an edge that two tiles share is cut once and cannot be moved by half a kerf for "
-                "both: kerf belongs to cut pieces"
-            )
-        if self.cut != "pieces":
-            for name in ("kerf", "clearance", "copies"):
-                if getattr(self, name):
-                    raise OrbiflowError(f"{name} belongs to cut pieces, not to cut {self.cut}")
-        elif self.clip:
-            raise OrbiflowError("clip belongs to cut none and cut skeleton: pieces are whole")
-        if self.border and not (self.cut == "skeleton" and self.clip):
-            raise OrbiflowError("border belongs to cut skeleton with clip")
-
-    @classmethod
-    def preset(cls, name: str, **settings: Any) -> ExportSettings:
-        """The settings for "laser", "print", "paper", "web" or "plotter", with others over them.
-
-        Raises:
-            OrbiflowError: for another name or a setting that cannot be used.
-        """
-        chosen = preset_values(name)
-        if settings.get("cut", chosen.get("cut")) == "pieces":
-            chosen.pop("clip", None)
-        known = {field.name for field in fields(cls)}
-        for setting in settings:
-            if setting not in known:
-                raise OrbiflowError(f"there is no export setting {setting!r}; see ExportSettings")
-        return cls(**{**chosen, **settings})
+    @property
+    def usual_format(self) -> str:
+        """What suits the purpose, else svg."""
+        return "pdf" if self.purpose in ("print", "paper") else "svg"
 
     @property
     def page(self) -> tuple[float, float]:
@@ -156,49 +145,18 @@ class ExportSettings:
         return max(0.05, self.tile_size / 800) if self.tolerance is None else self.tolerance
 
 
-PRESETS: dict[str, dict[str, Any]] = {
-    "laser": {
-        "format": "svg",
-        "cut": "skeleton",
-        "clip": False,
-        "filled": False,
-        "stroke": "#ff0000",
-        "stroke_width": 0.01,
-    },
-    "print": {"format": "pdf", "cut": "none", "clip": True, "filled": True},
+_LINES = {"cut": "skeleton", "clip": False, "filled": False}
+
+PURPOSES: Mapping[str, Mapping[str, Any]] = {
+    "laser": {**_LINES, "stroke": "#ff0000", "stroke_width": 0.01},
+    "plotter": {**_LINES, "stroke": "#000000", "stroke_width": 0.3},
+    "print": {"clip": True},
+    "web": {"clip": True},
     "paper": {
-        "format": "pdf",
-        "cut": "none",
         "clip": True,
-        "filled": True,
         "area": (COLUMNS["single"], round(COLUMNS["single"] / 1.5)),
         "tile_size": 17.0,
         "stroke_width": 0.12,
     },
-    "web": {"format": "svg", "cut": "none", "clip": True, "filled": True},
-    "plotter": {
-        "format": "svg",
-        "cut": "skeleton",
-        "clip": False,
-        "filled": False,
-        "stroke": "#000000",
-        "stroke_width": 0.3,
-    },
 }
-"""What each machine or medium wants; explicit settings go before."""
-
-
-def preset_values(name: str) -> dict[str, Any]:
-    """A preset as a new dictionary.
-
-    Raises:
-        OrbiflowError: for an unknown name.
-    """
-    if name not in PRESETS:
-        raise OrbiflowError(f"unknown preset {name!r}; there are {', '.join(PRESETS)}")
-    return dict(PRESETS[name])
-
-
-def _one_of(value: str, known: tuple[str, ...], name: str) -> None:
-    if value not in known:
-        raise OrbiflowError(f"{name} must be one of {', '.join(known)}, got {value!r}")
+"""What each machine or medium wants; settings that are given go before."""

@@ -9,15 +9,12 @@ from pathlib import Path
 from orbiflow import __version__
 from orbiflow.arguments import path as as_path
 from orbiflow.drawing import palette
-from orbiflow.errors import (
-    OrbiflowError,
-    OutputError,
-)
-from orbiflow.runtime import write_atomic
+from orbiflow.errors import OrbiflowError
+from orbiflow.runtime import Cancel, Progress, Sink, ignore, write_atomic
 from orbiflow.tiles.exporting.layouts import Layout, layout
 from orbiflow.tiles.exporting.pieces import pieces_scenes, place_on
 from orbiflow.tiles.exporting.scene import Scene
-from orbiflow.tiles.exporting.settings import FORMATS, ExportSettings
+from orbiflow.tiles.exporting.settings import ExportSettings
 from orbiflow.tiles.exporting.sheets import calibrated, split
 from orbiflow.tiles.exporting.svg_writer import write_svg
 from orbiflow.tiles.exporting.tiling_scenes import skeleton_scene, tiling_scene
@@ -65,42 +62,39 @@ def export(
     settings: ExportSettings | None = None,
     *,
     force: bool = False,
+    on_event: Sink = ignore,
+    cancel: Cancel | None = None,
 ) -> Exported:
     """Write a tiling, its lines or its pieces in real size.
 
     Args:
-        tile: in memory, or a run's folder; see `read_result`.
-        out: the file; with several sheets its name gets a number. An ending of a known format, such as
-            .pdf, decides the format.
-        settings: see `ExportSettings`; their format counts for other endings, which are refused
-            without them.
-        force: export a tile that is not certified; the file says so.
+        tile: A tile in memory, or a run's folder; see `read_result`.
+        out: The file; with several sheets its name gets a number. Its ending decides the format, unless
+            the settings give one.
+        settings: How it is drawn.
+        force: Export a tile that is not certified; the file says so.
+        on_event: Called with the `Progress`.
+        cancel: Stops the work; nothing is then written.
 
     Raises:
-        CertificationError: for a tile that is not certified.
-        OrbiflowError: for settings that cannot be met, in words.
-        OutputError: if a file cannot be written, or nothing says its format.
+        CertificationError: If the tile is not certified.
+        OrbiflowError: If the settings cannot be met, or nothing says the format.
+        OutputError: If a file cannot be written.
+        Cancelled: If it was cancelled.
     """
-    out = as_path(out, "the file to export to")
-    settings = _for_file(settings, out)
+    out, cancel = as_path(out, "the file to export to"), cancel or Cancel()
+    settings = (settings or ExportSettings()).for_file(out)
+    on_event(Progress(0.0, "laying out"))
     found, notes = scenes(tile, settings, force=force)
-    # all contents before the first file
-    contents = [write_scene(scene, settings) for scene in found]
+    contents: list[str | bytes] = []  # all, before the first file
+    for k, scene in enumerate(found):
+        cancel.check()
+        on_event(Progress((1 + k) / (1 + len(found)), "writing"))
+        contents.append(write_scene(scene, settings))
+    cancel.check()
     names = sheet_names(out, len(contents))
     files = [write_atomic(name, content) for name, content in zip(names, contents, strict=True)]
     return Exported(tuple(files), tuple(found), notes)
-
-
-def _for_file(settings: ExportSettings | None, out: Path) -> ExportSettings:
-    ending = out.suffix.lower().lstrip(".")
-    known = next((form for form in FORMATS if form == ending), None)
-    if settings is None and ending and known is None:
-        raise OutputError(
-            f"{out.name} ends in .{ending}; give ExportSettings with a format, or end it in "
-            f".{', .'.join(FORMATS)}"
-        )
-    settings = settings or ExportSettings()
-    return replace(settings, format=known or settings.format)
 
 
 def scenes(
@@ -127,7 +121,7 @@ def scenes(
 
 def _made(placed: Layout, settings: ExportSettings) -> list[Scene]:
     if settings.cut == "pieces":
-        return pieces_scenes(placed, fine=settings.format not in ("dxf", "json"))
+        return pieces_scenes(placed, fine=settings.file_format not in ("dxf", "json"))
     scene = skeleton_scene(placed) if settings.cut == "skeleton" else tiling_scene(placed)
     return [scene] if settings.bed is None else split(scene, settings.bed, settings.deviation / 4)
 
@@ -191,10 +185,7 @@ def write_scene(scene: Scene, settings: ExportSettings) -> str | bytes:
         OrbiflowError: for a PNG of too many pixels.
     """
     fine = settings.deviation / 4
-    match settings.format:
-        case "svg":
-            # what rounding moves is far below the tolerance
-            return write_svg(scene, decimals=max(3, math.ceil(-math.log10(fine / 5))))
+    match settings.file_format:
         case "pdf":
             return write_pdf(scene)
         case "png":
@@ -203,6 +194,9 @@ def write_scene(scene: Scene, settings: ExportSettings) -> str | bytes:
             return write_dxf(scene, tolerance=fine)
         case "json":
             return write_json(scene, tolerance=fine)
+        case _:
+            # what rounding moves is far below the tolerance
+            return write_svg(scene, decimals=max(3, math.ceil(-math.log10(fine / 5))))
 
 
 def sheet_names(out: Path, count: int) -> list[Path]:

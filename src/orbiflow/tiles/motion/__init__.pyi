@@ -1,3 +1,3 @@
-from .animations import AnimationSettings as AnimationSettings
 from .animations import animate as animate
 from .animations import animation as animation
+from .settings import AnimationSettings as AnimationSettings

@@ -3,32 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
 
-from orbiflow.arguments import (
-    number,
-    whole,
-)
-from orbiflow.arguments import (
-    path as as_path,
-)
-from orbiflow.drawing import DEFAULT_PALETTE, palette
-from orbiflow.errors import (
-    OrbiflowError,
-    OutputError,
-)
-from orbiflow.runtime import write_atomic
-from orbiflow.tiles.motion.kinds import (
-    KINDS,
-    Kind,
-    Motion,
-    bend,
-    frames,
-    grow,
-    morph,
-)
+from orbiflow.arguments import path as as_path
+from orbiflow.drawing import palette
+from orbiflow.runtime import Cancel, Note, Progress, Sink, ignore, write_atomic
+from orbiflow.tiles.motion.kinds import Motion, bend, frames, grow, morph
+from orbiflow.tiles.motion.settings import AnimationSettings
 from orbiflow.tiles.motion.writers import (
     require_ffmpeg,
     write_gif,
@@ -36,55 +17,7 @@ from orbiflow.tiles.motion.writers import (
     write_mp4,
 )
 from orbiflow.tiles.tile import EscherTile, TileSource
-
-Format = Literal["gif", "mp4", "svg"]
-FORMATS: tuple[Format, ...] = ("gif", "mp4", "svg")
-
-MOST_FRAMES = 2400
-
-
-@dataclass(frozen=True)
-class AnimationSettings:
-    """How a tile is animated.
-
-    - `format`: of the file.
-    - `kind`: "morph" (a tiling with straight edges becomes the tile's), "bend" (the silhouette bends
-      into the tile, then its tiling grows) or "grow" (the tiling grows around one tile).
-    - `seconds`: of the loop, there and back.
-    - `fps`: pictures a second; an SVG has none.
-    - `size`: width in pixels, an even number; the height is two thirds of it.
-    - `palette`: of the fills.
-
-    Raises:
-        OrbiflowError: for a setting that cannot be used, by its name.
-
-    >>> AnimationSettings(kind="grow", seconds=3).size
-    800
-    """
-
-    format: Format = "gif"
-    kind: Kind = "morph"
-    seconds: float = 6.0
-    fps: float = 24.0
-    size: int = 800
-    palette: str = DEFAULT_PALETTE
-
-    def __post_init__(self) -> None:
-        for name, known in (("format", FORMATS), ("kind", KINDS)):
-            value = getattr(self, name)
-            if value not in known:
-                raise OrbiflowError(f"{name} must be one of {', '.join(known)}, got {value!r}")
-        number(self.seconds, "seconds", 0.5, 120)
-        number(self.fps, "fps", 1, 60)
-        whole(self.size, "size", 64, 4000)
-        if self.size % 2:
-            raise OrbiflowError(f"size must be even, which videos need, got {self.size}")
-        palette(self.palette)
-        if self.format != "svg" and self.seconds * self.fps > MOST_FRAMES:
-            raise OrbiflowError(
-                f"{self.seconds:g} seconds of {self.fps:g} pictures are more than {MOST_FRAMES}; "
-                "choose fewer seconds or a lower fps"
-            )
+from orbiflow.tiles.tilings import colouring
 
 
 def animate(
@@ -93,32 +26,37 @@ def animate(
     settings: AnimationSettings | None = None,
     *,
     force: bool = False,
+    on_event: Sink = ignore,
+    cancel: Cancel | None = None,
 ) -> Path:
     """Write an animation of a tile.
 
     Args:
-        tile: in memory, or a run's folder; see `read_result`.
-        out: the file; an ending .gif, .mp4 or .svg decides the format.
-        settings: see `AnimationSettings`; their format counts for other endings, which are refused
-            without them.
-        force: take a tile that is not certified.
+        tile: A tile in memory, or a run's folder; see `read_result`.
+        out: The file. Its ending, .gif, .mp4 or .svg, decides the format, unless the settings give one.
+        settings: How it is animated.
+        force: Animate a tile that is not certified.
+        on_event: Called with each `Note` and `Progress`.
+        cancel: Stops the work; nothing is then written.
 
     Raises:
-        CertificationError: for a tile that is not certified.
-        OrbiflowError: for settings that cannot be met, in words.
-        OutputError: if the file cannot be written, or nothing says its format.
+        CertificationError: If the tile is not certified.
+        OrbiflowError: If the settings cannot be met, or nothing says the format.
+        OutputError: If the file cannot be written.
+        Cancelled: If it was cancelled.
     """
-    out = as_path(out, "the file to animate to")
-    ending = out.suffix.lower().lstrip(".")
-    form = next((known for known in FORMATS if known == ending), None)
-    if settings is None and ending and form is None:
-        raise OutputError(
-            f"{out.name} ends in .{ending}; give AnimationSettings with a format, or end it in "
-            f".{', .'.join(FORMATS)}"
-        )
-    settings = settings or AnimationSettings()
-    settings = replace(settings, format=form or settings.format)
-    return write_atomic(out, animation(tile, settings, force=force))
+    out, cancel = as_path(out, "the file to animate to"), cancel or Cancel()
+    settings, given = (settings or AnimationSettings()).for_file(out), EscherTile.of(tile)
+
+    def told(share: float) -> None:
+        cancel.check()
+        on_event(Progress(share, "drawing"))
+
+    for note in palette(settings.palette).shortage(colouring(given.tile).count):
+        on_event(Note(note))
+    content = animation(given, settings, force=force, told=told)
+    cancel.check()
+    return write_atomic(out, content)
 
 
 def animation(
@@ -136,7 +74,7 @@ def animation(
     Raises:
         As `animate`.
     """
-    settings = settings or AnimationSettings()
+    settings = (settings or AnimationSettings()).for_file(None)
     if settings.format == "mp4":
         require_ffmpeg()  # before the work
     given, colours = EscherTile.of(tile), palette(settings.palette)
@@ -144,15 +82,15 @@ def animation(
     made = motion(given, settings)
     told(0.0)
     loop = frames(settings.seconds, settings.fps)
-    match settings.format:
+    match settings.file_format:
         case "svg":
             title = f"{given.name}: {made.what}"
             name = f"{given.name}-{settings.kind}"
             return write_motion_svg(made, colours, seconds=settings.seconds, name=name, title=title)
-        case "gif":
-            return write_gif(made, colours, loop, told)
         case "mp4":
             return write_mp4(made, colours, loop, settings.fps, told)
+        case _:
+            return write_gif(made, colours, loop, told)
 
 
 def motion(tile: EscherTile, settings: AnimationSettings) -> Motion:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,9 +77,6 @@ class Motion:
 ALWAYS = (-1.0, -0.5)
 """Birth of what is there from the start."""
 
-
-Kind = Literal["morph", "bend", "grow"]
-KINDS: tuple[Kind, ...] = ("morph", "bend", "grow")
 
 BEND = 0.45
 """Share of the progress of a bending in which the silhouette bends; then the tiling grows."""

@@ -7,19 +7,14 @@ import functools
 import json
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any
 
 from orbiflow.arguments import instance
 from orbiflow.arguments import path as as_path
-from orbiflow.errors import OrbiflowError
-from orbiflow.runtime import (
-    ResultFolder,
-    work,
-    write_atomic,
-)
+from orbiflow.runtime import Note, ResultFolder, Sink, Written, ignore, work, write_atomic
 from orbiflow.tiles.pages.index import index_page
 from orbiflow.tiles.pages.overview import overview_png
 from orbiflow.tiles.pages.tile_folder import (
+    FIELD_FILES,
     FIGURE_FILES,
     TILE_FILES,
     figure_files,
@@ -27,12 +22,7 @@ from orbiflow.tiles.pages.tile_folder import (
 )
 from orbiflow.tiles.pictures import FrontPoint, front_png
 from orbiflow.tiles.result_file import RESULT, folder_names
-from orbiflow.tiles.search import (
-    BendingSettings,
-    ClassFailure,
-    Settings,
-    report,
-)
+from orbiflow.tiles.search import ClassFailure, SearchResult, report
 from orbiflow.tiles.silhouette import Target
 from orbiflow.tiles.tile import EscherTile
 from orbiflow.tiles.tilings import Colouring, colouring
@@ -141,71 +131,65 @@ def written_files(folder: Path) -> set[str]:
     return {RESULT, OVERVIEW, INDEX} | front | inside
 
 
+def result_folder(out: str | Path) -> ResultFolder:
+    """Return the folder that a run is written to.
+
+    Raises:
+        OutputError: If it holds what orbiflow did not write.
+    """
+    return ResultFolder(as_path(out, "the folder to write into"), written_files)
+
+
 def write_run(
-    results: Sequence[EscherTile],
-    target: Target,
+    result: SearchResult,
     out: str | Path,
-    settings: Settings | None = None,
     *,
-    failures: Sequence[ClassFailure] = (),
     figures: bool = False,
-) -> Path:
-    """Write tiles that were found as a result folder: a folder a class, overviews, `result.json`.
-
-    Args:
-        results: best first, at least one.
-        target: of the search.
-        out: the folder; an earlier run there is replaced whole.
-        settings: of the search, for the record; default those of `escherize`.
-        failures: classes without a tile.
-        figures: write the figures for print, too.
-
-    Returns:
-        The folder, which every command on a RESULT takes.
-
-    Raises:
-        OrbiflowError: without any result.
-        OutputError: if the folder holds what orbiflow did not write, or cannot be written.
-    """
-    if not results:
-        raise OrbiflowError("there is no tile to write; the search's failures say why")
-    target = instance(target, Target, "the target", "Target.read(file) gives one")
-    folder = ResultFolder(as_path(out, "the folder to write into"), written_files)
-    settings = BendingSettings.for_effort("normal") if settings is None else settings
-    seconds = sum(result.seconds for result in results)
-    document = report(target, results, failures, settings, seconds=seconds, workers=1)
-    with folder.replaced() as staged:
-        fill_run(staged, document, results, target, failures=failures, figures=figures)
-    return folder.path
-
-
-def fill_run(
-    folder: Path,
-    document: dict[str, Any],
-    results: Sequence[EscherTile],
-    target: Target,
-    *,
-    found: Sequence[EscherTile] = (),
-    failures: Sequence[ClassFailure] = (),
-    figures: bool = False,
-    workers: int = 1,
+    on_event: Sink = ignore,
 ) -> list[Path]:
-    """Write all files of a run into an empty folder.
+    """Write what a search found as a result folder: a folder a class, overviews, `result.json`.
+
+    An earlier run there is replaced whole, unless the search was interrupted before any class had its
+    tile: a first look is less than an earlier run's tiles.
 
     Args:
-        document: for `result.json`; see `orbiflow.escher.report.report`.
-        found: all tiles, those that are not listed among them, of a search for both.
-        workers: processes that draw figures.
+        result: What the search found.
+        out: The folder, which every command on a RESULT takes.
+        figures: Write the figures for print, too, in as many processes as the search had.
+        on_event: Called with each `Note` and `Written`.
 
     Returns:
-        The files, relative to the folder, in order.
+        The files; none if an earlier run was left as it is.
 
     Raises:
-        OutputError: if a file cannot be written.
+        OutputError: If the folder holds what orbiflow did not write, or cannot be written.
     """
-    if results:
-        write_gallery(results, target, folder, failures=failures, figures=figures, workers=workers)
+    instance(result, SearchResult, "the result", "escherize(target) gives one")
+    folder, tiles = result_folder(out), result.tiles
+    earlier = folder.has_a_run and (folder.path / OVERVIEW).is_file()
+    if earlier and all(tile.isohedral_class in result.interrupted for tile in tiles):
+        return []
+    if tiles:
+        on_event(Note("drawing"))
+    if tiles and figures and not any(FIELD_FILES[0] in figure_files(tile) for tile in tiles):
+        on_event(Note("no flow made these tiles, so there is none to draw: the silhouette bent"))
+    with folder.replaced() as staged:
+        _fill(staged, result, figures=figures)
+        files = [path.relative_to(staged) for path in staged.rglob("*") if path.is_file()]
+    written = [folder.path / path for path in sorted(files)]
+    for path in written:
+        on_event(Written(path))
+    return written
+
+
+def _fill(folder: Path, result: SearchResult, *, figures: bool) -> None:
+    """Write all files of a run into an empty folder."""
+    tiles, target = result.tiles, result.target
+    document = report(result)
+    if tiles:
+        workers = result.workers if figures else 1
+        failures = result.failures
+        write_gallery(tiles, target, folder, failures=failures, figures=figures, workers=workers)
         if document["objective"] == "both":
-            write_front(results, found or results, target, folder)
+            write_front(tiles, result.found or tiles, target, folder)
     write_atomic(folder / RESULT, json.dumps(document, allow_nan=False))
-    return sorted(path.relative_to(folder) for path in folder.rglob("*") if path.is_file())

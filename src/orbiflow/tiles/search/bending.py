@@ -37,8 +37,8 @@ from orbiflow.tiles.search.corner_shifts import (
     Stage,
     shifted,
 )
+from orbiflow.tiles.search.likeness_search import LikenessSearch
 from orbiflow.tiles.search.placements import Placements, best_placements
-from orbiflow.tiles.search.settings import BendingSettings
 from orbiflow.tiles.search.starts import mirror_closed
 from orbiflow.tiles.search.tile_space import TileSpace
 from orbiflow.tiles.tilings import IsohedralClass
@@ -91,7 +91,7 @@ def _told_nobody(_share: float) -> None:
 def bent_tiles(
     both: Sequence[Hand],
     kind: IsohedralClass,
-    settings: BendingSettings,
+    settings: LikenessSearch,
     progress: Callable[[float], None] | None = None,
     cancel: Cancel | None = None,
     *,
@@ -140,7 +140,7 @@ def _finalists(
     hand: Hand,
     stiffness: Stiffness,
     kind: IsohedralClass,
-    settings: BendingSettings,
+    settings: LikenessSearch,
     cancel: Cancel,
 ) -> tuple[list[Bent], int]:
     """The best of one hand and stiffness worked out, and how many of them cross themselves."""
@@ -156,7 +156,7 @@ def _finalists(
 
 
 def _best_placements(
-    bodies: Bodies, kind: IsohedralClass, settings: BendingSettings, cancel: Cancel
+    bodies: Bodies, kind: IsohedralClass, settings: LikenessSearch, cancel: Cancel
 ) -> Drawn:
     """Placements of the fine outline whose tiles cost least: few points, then more and more."""
     coarse, middle, fine = bodies
@@ -180,7 +180,7 @@ def _best_placements(
 
 
 def _best_coarse(
-    body: Elastic, kind: IsohedralClass, settings: BendingSettings
+    body: Elastic, kind: IsohedralClass, settings: LikenessSearch
 ) -> tuple[Placements, Complex]:
     """Placements whose tiles cost least, with these: few points, all placements side by side."""
     outline = body.rest[: body.size]

@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-import torch
 
 from orbiflow.arrays import Array, Complex
 from orbiflow.errors import CertificationError
@@ -19,15 +18,10 @@ from orbiflow.tiles.likeness import (
     overlaid,
 )
 from orbiflow.tiles.search.bending import Bent, bent_tiles
+from orbiflow.tiles.search.candidates import Fit, Progress, StillTiles, silent
 from orbiflow.tiles.search.co_deformation import Hand
-from orbiflow.tiles.search.fit import (
-    Fit,
-    Progress,
-    silent,
-)
-from orbiflow.tiles.search.model import TileModel
+from orbiflow.tiles.search.likeness_search import LikenessSearch
 from orbiflow.tiles.search.prototiles import Prototiles
-from orbiflow.tiles.search.settings import BendingSettings
 from orbiflow.tiles.search.tile_space import NearestTiles
 from orbiflow.tiles.silhouette import Target
 from orbiflow.tiles.tilings import IsohedralClass
@@ -64,7 +58,7 @@ class PlacedBent(NamedTuple):
 def fit_bending(
     target: Target,
     kind: IsohedralClass,
-    settings: BendingSettings,
+    settings: LikenessSearch,
     both: Sequence[Hand],
     *,
     per_class: int = 1,
@@ -93,7 +87,7 @@ def fit_bending(
 def _fit(
     target: Target,
     kind: IsohedralClass,
-    settings: BendingSettings,
+    settings: LikenessSearch,
     both: Sequence[Hand],
     per_class: int,
     progress: Progress | None,
@@ -116,16 +110,8 @@ def _fit(
     overlaps = [Overlap(target.normal * (1.0, -1.0 if hand.mirrored else 1.0)) for hand in both]
     placed = [placed_best(bent, overlaps[bent.hand.mirrored]) for bent in found]
     starts = Prototiles.joined([prototile(kind, one) for one in placed])
-    model = TileModel(
-        kind,
-        max_frequency=1,
-        segments=1,
-        smoothness=0.0,
-        steps=1,
-        dtype=torch.float64,
-        prototiles=starts,
-    )  # its field is zero: a flow that stays where it is
-    return Fit(model, settings.placements, dropped, enough, tuple(placed))
+    candidates = StillTiles(kind, starts)
+    return Fit(candidates, settings.placements, dropped, enough, tuple(placed))
 
 
 def placed_best(bent: Bent, overlap: Overlap) -> PlacedBent:

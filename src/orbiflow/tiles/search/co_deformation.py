@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -22,8 +22,9 @@ from orbiflow.tiles.likeness import (
     Pinned,
     Stiffness,
 )
+from orbiflow.tiles.search.likeness_search import LikenessSearch
+from orbiflow.tiles.search.method import Goal
 from orbiflow.tiles.search.placements import Placements
-from orbiflow.tiles.search.settings import BendingSettings
 from orbiflow.tiles.search.tile_space import TileSpace
 from orbiflow.tiles.silhouette import (
     Emphasis,
@@ -185,7 +186,7 @@ class Hand:
 
 def hands(
     target: Target,
-    settings: BendingSettings,
+    settings: LikenessSearch,
     *,
     emphasis: Emphasis | None = None,
     pins: Pins | None = None,
@@ -222,3 +223,20 @@ def hands(
         return Hand(mirrored, points, made)
 
     return hand(samples, False), hand(mirror, True)
+
+
+def shared_hands(goal: Goal, search: LikenessSearch) -> tuple[Hand, Hand]:
+    """Return the target's hands, made once for all classes."""
+    return _hands(goal.target, search.seed, search.multiples, goal.emphasis, goal.pins)
+
+
+@lru_cache(maxsize=2)
+def _hands(
+    target: Target,
+    seed: int,
+    multiples: tuple[int, ...],
+    emphasis: Emphasis | None,
+    pins: Pins | None,
+) -> tuple[Hand, Hand]:
+    settings = LikenessSearch(seed=seed, multiples=multiples)
+    return hands(target, settings, emphasis=emphasis, pins=pins)

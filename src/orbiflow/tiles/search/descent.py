@@ -22,8 +22,8 @@ from orbiflow.fields import (
 )
 from orbiflow.flows import METHODS
 from orbiflow.tiles.search.model import TileModel
+from orbiflow.tiles.search.overlap_search import OverlapSearch
 from orbiflow.tiles.search.prototiles import Prototiles
-from orbiflow.tiles.search.settings import DescentSettings
 from orbiflow.tiles.silhouette import SoftTarget
 from orbiflow.tiles.tilings import IsohedralClass
 from orbiflow.typed_torch import linalg
@@ -49,7 +49,7 @@ class Descent:
     """
 
     def __init__(
-        self, kind: IsohedralClass, prototiles: Prototiles, settings: DescentSettings
+        self, kind: IsohedralClass, prototiles: Prototiles, settings: OverlapSearch
     ) -> None:
         self.settings = settings
         self.done = 0

@@ -2,35 +2,37 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 import shapely
 import torch
 
 from orbiflow.arguments import instance
 from orbiflow.arrays import Array
-from orbiflow.runtime import Cancel
+from orbiflow.runtime import Cancel, one_thread
 from orbiflow.tiles.likeness import (
     Recogniser,
     boundary_iou,
     prepared_region,
     rank_score,
 )
-from orbiflow.tiles.search.descent import Descent
-from orbiflow.tiles.search.fit import (
+from orbiflow.tiles.search.candidates import (
     Fit,
     Progress,
     silent,
 )
+from orbiflow.tiles.search.descent import Descent
 from orbiflow.tiles.search.model import TileModel
+from orbiflow.tiles.search.overlap_search import OverlapSearch
 from orbiflow.tiles.search.polish import polish
 from orbiflow.tiles.search.prototiles import Prototiles
-from orbiflow.tiles.search.settings import DescentSettings
 from orbiflow.tiles.search.starts import (
     Starts,
     outline_starts,
     template_starts,
 )
-from orbiflow.tiles.silhouette import SoftTarget, Target
+from orbiflow.tiles.silhouette import Emphasis, SoftTarget, Target
 from orbiflow.tiles.tilings import IsohedralClass, isohedral_class
 
 FEW, POOR = 8, 0.4
@@ -43,7 +45,7 @@ NEAR = 0.01
 def fit_descent(
     target: Target,
     kind: IsohedralClass | str,
-    settings: DescentSettings | None = None,
+    settings: OverlapSearch | None = None,
     *,
     soft: SoftTarget | None = None,
     progress: Progress | None = None,
@@ -64,7 +66,7 @@ def fit_descent(
     """
     kind = isohedral_class(kind)
     instance(target, Target, "the target", "Target.read and Target.from_polygon make one")
-    settings = instance(settings or DescentSettings(), DescentSettings, "settings")
+    settings = instance(settings or OverlapSearch(), OverlapSearch, "settings")
     outline = shapely.Polygon(target.normal).exterior
     settings = settings.for_outline(outline.length)
     soft = soft or SoftTarget(target)
@@ -99,6 +101,13 @@ def fit_descent(
     return Fit(model, len(prototiles), crossed, 1)
 
 
+@lru_cache(maxsize=2)  # targets hash by identity; one serves all classes
+def shared_soft_target(target: Target, emphasis: Emphasis | None) -> SoftTarget:
+    """Return the target with a soft edge, made once for all classes."""
+    with one_thread():
+        return SoftTarget(target, emphasis=emphasis)
+
+
 def _with_start(model: TileModel, prototile: Prototiles) -> TileModel:
     """The candidates after a start that none of them beats, with a flow that stays where it is."""
     still = TileModel(
@@ -115,7 +124,7 @@ def _with_start(model: TileModel, prototile: Prototiles) -> TileModel:
 
 
 def _polished(
-    target: Target, model: TileModel, settings: DescentSettings, cancel: Cancel
+    target: Target, model: TileModel, settings: OverlapSearch, cancel: Cancel
 ) -> TileModel:
     """The same candidates, each with one segment more."""
     polished: list[TileModel] = []
@@ -162,7 +171,7 @@ def _best_first(target: Target, goal: shapely.Polygon, soft: SoftTarget, descent
 
 
 def _starts(
-    target: Target, kind: IsohedralClass, settings: DescentSettings, cancel: Cancel
+    target: Target, kind: IsohedralClass, settings: OverlapSearch, cancel: Cancel
 ) -> Starts:
     phase = float(np.random.default_rng(settings.seed).random()) if settings.seed else 0.0
     found: Starts | None = None

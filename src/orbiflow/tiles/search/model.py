@@ -25,7 +25,8 @@ from orbiflow.flows import Flow
 from orbiflow.symmetry import CrystallographicGroup
 from orbiflow.tiles.geometry import subdivided
 from orbiflow.tiles.search.prototiles import Prototiles
-from orbiflow.tiles.tilings import IsohedralClass
+from orbiflow.tiles.tile_map import TileMap
+from orbiflow.tiles.tilings import IsohedralClass, Tile
 from orbiflow.tiles.tilings import isohedral_class as class_of
 from orbiflow.typed_torch import linalg
 
@@ -282,6 +283,18 @@ class TileModel(nn.Module):
         for own, parameters in zip(model.fourier_fields(), fields, strict=True):
             own.parameters_.copy_(parameters)
         return model
+
+    def finished(self, index: int, *, force: bool = False) -> tuple[Tile, TileMap]:
+        """Return the polygon of a candidate with its group, and the flow that made it."""
+        from orbiflow.tiles.search.boundary import extract_tile
+        from orbiflow.tiles.search.storage import as_map
+
+        tile, fine = extract_tile(self.take([index]), force=force)
+        return tile, as_map(fine)
+
+    def as_model(self) -> TileModel:
+        """Return the candidates as a torch module, which they are."""
+        return self
 
     def require_single(self) -> None:
         """Do nothing if the model holds one candidate.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import shapely
@@ -13,15 +13,12 @@ from torch import Tensor
 
 from orbiflow.arguments import (
     instance,
-    number,
-    numbers,
     whole,
 )
-from orbiflow.flows import method as integrator
 from orbiflow.runtime import Cancel
-from orbiflow.tiles.search.fit import Progress, silent
+from orbiflow.tiles.search.candidates import Progress, silent
 from orbiflow.tiles.search.model import TileModel
-from orbiflow.tiles.search.settings import check_max_frequency
+from orbiflow.tiles.search.occupancy_search import OccupancySearch
 from orbiflow.tiles.search.starts import initial_poses, template_symmetries
 from orbiflow.tiles.silhouette import Target, signed_distance
 from orbiflow.tiles.tilings import IsohedralClass, isohedral_class
@@ -34,56 +31,6 @@ from orbiflow.typed_torch import (
 
 SHAPE_PENALTY = 0.02
 """Factor of the squared displacement of a pentagon's free vertex: keeps the template simple."""
-
-
-@dataclass(frozen=True)
-class OccupancySettings:
-    """Knobs of the occupancy method; the defaults were measured on the paper's goals.
-
-    - `max_frequency`: Omega; 0 leaves the flow the translations that commute with the group.
-    - `turns`: starting rotations of the template.
-    - `finalists`: starts that survive the affine phase; a third of the flow phase later the better
-      half of them goes on.
-    - `affine_iterations`, `iterations`: steps of each phase.
-    - `points`: sample points an iteration.
-    - `hardness`: tau at the start and end of the flow phase, per unit of length (the target has
-      area 1); it grows geometrically.
-    - `penalty`: factor of the fields' Sobolev energy, start and end. Without it the flow folds
-      parts of the tile to nothing, which no integrator follows.
-    - `smoothness`: Sobolev exponent s of the fields.
-    - `segments`: stationary pieces of the flow.
-    - `steps`, `method`: integrator during the optimisation; results are judged at finer steps.
-    - `learning_rate`: of Adam on the fields.
-    - `seed`: of the sample points.
-    """
-
-    max_frequency: int = 10
-    turns: int = 12
-    finalists: int = 4
-    affine_iterations: int = 80
-    iterations: int = 200
-    points: int = 800
-    hardness: tuple[float, float] = (8.0, 70.0)
-    penalty: tuple[float, float] = (1e-2, 1e-3)
-    smoothness: float = 2.0
-    segments: int = 1
-    steps: int = 4
-    method: str = "midpoint"
-    learning_rate: float = 0.04
-    seed: int = 0
-
-    def __post_init__(self) -> None:
-        for name in ("turns", "finalists", "iterations", "points", "segments", "steps"):
-            whole(getattr(self, name), name, 1)
-        check_max_frequency(self.max_frequency)
-        integrator(instance(self.method, str, "method"))
-        whole(self.affine_iterations, "affine_iterations", 0)
-        number(self.smoothness, "smoothness", 0)
-        number(self.learning_rate, "learning_rate", 0, above=True)
-        for name in ("hardness", "penalty"):
-            for value in numbers(getattr(self, name), name, (2,)):
-                number(value, f"{name}, first and last,", 0, above=True)
-        whole(self.seed, "seed", 0, 2**32 - 1)
 
 
 class OccupancySamples:
@@ -142,7 +89,7 @@ def occupancy_loss(
 def fit_occupancy(
     target: Target,
     kind: IsohedralClass | str,
-    settings: OccupancySettings | None = None,
+    settings: OccupancySearch | None = None,
     progress: Progress | None = None,
     *,
     cancel: Cancel | None = None,
@@ -157,7 +104,7 @@ def fit_occupancy(
     """
     kind = isohedral_class(kind)
     instance(target, Target, "the target", "Target.read and Target.from_polygon make one")
-    settings = instance(settings or OccupancySettings(), OccupancySettings, "settings")
+    settings = instance(settings or OccupancySearch(), OccupancySearch, "settings")
     # the mean over the candidates is all that couples them: separate fits, one tensor
     samples = OccupancySamples(target, 16384, seed=settings.seed)
     cancel = cancel or Cancel()
@@ -176,7 +123,7 @@ def fit_occupancy(
     return _ranked(model, samples, settings.hardness[1], keep=model.size)
 
 
-def _start(isohedral_class: IsohedralClass, settings: OccupancySettings) -> TileModel:
+def _start(isohedral_class: IsohedralClass, settings: OccupancySearch) -> TileModel:
     angles, mirrored = initial_poses(isohedral_class, settings.turns)
     return TileModel(
         isohedral_class,
@@ -196,7 +143,7 @@ def _pose(model: TileModel) -> list[torch.nn.Parameter]:
 
 
 def _affine_phase(
-    model: TileModel, samples: OccupancySamples, settings: OccupancySettings, cancel: Cancel
+    model: TileModel, samples: OccupancySamples, settings: OccupancySearch, cancel: Cancel
 ) -> TileModel:
     optimizer = adam(_pose(model), lr=0.03)
     for _ in range(settings.affine_iterations):
@@ -232,7 +179,7 @@ def _distinct(model: TileModel, count: int) -> list[int]:
 def _flow_phase(
     model: TileModel,
     samples: OccupancySamples,
-    settings: OccupancySettings,
+    settings: OccupancySearch,
     begin: int,
     end: int,
     report: Progress,

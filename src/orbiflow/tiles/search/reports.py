@@ -3,70 +3,43 @@
 from __future__ import annotations
 
 import platform
-from collections.abc import Sequence
 from dataclasses import asdict
-from typing import Any
+from importlib.metadata import version
+from typing import Any, cast
 
 import numpy as np
 import shapely
-import torch
 
 from orbiflow import __version__
 from orbiflow.tiles.result_file import SCHEMA_VERSION, tile_json
-from orbiflow.tiles.search.methods import (
-    Settings,
-    method_name,
-    objective_name,
-)
-from orbiflow.tiles.search.result import ClassFailure
-from orbiflow.tiles.silhouette import (
-    Emphasis,
-    Pins,
-    Target,
-)
-from orbiflow.tiles.tile import EscherTile
+from orbiflow.tiles.search.escherizing import SearchResult
 
 
-def report(
-    target: Target,
-    results: Sequence[EscherTile],
-    failures: Sequence[ClassFailure],
-    settings: Settings,
-    *,
-    seconds: float,
-    workers: int,
-    emphasis: Emphasis | None = None,
-    pins: Pins | None = None,
-) -> dict[str, Any]:
-    """The whole document, ready for JSON, tiles best first.
-
-    Args:
-        seconds: wall-clock time of the search.
-        workers: processes that were used.
-        emphasis: the mask, if there was one.
-        pins: what was not to bend, if anything.
-    """
+def report(result: SearchResult) -> dict[str, Any]:
+    """Return the whole document, ready for JSON, tiles best first."""
+    tiles, method = result.tiles, result.method
+    core_seconds = sum({tile.isohedral_class: tile.seconds for tile in tiles}.values())
     return {
         "schema_version": SCHEMA_VERSION,
-        "method": method_name(settings),
-        "objective": objective_name(settings),
-        "seed": settings.seed,
-        "settings": asdict(settings),
+        "method": method.method_name,
+        "objective": method.objective,
+        "seed": method.seed,
+        "settings": asdict(cast(Any, method)),
         "versions": {
             "orbiflow": __version__,
             "python": platform.python_version(),
-            "torch": torch.__version__,
+            "torch": version("torch"),
             "numpy": np.__version__,
             "shapely": shapely.__version__,
         },
         "timings": {
-            "wall_seconds": round(seconds, 3),
-            "core_seconds": round(sum({r.isohedral_class: r.seconds for r in results}.values()), 3),
-            "workers": workers,
+            "wall_seconds": round(result.seconds, 3),
+            "core_seconds": round(core_seconds, 3),
+            "workers": result.workers,
         },
-        "input": target.report(),
-        "emphasis": None if emphasis is None else emphasis.report(),
-        "pins": None if pins is None else pins.report(),
-        "tiles": [tile_json(result) for result in results],
-        "failed": [{"class": f.name, "reason": f.reason} for f in failures],
+        "input": result.target.report(),
+        "emphasis": None if result.emphasis is None else result.emphasis.report(),
+        "pins": None if result.pins is None else result.pins.report(),
+        "tiles": [tile_json(tile) for tile in tiles],
+        "failed": [{"class": f.name, "reason": f.reason} for f in result.failures],
     }

@@ -24,32 +24,12 @@ from orbiflow.runtime import (
     process_context,
     work,
 )
-from orbiflow.tiles.likeness import (
-    diverse,
-    least_neck,
-    mutual_iou,
-)
-from orbiflow.tiles.search.front import (
-    ALIKE,
-    front_list,
-    measured,
-)
-from orbiflow.tiles.search.methods import (
-    BothSettings,
-    OneSettings,
-    Settings,
-    fit,
-    parts,
-    prepare,
-    shared_hands,
-)
-from orbiflow.tiles.search.occupancy import OccupancySettings
-from orbiflow.tiles.search.result import (
-    ClassFailure,
-    best_tiles,
-)
-from orbiflow.tiles.search.settings import BendingSettings, DescentSettings
-from orbiflow.tiles.search.steps import quick_bent_tile, quick_tile
+from orbiflow.tiles.likeness import diverse, mutual_iou
+from orbiflow.tiles.search.both_search import ALIKE
+from orbiflow.tiles.search.candidates import Fit, Progress
+from orbiflow.tiles.search.certifying import HOW, ClassFailure, best_tiles
+from orbiflow.tiles.search.likeness_search import LikenessSearch
+from orbiflow.tiles.search.method import Goal, SearchMethod
 from orbiflow.tiles.silhouette import (
     Emphasis,
     Pins,
@@ -61,9 +41,6 @@ from orbiflow.tiles.tilings import (
     IsohedralClass,
     isohedral_class,
 )
-
-CANDIDATES = 3
-"""Tiles of each class, of either search, that a search for both chooses from at least."""
 
 INTERRUPTED = "interrupted"
 """The reason given for a class that was left undone."""
@@ -77,7 +54,7 @@ Outcome = EscherTile | ClassFailure
 
 @dataclass(frozen=True)
 class Event:
-    """News from a search, told in the thread that called `escherize`, in this order:
+    """News from a search, told in the thread that called `search_classes`, in this order:
 
     1. at most one event with a `preview`;
     2. of each class, any number of events whose `share` never falls, then exactly one with its
@@ -101,34 +78,100 @@ class Event:
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """What is to be done for each class: arguments as in `escherize`."""
+    """What is to be done for each class: arguments as in `search_classes`."""
 
-    target: Target
-    settings: Settings
-    emphasis: Emphasis | None = None
-    pins: Pins | None = None
+    goal: Goal
+    method: SearchMethod
     per_class: int = 1
     force: bool = False
 
-    def __post_init__(self) -> None:
-        instance(self.target, Target, "the target", "Target.read and Target.from_polygon make one")
-        if not is_a(self.settings, Settings):
-            raise OrbiflowError(
-                f"settings must be of a method, got {described(self.settings)}; for a level of "
-                'effort: BendingSettings.for_effort("fast")'
-            )
-        if self.pins is not None:
-            instance(self.pins, Pins, "pins", "Pins.read and Pins.at make one")
-            if not isinstance(self.settings, BendingSettings | BothSettings):
-                raise OrbiflowError(
-                    "pins belong to the search for likeness, where silhouettes bend"
-                )
+    @classmethod
+    def checked(
+        cls,
+        target: Target,
+        method: SearchMethod | None,
+        emphasis: Emphasis | None,
+        pins: Pins | None,
+        per_class: int,
+        force: bool,
+    ) -> Task:
+        """Return the task, with what its method needs imported."""
+        instance(target, Target, "the target", HOW)
+        if pins is not None:
+            instance(pins, Pins, "pins", "Pins.read and Pins.at make one")
+        method = _checked(method, pins)
+        method.load()
+        return cls(Goal(target, emphasis, pins), method, per_class, force)
 
 
-def escherize(
+def fit_tile(
+    target: Target,
+    kind: IsohedralClass | str | int,
+    method: SearchMethod | None = None,
+    *,
+    emphasis: Emphasis | None = None,
+    pins: Pins | None = None,
+    per_class: int = 1,
+    progress: Progress | None = None,
+    cancel: Cancel | None = None,
+) -> Fit:
+    """Fit tiles of one class to a target, in this process; `certified_tiles` makes polygons of them.
+
+    `escherize` does both, for several classes. This is for those who look at, or go on with, what was
+    fitted: `Fit.model` is a `TileModel`, a torch module whose candidates may be trained on.
+
+    Args:
+        target: the silhouette.
+        kind: the class, or its name.
+        method: how to search; default `LikenessSearch`.
+        emphasis: what must survive; the occupancy method takes no notice.
+        pins: what must not bend, in the search for likeness.
+        per_class: certified tiles that are wanted.
+        progress: told the share of the work done, and the loss.
+        cancel: looked at before each step.
+
+    Raises:
+        OrbiflowError: for an argument that cannot be used.
+        CertificationError: if no candidate is left.
+        Cancelled: if it was told to stop.
+
+    >>> boot = Target.from_polygon([[0, 0], [3, 0], [3.4, 1.2], [2.2, 1.5], [2, 2.8], [0.8, 2.5]])
+    >>> few = LikenessSearch(placements=10, held=3, finalists=1, rounds=2)
+    >>> best, *_ = certified_tiles(boot, fit_tile(boot, "IH4", few))
+    >>> best.name, best.certificate.valid
+    ('IH4', True)
+    """
+    instance(target, Target, "the target", HOW)
+    method = _checked(method, pins)
+    method.load()
+    with one_thread():
+        return method.fit(
+            Goal(target, emphasis, pins),
+            isohedral_class(kind),
+            per_class=per_class,
+            progress=progress,
+            cancel=cancel,
+        )
+
+
+def _checked(method: SearchMethod | None, pins: Pins | None) -> SearchMethod:
+    """Return the method, by default a search for likeness of normal effort."""
+    if method is None:
+        return LikenessSearch.for_effort("normal")
+    if not is_a(method, SearchMethod):
+        raise OrbiflowError(
+            f"the method must be a search such as LikenessSearch(), got {described(method)}; for a "
+            'level of effort: LikenessSearch.for_effort("fast")'
+        )
+    if pins is not None and not method.takes_pins:
+        raise OrbiflowError("pins belong to the search for likeness, where silhouettes bend")
+    return method
+
+
+def search_classes(
     target: Target,
     classes: ClassName | Iterable[ClassName] = tuple(CLASSES),
-    settings: Settings | None = None,
+    method: SearchMethod | None = None,
     *,
     emphasis: Emphasis | None = None,
     pins: Pins | None = None,
@@ -138,14 +181,13 @@ def escherize(
     watch: Watcher | None = None,
     cancel: Cancel | None = None,
 ) -> tuple[list[EscherTile], list[ClassFailure]]:
-    """Fit a tile of each class to the target.
+    """Fit a tile of each class to the target, with knobs of one's own; see `escherize`.
 
     Args:
         target: the silhouette.
         classes: name of one, such as "IH4", or several; each is done once, in its own process.
-        settings: of the search for likeness (`BendingSettings`, the default), for overlap
-            (`DescentSettings`), for both (`BothSettings`), or of the paper's method
-            (`OccupancySettings`).
+        method: how to search: for likeness (`LikenessSearch`, the default), for overlap
+            (`OverlapSearch`), for both (`BothSearch`), or by the paper's method (`OccupancySearch`).
         emphasis: what must survive.
         pins: what must not bend, in the search for likeness.
         per_class: tiles of each class at most, no two of them with a mutual IoU of .9; in a search
@@ -160,7 +202,7 @@ def escherize(
 
     Returns:
         Certified tiles, best first (`EscherTile.score`), and the classes that gave none. Of
-        `BothSettings` at most twelve tiles in all, those for likeness first: see `front_list`. The
+        `BothSearch` at most twelve tiles in all, those for likeness first: see `front_list`. The
         same seed gives the same tiles, whatever the number of workers. If it was cancelled: what was
         found by then, and the other classes as failures with the reason `INTERRUPTED`.
 
@@ -173,13 +215,13 @@ def escherize(
     for what, number in (("workers", workers), ("per_class", per_class)):
         if number < 1:
             raise OrbiflowError(f"{what} must be at least 1, got {number}")
-    settings = BendingSettings.for_effort("normal") if settings is None else settings
-    task = Task(target, settings, emphasis, pins, per_class, force)
+    task = Task.checked(target, method, emphasis, pins, per_class, force)
     cancel = cancel or Cancel()
     teller = _Teller(watch)
     count = min(workers, len(names))
     # asked before torch is limited here: a limit makes no fork safe
-    context = process_context(("orbiflow.tiles.search.searching",)) if count > 1 else None
+    preload = ("orbiflow.tiles.search.searching", *task.method.modules)
+    context = process_context(preload) if count > 1 else None
     with contextlib.suppress(Cancelled):
         _preview(task, names, teller.tell, cancel)
         if context is None:
@@ -190,7 +232,7 @@ def escherize(
                     teller.tell(event)
     teller.interrupted(names)
     results, failures = teller.sorted(names)
-    return front_list(results) if isinstance(settings, BothSettings) else results, failures
+    return task.method.short_list(results), failures
 
 
 def _names(classes: ClassName | Iterable[ClassName]) -> list[str]:
@@ -206,7 +248,7 @@ def _names(classes: ClassName | Iterable[ClassName]) -> list[str]:
 def escherize_class(
     target: Target,
     name: str,
-    settings: Settings,
+    method: SearchMethod,
     *,
     emphasis: Emphasis | None = None,
     pins: Pins | None = None,
@@ -215,12 +257,12 @@ def escherize_class(
     watch: Watcher | None = None,
     cancel: Cancel | None = None,
 ) -> Outcome:
-    """Fit and certify one class in this process, on one thread; arguments as in `escherize`.
+    """Fit and certify one class in this process, on one thread; arguments as in `search_classes`.
 
     Raises:
         Cancelled: if it was told to stop.
     """
-    task = Task(target, settings, emphasis, pins, per_class, force)
+    task = Task.checked(target, method, emphasis, pins, per_class, force)
     return _work_on(task, name, watch or _ignore, cancel or Cancel())
 
 
@@ -268,9 +310,9 @@ def _work_on(task: Task, name: str, watch: Watcher, cancel: Cancel) -> Outcome:
     chosen: list[EscherTile] = []
     reasons: list[str] = []
     done = 0.0
-    for share, settings in parts(task.settings):
+    for share, method in task.method.parts():
         try:
-            chosen += _chosen_tiles(task, kind, settings, watch, cancel, done, share)
+            chosen += _chosen_tiles(task, kind, method, watch, cancel, done, share)
         except CertificationError as error:  # the other part may give one
             reasons.append(str(error))
         done += share
@@ -284,39 +326,26 @@ def _work_on(task: Task, name: str, watch: Watcher, cancel: Cancel) -> Outcome:
 def _chosen_tiles(
     task: Task,
     kind: IsohedralClass,
-    settings: OneSettings,
+    method: SearchMethod,
     watch: Watcher,
     cancel: Cancel,
     done: float,
     share: float,
-) -> list[EscherTile]:
+) -> Sequence[EscherTile]:
     """The tiles of one fit that are shown, best first; `done` of the class's work was done before."""
-    both = isinstance(task.settings, BothSettings)
-    count = max(CANDIDATES, task.per_class) if both else task.per_class
+    goal, count = task.goal, task.method.shown(task.per_class)
     with one_thread():
-        found = fit(
-            task.target,
+        found = method.fit(
+            goal,
             kind,
-            settings,
-            emphasis=task.emphasis,
-            pins=task.pins,
             per_class=count,
             progress=lambda own, loss: watch(Event(kind.name, done + share * own, loss)),
             cancel=cancel,
         )
-        tiles = best_tiles(task.target, found, force=task.force, min_neck=_min_neck(task, settings))
+        tiles = best_tiles(goal.target, found, force=task.force, min_neck=method.least_neck(goal))
         chosen = [tiles[k] for k in _without_twins(tiles, count)]
-        if not isinstance(task.settings, BothSettings):
-            return chosen
-        hand, _ = shared_hands(task.target, task.settings.likeness, task.emphasis, task.pins)
         cancel.check()
-        return [measured(tile, hand) for tile in chosen]
-
-
-def _min_neck(task: Task, settings: OneSettings) -> float:
-    if isinstance(settings, BendingSettings):
-        return least_neck(task.target.normal, settings.min_neck)
-    return 0.0 if isinstance(settings, OccupancySettings) else settings.min_neck
+        return task.method.finish(chosen, goal)
 
 
 def _without_twins(tiles: Sequence[EscherTile], count: int) -> list[int]:
@@ -331,15 +360,8 @@ def _without_twins(tiles: Sequence[EscherTile], count: int) -> list[int]:
 
 def _preview(task: Task, names: Sequence[str], watch: Watcher, cancel: Cancel) -> None:
     """A first tile to look at, while the others are on their way."""
-    tile = None
-    _, settings = parts(task.settings)[0]
     with one_thread():
-        if isinstance(settings, BendingSettings):
-            tile = quick_bent_tile(
-                task.target, names, settings, task.emphasis, task.pins, cancel=cancel
-            )
-        elif isinstance(settings, DescentSettings) and settings.starts == "outline":
-            tile = quick_tile(task.target, names, cancel=cancel)
+        tile = task.method.preview(task.goal, names, cancel)
     if tile is not None:
         watch(Event(tile.name, 0.0, 1 - tile.metrics.iou, preview=tile))
 
@@ -364,7 +386,7 @@ def _run_pool(
     cancel.check()
     if context.get_start_method() == "fork":
         with one_thread():
-            prepare(task.target, task.settings, task.emphasis, task.pins)  # once, for all workers
+            task.method.prepare(task.goal)  # once, for all workers
     # classes with more lattice freedom take longer
     order = sorted(names, key=lambda name: -isohedral_class(name).stretch_dim)
     function = functools.partial(_work_on, task)

@@ -9,10 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
-import torch
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
-from torch import Tensor
 
 from orbiflow.arguments import instance, whole
 from orbiflow.arrays import Array, Complex
@@ -63,16 +61,16 @@ def template_symmetries(isohedral_class: IsohedralClass) -> tuple[int, bool]:
     return order, mirrored
 
 
-def initial_poses(isohedral_class: IsohedralClass, turns: int) -> tuple[Tensor, Tensor]:
+def initial_poses(isohedral_class: IsohedralClass, turns: int) -> tuple[Array, NDArray[np.bool_]]:
     """Angles (S,) in radians and mirror flags (S,): `turns` angles, twice if mirroring matters.
 
     The angles divide the range in which the template does not look the same.
     """
     order, mirror_closed = template_symmetries(isohedral_class)
-    angles = torch.arange(turns, dtype=torch.float64) * (2 * math.pi / order / turns)
+    angles = np.arange(turns, dtype=np.float64) * (2 * math.pi / order / turns)
     if mirror_closed:
-        return angles, torch.zeros(turns, dtype=torch.bool)
-    return angles.repeat(2), torch.arange(2 * turns) >= turns
+        return angles, np.zeros(turns, dtype=np.bool_)
+    return np.tile(angles, 2), np.arange(2 * turns) >= turns
 
 
 def _keeps(isometry: Isometry, vertices: Array, group: CrystallographicGroup) -> bool:

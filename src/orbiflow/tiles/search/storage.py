@@ -11,14 +11,14 @@ import torch
 from orbiflow.arguments import instance
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
+from orbiflow.tiles.search.candidates import CORNERS, VERTICES
+from orbiflow.tiles.search.method import MAX_FREQUENCY, MAX_SEGMENTS
 from orbiflow.tiles.search.model import TileModel
-from orbiflow.tiles.search.settings import MAX_FREQUENCY, MAX_SEGMENTS
 from orbiflow.tiles.silhouette import Bending, Frame
 from orbiflow.tiles.tile_map import TileMap, naming_file
 from orbiflow.tiles.tilings import isohedral_class
 
 MAX_SIDES = 100_000
-VERTICES, CORNERS = "prototile.outline", "prototile.corners"
 
 
 def as_map(model: TileModel, frame: Frame | None = None, bending: Bending | None = None) -> TileMap:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, overload
@@ -10,7 +9,7 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from orbiflow.arguments import numbers
+from orbiflow.arguments import is_tensor, numbers
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.geometry import best_similarity, complex_points
@@ -165,8 +164,9 @@ def _checked(points: Any) -> Array:
 
 
 def _kind_of(given: Any, result: Array) -> Any:
-    torch = sys.modules.get("torch")  # which a tensor's owner has imported
-    if torch is None or not isinstance(given, torch.Tensor):
+    if not is_tensor(given):
         return result
+    import torch
+
     dtype = given.dtype if given.is_floating_point() else torch.float64
     return torch.as_tensor(result, dtype=dtype, device=given.device)

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Self, overload
+from typing import TYPE_CHECKING, Any, Self, overload
 
 import numpy as np
-import torch
 from numpy.typing import ArrayLike
 
-from orbiflow.arguments import numbers
+from orbiflow.arguments import is_tensor, numbers
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
+
+if TYPE_CHECKING:
+    import torch
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +74,7 @@ class Frame:
     def to_input(self, points: ArrayLike) -> Array: ...
     def to_input(self, points: torch.Tensor | ArrayLike) -> torch.Tensor | Array:
         """Points (..., 2) of the normal form in the input's units; arrays, lists or tensors."""
-        if isinstance(points, torch.Tensor):
+        if is_tensor(points):
             points = _tensor(points)
             return points @ points.new_tensor(self.linear).T + points.new_tensor(self.offset)
         return numbers(points, "points", (..., 2), finite=False) @ self.linear.T + self.offset
@@ -83,7 +85,7 @@ class Frame:
     def to_normal(self, points: ArrayLike) -> Array: ...
     def to_normal(self, points: torch.Tensor | ArrayLike) -> torch.Tensor | Array:
         """Points (..., 2) in the input's units, in the normal form; arrays, lists or tensors."""
-        if isinstance(points, torch.Tensor):
+        if is_tensor(points):
             points = _tensor(points)
             return (points - points.new_tensor(self.offset)) @ points.new_tensor(self.inverse).T
         local = numbers(points, "points", (..., 2), finite=False) - self.offset

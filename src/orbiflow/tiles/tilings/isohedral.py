@@ -6,12 +6,11 @@ import math
 import re
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple, overload
+from typing import Any, NamedTuple, cast, overload
 
 import numpy as np
-import torch
 
-from orbiflow.arguments import described, numbers
+from orbiflow.arguments import described, is_tensor, numbers
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import (
@@ -72,42 +71,46 @@ PENTAGONS: dict[str, PentagonGauge] = {
 }
 
 
-def hexagon() -> torch.Tensor:
+def hexagon() -> Array:
     """(6, 2) vertices p_k = (cos 60k, sin 60k), float64, counter-clockwise."""
     half, high = 0.5, math.sqrt(3.0) / 2
-    return torch.tensor(
-        [(1.0, 0.0), (half, high), (-half, high), (-1.0, 0.0), (-half, -high), (half, -high)],
-        dtype=torch.float64,
+    return np.array(
+        [(1.0, 0.0), (half, high), (-half, high), (-1.0, 0.0), (-half, -high), (half, -high)]
     )
 
 
-def pentagon(gauge: PentagonGauge, shape: torch.Tensor) -> torch.Tensor:
+def pentagon(gauge: PentagonGauge, shape: Points) -> Points:
     """Vertices (..., 5, 2) of the pentagon whose p1 is moved by `shape` (..., 2) from its default.
 
     Counter-clockwise for small shapes. Differentiable in `shape`.
 
-    >>> tile = pentagon(PENTAGONS["cairo"], torch.zeros(2, dtype=torch.float64))
-    >>> sides = (tile.roll(-1, 0) - tile).norm(dim=1) / tile[1].norm()
-    >>> [round(float(side), 6) for side in sides]
+    >>> tile = pentagon(PENTAGONS["cairo"], np.zeros(2))
+    >>> sides = np.linalg.norm(np.roll(tile, -1, axis=0) - tile, axis=1)
+    >>> [round(float(side), 6) for side in sides / sides[0]]
     [1.0, 1.0, 1.0, 0.732051, 1.0]
     """
 
-    def turn(degrees: float, vector: torch.Tensor) -> torch.Tensor:
-        return vector @ cast_like(rotation_matrix(math.radians(degrees)), shape).T
+    def turn(degrees: float, vector: Points) -> Points:
+        matrix = rotation_matrix(math.radians(degrees))
+        if not is_tensor(vector):  # rounded as torch rounds it, so that both give the same template
+            turned = vector[..., :1] * matrix[:, 0] + vector[..., 1:] * matrix[:, 1]
+            return cast(Points, turned)
+        return vector @ cast_like(matrix, shape).T
 
-    p1 = shape + shape.new_tensor(gauge.default)
-    p0 = torch.zeros_like(p1)
-    p2 = torch.zeros_like(p1) + shape.new_tensor((gauge.distance, 0.0))
+    functions = _functions(shape)
+    p1 = shape + cast_like(np.array(gauge.default), shape)
+    p0 = functions.zeros_like(p1)
+    p2 = p0 + cast_like(np.array((gauge.distance, 0.0)), shape)
     p3 = p2 + turn(gauge.degrees_2, p1 - p2)
     p4 = turn(gauge.degrees_0, p1)
-    return torch.stack([p0, p1, p2, p3, p4], dim=-2)
+    return functions.stack([p0, p1, p2, p3, p4], -2)
 
 
-def template_vertices(kind: TemplateKind, shape: torch.Tensor) -> torch.Tensor:
+def template_vertices(kind: TemplateKind, shape: Points) -> Points:
     """Vertices (..., K, 2) for shape parameters (..., 2) of a pentagon or (..., 0) of the hexagon."""
     if kind == "hexagon":
-        vertices = hexagon().to(dtype=shape.dtype, device=shape.device)
-        return vertices.expand(*shape.shape[:-1], 6, 2)
+        vertices = cast_like(hexagon(), shape)
+        return _functions(shape).broadcast_to(vertices, (*shape.shape[:-1], 6, 2))
     return pentagon(PENTAGONS[kind], shape)
 
 
@@ -142,27 +145,46 @@ def commutant(linear_parts: Array) -> Array:
     return np.array(basis).reshape(-1, 2)
 
 
-def stretch_matrix(basis: Array, parameters: torch.Tensor) -> torch.Tensor:
+def stretch_matrix(basis: Array, parameters: Points) -> Points:
     """Unimodular symmetric maps (..., 2, 2) for parameters (..., m) over a basis of `commutant`.
 
     exp [[a, b], [b, -a]], where (a, b) = parameters @ basis. Differentiable, at zero too.
     """
-    a, b = (parameters @ parameters.new_tensor(basis)).unbind(dim=-1)
+    both = parameters @ cast_like(basis, parameters)
+    a, b = both[..., 0], both[..., 1]
     cosh, sinhc = _cosh_sinhc(a * a + b * b)
     rows = [cosh + sinhc * a, sinhc * b, sinhc * b, cosh - sinhc * a]
-    return torch.stack(rows, dim=-1).reshape(*parameters.shape[:-1], 2, 2)
+    return _functions(parameters).stack(rows, -1).reshape(*parameters.shape[:-1], 2, 2)
 
 
-def _cosh_sinhc(square: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+def _functions(values: Any) -> Any:
+    """Return the library that these values belong to, of which functions of both are used."""
+    if not is_tensor(values):
+        return np
+    import torch
+
+    return torch
+
+
+class _OfTheCLibrary:
+    """Functions of NumPy arrays rounded as torch rounds them."""
+
+    cosh = np.vectorize(math.cosh, otypes=[float])
+    sinh = np.vectorize(math.sinh, otypes=[float])
+
+
+def _cosh_sinhc(square: Any) -> tuple[Any, Any]:
     """cosh r and sinh(r) / r as functions of r^2, by their series where the root would hurt."""
+    own = _functions(square)
+    hyperbolic = own if is_tensor(square) else _OfTheCLibrary
     small = square < 1e-2
-    root = torch.sqrt(torch.where(small, torch.ones_like(square), square))
-    s = torch.where(small, square, torch.zeros_like(square))
+    root = own.sqrt(own.where(small, own.ones_like(square), square))
+    s = own.where(small, square, own.zeros_like(square))
     cosh = 1 + s / 2 * (1 + s / 12 * (1 + s / 30 * (1 + s / 56 * (1 + s / 90))))
     sinhc = 1 + s / 6 * (1 + s / 20 * (1 + s / 42 * (1 + s / 72 * (1 + s / 110))))
     return (
-        torch.where(small, cosh, torch.cosh(root)),
-        torch.where(small, sinhc, torch.sinh(root) / root),
+        own.where(small, cosh, hyperbolic.cosh(root)),
+        own.where(small, sinhc, hyperbolic.sinh(root) / root),
     )
 
 
@@ -231,8 +253,8 @@ class IsohedralClass:
         """
         if shape is None:
             return self._default.copy()
-        tensor = self._parameters(shape, self.shape_dim, "shape")
-        return _same_kind(template_vertices(self.row.template, tensor), shape)
+        own = self._parameters(shape, self.shape_dim, "shape")
+        return template_vertices(self.row.template, own)
 
     def stretch(self, parameters: Points) -> Points:
         """Unimodular maps L (..., 2, 2) that commute with the point group.
@@ -243,8 +265,9 @@ class IsohedralClass:
         Raises:
             OrbiflowError: if the last axis of `parameters` is not `stretch_dim` long.
         """
-        tensor = self._parameters(parameters, self.stretch_dim, "stretch")
-        return _same_kind(stretch_matrix(self._freedom, tensor), parameters)
+        return stretch_matrix(
+            self._freedom, self._parameters(parameters, self.stretch_dim, "stretch")
+        )
 
     def group(self) -> CrystallographicGroup:
         """The group of the template; the same for all shape parameters."""
@@ -271,9 +294,7 @@ class IsohedralClass:
 
     @cached_property
     def _default(self) -> Array:
-        return template_vertices(
-            self.row.template, torch.zeros(self.shape_dim, dtype=torch.float64)
-        ).numpy()
+        return np.array(template_vertices(self.row.template, np.zeros(self.shape_dim)))
 
     @cached_property
     def _group(self) -> CrystallographicGroup:
@@ -299,27 +320,20 @@ class IsohedralClass:
         line = Line(self._point(row.point), self._point(row.direction))
         return PaperOperator(transflection(line, float(np.hypot(*self._point(row.shift)))), 2)
 
-    def _parameters(self, values: Array | torch.Tensor, size: int, what: str) -> torch.Tensor:
-        tensor = values
-        if not isinstance(tensor, torch.Tensor):
-            tensor = torch.as_tensor(numbers(tensor, f"{what} parameters", (...,)))
-        elif not tensor.is_floating_point():
-            tensor = tensor.double()
-        if tensor.ndim == 0 or tensor.shape[-1] != size:
+    def _parameters(self, values: Any, size: int, what: str) -> Any:
+        if not is_tensor(values):
+            values = numbers(values, f"{what} parameters", (...,))
+        elif not values.is_floating_point():
+            values = values.double()
+        if values.ndim == 0 or values.shape[-1] != size:
             raise OrbiflowError(
                 f"{self.name} has {size} {what} parameters: expected shape (..., {size}), "
-                f"got {tuple(tensor.shape)}"
+                f"got {tuple(values.shape)}"
             )
-        return tensor
+        return values
 
     def __repr__(self) -> str:
         return f"IsohedralClass({self.name}, {self.group_name})"
-
-
-def _same_kind(result: torch.Tensor, like: Points) -> Points:
-    if isinstance(like, torch.Tensor):
-        return result
-    return result.numpy().copy()
 
 
 CLASSES: dict[str, IsohedralClass] = {

@@ -8,12 +8,11 @@ from numbers import Real
 from typing import Any, TypeVar
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 from PIL import Image, ImageOps, UnidentifiedImageError
 from skimage.filters import threshold_otsu
 
-from orbiflow.arguments import described
+from orbiflow.arguments import described, is_tensor
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.tiles.silhouette.readers.reading import (
     Held,
@@ -302,7 +301,7 @@ def read_mask_array(
 
 
 def _array(values: Any, name: str) -> NDArray[Any]:
-    if isinstance(values, torch.Tensor):
+    if is_tensor(values):
         values = values.detach().cpu().numpy()
     try:
         array = np.asarray(values)

@@ -1,4 +1,4 @@
-"""What an escherization gives: the tile, how good it is, and the proof that it tiles."""
+"""From candidates to finished tiles: polygons, measured and certified."""
 
 from __future__ import annotations
 
@@ -8,23 +8,26 @@ from functools import lru_cache
 
 import shapely
 
+from orbiflow.arguments import instance
 from orbiflow.errors import CertificationError, OrbiflowError
+from orbiflow.runtime import one_thread
 from orbiflow.tiles.likeness import (
     Pinned,
     Recogniser,
     compare,
     iou,
+    least_neck,
     narrowest_neck,
 )
 from orbiflow.tiles.search.bending_fit import PlacedBent
 from orbiflow.tiles.search.bent_map import map_of_bent
-from orbiflow.tiles.search.boundary import extract_tile
-from orbiflow.tiles.search.fit import Fit
-from orbiflow.tiles.search.model import TileModel
-from orbiflow.tiles.search.storage import as_map
+from orbiflow.tiles.search.candidates import Candidates, Fit
 from orbiflow.tiles.silhouette import Bending, Target
 from orbiflow.tiles.tile import EscherTile
 from orbiflow.tiles.tilings import Tile
+
+HOW = "Target.read, Target.from_mask and Target.from_polygon make one"
+"""How a target is made, for messages."""
 
 
 @dataclass(frozen=True)
@@ -53,9 +56,9 @@ def best_tiles(
     """
     found: list[EscherTile] = []
     reasons: list[str] = []
-    for index in range(fit.model.size):
+    for index in range(fit.candidates.size):
         try:
-            result = _result(target, fit.model.take([index]), fit.starts, seconds, force=force)
+            result = _result(target, fit, index, seconds, force=force)
             result = result.changed(min_neck=min_neck)
             if not force:
                 result.certificate.require()
@@ -72,10 +75,8 @@ def best_tiles(
     return [result.changed(dropped=fit.crossed + len(reasons)) for result in found]
 
 
-def _result(
-    target: Target, model: TileModel, starts: int, seconds: float, *, force: bool
-) -> EscherTile:
-    tile, fine = extract_tile(model, force=force)
+def _result(target: Target, fit: Fit, index: int, seconds: float, *, force: bool) -> EscherTile:
+    tile, flow = fit.candidates.finished(index, force=force)
     placed = tile.transformed(target.frame.linear, target.frame.offset)
     # a forced tile may cross itself: measure the region that it covers
     shape = shapely.Polygon(placed.polygon)
@@ -84,11 +85,11 @@ def _result(
         placed,
         y_down=target.y_down,
         silhouette=target.report(),
-        map_source=as_map(fine, target.frame),
+        map_source=replace(flow, frame=target.frame),
         normal=tile,
         metrics=compare(region, target.outline),
         recognisability=recogniser(target)(region),
-        starts=starts,
+        starts=fit.starts,
         seconds=seconds,
         thinnest=narrowest_neck(placed.polygon) if shape.is_valid else None,
     )
@@ -124,3 +125,28 @@ def _with_bent(target: Target, result: EscherTile, placed: PlacedBent) -> Escher
 def recogniser(target: Target) -> Recogniser:
     """Of the target's outline in the input's own coordinates."""
     return Recogniser(target.outline)
+
+
+def certified_tiles(
+    target: Target, found: Fit | Candidates, *, force: bool = False, min_neck: float = 0.0
+) -> list[EscherTile]:
+    """Polygons of what was fitted, each proved to tile the plane, best first.
+
+    Args:
+        target: that it was fitted to.
+        found: of `fit_tile`, `fit_descent` or `fit_bending`; the candidates of `fit_occupancy`, or any
+            others, trained further or loaded.
+        force: give tiles that are not certified, too; their certificates say why.
+        min_neck: narrowest neck that a tile's score forgives, a share of its size.
+
+    Raises:
+        OrbiflowError: for what holds no candidates.
+        CertificationError: if none of them is certified and `force` is not set.
+    """
+    instance(target, Target, "the target", HOW)
+    if not isinstance(found, Fit):
+        if not hasattr(found, "finished"):
+            instance(found, Fit, "what was found", "fit_tile gives a Fit, load_model a TileModel")
+        found = Fit(found, found.size, 0, found.size)
+    with one_thread():
+        return best_tiles(target, found, force=force, min_neck=least_neck(target.normal, min_neck))

@@ -1,4 +1,4 @@
-"""A short list from two searches: tiles that no other beats in deformation and overlap together.
+"""The search for both: a short list of tiles that no other beats in deformation and overlap together.
 
 The front of Pareto: a tile is on it if no other has at most its deformation and at least its IoU, and
 one of them better.
@@ -7,14 +7,23 @@ one of them better.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
 
 import numpy as np
 
 from orbiflow.arrays import Array
+from orbiflow.errors import OrbiflowError
+from orbiflow.runtime import Cancel
 from orbiflow.tiles.geometry import orient
 from orbiflow.tiles.likeness import laid_on, mutual_iou
-from orbiflow.tiles.search.co_deformation import Hand
+from orbiflow.tiles.search.candidates import Fit
+from orbiflow.tiles.search.co_deformation import Hand, shared_hands
+from orbiflow.tiles.search.likeness_search import LikenessSearch
+from orbiflow.tiles.search.method import Goal, SearchMethod
+from orbiflow.tiles.search.overlap_search import OverlapSearch
 from orbiflow.tiles.tile import EscherTile
+from orbiflow.tiles.tilings import IsohedralClass
 
 MOST = 12
 """Tiles in the list."""
@@ -27,6 +36,59 @@ NEAR = 0.15
 
 WORTH = 0.2
 """IoU that is worth as much as all of the deformation, behind the front."""
+
+
+CANDIDATES = 3
+"""Tiles of each class, of either search, that the list is chosen from at least."""
+
+
+@dataclass(frozen=True)
+class BothSearch(SearchMethod):
+    """A search for likeness and one for overlap, each with its own settings, and one short list."""
+
+    objective: ClassVar[str] = "both"
+    takes_pins: ClassVar[bool] = True
+    modules: ClassVar[tuple[str, ...]] = LikenessSearch.modules + OverlapSearch.modules
+
+    likeness: LikenessSearch = field(default_factory=LikenessSearch)
+    overlap: OverlapSearch = field(default_factory=OverlapSearch)
+
+    @property
+    def seed(self) -> int:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """The seed of both."""
+        return self.likeness.seed
+
+    def parts(self) -> Sequence[tuple[float, SearchMethod]]:
+        """Return the two searches."""
+        return [(0.3, self.likeness), (0.7, self.overlap)]
+
+    def fit(self, goal: Goal, kind: IsohedralClass, **_: Any) -> Fit:  # noqa: ARG002
+        """Refuse: each of the `parts` has candidates of its own."""
+        raise OrbiflowError("a search for both fits twice: take its likeness or its overlap")
+
+    def preview(
+        self, goal: Goal, names: Sequence[str], cancel: Cancel | None = None
+    ) -> EscherTile | None:
+        """Return the preview of the search for likeness."""
+        return self.likeness.preview(goal, names, cancel)
+
+    def prepare(self, goal: Goal) -> None:
+        """Prepare both."""
+        self.likeness.prepare(goal)
+        self.overlap.prepare(goal)
+
+    def shown(self, per_class: int) -> int:
+        """Return how many tiles of a class each search gives to choose from."""
+        return max(CANDIDATES, per_class)
+
+    def finish(self, tiles: Sequence[EscherTile], goal: Goal) -> Sequence[EscherTile]:
+        """Return the tiles with their deformation measured."""
+        hand, _ = shared_hands(goal, self.likeness)
+        return [measured(tile, hand) for tile in tiles]
+
+    def short_list(self, tiles: Sequence[EscherTile]) -> list[EscherTile]:
+        """Return the front; see `front_list`."""
+        return front_list(tiles)
 
 
 def front_list(results: Sequence[EscherTile]) -> list[EscherTile]:

@@ -1,0 +1,349 @@
+"""The operations on tiles: find them, export, draw and animate one, list the classes."""
+
+from __future__ import annotations
+
+import os
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from orbiflow.runtime import (
+    Cancel,
+    Note,
+    Outcome,
+    Sink,
+    Written,
+    check_output_file,
+    check_output_folder,
+    ignore,
+    operation,
+)
+from orbiflow.settings import DefaultText, Ending, Hidden, Option, Range, Settings
+from orbiflow.tiles.art import ArtSettings
+from orbiflow.tiles.exporting import ExportSettings
+from orbiflow.tiles.motion import AnimationSettings
+from orbiflow.tiles.search import EscherizeSettings
+
+if TYPE_CHECKING:
+    from orbiflow.tiles.exporting import Exported
+    from orbiflow.tiles.search import SearchResult
+    from orbiflow.tiles.tile import EscherTile
+    from orbiflow.tiles.tilings import IsohedralClass
+
+POOR = (
+    "even the first tile hardly looks like it; another pose, fewer or thicker limbs, all nine classes "
+    "or more effort may do better"
+)
+"""Said where nothing that was found looks like the silhouette."""
+
+NEVER = Cancel()
+
+
+class ReadingSettings(Settings, group="Reading the silhouette"):
+    """How a silhouette is read."""
+
+    threshold: Annotated[float | None, Range(0, 1), DefaultText("found automatically")] = None
+    """Level between shape and background."""
+
+    invert: Annotated[bool | None, DefaultText("found automatically")] = None
+    """Whether the shape is the light part."""
+
+
+class TileChoice(Settings):
+    """Which tile of a result is taken."""
+
+    tile: str = "1"
+    """A class, such as IH4, or a rank; 1 is best."""
+
+    force: bool = False
+    """Take a tile that is not certified; an exported file says so."""
+
+    def read(self, result: Path) -> EscherTile:
+        """Return the tile of a run."""
+        from orbiflow.tiles.tile import EscherTile
+
+        return EscherTile.load(result, self.tile)
+
+
+@operation("escherize", keeps_partial=True, starts_processes=True)
+def escherize(
+    image: Path,
+    out: Annotated[Path, Option("-o")] = Path("out"),
+    settings: EscherizeSettings = EscherizeSettings(),
+    reading: ReadingSettings = ReadingSettings(),
+    *,
+    figures: bool = False,
+    called: Annotated[str | None, Hidden()] = None,
+    on_event: Sink = ignore,
+    cancel: Cancel = NEVER,
+) -> Outcome:
+    """Find tiles that look like a silhouette and tile the plane, and prove it.
+
+    Writes result.json, overview.png and index.html into the folder, and for each class a folder with
+    tile.svg, tiling.svg, tiling.png, overlay.png and model.safetensors; after a search for both,
+    front.png, too.
+
+    Args:
+        image: The silhouette: PNG, JPEG, WebP, SVG, or a polygon (.json, .dat).
+        out: Folder for the results, made if need be.
+        figures: Also write for print tiling.pdf and overlay.pdf, and of the flow field.png and
+            field.pdf.
+        called: What the results call the silhouette. Default: its path.
+    """
+    from orbiflow.tiles import pages, search, silhouette
+
+    begin = time.perf_counter()
+    target = silhouette.Target.read(image, threshold=reading.threshold, invert=reading.invert)
+    target = target if called is None else replace(target, source=called)
+    pages.result_folder(out)
+    masks = [Path(pin) for pin in settings.pin or ()]
+    check_output_folder(out, image, settings.emphasis, *masks)
+    for note in target.notes:
+        on_event(Note(note))
+    settings = settings.replace(workers=settings.workers or os.cpu_count() or 1)
+    result = search.escherize(target, settings, on_event=on_event, cancel=cancel)
+    for text in _remarks(result):
+        on_event(Note(text))
+    written = pages.write_run(result, out, figures=figures, on_event=on_event)
+    tiles = result.tiles if written else ()
+    summary = {
+        "folder": str(out),
+        "written": bool(written),
+        "seconds": time.perf_counter() - begin,
+        "tiles": [_measures(tile) for tile in tiles],
+        "failed": [{"class": f.name, "reason": f.reason} for f in result.failures],
+    }
+    if result.interrupted or cancel.cancelled:
+        return Outcome(summary, "cancelled")
+    return Outcome(summary, "done" if result.tiles else "nothing found")
+
+
+def _remarks(result: SearchResult) -> list[str]:
+    """What the user should know of a search's tiles."""
+    from orbiflow.tiles.pages import is_poor
+
+    tiles, found, remarks = result.tiles, result.found, list[str]()
+    if tiles and tiles[0].front is not None:
+        best = sum(tile.front is True for tile in tiles)
+        near = "" if best == len(tiles) else f", {len(tiles) - best} near these"
+        remarks.append(
+            f"{len(tiles)} of {len(found)} tiles are listed: {best} that no other beats in both "
+            f"deformation and overlap{near}"
+        )
+    if tiles and is_poor(tiles[0]):
+        remarks.append(POOR)
+    return remarks
+
+
+def _measures(tile: EscherTile) -> dict[str, Any]:
+    mismatch = tile.certificate.edge_mismatch
+    return {
+        "class": tile.isohedral_class,
+        "group": tile.group_name,
+        "objective": tile.objective,
+        "deformation": tile.deformation,
+        "front": tile.front,
+        "score": tile.score,
+        "iou": tile.metrics.iou,
+        "dice": tile.metrics.dice,
+        "recognised": tile.recognisability.score,
+        "certified": tile.certificate.valid,
+        "edge_mismatch": mismatch if mismatch < float("inf") else None,
+        "seconds": tile.seconds,
+    }
+
+
+@operation("export")
+def export(
+    result: Path,
+    settings: ExportSettings = ExportSettings(),
+    choice: TileChoice = TileChoice(),
+    *,
+    out: Annotated[Path | None, Option("-o"), DefaultText("named after the tile")] = None,
+    on_event: Sink = ignore,
+    cancel: Cancel = NEVER,
+) -> Outcome:
+    """Write a tiling in real size: to print, to cut with a laser, to draw, to put on a page.
+
+    Lengths are numbers with a unit: mm, cm, in or pt.
+
+    Args:
+        result: A search's folder, or its result.json.
+        out: The file.
+    """
+    settings = settings.for_file(out)
+
+    from orbiflow.tiles import exporting
+
+    tile = choice.read(result)
+    out = out or Path(f"{tile.name}.{settings.format}")
+    check_output_file(out, result)
+    done = exporting.export(
+        tile, out, settings, force=choice.force, on_event=on_event, cancel=cancel
+    )
+    for note in (*done.notes, _exported(done, settings, tile.isohedral_class)):
+        on_event(Note(note))
+    for path in done.files:
+        on_event(Written(path))
+    return Outcome(
+        {
+            "files": [str(path) for path in done.files],
+            "tiles": done.tiles,
+            "class": tile.isohedral_class,
+            "tile_size": settings.tile_size,
+        }
+    )
+
+
+def _exported(done: Exported, settings: ExportSettings, name: str) -> str:
+    width, height = settings.page
+    what = {"none": "tiles", "skeleton": "tiles in outline", "pieces": "pieces"}[settings.cut]
+    files = str(done.files[0])
+    if len(done.files) > 1:
+        files = f"{len(done.files)} sheets, {done.files[0]} to {done.files[-1].name}"
+    return (
+        f"written {files}: {done.tiles} {what} of {name}, {settings.tile_size:g} mm, on "
+        f"{width:g} x {height:g} mm"
+    )
+
+
+@operation("art")
+def art(
+    result: Path,
+    settings: ArtSettings = ArtSettings(),
+    choice: TileChoice = TileChoice(),
+    *,
+    out: Annotated[
+        Path | None, Option("-o"), Ending(".png", ".svg"), DefaultText("a PNG named after the tile")
+    ] = None,
+    picture: Path | None = None,
+    on_event: Sink = ignore,
+    cancel: Cancel = NEVER,
+) -> Outcome:
+    """Carry a picture of the silhouette onto its tile and repeat it over the plane.
+
+    Without a picture tiles are coloured by a palette, and --engrave draws inside them.
+
+    Args:
+        result: A search's folder, or its result.json.
+        out: The file, .png or .svg.
+        picture: A picture over the silhouette, in the same frame: PNG, JPEG, WebP or an SVG drawing.
+    """
+    from orbiflow.tiles.art import draw_art
+
+    tile = choice.read(result)
+    out = out or Path(f"{tile.name}.png")
+    check_output_file(out, result, picture)
+    drawn = draw_art(
+        tile, out, settings, picture=picture, force=choice.force, on_event=on_event, cancel=cancel
+    )
+    page = drawn.page
+    for note in drawn.notes:
+        on_event(Note(note))
+    on_event(
+        Note(
+            f"written {out}: {page.width} x {page.height} pixels, {page.shown:.0f} tiles of "
+            f"{tile.isohedral_class}, {page.tile_size:.0f} pixels each"
+        )
+    )
+    on_event(Written(out))
+    return Outcome(
+        {
+            "file": str(out),
+            "width": page.width,
+            "height": page.height,
+            "tiles": page.shown,
+            "class": tile.isohedral_class,
+            "tile_size": page.tile_size,
+        }
+    )
+
+
+@operation("animate")
+def animate(
+    result: Path,
+    settings: AnimationSettings = AnimationSettings(),
+    choice: TileChoice = TileChoice(),
+    *,
+    out: Annotated[
+        Path | None,
+        Option("-o"),
+        Ending(".gif", ".mp4", ".svg"),
+        DefaultText("a GIF named after the tile"),
+    ] = None,
+    on_event: Sink = ignore,
+    cancel: Cancel = NEVER,
+) -> Outcome:
+    """Write an animation: a tiling becoming animals, a silhouette bending, a tiling that grows.
+
+    It loops, there and back. In a morph every picture is an exact tiling.
+
+    Args:
+        result: A search's folder, or its result.json.
+        out: The file: .gif, .svg, or .mp4, which needs ffmpeg.
+    """
+    settings = settings.for_file(out)
+
+    from orbiflow.tiles import motion
+
+    tile = choice.read(result)
+    out = out or Path(f"{tile.name}-{settings.kind}.{settings.format}")
+    check_output_file(out, result)
+    motion.animate(tile, out, settings, force=choice.force, on_event=on_event, cancel=cancel)
+    size = out.stat().st_size
+    on_event(
+        Note(
+            f"written {out}: {settings.kind} of {tile.isohedral_class}, {settings.seconds:g} s, "
+            f"{settings.size} pixels wide, {size / 1000:.0f} kB"
+        )
+    )
+    on_event(Written(out))
+    return Outcome(
+        {"file": str(out), "bytes": size, "class": tile.isohedral_class, "kind": settings.kind}
+    )
+
+
+@operation("classes")
+def classes(
+    *,
+    out: Annotated[Path | None, Option("-o"), Ending(".png", "")] = None,
+    on_event: Sink = ignore,
+    cancel: Cancel = NEVER,
+) -> Outcome:
+    """List the nine isohedral classes: edges, rotation centres, glide lines.
+
+    Between them they give every shape that tiles the plane isohedrally. Edges are numbered in order
+    around the tile; "0=3" is moved by a translation, "0~5" by a glide reflection, "0>4" by a
+    rotation, "2o" turns about its own midpoint.
+
+    Args:
+        out: Also draw them into this PNG file.
+    """
+    from orbiflow.runtime import write_atomic
+    from orbiflow.tiles.pictures import classes_png
+    from orbiflow.tiles.tilings import CLASSES
+
+    cancel.check()
+    if out is not None:
+        write_atomic(out, classes_png())
+        on_event(Written(out))
+    file = None if out is None else str(out)
+    return Outcome({"classes": [_facts(kind) for kind in CLASSES.values()], "file": file})
+
+
+def _facts(kind: IsohedralClass) -> dict[str, str]:
+    from orbiflow.symmetry import symmetry_elements
+
+    elements = symmetry_elements(kind.group())
+    orders = sorted({center.order for center in elements.centers})
+    glides = {tuple(abs(glide.line.direction).round(6)) for glide in elements.lines}
+    return {
+        "class": kind.name,
+        "group": kind.group_name,
+        "edges": str(len(kind.template())),
+        "identified": " ".join(pair.brief for pair in kind.identified_edges),
+        "rotation centres": ", ".join(f"{order}-fold" for order in orders) or "-",
+        "glides": {0: "-", 1: "one direction"}.get(len(glides), "two directions"),
+        "stretch": {0: "none", 1: "one axis", 2: "any"}[kind.stretch_dim],
+    }

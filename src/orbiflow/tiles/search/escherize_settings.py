@@ -1,0 +1,147 @@
+"""Settings of a search for tiles."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from orbiflow.settings import (
+    DefaultText,
+    Group,
+    Needs,
+    OnlyWith,
+    Parsed,
+    Range,
+    Repeated,
+    Settings,
+)
+
+if TYPE_CHECKING:
+    from orbiflow.tiles.search.method import SearchMethod
+
+LIKENESS = Group("Search for likeness")
+OVERLAP = Group("Search for overlap")
+OCCUPANCY = Group("Occupancy method")
+
+Count = Annotated[int, Range(1)]
+
+
+def class_names(text: str) -> tuple[str, ...] | None:
+    """Return the isohedral classes that a text names, None for all.
+
+    >>> class_names("IH4, IH6"), class_names("all")
+    (('IH4', 'IH6'), None)
+    """
+    if text.strip().lower() == "all":
+        return None
+    return tuple(filter(None, re.split(r"[,\s]+", text)))
+
+
+class SearchSettings(Settings, group="Search"):
+    """Which tiles are looked for, how, and for how long, whatever the silhouette."""
+
+    classes: Annotated[
+        tuple[str, ...] | None,
+        Parsed(class_names, "classes such as IH4,IH6, or all", "CLASSES"),
+        DefaultText("all"),
+    ] = None
+    """Isohedral classes, such as IH4,IH6, or all."""
+
+    effort: Annotated[Literal["fast", "normal", "best"], OnlyWith(method="descent")] = "normal"
+    """How long the search takes: seconds, a quarter of a minute, or minutes."""
+
+    objective: Annotated[Literal["likeness", "overlap", "both"], OnlyWith(method="descent")] = (
+        "likeness"
+    )
+    """With likeness, the silhouette bends until it is a tile, and every limb is kept. With overlap,
+    the tile covers the silhouette as it is. With both, the result is a short list of the best
+    compromises."""
+
+    method: Literal["descent", "occupancy"] = "descent"
+    """The descent, or the paper's occupancy loss for comparison."""
+
+    per_class: Count = 1
+    """Number of tiles of each class: the best, and others that differ from it."""
+
+    min_neck: Annotated[float, Range(0, 0.2), OnlyWith(method="descent")] = 0.01
+    """Tiles with necks thinner than this rank lower; in square roots of the tile's area."""
+
+    max_frequency: Annotated[
+        int | None,
+        Range(0, 60),
+        OnlyWith(objective=("overlap", "both")),
+        OVERLAP,
+        DefaultText("10, or 15 for effort best"),
+    ] = None
+    """Largest frequency of the deformation (Omega in the paper)."""
+
+    turns: Annotated[Count | None, OnlyWith(method="occupancy"), OCCUPANCY, DefaultText("12")] = (
+        None
+    )
+    """Number of starting rotations."""
+
+    iterations: Annotated[
+        Count | None, OnlyWith(method="occupancy"), OCCUPANCY, DefaultText("200")
+    ] = None
+    """Number of steps of the fit."""
+
+    seed: Annotated[int, Range(0, 2**32 - 1)] = 0
+    """Seed of the random numbers: the same seed on the same machine gives the same tiles."""
+
+    force: bool = False
+    """Keep tiles that are not certified, marked so."""
+
+    def defaults(self) -> Mapping[str, Any]:
+        return {"objective": "overlap"} if self.method == "occupancy" else {}
+
+    @property
+    def search_method(self) -> SearchMethod:
+        """The method that is asked for: with what is set here, and otherwise its own defaults."""
+        from orbiflow.tiles.search.both_search import BothSearch
+        from orbiflow.tiles.search.likeness_search import LikenessSearch
+        from orbiflow.tiles.search.occupancy_search import OccupancySearch
+        from orbiflow.tiles.search.overlap_search import OverlapSearch
+
+        if self.method == "occupancy":
+            return OccupancySearch(**self._shared(OccupancySearch))
+        if self.objective == "overlap":
+            return OverlapSearch.for_effort(self.effort, **self._shared(OverlapSearch))
+        likeness = LikenessSearch.for_effort(self.effort, **self._shared(LikenessSearch))
+        if self.objective == "likeness":
+            return likeness
+        overlap = OverlapSearch.for_effort(self.effort, **self._shared(OverlapSearch))
+        return BothSearch(likeness, overlap)
+
+    def _shared(self, kind: type[Any]) -> dict[str, Any]:
+        """The settings that a method has, too."""
+        names = {entry.name for entry in fields(kind)} & {entry.name for entry in fields(self)}
+        values = {name: getattr(self, name) for name in names - {"method"}}
+        return {name: value for name, value in values.items() if value is not None}
+
+
+class EscherizeSettings(SearchSettings, group="Search"):
+    """How tiles are looked for that look like one silhouette."""
+
+    emphasis: Annotated[Path | None, OnlyWith(method="descent")] = None
+    """A mask, white where the silhouette must survive, such as a head or a tail."""
+
+    strength: Annotated[float | None, Range(above=0), Needs("emphasis"), DefaultText("4")] = None
+    """How many times more the white part of the mask counts."""
+
+    pin: Annotated[
+        tuple[str, ...] | None,
+        Repeated(),
+        OnlyWith(method="descent", objective=("likeness", "both")),
+        LIKENESS,
+    ] = None
+    """A part that keeps its shape while the rest bends: x,y or x,y,radius in the coordinates of the
+    input, or a mask that is white where pinned. May be repeated."""
+
+    pin_angle: Annotated[bool, Needs("pin"), LIKENESS] = False
+    """Keep the angle of what is pinned, too."""
+
+    workers: Annotated[int | None, Range(1), DefaultText("one per core")] = None
+    """Number of processes. Python calls take 1 unless told otherwise."""

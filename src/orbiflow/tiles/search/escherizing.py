@@ -1,0 +1,162 @@
+"""The search for tiles: from a silhouette and settings to a list of certified tiles."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from orbiflow.arguments import instance
+from orbiflow.runtime import (
+    Cancel,
+    ClassFailed,
+    Note,
+    Preview,
+    Progress,
+    Sink,
+    TileFound,
+    ignore,
+)
+from orbiflow.tiles.search.certifying import ClassFailure
+from orbiflow.tiles.search.escherize_settings import EscherizeSettings
+from orbiflow.tiles.search.likeness_search import LikenessSearch
+from orbiflow.tiles.search.method import SearchMethod
+from orbiflow.tiles.search.searching import INTERRUPTED, Event, search_classes
+from orbiflow.tiles.silhouette import Emphasis, Pins, Target
+from orbiflow.tiles.tile import EscherTile
+from orbiflow.tiles.tilings import CLASSES, isohedral_class
+
+
+@dataclass(frozen=True, eq=False)
+class SearchResult:
+    """What a search found.
+
+    - `target`: The silhouette.
+    - `tiles`: Certified tiles, best first; after a search for both those for likeness come first.
+    - `failures`: The classes that gave none, and why.
+    - `found`: All tiles that were found, those that are not listed among them.
+    - `method`: The method that was used, with its settings.
+    - `emphasis`, `pins`: What had to survive, and what did not bend.
+    - `seconds`: How long it took.
+    - `workers`: The number of processes.
+    """
+
+    target: Target
+    tiles: Sequence[EscherTile] = ()
+    failures: Sequence[ClassFailure] = ()
+    found: Sequence[EscherTile] = ()
+    method: SearchMethod = field(default_factory=lambda: LikenessSearch.for_effort("normal"))
+    emphasis: Emphasis | None = None
+    pins: Pins | None = None
+    seconds: float = 0.0
+    workers: int = 1
+
+    @property
+    def interrupted(self) -> frozenset[str]:
+        """The classes that were not finished."""
+        return frozenset(f.name for f in self.failures if f.reason == INTERRUPTED)
+
+
+def escherize(
+    target: Target,
+    settings: EscherizeSettings | None = None,
+    *,
+    method: SearchMethod | None = None,
+    emphasis: Emphasis | None = None,
+    pins: Pins | None = None,
+    on_event: Sink = ignore,
+    cancel: Cancel | None = None,
+) -> SearchResult:
+    """Find tiles that look like a silhouette and tile the plane, and certify them.
+
+    Args:
+        target: The silhouette; `Target.read` reads one.
+        settings: Which tiles are looked for, and how. Without `workers` the search stays in this
+            process; a script that asks for more must work under `if __name__ == "__main__":`.
+        method: A method of one's own, or with settings of its own, instead of the settings'.
+        emphasis: What must survive, instead of the settings' mask.
+        pins: What must not bend, instead of the settings'.
+        on_event: Called in this thread with each `Note`, `Progress`, `Preview`, `TileFound` and
+            `ClassFailed`. What it raises ends the search.
+        cancel: Ends the search early; what was found by then is returned, and the other classes are
+            `interrupted`.
+
+    Returns:
+        The same seed gives the same tiles, whatever the number of workers.
+
+    Raises:
+        OrbiflowError: For an unknown class, a mask that cannot be read, or workers that die.
+    """
+    begin = time.perf_counter()
+    instance(target, Target, "the target", "Target.read and Target.from_polygon make one")
+    settings = instance(settings or EscherizeSettings(), EscherizeSettings, "settings")
+    if emphasis is None and settings.emphasis is not None:
+        emphasis = _emphasis(settings, target)
+    if pins is None and settings.pin is not None:
+        pins = Pins.read(settings.pin, target, keep_angle=settings.pin_angle)
+    for source in (emphasis, pins):
+        for note in source.notes if source else ():
+            on_event(Note(note))
+    method = method or settings.search_method
+    chosen = CLASSES if settings.classes is None else settings.classes
+    names = list(dict.fromkeys(isohedral_class(name).name for name in chosen))
+    workers = min(settings.workers or 1, len(names))
+    relay = _Relay(names, on_event)
+    tiles, failures = search_classes(
+        target,
+        names,
+        method,
+        emphasis=emphasis,
+        pins=pins,
+        per_class=settings.per_class,
+        workers=workers,
+        force=settings.force,
+        watch=relay,
+        cancel=cancel,
+    )
+    seconds = time.perf_counter() - begin
+    return SearchResult(
+        target,
+        tiles,
+        failures,
+        relay.found,
+        method,
+        emphasis,
+        pins,
+        seconds,
+        workers,
+    )
+
+
+def _emphasis(settings: EscherizeSettings, target: Target) -> Emphasis:
+    assert settings.emphasis is not None
+    strength = {} if settings.strength is None else {"strength": settings.strength}
+    return Emphasis.read(settings.emphasis, target, **strength)
+
+
+class _Relay:
+    """The events of a search for those who watch; all tiles of all classes go into `found`."""
+
+    def __init__(self, names: Sequence[str], on_event: Sink) -> None:
+        self.found: list[EscherTile] = []
+        self.shares = dict.fromkeys(names, 0.0)
+        self.on_event = on_event
+        self.begin = time.perf_counter()
+        on_event(Progress(0.0, "fitting"))
+
+    def __call__(self, event: Event) -> None:
+        name, outcome = event.name, event.outcome
+        if event.preview is not None:
+            seconds = time.perf_counter() - self.begin
+            self.on_event(Preview(name, event.preview.metrics.iou, seconds))
+            return
+        self.shares[name] = event.share
+        share = sum(self.shares.values()) / len(self.shares)
+        loss = event.loss if abs(event.loss) < float("inf") else None  # no NaN in JSON
+        self.on_event(Progress(share, "fitting", name, event.share, loss))
+        if isinstance(outcome, ClassFailure):
+            self.on_event(ClassFailed(name, outcome.reason))
+        elif outcome is not None:
+            self.found += outcome.family()
+            iou, certified = outcome.metrics.iou, outcome.certificate.valid
+            self.on_event(TileFound(name, iou, outcome.score, certified))

@@ -1,0 +1,169 @@
+"""The search for likeness: its settings, its levels of effort, and how it searches."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
+
+from orbiflow.errors import CertificationError, OrbiflowError
+from orbiflow.runtime import Cancel
+from orbiflow.tiles.likeness import least_neck
+from orbiflow.tiles.search.candidates import Fit, Progress
+from orbiflow.tiles.search.method import Goal, SearchMethod, preferred_class, settings_for
+from orbiflow.tiles.tile import EscherTile
+from orbiflow.tiles.tilings import IsohedralClass
+
+SKETCH = {
+    "placements": 60,
+    "held": 6,
+    "starts": 1,
+    "share": 0.1,
+    "finalists": 1,
+    "rounds": 10,
+    "below": 0,
+}
+"""Settings of the preview."""
+
+
+@dataclass(frozen=True)
+class LikenessSearch(SearchMethod):
+    """The search for likeness; the defaults are effort "normal" without the levels below.
+
+    - `placements`: ways to lay the outline along the template's edges that are tried, a class.
+    - `held`: of these, the best after the springs, whose energy is minimised among tiles.
+    - `starts`: of these, the best whose corners are moved along the outline, step by step.
+    - `share`: of all such steps that are worked out, those that look best.
+    - `finalists`: of what comes of it, the best that are worked out with all of the outline's detail,
+      a class and hand.
+    - `rounds`: steps of the minimisation for finalists.
+    - `below`: levels of effort below that are searched, too, so that more effort never finds less.
+    - `multiples`: points of a tile for each point of the search, the first that holds the corners.
+    - `min_neck`: width of necks below which a tile's score falls, in square roots of the area; if
+      above 0, a part of the silhouette's own narrowest if more, see `likeness.thinnest.least_neck`.
+    - `seed`: moves the outline's points.
+    """
+
+    objective: ClassVar[str] = "likeness"
+    takes_pins: ClassVar[bool] = True
+    modules: ClassVar[tuple[str, ...]] = ("orbiflow.tiles.search.bending_fit",)
+
+    placements: int = 300
+    held: int = 80
+    starts: int = 32
+    share: float = 0.3
+    finalists: int = 5
+    rounds: int = 20
+    below: int = 0
+    multiples: tuple[int, ...] = (4, 6)
+    min_neck: float = 0.01
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        for name in ("placements", "held", "starts", "finalists", "rounds"):
+            if getattr(self, name) < 1:
+                raise OrbiflowError(f"{name} must be at least 1, got {getattr(self, name)}")
+        if not 0 < self.share <= 1:
+            raise OrbiflowError(f"share must be above 0, at most 1, got {self.share}")
+        if not 0 <= self.below <= 2:
+            raise OrbiflowError(f"below must be 0, 1 or 2, got {self.below}")
+        if not self.multiples or min(self.multiples) < 1:
+            raise OrbiflowError(f"multiples must be at least 1, got {self.multiples}")
+        if not 0 <= self.min_neck <= 0.2:
+            raise OrbiflowError(f"min_neck must be from 0 to 0.2, got {self.min_neck}")
+        if not 0 <= self.seed < 2**32:
+            raise OrbiflowError(f"seed must be from 0 to 2^32 - 1, got {self.seed}")
+
+    def fit(
+        self,
+        goal: Goal,
+        kind: IsohedralClass,
+        *,
+        per_class: int = 1,
+        progress: Progress | None = None,
+        cancel: Cancel | None = None,
+    ) -> Fit:
+        """Let the silhouette bend into tiles of the class."""
+        from orbiflow.tiles.search.bending_fit import fit_bending
+        from orbiflow.tiles.search.co_deformation import shared_hands
+
+        both = shared_hands(goal, self)
+        return fit_bending(
+            goal.target, kind, self, both, per_class=per_class, progress=progress, cancel=cancel
+        )
+
+    def preview(
+        self, goal: Goal, names: Sequence[str], cancel: Cancel | None = None
+    ) -> EscherTile | None:
+        """Return a tile that the silhouette bends to in haste; None if none is simple."""
+        from orbiflow.tiles.search.bending_fit import fit_bending
+        from orbiflow.tiles.search.certifying import best_tiles
+        from orbiflow.tiles.search.co_deformation import shared_hands
+
+        both, quick = shared_hands(goal, self), replace(self, **SKETCH)
+        try:
+            found = fit_bending(goal.target, preferred_class(names), quick, both, cancel=cancel)
+            return best_tiles(goal.target, found._replace(enough=1))[0]
+        except CertificationError:
+            return None
+
+    def prepare(self, goal: Goal) -> None:
+        """Triangulate the silhouette and its mirror image."""
+        from orbiflow.tiles.search.co_deformation import shared_hands
+
+        shared_hands(goal, self)
+
+    def least_neck(self, goal: Goal) -> float:
+        """Return `min_neck`, or a part of the silhouette's own narrowest neck."""
+        return least_neck(goal.target.normal, self.min_neck)
+
+    @classmethod
+    def for_effort(cls, effort: str, **changes: Any) -> LikenessSearch:
+        """The settings of a level of effort: "fast", "normal" or "best".
+
+        >>> LikenessSearch.for_effort("fast", seed=3).seed
+        3
+        """
+        return settings_for(cls, BENDING_EFFORTS, effort, changes)
+
+    def searches(self, wanted: int = 1) -> tuple[LikenessSearch, ...]:
+        """Those of the levels below, least first, and these: none with levels below.
+
+        Args:
+            wanted: finalists at least, for which each gets twice as many starts at least.
+
+        >>> [own.starts for own in LikenessSearch.for_effort("best").searches()]
+        [8, 32, 128]
+        """
+        below = (FAST, NORMAL)[: self.below]
+        each = [replace(self, below=0, **changes) for changes in (*below, {})]
+        return tuple(own if own.finalists >= wanted else own._with(wanted) for own in each)
+
+    def _with(self, finalists: int) -> LikenessSearch:
+        return replace(self, finalists=finalists, starts=max(self.starts, 2 * finalists))
+
+
+FAST = {
+    "placements": 80,
+    "held": 20,
+    "starts": 8,
+    "share": 0.15,
+    "finalists": 2,
+    "rounds": 12,
+}
+NORMAL = {name: getattr(LikenessSearch(), name) for name in FAST}
+BEST = {
+    "placements": 1500,
+    "held": 300,
+    "starts": 128,
+    "share": 1.0,
+    "finalists": 12,
+    "rounds": 40,
+}
+
+BENDING_EFFORTS: dict[str, dict[str, Any]] = {
+    "fast": FAST,
+    "normal": {**NORMAL, "below": 1},
+    "best": {**BEST, "below": 2},
+}
+"""What each level changes."""

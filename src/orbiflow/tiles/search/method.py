@@ -1,0 +1,175 @@
+"""What a search method is: settings that know how to search."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from importlib import import_module
+from typing import Any, ClassVar, TypeVar
+
+from orbiflow.arguments import whole
+from orbiflow.errors import OrbiflowError
+from orbiflow.runtime import Cancel
+from orbiflow.tiles.search.candidates import Fit, Progress
+from orbiflow.tiles.silhouette import Emphasis, Pins, Target
+from orbiflow.tiles.tile import EscherTile
+from orbiflow.tiles.tilings import IsohedralClass, isohedral_class
+
+Settings = TypeVar("Settings")
+
+
+@dataclass(frozen=True, eq=False)
+class Goal:
+    """What tiles are to look like.
+
+    - `target`: The silhouette.
+    - `emphasis`: What must survive.
+    - `pins`: What must not bend.
+    """
+
+    target: Target
+    emphasis: Emphasis | None = None
+    pins: Pins | None = None
+
+
+class SearchMethod(ABC):
+    """A way to search for tiles, with its settings: derive a frozen dataclass, and write `fit`.
+
+    A search asks its method for candidates of one class after another, in worker processes if there
+    are several, and certifies what it gets. Everything but `fit` has a default.
+
+    - `objective`: What the method is after, for result.json.
+    - `method_name`: The name of the method, for result.json.
+    - `takes_pins`: Whether it minds parts of the silhouette that must not bend.
+    - `modules`: What `fit` needs and nothing has imported yet.
+    - `seed`: What a user changes for other tiles.
+    """
+
+    objective: ClassVar[str] = "overlap"
+    method_name: ClassVar[str] = "descent"
+    takes_pins: ClassVar[bool] = False
+    modules: ClassVar[tuple[str, ...]] = ()
+    seed: int = 0
+
+    @abstractmethod
+    def fit(
+        self,
+        goal: Goal,
+        kind: IsohedralClass,
+        *,
+        per_class: int = 1,
+        progress: Progress | None = None,
+        cancel: Cancel | None = None,
+    ) -> Fit:
+        """Return candidates of one class, best first.
+
+        Args:
+            goal: The silhouette, and what matters in it; emphasis may be ignored, and only methods
+                with `takes_pins` are given pins.
+            kind: The class.
+            per_class: The number of certified tiles that are wanted.
+            progress: Called with the share of the work done and the best loss so far.
+            cancel: Checked before each step.
+
+        Raises:
+            CertificationError: if no candidate is left.
+            Cancelled: if it was told to stop.
+        """
+
+    def preview(
+        self,
+        goal: Goal,  # noqa: ARG002 - for methods that can
+        names: Sequence[str],  # noqa: ARG002
+        cancel: Cancel | None = None,  # noqa: ARG002
+    ) -> EscherTile | None:
+        """Return a certified tile of one of the classes in a moment, if the method can."""
+        return None
+
+    def load(self) -> None:
+        """Import what `fit` needs, before worker processes start."""
+        for name in self.modules:
+            import_module(name)
+
+    def prepare(self, goal: Goal) -> None:  # noqa: B027 - nothing to prepare
+        """Compute what the fits of all classes share, so that forked processes find it done."""
+
+    def least_neck(self, goal: Goal) -> float:  # noqa: ARG002
+        """Return the width of necks below which scores fall, in square roots of the area."""
+        return 0.0
+
+    def parts(self) -> Sequence[tuple[float, SearchMethod]]:
+        """Return the methods that are used in turn for each class, each with its share of the work."""
+        return [(1.0, self)]
+
+    def shown(self, per_class: int) -> int:
+        """Return how many tiles of a class each part keeps."""
+        return per_class
+
+    def finish(
+        self,
+        tiles: Sequence[EscherTile],
+        goal: Goal,  # noqa: ARG002
+    ) -> Sequence[EscherTile]:
+        """Return one part's certified tiles of a class with whatever else is to be measured."""
+        return tiles
+
+    def short_list(self, tiles: Sequence[EscherTile]) -> list[EscherTile]:
+        """Return which of all tiles the search gives, in order."""
+        return list(tiles)
+
+
+PREFERRED = ("IH6", "IH5", "IH4", "IH2", "IH3", "IH7", "IH21", "IH28", "IH1")
+"""The classes by how often they come near a silhouette at once, for the time that they take."""
+
+
+def preferred_class(names: Sequence[str]) -> IsohedralClass:
+    """Return the class of `names` that a preview takes."""
+    return isohedral_class(next(name for name in PREFERRED if name in names))
+
+
+def settings_for(
+    kind: type[Settings],
+    efforts: Mapping[str, Mapping[str, Any]],
+    effort: str,
+    changes: Mapping[str, Any],
+) -> Settings:
+    """Settings of a level of effort, with changes.
+
+    Args:
+        kind: a dataclass of settings.
+        efforts: what each level changes, by name.
+        effort: the level.
+        changes: settings that differ from it, by name.
+
+    Raises:
+        OrbiflowError: for an unknown level or setting.
+    """
+    if effort not in efforts:
+        raise OrbiflowError(f"effort must be one of {', '.join(efforts)}, got {effort!r}")
+    known = {field.name for field in fields(kind)}  # pyright: ignore[reportArgumentType]
+    unknown = [name for name in changes if name not in known]
+    if unknown:
+        raise OrbiflowError(f"unknown settings {', '.join(unknown)}")
+    return kind(**{**efforts[effort], **changes})
+
+
+MAX_FREQUENCY = 60
+"""Largest Omega that a fit takes on; time and memory grow with its square."""
+
+
+def check_max_frequency(value: int) -> None:
+    """Do nothing for an Omega from 0, constant fields (paper, figure of Omega), to `MAX_FREQUENCY`.
+
+    Raises:
+        OrbiflowError: for any other.
+    """
+    if not 0 <= whole(value, "max_frequency", 0) <= MAX_FREQUENCY:
+        raise OrbiflowError(
+            f"max_frequency must be from 0 to {MAX_FREQUENCY}, got {value}: "
+            "10 is plenty for most silhouettes"
+        )
+
+
+MAX_SEGMENTS = 2000
+"""Of a flow; the descent adds one a step."""

@@ -1,0 +1,241 @@
+"""The search for overlap by descent: its settings, its levels of effort, and how it searches."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+from orbiflow.arguments import number, numbers, whole
+from orbiflow.errors import CertificationError, OrbiflowError
+from orbiflow.runtime import Cancel, one_thread
+from orbiflow.tiles.search.candidates import Fit, Progress
+from orbiflow.tiles.search.method import (
+    MAX_SEGMENTS,
+    Goal,
+    SearchMethod,
+    check_max_frequency,
+    preferred_class,
+    settings_for,
+)
+from orbiflow.tiles.tile import EscherTile
+from orbiflow.tiles.tilings import IsohedralClass
+
+POINTS = 60
+"""Points of the outline that the preview looks at."""
+
+PLAIN = 8.0
+"""Length of an outline, in square roots of its area, up to which the settings are as they are."""
+
+
+RAGGED = 3.5
+"""Power of the length beyond, by which the number of starts grows."""
+
+MOST_TIMES = 6.0
+"""What a ragged outline may multiply the starts by."""
+
+
+@dataclass(frozen=True)
+class OverlapSearch(SearchMethod):
+    """The search for overlap, by descent; the defaults are effort "normal".
+
+    - `max_frequency`: Omega; 0 moves pose and lattice alone, and IH1 to IH3 along their glides.
+    - `starts`: "outline" (tiles that are near the target's outline already) or "template" (the
+      template turned and stretched; also what is left when no outline start is simple).
+    - `candidates`: outline starts that the descent begins with.
+    - `resolutions`: points of the outline from which starts are made.
+    - `projected`, `measured`: of each resolution, placements whose nearest tile is computed, and of
+      these the nearest whose overlap is measured.
+    - `turns`, `stretch`: of template starts.
+    - `stages`: (steps, survivors) of the successive halving; a step is a segment of the flow.
+    - `boundary`: boundary points of each candidate; divided by each resolution and by 5 and 6.
+    - `smoothness`: exponent s of the damping (1 + |kappa|^2)^-s, first and last.
+    - `momentum`: share of the last field that is kept.
+    - `reach`: how far a boundary point may move in a step, first and last; the target has area 1.
+    - `blur`: of the target's edge, first and last.
+    - `lattice`: whether the lattice freedom takes part.
+    - `polish`: L-BFGS iterations on the exact IoU; 0 for none.
+    - `finalists`: survivors of the last stage that are polished, best first.
+    - `min_neck`: width of necks below which a tile's score falls, in square roots of the area.
+    - `seed`: moves the starts.
+    """
+
+    modules: ClassVar[tuple[str, ...]] = ("orbiflow.tiles.search.descent_fit",)
+
+    max_frequency: int = 10
+    starts: str = "outline"
+    candidates: int = 48
+    resolutions: tuple[int, ...] = (40, 60, 80)
+    projected: int = 1000
+    measured: int = 200
+    turns: int = 12
+    stretch: float = 0.25
+    stages: tuple[tuple[int, int], ...] = ((20, 12), (30, 4), (25, 2))
+    boundary: int = 240
+    smoothness: tuple[float, float] = (2.0, 1.25)
+    momentum: float = 0.8
+    reach: tuple[float, float] = (0.02, 0.0005)
+    blur: tuple[float, float] = (0.05, 0.006)
+    lattice: bool = True
+    polish: int = 20
+    finalists: int = 1
+    min_neck: float = 0.0
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        for name in ("candidates", "projected", "measured", "turns", "finalists"):
+            whole(getattr(self, name), name, 1)
+        check_max_frequency(self.max_frequency)
+        if self.starts not in ("outline", "template"):
+            raise OrbiflowError(f'starts must be "outline" or "template", got {self.starts!r}')
+        if whole(self.boundary, "boundary", 0) < 60 or self.boundary % 30:
+            raise OrbiflowError(f"boundary must be a multiple of 30 from 60, got {self.boundary}")
+        for points in numbers(self.resolutions, "resolutions", ("n",)):
+            if points < 24 or self.boundary % points:
+                raise OrbiflowError(
+                    f"resolutions must be at least 24 and divide boundary = {self.boundary}, "
+                    f"got {points:g}"
+                )
+        self._check_stages()
+        for name in ("smoothness", "reach", "blur"):
+            for value in numbers(getattr(self, name), name, (2,)):
+                number(value, f"{name}, first and last,", 0, above=name != "smoothness")
+        number(self.momentum, "momentum", 0, 1)
+        number(self.stretch, "stretch", 0)
+        whole(self.polish, "polish", 0, 1000)
+        whole(self.seed, "seed", 0, 2**32 - 1)
+
+    def _check_stages(self) -> None:
+        stages = numbers(self.stages, "stages", (...,))
+        pairs = stages.ndim == 2 and stages.shape[1] == 2
+        if not pairs or (stages < 1).any() or (stages % 1).any():
+            raise OrbiflowError(f"stages need steps and survivors of at least 1: {self.stages}")
+        if self.iterations >= MAX_SEGMENTS:
+            raise OrbiflowError(f"stages must have less than {MAX_SEGMENTS} steps in all")
+
+    @property
+    def iterations(self) -> int:
+        """Steps of all stages."""
+        return sum(steps for steps, _ in self.stages)
+
+    def fit(
+        self,
+        goal: Goal,
+        kind: IsohedralClass,
+        *,
+        per_class: int = 1,
+        progress: Progress | None = None,
+        cancel: Cancel | None = None,
+    ) -> Fit:
+        """Let flows carry near tiles closer to the silhouette."""
+        from orbiflow.tiles.search.descent_fit import fit_descent, shared_soft_target
+
+        with one_thread():
+            found = fit_descent(
+                goal.target,
+                kind,
+                self.with_survivors(2 * per_class),
+                soft=shared_soft_target(goal.target, goal.emphasis),
+                progress=progress,
+                cancel=cancel,
+            )
+        return found._replace(enough=1 if per_class == 1 else 2 * per_class)
+
+    def preview(
+        self, goal: Goal, names: Sequence[str], cancel: Cancel | None = None
+    ) -> EscherTile | None:
+        """Return the tile nearest to the outline; None if none is simple."""
+        if self.starts != "outline":
+            return None
+        from orbiflow.tiles.search.certifying import best_tiles
+        from orbiflow.tiles.search.model import TileModel
+        from orbiflow.tiles.search.starts import outline_starts
+
+        kind, target = preferred_class(names), goal.target
+        found = outline_starts(
+            target,
+            kind,
+            count=3,
+            resolutions=(POINTS,),
+            measured=40,
+            vertices=POINTS,
+            cancel=cancel,
+        )
+        if not len(found.prototiles):
+            return None
+        model = TileModel(kind, max_frequency=1, steps=1, prototiles=found.prototiles)
+        try:
+            return best_tiles(target, Fit(model, len(found.prototiles), 0, 1))[0]
+        except CertificationError:
+            return None
+
+    def prepare(self, goal: Goal) -> None:
+        """Draw the silhouette's soft edge."""
+        from orbiflow.tiles.search.descent_fit import shared_soft_target
+
+        shared_soft_target(goal.target, goal.emphasis)
+
+    def least_neck(self, goal: Goal) -> float:  # noqa: ARG002
+        """Return `min_neck`."""
+        return self.min_neck
+
+    def for_outline(self, length: float) -> OverlapSearch:
+        """More starts for a ragged silhouette: there are more ways to lay it out, and more fail.
+
+        Args:
+            length: of the outline, in square roots of the silhouette's area; a disc has 3.5.
+        """
+        share = min(max((length / PLAIN) ** RAGGED, 1.0), MOST_TIMES)
+        (steps, kept), *later = self.stages
+        return replace(
+            self,
+            candidates=round(share * self.candidates),
+            projected=round(share * self.projected),
+            measured=round(share * self.measured),
+            stages=((steps, round(share * kept)), *later),
+        )
+
+    def with_survivors(self, least: int) -> OverlapSearch:
+        """The same, with at least that many candidates after each stage."""
+        stages = tuple((steps, max(kept, least)) for steps, kept in self.stages)
+        return replace(self, stages=stages)
+
+    @classmethod
+    def for_effort(cls, effort: str, **changes: object) -> OverlapSearch:
+        """The settings of a level of effort: "fast", "normal" or "best".
+
+        Args:
+            effort: the level.
+            changes: settings that differ from it, by name.
+
+        >>> OverlapSearch.for_effort("fast", seed=3).seed
+        3
+        """
+        return settings_for(cls, DESCENT_EFFORTS, effort, changes)
+
+
+DESCENT_EFFORTS: dict[str, dict[str, object]] = {
+    "fast": {
+        "candidates": 8,
+        "resolutions": (60,),
+        "projected": 800,
+        "measured": 150,
+        "stages": ((12, 2), (16, 1)),
+        "boundary": 120,
+        "polish": 0,
+        "finalists": 1,
+    },
+    "normal": {},
+    "best": {
+        "max_frequency": 15,
+        "candidates": 400,
+        "resolutions": (30, 48, 96, 120),
+        "boundary": 480,
+        "projected": 4000,
+        "measured": 1000,
+        "stages": ((20, 60), (35, 16), (45, 5), (40, 4)),
+        "polish": 100,
+        "finalists": 4,
+    },
+}
+"""What each level changes."""

@@ -1,0 +1,80 @@
+"""A search method of one's own, in one file: templates laid over the silhouette, none moved."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from orbiflow.errors import OrbiflowError
+from orbiflow.fields import FourierField
+from orbiflow.runtime import Cancel
+from orbiflow.tiles import CLASSES, EscherTile, Fit, Pins, Target, report, search_classes
+from orbiflow.tiles.search import BothSearch, Goal, SearchMethod
+from orbiflow.tiles.search.candidates import WAVES, Progress, StillTiles
+from orbiflow.tiles.search.starts import template_starts
+from orbiflow.tiles.tilings import IsohedralClass
+
+BOOT = Target.from_polygon([[0, 0], [3, 0], [3.4, 1.2], [2.2, 1.5], [2, 2.8], [0.8, 2.5]])
+
+
+@dataclass(frozen=True)
+class TemplateSearch(SearchMethod):
+    """Take the class's template, turned and stretched in a few ways."""
+
+    method_name = "template"
+    turns: int = 5
+    seed: int = 0
+
+    def fit(
+        self,
+        goal: Goal,
+        kind: IsohedralClass,
+        *,
+        per_class: int = 1,
+        progress: Progress | None = None,
+        cancel: Cancel | None = None,
+    ) -> Fit:
+        starts = template_starts(kind, turns=self.turns, stretch=0.2, phase=self.seed / 10)
+        if cancel is not None:
+            cancel.check()
+        if progress is not None:
+            progress(1.0, float(goal.target.area))
+        return Fit(StillTiles(kind, starts), len(starts), 0, per_class)
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_method_of_one_s_own_is_searched_with(workers: int) -> None:
+    method = TemplateSearch()
+    tiles, failures = search_classes(BOOT, ["IH4", "IH6"], method, workers=workers)
+    assert failures == []
+    assert {tile.isohedral_class for tile in tiles} == {"IH4", "IH6"}
+    assert all(isinstance(tile, EscherTile) and tile.certificate.valid for tile in tiles)
+    document = report(BOOT, tiles, failures, method, seconds=1.0, workers=workers)
+    assert (document["method"], document["objective"]) == ("template", "overlap")
+    assert document["settings"] == {"turns": 5, "seed": 0}
+
+
+def test_what_it_does_not_take_is_refused() -> None:
+    pins = Pins.at(BOOT, [(0.2, 0.2)])
+    with pytest.raises(OrbiflowError, match="pins"):
+        search_classes(BOOT, "IH4", TemplateSearch(), pins=pins)
+    with pytest.raises(OrbiflowError, match="fits twice"):
+        BothSearch().fit(Goal(BOOT), CLASSES["IH4"])
+
+
+@pytest.mark.parametrize("name", CLASSES)
+def test_tiles_that_no_flow_moves_are_those_of_a_flow_of_zero(name: str) -> None:
+    kind = CLASSES[name]
+    assert WAVES[name] == FourierField(kind.group(), 1).size
+    still = StillTiles(kind, template_starts(kind, turns=3, stretch=0.2))
+    for index in (0, still.size - 1):
+        tile, own = still.finished(index)
+        other, flow = still.as_model().finished(index)
+        assert np.abs(tile.polygon - other.polygon).max() < 1e-15
+        assert own.settings == flow.settings
+        assert list(own.arrays) == list(flow.arrays)
+        for key, array in own.arrays.items():
+            assert array.shape == flow.arrays[key].shape
+            assert np.array_equal(array, flow.arrays[key])

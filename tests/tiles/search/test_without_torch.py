@@ -1,0 +1,44 @@
+"""The search for likeness needs no torch: neither where it is asked for nor in its workers."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+SEARCH = """
+import sys
+from orbiflow.tiles import LikenessSearch, Target, search_classes
+from orbiflow.tiles.search import searching
+
+boot = Target.from_polygon([[0, 0], [3, 0], [3.4, 1.2], [2.2, 1.5], [2, 2.8], [0.8, 2.5]])
+few = LikenessSearch(placements=10, held=3, starts=2, finalists=1, rounds=2)
+inside = searching._work_on
+
+def work_on(*arguments):
+    outcome = inside(*arguments)
+    assert "torch" not in sys.modules
+    return outcome
+
+searching._work_on = work_on
+if __name__ == "__main__":
+    tiles, failures = search_classes(boot, ["IH4", "IH6"], few, workers=WORKERS)
+    assert len(tiles) == 2 and not failures, failures
+    assert all(tile.certificate.valid for tile in tiles)
+    tiles[0].save(sys.argv[1])
+    assert tiles[0].load(sys.argv[1]).bending is not None
+    print([name for name in sys.modules if name.split(".")[0] == "torch"])
+"""
+
+
+def test_a_search_for_likeness_imports_no_torch(tmp_path) -> None:
+    for workers in (1, 2):
+        file = tmp_path / f"search{workers}.py"
+        file.write_text(SEARCH.replace("WORKERS", str(workers)))
+        done = subprocess.run(
+            [sys.executable, str(file), str(tmp_path / f"out{workers}")],
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert done.returncode == 0, done.stderr
+        assert done.stdout.strip() == "[]"
