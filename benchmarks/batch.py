@@ -18,6 +18,7 @@ import signal
 import tempfile
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -27,14 +28,7 @@ import torch
 from common import BUNDLED, DATA
 
 from orbiflow.errors import OrbiflowError
-from orbiflow.jobs import (
-    BatchRequest,
-    Event,
-    Finished,
-    ItemDone,
-    run,
-)
-from orbiflow.runtime import Cancel
+from orbiflow.runtime import Call, Cancel, Cancelled, Event, Finished, ItemDone, find
 from orbiflow.tiles import Target
 
 SEED = 15
@@ -79,19 +73,23 @@ def write_silhouettes(folder: Path, count: int) -> None:
 
 
 def timed(
-    request: BatchRequest, watch: Callable[[int, Cancel], None] | None = None
+    call: Call, watch: Callable[[int, Cancel], None] | None = None
 ) -> tuple[dict[str, Any], float]:
     """The summary and the seconds; `watch` is told how many are done."""
     cancel, done, begin = Cancel(), 0, time.perf_counter()
+    last: list[Event] = []
 
     def sink(event: Event) -> None:
         nonlocal done
+        last[:] = [event]
         if isinstance(event, ItemDone):
             done += 1
             if watch is not None:
                 watch(done, cancel)
 
-    finished = run(request, sink, cancel)
+    with suppress(Cancelled):
+        call.run(sink, cancel)
+    (finished,) = last
     assert isinstance(finished, Finished)
     return finished.summary, time.perf_counter() - begin
 
@@ -153,7 +151,8 @@ def compare(folder: Path, count: int, each: dict[str, Any], workers: int) -> Non
     """Both executors, the second after the first."""
     from distributed import LocalCluster
 
-    local = BatchRequest(folder / "in", folder / "local", each=each, workers=workers)
+    given = {"folder": folder / "in", **each}
+    local = find("batch").call({**given, "out": folder / "local", "workers": workers})
 
     def stop(done: int, cancel: Cancel) -> None:
         if done == count // 2:
@@ -167,7 +166,7 @@ def compare(folder: Path, count: int, each: dict[str, Any], workers: int) -> Non
         n_workers=workers, threads_per_worker=1, host="127.0.0.1", dashboard_address="127.0.0.1:0"
     ) as cluster:
         address = str(getattr(cluster, "scheduler_address"))  # noqa: B009  (it may be a coroutine)
-        remote = BatchRequest(folder / "in", folder / "dask", each=each, scheduler=address)
+        remote = find("batch").call({**given, "out": folder / "dask", "scheduler": address})
         victim = pids(address)[0]
 
         def kill(done: int, _cancel: Cancel) -> None:

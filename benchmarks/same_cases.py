@@ -37,6 +37,8 @@ BEFORE = Renamed()
 PRESENT = Renamed(
     options={
         "density fit --parts": "--components",
+        "density batch --parts": "--components",
+        "density cv --parts": "--components",
         "density fit --detail": "--max-frequency",
     },
     keys={"parts": "components", "detail": "max_frequency"},

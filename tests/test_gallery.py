@@ -5,16 +5,17 @@ from __future__ import annotations
 import re
 import shlex
 from pathlib import Path
+from typing import Any
 
 import pytest
-import typer
 from PIL import Image
 
 from gallery_page import PAGE, SHEET, page, shown
 from gallery_table import FREE, Entry, read_table
-from orbiflow.cli.app import app
 from orbiflow.drawing import palette
+from orbiflow.runtime import Call
 from orbiflow.tiles import CLASSES
+from shell_lines import call_by_orbiflow
 
 ROOT = Path(__file__).parents[1]
 GALLERY = ROOT / "docs" / "gallery"
@@ -67,13 +68,11 @@ def test_commands_parse(entry: Entry) -> None:
             assert read["tile"] in ("1", entry.tile)
 
 
-def parsed(words: list[str]) -> dict[str, str]:
-    """What the real command line makes of a command."""
-    command = typer.main.get_command(app)
-    context = command.make_context("orbiflow", list(words), resilient_parsing=False)
-    name, own, rest = command.resolve_command(context, words)  # type: ignore[attr-defined]
-    assert own is not None, name
-    return own.make_context(name, rest, parent=context).params
+def parsed(words: list[str]) -> dict[str, Any]:
+    """What the command line makes of a command: its settings by name."""
+    call = call_by_orbiflow(words)
+    assert isinstance(call, Call), call
+    return call.flat
 
 
 def test_nothing_is_left_over() -> None:

@@ -18,12 +18,8 @@ from orbiflow.errors import (
     OrbiflowError,
     OutputError,
 )
-from orbiflow.jobs import (
-    DensityFitRequest,
-    EscherizeRequest,
-    run,
-)
 from orbiflow.loading import LoadedRun
+from orbiflow.runtime import find
 from orbiflow.tiles import (
     AnimationSettings,
     ArtSettings,
@@ -42,19 +38,14 @@ TURTLE = Path(__file__).parents[1] / "examples" / "silhouettes" / "turtle.png"
 def folders_fixture(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A run of two classes, and a density of angles in degrees."""
     root = tmp_path_factory.mktemp("loaded")
-    run(
-        EscherizeRequest(
-            TURTLE, out=root / "turtle", classes=("IH4", "IH6"), effort="fast", workers=1
-        )
-    )
+    search = {"out": root / "turtle", "classes": ["IH4", "IH6"], "effort": "fast", "workers": 1}
+    find("escherize").call({"image": TURTLE, **search}).run()
     angles = np.degrees(np.random.default_rng(0).vonmises([0.5, -1.0], 6.0, (150, 2)))
     (root / "a.csv").write_text(
         "phi,psi\n" + "\n".join(f"{a:.3f},{b:.3f}" for a, b in angles) + "\n"
     )
-    request = DensityFitRequest(
-        root / "a.csv", "torus", out=root / "density", unit="degrees", parts=("kernels",), seed=3
-    )
-    run(request)
+    fit = {"space": "torus", "unit": "degrees", "components": ["kernels"], "seed": 3}
+    find("density fit").call({"data": root / "a.csv", "out": root / "density", **fit}).run()
     return root
 
 

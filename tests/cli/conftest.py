@@ -24,18 +24,15 @@ Run = Callable[..., Outcome]
 
 def call_main(capture: Callable[[], tuple[str, str]], *arguments: object) -> Outcome:
     """`orbiflow ARGUMENTS` in this process: importing torch again would take seconds."""
-    from orbiflow.cli.app import main
+    from orbiflow.cli.app import run
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sys, "argv", ["orbiflow", *map(str, arguments)])
         patch.setenv("COLUMNS", "200")
-        status: object = 0
         try:
-            main()
+            status = run(list(map(str, arguments)))
         except SystemExit as leaving:
-            status = leaving.code
-    out, err = capture()
-    return Outcome(0 if status is None else int(str(status)), out, err)
+            status = int(str(leaving.code or 0))
+    return Outcome(status, *capture())
 
 
 @pytest.fixture(name="orbiflow")

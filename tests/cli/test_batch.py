@@ -2,25 +2,20 @@
 
 from __future__ import annotations
 
-import inspect
 import json
 import os
 import signal
 import subprocess
 import sys
 from pathlib import Path
-from typing import get_type_hints
 
 import numpy as np
 import pytest
 from PIL import Image
 
-from jobs.batches import rows, write_boot
-from jobs.searches import ENDLESS
-from orbiflow.cli.batch import batch
-from orbiflow.cli.density_batch import batch as density_batch
-from orbiflow.jobs import BatchRequest
+from batch.small_batches import rows, write_boot
 from orbiflow.runtime import find
+from runtime.searches import ENDLESS
 
 QUICK = [
     "--classes",
@@ -61,7 +56,8 @@ def test_ctrl_c_says_how_to_go_on(tmp_path: Path) -> None:
     for name in ("one", "two", "three"):
         write_boot(tmp_path / "in" / f"{name}.json")
     command = [sys.executable, "-u", "-m", "orbiflow", "batch", tmp_path / "in"]
-    command += ["--out", tmp_path / "out", "--workers", "2", *QUICK, "--iterations", str(ENDLESS)]
+    endless = [str(ENDLESS) if word == "2" else word for word in QUICK]
+    command += ["--out", tmp_path / "out", "--workers", "2", *endless]
     with subprocess.Popen(
         [str(part) for part in command],
         stdout=subprocess.PIPE,
@@ -87,7 +83,7 @@ def test_tables(tmp_path: Path, orbiflow) -> None:
     np.savetxt(tmp_path / "in" / "one.csv", draws, delimiter=",")
     outcome = orbiflow(
         *("density", "batch", tmp_path / "in", "--out", tmp_path / "out"),
-        *("--space", "torus", "--parts", "kernels", "--workers", 1),
+        *("--space", "torus", "--components", "kernels", "--workers", 1),
     )
     assert outcome.status == 0, outcome.err
     row = rows(tmp_path / "out")["one.csv"]
@@ -106,7 +102,7 @@ def test_tables(tmp_path: Path, orbiflow) -> None:
         assert orbiflow("density", "plot", *model, "--format", form).status == 0
     again = orbiflow(
         *("density", "batch", tmp_path / "in", "--out", tmp_path / "out"),
-        *("--space", "torus", "--parts", "mixture", "--workers", 1),
+        *("--space", "torus", "--components", "mixture", "--workers", 1),
     )
     assert again.status == 0, again.err
     assert sorted(path.name for path in (tmp_path / "out" / "one").iterdir()) == [
@@ -124,9 +120,12 @@ def test_tables(tmp_path: Path, orbiflow) -> None:
         (("empty",), "no file to read; wanted are names that end in .png"),
         (("in", "--out", "in/out"), "choose an --out somewhere else"),
         (("in", "--workers", "0"), "--workers must be at least 1"),
-        (("in", "--workers", "2", "--scheduler", "tcp://127.0.0.1:1"), "of a --scheduler are its"),
+        (
+            ("in", "--workers", "2", "--scheduler", "tcp://127.0.0.1:1"),
+            "--scheduler and --workers exclude",
+        ),
         (("in", "--match", "*.webp"), "none of its 1 files fits the pattern '*.webp'"),
-        (("in", "--turns", "3"), "--turns belongs to --method occupancy"),
+        (("in", "--turns", "3"), "--turns applies only to --method occupancy"),
     ],
 )
 def test_mistakes(
@@ -145,13 +144,9 @@ def test_mistakes(
 
 
 def test_options_of_a_search_are_those_of_escherize() -> None:
-    fields = {entry.name for entry in find("escherize").fields}
-    own = set(inspect.signature(batch).parameters)
-    of_one = {"image", "out", "workers", *BatchRequest.OWN}
-    assert fields - of_one <= own
+    def options(name: str) -> set[tuple[str, ...]]:
+        return {field.option.names for field in find(name).fields if not field.positional}
 
-
-def test_options_of_both_batches_are_one() -> None:
-    own, other = (get_type_hints(f, include_extras=True) for f in (batch, density_batch))
-    for name in ("match", "workers", "scheduler", "retry_failed"):
-        assert own[name].__metadata__[0] is other[name].__metadata__[0]
+    of_one = {"--emphasis", "--strength", "--pin", "--pin-angle"}
+    own, other = options("batch"), options("escherize")
+    assert {names[0] for names in other - own} == {*of_one, "--called"}

@@ -7,17 +7,13 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any, get_type_hints
+from typing import Any
 
 import pytest
 
-from jobs.cross_validations import lines_of, table_of
-from orbiflow.cli.batch import batch
-from orbiflow.cli.density_batch import batch as density_batch
-from orbiflow.cli.density_compare import compare
-from orbiflow.cli.density_cv import cv
+from density.cross_validation.small_tables import lines_of, table_of
 
-QUICK = ("--space", "torus", "--parts", "kernels", "--against", "uniform", "--folds", 2)
+QUICK = ("--space", "torus", "--components", "kernels", "--against", "uniform", "--folds", 2)
 
 
 def test_twice(tmp_path: Path, orbiflow: Any) -> None:
@@ -69,10 +65,13 @@ def test_ctrl_c_says_how_to_go_on(tmp_path: Path) -> None:
         (("--group", "chain"), "no column 'chain'; it has phi, psi, protein"),
         (("--columns", "phi,chi"), "no column 'chi'"),
         (("--against", "kernels,magic"), "--against must be of flow, kernels, mixture, chains"),
-        (("--against", "kernels"), "--parts and --against are both kernels: compare it with"),
-        (("--parts", "mixture,chains", "--against", "chains+mixture"), "both mixture+chains"),
+        (("--against", "kernels"), "--components and --against are both kernels: compare it with"),
+        (("--components", "mixture,chains", "--against", "chains+mixture"), "both mixture+chains"),
         (("--workers", "0"), "--workers must be at least 1"),
-        (("--workers", "2", "--scheduler", "tcp://127.0.0.1:1"), "of a --scheduler are its"),
+        (
+            ("--workers", "2", "--scheduler", "tcp://127.0.0.1:1"),
+            "--scheduler and --workers exclude",
+        ),
         (("--out", "diary"), "holds page.txt, which is of no earlier cross-validation"),
     ],
 )
@@ -83,19 +82,10 @@ def test_mistakes(
     table_of(tmp_path, 40, protein=[f"p{k // 4}" for k in range(40)])
     (tmp_path / "diary").mkdir()
     (tmp_path / "diary" / "page.txt").touch()
-    outcome = orbiflow("density", "cv", "angles.csv", *QUICK, *arguments)
+    usual = dict(zip(QUICK[::2], QUICK[1::2], strict=True))
+    others = [word for name in usual if name not in arguments for word in (name, usual[name])]
+    outcome = orbiflow("density", "cv", "angles.csv", *others, *arguments)
     assert outcome.status == 2
     assert outcome.err.startswith("error: ")
     assert message in " ".join(outcome.err.split())
     assert not (tmp_path / "cv").exists()
-
-
-def test_options_are_those_of_other_commands() -> None:
-    own, comparing, one, other = (
-        get_type_hints(f, include_extras=True) for f in (cv, compare, density_batch, batch)
-    )
-    names = ("columns", "unit", "parts", "repeats", "out", "workers", "scheduler", "retry_failed")
-    shared = [(name, one) for name in names]
-    for name, theirs in [*shared, ("group", comparing)]:
-        assert own[name].__metadata__[0] is theirs[name].__metadata__[0], name
-    assert one["out"].__metadata__[0] is other["out"].__metadata__[0]

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from orbiflow.cli.interrupts import stopped_by_interrupt
+from orbiflow.cli.terminal import stopped_by_interrupt
 
 BOOT = [[60, 20], [210, 20], [230, 80], [170, 95], [160, 190], [100, 145], [45, 80]]
 NAMES = ["IH7", "IH1", "IH2", "IH4"]

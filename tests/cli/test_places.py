@@ -13,8 +13,7 @@ import numpy as np
 import pytest
 
 from cli.conftest import Run, call_main
-from jobs.searches import boot_request
-from orbiflow.jobs import run
+from runtime.searches import boot_call
 
 KERNELS = ("--components", "kernels", "--space", "torus", "--unit", "degrees")
 KEPT = "would replace what is read: choose another --out"
@@ -32,7 +31,7 @@ def made_fixture(tmp_path_factory: pytest.TempPathFactory) -> Path:
     marginal = ("density", "marginal", "-m", folder / "m", "--columns", "psi")
     for words in (fit, (*marginal, "--out", folder / "psi")):
         assert call_main(lambda: ("", ""), *words).status == 0
-    run(boot_request(folder, "IH4"), lambda _: None)
+    boot_call(folder, "IH4").run()
     (folder / "out").rename(folder / "r")
     return folder
 

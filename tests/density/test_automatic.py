@@ -24,7 +24,6 @@ from orbiflow.density import (
 from orbiflow.density.fitting import COMPONENTS
 from orbiflow.density.fitting.settings import Component
 from orbiflow.errors import OrbiflowError
-from orbiflow.jobs import density_requests
 
 SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")
 QUICK: dict[str, Any] = {
@@ -186,8 +185,8 @@ def test_what_cannot_be_chosen_is_refused() -> None:
         fit_automatic(make_space("torus"), torch.rand(3, 2).repeat(10, 1))
 
 
-def test_the_request_knows_the_same_parts() -> None:
-    assert density_requests.PARTS == COMPONENTS == get_args(Component)
+def test_the_settings_know_the_same_components() -> None:
+    assert get_args(Component) == COMPONENTS
 
 
 def test_parts_for_new_groups() -> None:

@@ -19,8 +19,9 @@ def test_the_snippet(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_the_commands_are_there() -> None:
-    from orbiflow.cli.app import DERIVED
     from orbiflow.cli.density import density
+
+    from orbiflow.cli.app import DERIVED
 
     names = {
         command.name or getattr(command.callback, "__name__", "")

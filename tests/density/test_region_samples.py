@@ -28,7 +28,6 @@ from orbiflow.density.regions.levels import (
     SAMPLES,
 )
 from orbiflow.errors import OrbiflowError
-from orbiflow.jobs import density_requests
 
 masses = st.floats(2e-5, 1 - 2e-5)
 
@@ -89,4 +88,5 @@ def test_pictures_have_the_same_rule() -> None:
     assert PlotSettings(regions=(0.9995,)).regions == (0.9995,)
     with pytest.raises(OrbiflowError, match="region_samples must be at least 20000"):
         PlotSettings(regions=(0.9995,), region_samples=10_000)
-    assert density_requests.MOST_REGION_SAMPLES == MOST_SAMPLES
+    with pytest.raises(OrbiflowError, match="region_samples"):
+        PlotSettings(regions=(0.9,), region_samples=MOST_SAMPLES + 1)

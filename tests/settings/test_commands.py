@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from orbiflow.cli import commands
+from orbiflow.cli import app
 from orbiflow.runtime import Operation, Outcome, all_operations, find
 
 
@@ -46,7 +46,7 @@ LINES: dict[str, tuple[str, dict[str, Any]]] = {
 @pytest.mark.parametrize("name", LINES)
 def test_words_become_settings(name: str, called: list[dict[str, Any]]) -> None:
     line, wanted = LINES[name]
-    assert commands.run(line.split()) == 0
+    assert app.run(line.split()) == 0
     assert wanted.items() <= called[0].items()
 
 
@@ -73,7 +73,7 @@ MISTAKES = {
 
 @pytest.mark.parametrize("line", MISTAKES)
 def test_mistakes_are_one_line_with_status_2(line: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert commands.run(line.split()) == 2
+    assert app.run(line.split()) == 2
     told = capsys.readouterr()
     assert told.err.startswith("error: ")
     assert told.err.count("\n") == 1
@@ -87,7 +87,7 @@ def test_help_names_every_option(
     made: Operation, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("COLUMNS", "200")
-    assert commands.run([*made.name.split(), "--help"]) == 0
+    assert app.run([*made.name.split(), "--help"]) == 0
     text = capsys.readouterr().out
     for entry in made.fields:
         names = [entry.name.upper()] if entry.positional else entry.option.names
@@ -96,7 +96,7 @@ def test_help_names_every_option(
 
 
 def test_alone_it_prints_its_help(capsys: pytest.CaptureFixture[str]) -> None:
-    assert commands.run([]) == 0
+    assert app.run([]) == 0
     text = capsys.readouterr().out
     assert all(name in text for name in ("escherize", "export", "density", "--install-completion"))
 
@@ -109,25 +109,25 @@ def test_exit_statuses(monkeypatch: pytest.MonkeyPatch) -> None:
     }
     for status, outcome in outcomes.items():
         monkeypatch.setattr(Operation, "run", lambda *_, outcome=outcome: outcome)
-        assert commands.run(["export", "X"]) == status
+        assert app.run(["export", "X"]) == status
     assert Outcome(failed=2).exit_status == 1
 
     def interrupted(*_: object) -> Outcome:
         raise KeyboardInterrupt
 
     monkeypatch.setattr(Operation, "run", interrupted)
-    assert commands.run(["export", "X"]) == 130
+    assert app.run(["export", "X"]) == 130
 
 
 def test_completion_knows_commands_and_choices() -> None:
-    script = commands.app_for([]).generate_completion(shell="bash")
+    script = app.app_for([]).generate_completion(shell="bash")
     assert all(word in script for word in ("escherize", "--tile-size", "skeleton"))
 
 
 @pytest.mark.parametrize("line", ["export X --tile-size 40", "escherize --help", "density", ""])
 def test_mistakes_and_help_need_no_numerical_library(line: str) -> None:
     code = (
-        "import sys; from orbiflow.cli.commands import run\n"
+        "import sys; from orbiflow.cli.app import run\n"
         f"run({line.split()!r})\n"
         "print({'numpy', 'torch', 'scipy'} & set(sys.modules), file=sys.stderr)"
     )

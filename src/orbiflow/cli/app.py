@@ -1,90 +1,248 @@
-"""`orbiflow`: the commands, and what happens when one fails."""
+"""Commands derived from operations: options from settings, events to the terminal."""
 
 from __future__ import annotations
 
 import sys
-from typing import Annotated
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import nullcontext
+from inspect import Parameter as Argument
+from inspect import Signature
+from pathlib import Path
+from typing import Annotated, Any, cast
 
-import typer
+from cyclopts import App, CoercionError, CycloptsError, Group, MissingArgumentError, Parameter
+from cyclopts.exceptions import RepeatArgumentError, UnusedCliTokensError
+from rich.console import Console
 from rich.markup import escape
 
 from orbiflow import __version__
-from orbiflow.cli import commands
-from orbiflow.cli.animate import animate
-from orbiflow.cli.art import art
-from orbiflow.cli.batch import batch
-from orbiflow.cli.classes import classes
-from orbiflow.cli.console import errors
-from orbiflow.cli.density import density
-from orbiflow.cli.escherize import escherize
-from orbiflow.cli.export import export
-from orbiflow.errors import OrbiflowError, SettingError
-from orbiflow.jobs import RecordError
+from orbiflow.arguments import meant
+from orbiflow.errors import OrbiflowError, SettingError, literal
+from orbiflow.kinds import ListKind
+from orbiflow.operations import OPERATIONS
+from orbiflow.runtime import Cancel, Cancelled, Operation, find, use_one_thread
+from orbiflow.settings import Field, Hidden
 
-app = typer.Typer(
-    name="orbiflow",
-    help="Turn a silhouette into a tile that looks like it and provably tiles the plane.",
-    epilog="Start with: orbiflow escherize photo-cutout.png --out out/  "
-    "(then look at out/overview.png)",
-    no_args_is_help=True,
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    rich_markup_mode="rich",
-    context_settings={"help_option_names": ["-h", "--help"]},
+HELP = "Turn a silhouette into a tile that looks like it and provably tiles the plane."
+START = (
+    "Start with: orbiflow escherize photo-cutout.png --out out/  (then look at out/overview.png)"
 )
-app.command()(escherize)
-app.command()(batch)
-app.command()(export)
-app.command()(art)
-app.command()(animate)
-app.command()(classes)
-app.add_typer(density)
+ARGUMENTS, OPTIONS = Group("Arguments", sort_key=0), Group("Options", sort_key=1)
+GROUPS = {
+    "density": "Fit, evaluate, sample and draw exact densities of angles, directions and axes."
+}
+"""Names that several commands begin with, and what they are about."""
 
 
-@app.callback(invoke_without_command=True)
-def _global(
-    context: typer.Context,
-    version: Annotated[bool, typer.Option("--version", help="Print the version and stop.")] = False,
-) -> None:
-    if version:
-        typer.echo(f"orbiflow {__version__}")
-        raise typer.Exit
-    if context.invoked_subcommand is None:
-        typer.echo(context.get_help())
+def main(words: Sequence[str] | None = None) -> None:
+    """Run the command line: exit status 0, 1 (nothing found), 2 (a mistake) or 130 (Ctrl-C)."""
+    sys.exit(run(sys.argv[1:] if words is None else words))
 
 
-def _option(field: str) -> str:
-    """What a field of a request is called here."""
-    return {
-        "count": "-n",
-        "purpose": "--for",
-        "eyes": "--eye",
-        "animation": "--kind",
-        "models": "--model",
-    }.get(field, "--" + field.replace("_", "-"))
-
-
-DERIVED = (
-    "density fit",
-    "density score",
-    "density sample",
-    "density marginal",
-    "density conditional",
-)
-"""Commands that are derived from their operations already."""
-
-
-def main() -> None:
-    """Run the command line: exit status 0, 1 (no tile found), 2 (a user's mistake) or 130 (Ctrl-C)."""
-    if " ".join(sys.argv[1:3]) in DERIVED:
-        commands.main()
+def run(words: Sequence[str]) -> int:
+    """Run a command and return its exit status."""
     try:
-        app()
+        try:
+            status = app_for(words)(words)
+        except CycloptsError as error:
+            raise _mistake(error, _operation(words), words) from error
     except OrbiflowError as error:
-        named = isinstance(error, RecordError | SettingError)
-        text = error.named(_option) if named else str(error)
-        errors.print(f"[bold red]error:[/] {escape(text)}", soft_wrap=True, highlight=False)
-        sys.exit(2)
-    except KeyboardInterrupt:
-        errors.print("interrupted")
-        sys.exit(130)
+        text = str(error)
+        if isinstance(error, SettingError) and (operation := _operation(words)):
+            text = error.named(_namer(operation))
+        _to_standard_error(f"[bold red]error:[/] {escape(text)}")
+        return 2
+    except (KeyboardInterrupt, Cancelled):
+        _to_standard_error("interrupted")
+        return 130
+    return status if isinstance(status, int) else 0
+
+
+def _to_standard_error(text: str) -> None:
+    Console(stderr=True).print(text, soft_wrap=True, highlight=False)
+
+
+def app_for(words: Sequence[str]) -> App:
+    """Return the application with the one command that is asked for, or else with all."""
+    app = App(
+        name="orbiflow",
+        help=HELP,
+        help_epilogue=START,
+        version=__version__,
+        version_flags="--version",
+        help_flags=["--help", "-h"],
+        help_format="plaintext",
+        result_action="return_value",
+        exit_on_error=False,
+        print_error=False,
+        suppress_keyboard_interrupt=False,
+        default_parameter=Parameter(negative=()),
+    )
+    for name, text in GROUPS.items():
+        app.command(App(name=name, help=text, help_epilogue=""))
+    asked = _operation(words)
+    for place, operation in enumerate([asked] if asked else map(find, OPERATIONS)):
+        *group, command = operation.name.split()
+        home = app[group[0]] if group else app
+        home.command(
+            _command(operation),
+            name=command,
+            help_epilogue="",
+            sort_key=place,
+            group_arguments=ARGUMENTS,
+            group_parameters=OPTIONS,
+        )
+    if asked is None:
+        app.register_install_completion_command()  # pyright: ignore[reportUnknownMemberType]
+    return app
+
+
+def _operation(words: Sequence[str]) -> Operation | None:
+    names = (" ".join(words[:count]) for count in (1, 2))
+    return next((find(name) for name in names if name in OPERATIONS), None)
+
+
+def _command(operation: Operation) -> Callable[..., int]:
+    """A function whose signature is the command line of an operation."""
+    fields = {entry.name: entry for entry in operation.fields if not entry.of_class(Hidden)}
+
+    def command(*words: Any, **options: Any) -> int:
+        found = signature.bind(*words, **options).arguments
+        given = {
+            name: _value(fields[name], word) for name, word in found.items() if word is not None
+        }
+        return _do(operation, given)
+
+    named = _namer(operation)
+    headings = dict.fromkeys(entry.group for entry in fields.values() if entry.group)
+    groups = {name: Group(name, sort_key=2 + k) for k, name in enumerate(headings)}
+    arguments = [_argument(entry, groups, named) for entry in fields.values()]
+    # arguments go before options, and what is required before what is not
+    arguments.sort(key=lambda argument: (argument.kind, argument.default is not Argument.empty))
+    paragraphs = operation.doc.split("\n\n")
+    command.__doc__ = "\n\n".join(" ".join(text.split()) for text in paragraphs)
+    command.__name__ = operation.name.split()[-1]
+    command.__signature__ = signature = Signature(arguments)  # pyright: ignore[reportFunctionMemberAccess]
+    return command
+
+
+def _argument(entry: Field, groups: dict[str, Group], named: Callable[[str], str]) -> Argument:
+    parameter = Parameter(
+        name=entry.name.upper() if entry.positional else entry.option.names,
+        help=_help(entry, named),
+        group=ARGUMENTS if entry.positional else groups.get(entry.group, OPTIONS),
+        negative=entry.option.off or (),
+        required=entry.required,
+        show_default=False,
+        allow_leading_hyphen=not entry.positional and not _is_flag(entry),
+        metavar=None if _is_flag(entry) else _metavar(entry),
+        choices=entry.kind.choices or None,
+        show_choices=False,
+    )
+    return Argument(
+        entry.name,
+        Argument.POSITIONAL_ONLY if entry.positional else Argument.KEYWORD_ONLY,
+        default=Argument.empty if entry.required else None,
+        annotation=Annotated[_hint(entry), parameter],
+    )
+
+
+def _hint(entry: Field) -> Any:
+    """What cyclopts takes: words, which the field then reads."""
+    if _is_flag(entry):
+        hint: Any = bool
+    else:
+        hint = Path if entry.alternatives == {Path} else str
+        if entry.kind.repeated or (entry.positional and isinstance(entry.kind, ListKind)):
+            hint = list[hint]
+    return hint if entry.required else hint | None
+
+
+def _value(entry: Field, word: Any) -> Any:
+    if isinstance(word, bool):
+        return word
+    words = cast(list[Any], word) if isinstance(word, list) else [word]
+    return entry.parse(list(map(str, words)))
+
+
+def _is_flag(entry: Field) -> bool:
+    return entry.alternatives == {bool}
+
+
+def _metavar(entry: Field) -> str:
+    if entry.kind.choices:
+        return "|".join(entry.kind.choices)
+    return entry.kind.metavar
+
+
+def _help(entry: Field, named: Callable[[str], str]) -> str:
+    """The field's sentence, then range, default and rules in brackets."""
+    rules = [SettingError(str(rule)).named(named) for rule in entry.rules if str(rule)]
+    notes = {
+        "": entry.kind.limits,
+        "default: ": entry.default_text,
+        "only with ": " and ".join(rules),
+    }
+    said = "; ".join(word + note for word, note in notes.items() if note)
+    return f"{entry.doc} [{said}]" if said else entry.doc
+
+
+def _namer(operation: Operation) -> Callable[[str], str]:
+    """What the command line calls each setting of an operation."""
+    fields = {entry.name: entry for entry in operation.fields}
+
+    def named(name: str) -> str:
+        if name not in fields or fields[name].of_class(Hidden):
+            return name
+        return name.upper() if fields[name].positional else fields[name].option.names[0]
+
+    return named
+
+
+def _do(operation: Operation, given: dict[str, Any]) -> int:
+    """Run an operation on the terminal and return the exit status."""
+    call = operation.call(given)
+
+    from orbiflow.cli.terminal import Terminal, stopped_by_interrupt
+
+    use_one_thread()
+    # only what keeps a part has something to stop for
+    stopping = stopped_by_interrupt() if operation.keeps_partial else nullcontext(Cancel())
+    with stopping as cancel, Terminal() as terminal:
+        return call.run(terminal, cancel).exit_status
+
+
+def _mistake(
+    error: CycloptsError, operation: Operation | None, words: Sequence[str]
+) -> OrbiflowError:
+    """What is wrong with a command line, in the words of settings."""
+    fields = {entry.name: entry for entry in operation.fields} if operation else {}
+    named = error.argument.field_info.name if error.argument else ""
+    if isinstance(error, RepeatArgumentError):
+        return OrbiflowError(f"{error.token.keyword} is given more than once; give it once")
+    if isinstance(error, UnusedCliTokensError):
+        words = ", ".join(map(repr, error.unused_tokens or ()))
+        return OrbiflowError(f"there are arguments too many: {words}; see --help")
+    if isinstance(error, MissingArgumentError) and (unknown := _unknown(words, fields.values())):
+        return unknown  # what is missing may be what was misspelt
+    if isinstance(error, MissingArgumentError) and named in fields:
+        lacks = "needs a value" if error.keyword else "is missing"
+        return SettingError(f"{{{named}}} {lacks}; give {literal(fields[named].kind.wanted)}")
+    if isinstance(error, CoercionError) and error.token and named in fields:
+        try:
+            fields[named].parse([error.token.value])
+        except SettingError as own:
+            return own
+    error.verbose = False
+    return OrbiflowError(" ".join(str(error).split()))
+
+
+def _unknown(words: Sequence[str], fields: Iterable[Field]) -> OrbiflowError | None:
+    """What is wrong with the first option that there is not, if there is one."""
+    known = [name for field in fields for name in (*field.option.names, field.option.off) if name]
+    for word in words:
+        option = word.split("=")[0]
+        if option[:2] == "--" and option[2:3].isalpha() and option not in known:
+            hint = meant(option, known) or "see --help"
+            return OrbiflowError(f"unknown option {option}; {hint}")
+    return None

@@ -1,16 +1,21 @@
-"""A job's events in words, with a bar where there is a terminal."""
+"""What a command shows of its operation's events, and how Ctrl-C stops it."""
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Any
+import signal
+import threading
+from collections.abc import Generator
+from contextlib import contextmanager
 
+from rich.console import Console
+from rich.markup import escape
 from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeElapsedColumn
 from rich.progress import Progress as Bar
-from rich.table import Table
+from rich.table import Table as TextTable
 
-from orbiflow.cli.console import errors, output
-from orbiflow.jobs import (
+from orbiflow.runtime import (
+    Cancel,
+    ClassFailed,
     Event,
     Finished,
     ItemDone,
@@ -18,20 +23,20 @@ from orbiflow.jobs import (
     Preview,
     Progress,
     Started,
+    Table,
     TileFound,
+    find,
 )
 
-INTERRUPTED = "interrupted"
-BATCHES = ("batch", "density-batch", "density-cv")
-FORKING = ("escherize", *BATCHES)
-"""Jobs that start processes."""
+output, errors = Console(), Console(stderr=True)
 
 
 class Terminal:
-    """A sink. To be used in a `with` block: the bar must not outlive an error."""
+    """A sink of events. Use it in a `with` block: the bar must not outlive an error."""
 
     def __init__(self) -> None:
-        self.job = ""
+        self.forks = False
+        self.best = (0.0, "")
         self.bar: _Bar | None = None
 
     def __enter__(self) -> Terminal:
@@ -44,40 +49,38 @@ class Terminal:
         """Show an event."""
         match event:
             case Started():
-                self.job = event.operation
+                self.forks = find(event.operation).starts_processes
             case Progress():
                 if self.bar is None:
-                    self.bar = _Bar(search=self.job == "escherize", forks=self.job in FORKING)
-                self.bar.update(event)
+                    self.bar = _Bar(forks=self.forks)
+                self.bar.update(event, self.best)
             case Note():
-                self._end_bar()  # they come before the work and after it
-                _say(event.text)
+                self._end_bar()  # notes come before the work and after it
+                _say(event.text, errors if event.warning else output)
+            case Table():
+                self._end_bar()
+                output.print(_aligned(event))
             case Preview():
-                self._best(event)
-                _say(
-                    f"first tile after {event.seconds:.1f} s: {event.class_name}, "
-                    f"IoU {event.iou:.4f}, certified"
-                )
+                self._found(event)
+                seconds = f"first tile after {event.seconds:.1f} s"
+                _say(f"{seconds}: {event.class_name}, IoU {event.iou:.4f}, certified")
             case TileFound():
-                self._best(event)
+                self._found(event)
                 _say(f"{event.class_name}: IoU {event.iou:.4f}")
+            case ClassFailed():
+                interrupted = event.reason == "interrupted"
+                reason = event.reason if interrupted else f"no tile: {event.reason}"
+                _say(f"{event.class_name}: {reason}", errors)
             case ItemDone():
                 failed = "" if event.state == "done" else f"{event.state}: "
                 _say(f"{event.name}: {failed}{event.what}")
             case Finished():
                 self._end_bar()
-                if self.job == "escherize":
-                    _show_tiles(event)
-                elif self.job == "classes":
-                    _show_classes(event)
-                elif self.job in BATCHES:
-                    _show_batch(event)
             case _:
                 pass  # the rest is for programs
 
-    def _best(self, event: Preview | TileFound) -> None:
-        if self.bar is not None:
-            self.bar.best = max(self.bar.best, (event.iou, event.class_name))
+    def _found(self, event: Preview | TileFound) -> None:
+        self.best = max(self.best, (event.iou, event.class_name))
 
     def _end_bar(self) -> None:
         if self.bar is not None:
@@ -86,129 +89,71 @@ class Terminal:
 
 
 class _Bar:
-    """How far a job is, gone when it is done."""
+    """How far an operation is; gone when it has finished."""
 
-    def __init__(self, *, search: bool, forks: bool) -> None:
+    def __init__(self, *, forks: bool) -> None:
         self.forks = forks
-        self.best: tuple[float, str] = (0.0, "")
-        columns = [BarColumn(), TaskProgressColumn(), TimeElapsedColumn()]
-        text = TextColumn("{task.description}")
         # no thread that refreshes: workers are forked from a process with one thread
         self.progress = Bar(
-            *([text] if search else []),
-            *columns,
-            TextColumn("{task.fields[best]}") if search else text,
+            BarColumn(),
+            TaskProgressColumn(),
+            TimeElapsedColumn(),
+            TextColumn("{task.description}"),
             console=output,
             transient=True,
             auto_refresh=not forks,
         )
-        self.task = self.progress.add_task("", total=1.0, best="")
+        self.task = self.progress.add_task("", total=1.0)
         self.progress.start()
 
-    def update(self, event: Progress) -> None:
-        iou, name = self.best
+    def update(self, event: Progress, best: tuple[float, str]) -> None:
+        iou, name = best
+        shown = f", best {iou:.4f} ({name})" if name else ""
         self.progress.update(
             self.task,
             completed=event.share,
-            description=event.what,
-            best=f"best {iou:.4f} ({name})" if name else "",
+            description=escape(f"{event.what}{shown}"),
             refresh=self.forks,
         )
 
 
-def _say(text: str) -> None:
-    output.print(f"  {text}", highlight=False, soft_wrap=True, markup=False)
+def _say(text: str, console: Console = output) -> None:
+    # a path broken over two lines cannot be copied
+    console.print(f"  {text}", highlight=False, soft_wrap=True, markup=False)
 
 
-def _show_batch(event: Finished) -> None:
-    """What came of many, and how to go on."""
-    summary = event.summary
-    count = summary["files"] if "files" in summary else summary["fits"]
-    shown = [f"{summary['done']} of {count} done"]
-    if summary["kept"] == count:
-        shown = ["nothing was left to do"]
-    without = summary["failed"] + summary["nothing"]
-    output.print(
-        f"{', '.join(shown)}, in {summary['seconds']:.0f} s; look at {summary['page']}, or "
-        f"{summary['table']}",
-        soft_wrap=True,
-        highlight=False,
-    )
-    if summary["left"]:
-        errors.print(
-            f"interrupted with {summary['left']} still to do; the same command goes on from here",
-            soft_wrap=True,
-            highlight=False,
-        )
-    elif without:
-        errors.print(
-            f"{without} without a result, for the reasons in {summary['table']}; --retry-failed does "
-            "them again",
-            soft_wrap=True,
-            highlight=False,
-        )
-
-
-def _show_classes(event: Finished) -> None:
-    """The isohedral classes."""
-    rows, file = event.summary["classes"], event.summary["file"]
-    table = Table(*rows[0], title="The nine isohedral classes")
-    for row in rows:
-        table.add_row(*row.values())
-    output.print(table)
-    if file is not None:
-        output.print(f"drawn in {file}", soft_wrap=True)
-
-
-def _show_tiles(event: Finished) -> None:
-    """What came of a search."""
-    summary, folder = event.summary, Path(event.summary["folder"])
-    tiles, failed = summary["tiles"], summary["failed"]
-    if tiles:
-        output.print(_table(tiles))
-    for failure in failed:
-        interrupted = failure["reason"] == INTERRUPTED
-        what = INTERRUPTED if interrupted else f"no tile: {failure['reason']}"
-        errors.print(f"{failure['class']}: {what}", highlight=False, soft_wrap=True, markup=False)
-    if tiles:
-        # a path broken over two lines cannot be copied
-        output.print(
-            f"written to {folder} in {summary['seconds']:.0f} s; look at "
-            f"{folder / 'overview.png'} first, or open {folder / 'index.html'}",
-            soft_wrap=True,
-        )
-        return
-    if event.state == "nothing found":
-        where = f"see {folder / 'result.json'}"
-        if not summary["written"]:
-            where = f"{folder} still holds the tiles of an earlier run"
-        errors.print(f"no certified tile was found; {where}", soft_wrap=True)
-    elif not summary["written"]:
-        errors.print(f"{folder} still holds the tiles of an earlier run", soft_wrap=True)
-
-
-def _table(tiles: list[dict[str, Any]]) -> Table:
-    both = any(tile["front"] is not None for tile in tiles)
-    table = Table(title="Tiles for likeness, then for overlap" if both else "Tiles, best first")
-    columns = ("score", "bent", "IoU", "recognised", "certified", "edges", "s")
-    if both:  # for 80 columns
-        columns = ("for", "deformation", "overlap", "front", "certified", "s")
-    table.add_column("class", no_wrap=True)
-    for column in columns:
-        table.add_column(column, justify="left" if column == "for" else "right", no_wrap=True)
-    for tile in tiles:
-        mismatch = tile["edge_mismatch"]
-        cells = {
-            "score": f"{tile['score']:.3f}",
-            "for": tile["objective"],
-            "bent": "-" if tile["deformation"] is None else f"{tile['deformation']:.3f}",
-            "IoU": f"{tile['iou']:.4f}",
-            "recognised": f"{tile['recognised']:.3f}",
-            "front": "yes" if tile["front"] else "near",
-            "certified": "yes" if tile["certified"] else "[red]NO[/]",
-            "edges": "-" if mismatch is None else f"{mismatch:.0e}",
-            "s": f"{tile['seconds']:.1f}",
-        }
-        cells |= {"deformation": cells["bent"], "overlap": cells["IoU"]}
-        table.add_row(f"{tile['class']} ({tile['group']})", *(cells[name] for name in columns))
+def _aligned(event: Table) -> TextTable:
+    """A table with its numbers at the right."""
+    table = TextTable(title=event.title)
+    cells = zip(*event.rows, strict=True) if event.rows else ((),) * len(event.columns)
+    for heading, column in zip(event.columns, cells, strict=True):
+        numbers = all(cell[:1] in "0123456789+-" for cell in column)
+        table.add_column(heading, justify="right" if numbers else "left", no_wrap=True)
+    for row in event.rows:
+        table.add_row(*map(escape, row))
     return table
+
+
+@contextmanager
+def stopped_by_interrupt() -> Generator[Cancel]:
+    """Yield a token that the first Ctrl-C cancels; a second raises `KeyboardInterrupt`.
+
+    A shell may have told this process to ignore Ctrl-C, as with `nohup` or `&` in a script: then it
+    stays ignored.
+    """
+    cancel = Cancel()
+
+    def interrupted(_number: int, _frame: object) -> None:
+        if cancel.cancelled:
+            raise KeyboardInterrupt
+        cancel.cancel()
+
+    ignored = signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+    if ignored or threading.current_thread() is not threading.main_thread():
+        yield cancel
+        return
+    before = signal.signal(signal.SIGINT, interrupted)
+    try:
+        yield cancel
+    finally:
+        signal.signal(signal.SIGINT, before)

@@ -1,3 +1,5 @@
+from .call_process import CallProcess as CallProcess
+from .call_process import start as start
 from .cancel import Cancel as Cancel
 from .cancel import Cancelled as Cancelled
 from .events import ClassFailed as ClassFailed
@@ -10,6 +12,7 @@ from .events import Preview as Preview
 from .events import Progress as Progress
 from .events import Started as Started
 from .events import State as State
+from .events import Table as Table
 from .events import TileFound as TileFound
 from .events import Written as Written
 from .events import event_from_json as event_from_json
@@ -38,12 +41,9 @@ from .places import check_output_folder as check_output_folder
 from .places import check_outside_runs as check_outside_runs
 from .processes import process_context as process_context
 from .processes import work as work
-from .records import Record as Record
-from .records import RecordError as RecordError
-from .records import field_names as field_names
-from .records import kind_of as kind_of
 from .tensor_files import read_arrays as read_arrays
 from .tensor_files import read_tensors as read_tensors
 from .tensor_files import tensor_bytes as tensor_bytes
 from .threads import one_blas_thread as one_blas_thread
 from .threads import one_thread as one_thread
+from .threads import use_one_thread as use_one_thread

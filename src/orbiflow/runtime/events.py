@@ -1,10 +1,10 @@
 """What an operation tells while it runs.
 
-`Started` comes first; then `Note`, `Progress`, `Preview` (at most one, before any `TileFound`),
-`TileFound`, `ClassFailed`, `ItemDone` and `Written` as they happen; last `Finished` or `Failed`. The
-`share` of `Progress` never falls, nor does its `class_share` within a class. Each class of a search has
-exactly one outcome after its last `Progress`: `TileFound` or `ClassFailed`. `ItemDone` comes when the
-folder of an item has its final name, and `Written` when a file has.
+`Started` comes first; then `Note`, `Table`, `Progress`, `Preview` (at most one, before any
+`TileFound`), `TileFound`, `ClassFailed`, `ItemDone` and `Written` as they happen; last `Finished` or
+`Failed`. The `share` of `Progress` never falls, nor does its `class_share` within a class. Each class
+of a search has exactly one outcome after its last `Progress`: `TileFound` or `ClassFailed`. `ItemDone`
+comes when the folder of an item has its final name, and `Written` when a file has.
 
 All events come in the thread that called the operation, or from `Process.events`.
 """
@@ -15,6 +15,7 @@ import dataclasses
 import json
 import typing
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -62,11 +63,30 @@ class Started(Event):
 
 @dataclass(frozen=True)
 class Note(Event):
-    """Something that the user should know, in words."""
+    """Something that the user should know, in words.
+
+    - `warning`: Whether it is something that went wrong, rather than what was done.
+    """
 
     KIND = "note"
 
     text: str
+    warning: bool = False
+
+
+@dataclass(frozen=True)
+class Table(Event):
+    """A small table of results to look at, as words; the summary of `Finished` has the figures.
+
+    - `columns`: The headings.
+    - `rows`: The cells of each row.
+    """
+
+    KIND = "table"
+
+    title: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
 
 
 @dataclass(frozen=True)
@@ -163,6 +183,11 @@ class Finished(Event):
     state: State
     summary: dict[str, Any]
 
+    def __post_init__(self) -> None:
+        # the same here as where it comes from another process
+        plain = json.loads(json.dumps(self.summary, allow_nan=False))
+        object.__setattr__(self, "summary", plain)
+
 
 @dataclass(frozen=True)
 class Failed(Event):
@@ -188,7 +213,7 @@ def event_from_json(document: object) -> Event:
         SettingError: If it is not such an object.
 
     >>> event_from_json({"kind": "note", "text": "dark on light"})
-    Note(text='dark on light')
+    Note(text='dark on light', warning=False)
     """
     if not is_object(document):
         raise SettingError(f"an event is a JSON object, got {literal(described(document))}")
@@ -212,9 +237,7 @@ def _fields(event: type[Event]) -> dict[str, Field]:
 def _read(field: Field, value: Any) -> Any:
     if field.name != "summary":
         return field.read(value)
-    try:
-        if is_object(value):
-            return json.loads(json.dumps(value, allow_nan=False))
-    except (TypeError, ValueError):
-        pass
+    with suppress(TypeError, ValueError):
+        if is_object(value) and json.dumps(value, allow_nan=False):
+            return value
     raise SettingError(f"{{summary}} must be a JSON object, got {literal(described(value))}")

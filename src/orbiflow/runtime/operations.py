@@ -307,17 +307,18 @@ def progress_events(tell: Sink, cancel: Cancel) -> Callable[[float, str], None]:
 
 @cache
 def find(name: str) -> Operation:
-    """Return the operation of a name in `orbiflow.operations`, importing its module.
+    """Return the operation that `orbiflow.operations` has under a name, importing its module.
 
     Raises:
         SettingError: If there is none.
     """
-    from orbiflow.operations import OPERATIONS
+    from orbiflow.operations import OPERATIONS, WORK
 
-    if name not in OPERATIONS:
+    place = {**OPERATIONS, **WORK}.get(name)
+    if place is None:
         hint = meant(name, list(OPERATIONS)) or f"there are {', '.join(OPERATIONS)}"
         raise SettingError(f"unknown operation {literal(described(name))}; {literal(hint)}")
-    module, function = OPERATIONS[name].split(":")
+    module, function = place.split(":")
     return getattr(import_module(module), function).operation
 
 

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import multiprocessing
-import os
 import pickle
 import signal
-import sys
 import threading
 import time
 import traceback
@@ -20,25 +18,26 @@ from typing import Any
 
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime.cancel import Cancel, Cancelled
+from orbiflow.runtime.threads import imported_torch, use_one_thread
 
 Function = Callable[[Any, Callable[[Any], None], Cancel], Any]
-"""What a worker does: it is given an item, what takes its news, and the token to look at."""
+"""What a worker does with an item, a function that takes its news, and a token that stops it."""
 
 POLL = 0.05
 """Seconds between looks at the token while no worker says anything."""
 
 GRACE = 2.0
-"""Seconds that workers have to end by themselves once they are told to."""
+"""Seconds that workers have to end by themselves when they are told to stop."""
 
 
 @dataclass(frozen=True, eq=False)
 class News:
-    """From a worker.
+    """What a worker tells, or its result.
 
-    - `index`: of the item that it works on.
-    - `value`: what it tells, or the result.
-    - `done`: whether it is the result.
-    - `died`: whether there is none, since every worker that was given the item died; `done`, too.
+    - `index`: The number of the item that it works on, from 0.
+    - `value`: What it tells, or the result.
+    - `done`: Whether it is the result.
+    - `died`: Whether there is none, because all workers that were given the item died; `done`, too.
     """
 
     index: int
@@ -48,17 +47,16 @@ class News:
 
 
 def process_context(preload: Sequence[str] = ("torch",)) -> Any:
-    """How workers start: forked where that is safe, which saves them two seconds of imports.
+    """Return how workers start: forked where that is safe, which saves seconds of imports.
 
-    A fork is safe as long as this process has no other thread and torch, if it was imported, has not
-    been allowed any.
-    Elsewhere they are forked from a server, where there is one, which begins with importing the modules
-    of `preload`; there is one server a process, and its first call decides.
+    A fork is safe if this process has no other thread and torch has not been allowed any. Otherwise
+    workers are forked from a server, where there is one, which first imports the modules of `preload`;
+    there is one server per process, and its first call decides.
     """
     methods = multiprocessing.get_all_start_methods()
-    torch = sys.modules.get("torch")
-    single = torch is None or torch.get_num_threads() == 1
-    if "fork" in methods and single and threading.active_count() == 1:
+    torch = imported_torch()
+    one_thread = torch is None or torch.get_num_threads() == 1
+    if "fork" in methods and one_thread and threading.active_count() == 1:
         return multiprocessing.get_context("fork")
     context = multiprocessing.get_context("forkserver" if "forkserver" in methods else "spawn")
     if context.get_start_method() == "forkserver":
@@ -75,23 +73,23 @@ def work(
     cancel: Cancel | None = None,
     tries: int | None = None,
 ) -> Generator[News, None, None]:
-    """Do `function(item, tell, cancel)` for each item, in processes; yield their news in this thread.
+    """Do `function(item, tell, cancel)` for each item in processes; yield their news in this thread.
 
-    Workers run torch on one thread and take no notice of Ctrl-C: this process decides. They end when
-    the generator is closed, and also when this process dies. Told to stop, they have two seconds to
-    say what they have found; the generator then ends without the other results.
+    Workers have one torch thread and ignore Ctrl-C: this process decides. They end when the generator
+    is closed, and also when this process dies. When they are told to stop, they have two seconds to say
+    what they have found; the generator then ends without the other results.
 
     Args:
-        function: of a module, or a `functools.partial` of one; it is handed to each worker once.
-        items: taken in order, one at a time, by whichever worker is free.
-        workers: processes at most.
-        context: of `process_context`.
-        cancel: looked at between news; workers are given a token that follows it.
-        tries: workers that may die of an item. Each is replaced by a new one; an item that has had
-            so many is done with, its news say `died`. None: no worker may die.
+        function: A function of a module, or a `functools.partial` of one; each worker gets it once.
+        items: Taken in order, one at a time, by whichever worker is free.
+        workers: Maximum number of processes.
+        context: How they start, from `process_context`.
+        cancel: Stops the work; the workers' tokens follow it.
+        tries: Number of workers that may die of an item. Each is replaced by a new one; the news of an
+            item that has killed so many say `died`. None: no worker may die.
 
     Raises:
-        OrbiflowError: if a worker dies without `tries`; and whatever `function` raises.
+        OrbiflowError: If a worker dies without `tries`; and whatever `function` raises.
     """
     pool = _Pool(function, items, context or process_context(), cancel or Cancel(), tries)
     try:
@@ -158,7 +156,7 @@ class _Pool:
                 yield news
 
     def close(self) -> None:
-        """Without waiting for what workers are at."""
+        """End the workers without waiting for their work."""
         for channel in list(self.workers):
             self._ended(channel)
         for process in self.ended:
@@ -167,7 +165,7 @@ class _Pool:
             process.join()
 
     def _next(self) -> _Order | None:
-        """What is to be done next, nothing once this is the end."""
+        """What is to be done next, or None at the end."""
         if self.stop_by is not None:
             return None
         if self.again:
@@ -196,7 +194,7 @@ class _Pool:
         return bool(self.workers) and (self.stop_by is None or time.monotonic() < self.stop_by)
 
     def _listen(self) -> None:
-        """Tell the workers, once, that this is the end."""
+        """Tell the workers to stop, once, if this process was told to."""
         if self.cancel.cancelled and self.stop_by is None:
             self.stop_by = time.monotonic() + GRACE
             for channel, worker in self.workers.items():
@@ -204,14 +202,14 @@ class _Pool:
                     _send(channel, None)
 
     def _feed(self, channel: Connection, order: _Order | None) -> None:
-        """The next item to a free worker, or its end."""
+        """Give a free worker its next item, or let it end."""
         self.workers[channel].order = order
         _send(channel, None if order is None else (order.item,))
         if order is None:
             self._ended(channel)
 
     def _lost(self, channel: Connection, order: _Order, error: Exception) -> bool:
-        """Whether the item that a worker died of is given up; else another one is to try."""
+        """Whether the item that a worker died of is given up; otherwise another worker tries it."""
         self._listen()  # Ctrl-C may have ended a worker that was only just starting
         if self.stop_by is None and self.tries is None:
             raise OrbiflowError(
@@ -235,14 +233,14 @@ class _Pool:
 
 
 def _serve(channel: Connection, inherited: Iterable[Connection], function: Function) -> None:
-    """The life of a worker."""
+    """Do what a worker does until it is told to end."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     if hasattr(signal, "pthread_sigmask"):
         signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
     for other in inherited:
         other.close()
-    _limit_torch()
+    use_one_thread()
     cancel = _Asked(channel)
     with contextlib.suppress(EOFError, OSError, Cancelled):  # nobody listens any more
         while (order := channel.recv()) is not None:
@@ -258,16 +256,8 @@ def _serve(channel: Connection, inherited: Iterable[Connection], function: Funct
             channel.send(answer)
 
 
-def _limit_torch() -> None:
-    """Let torch have one thread in this process, whether it is imported already or later."""
-    os.environ |= dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-    torch = sys.modules.get("torch")
-    if torch is not None:
-        torch.set_num_threads(1)
-
-
 def _portable(error: Exception) -> Exception:
-    """With its traceback as a note, and as a plain error if it would not survive the journey."""
+    """Return an error with its traceback as a note, as a plain error if it cannot be pickled."""
     error.add_note("in a worker process:\n" + traceback.format_exc())
     try:
         pickle.loads(pickle.dumps(error))
@@ -277,7 +267,7 @@ def _portable(error: Exception) -> Exception:
 
 
 class _Asked(Cancel):
-    """In a worker: any word while it works means stop, and so does the death of its parent."""
+    """In a worker, a token that any word from its parent cancels, and its parent's death."""
 
     def __init__(self, channel: Connection) -> None:
         super().__init__()
@@ -300,7 +290,7 @@ def _send(channel: Connection, value: Any) -> None:
 
 @contextlib.contextmanager
 def _quiet_fork() -> Generator[None]:
-    """Newer Pythons warn of every fork beside a numerical library."""
+    """Hide the warning of newer Pythons about forks beside a numerical library."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DeprecationWarning)
         yield
@@ -308,7 +298,7 @@ def _quiet_fork() -> Generator[None]:
 
 @contextlib.contextmanager
 def _without_interrupts() -> Generator[None]:
-    """Ctrl-C waits while a process starts, until it takes no notice of it."""
+    """Let Ctrl-C wait while a process starts, until the process ignores it."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return

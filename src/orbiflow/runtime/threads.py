@@ -1,4 +1,4 @@
-"""One torch thread for a while, and the caller's own number again afterwards.
+"""One torch thread, for a whole process or for a while.
 
 Orbiflow's work is many small operations. With several threads each of them waits for all, and on a
 busy machine a wait lasts as long as the scheduler likes: tens of times the work itself.
@@ -7,6 +7,7 @@ busy machine a wait lasts as long as the scheduler likes: tens of times the work
 from __future__ import annotations
 
 import contextlib
+import os
 import sys
 import threading
 from collections.abc import Generator
@@ -15,6 +16,31 @@ from typing import Any
 import threadpoolctl
 
 _lock = threading.Lock()
+
+
+def one_thread_environment() -> dict[str, str]:
+    """Return the environment variables of a process in which torch has one thread.
+
+    NumPy's linear algebra has as many as it would have without them.
+    """
+    blas = os.environ.get("OMP_NUM_THREADS", str(os.cpu_count() or 1))
+    single = dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+    return {"OPENBLAS_NUM_THREADS": blas, **os.environ, **single}
+
+
+def use_one_thread() -> None:
+    """Let torch use one thread in this process, whether it is imported already or not.
+
+    A process that began so can be forked.
+    """
+    os.environ.update(one_thread_environment())
+    if (torch := imported_torch()) is not None:
+        torch.set_num_threads(1)
+
+
+def imported_torch() -> Any:
+    """Return torch if this process has imported it, else None."""
+    return sys.modules.get("torch")
 
 
 @contextlib.contextmanager
@@ -33,7 +59,7 @@ def one_thread() -> Generator[None]:
     ...     torch.get_num_threads()
     1
     """
-    torch: Any = sys.modules.get("torch")
+    torch = imported_torch()
     if torch is None:
         yield
         return

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -13,6 +14,7 @@ from orbiflow.runtime import (
     Note,
     Outcome,
     Sink,
+    Table,
     Written,
     check_output_file,
     check_output_folder,
@@ -114,9 +116,59 @@ def escherize(
         "tiles": [_measures(tile) for tile in tiles],
         "failed": [{"class": f.name, "reason": f.reason} for f in result.failures],
     }
+    if tiles:
+        on_event(_table(tiles))
+    on_event(_closing(out, bool(written), bool(result.tiles), summary["seconds"]))
     if result.interrupted or cancel.cancelled:
         return Outcome(summary, "cancelled")
     return Outcome(summary, "done" if result.tiles else "nothing found")
+
+
+def _table(tiles: Sequence[EscherTile]) -> Table:
+    """The tiles that were found, to look at."""
+    both = any(tile.front is not None for tile in tiles)
+    title = "Tiles for likeness, then for overlap" if both else "Tiles, best first"
+    # for 80 columns
+    columns = ("score", "bent", "IoU", "recognised", "certified", "edges", "s")
+    if both:
+        columns = ("for", "deformation", "overlap", "front", "certified", "s")
+    rows = tuple(
+        (f"{tile.name} ({tile.group_name})", *(_cells(tile)[name] for name in columns))
+        for tile in tiles
+    )
+    return Table(title, ("class", *columns), rows)
+
+
+def _cells(tile: EscherTile) -> dict[str, str]:
+    mismatch = tile.certificate.edge_mismatch
+    bent = "-" if tile.deformation is None else f"{tile.deformation:.3f}"
+    overlap = f"{tile.metrics.iou:.4f}"
+    return {
+        "score": f"{tile.score:.3f}",
+        "for": tile.objective,
+        "bent": bent,
+        "deformation": bent,
+        "IoU": overlap,
+        "overlap": overlap,
+        "recognised": f"{tile.recognisability.score:.3f}",
+        "front": "yes" if tile.front else "near",
+        "certified": "yes" if tile.certificate.valid else "NO",
+        "edges": f"{mismatch:.0e}" if mismatch < float("inf") else "-",
+        "s": f"{tile.seconds:.1f}",
+    }
+
+
+def _closing(out: Path, written: bool, found: bool, seconds: float) -> Note:
+    """What was written, or why nothing was."""
+    if written and found:
+        where = f"look at {out / 'overview.png'} first, or open {out / 'index.html'}"
+        return Note(f"written to {out} in {seconds:.0f} s; {where}")
+    where = (
+        f"see {out / 'result.json'}"
+        if written
+        else f"{out} still holds the tiles of an earlier run"
+    )
+    return Note(f"no certified tile was found; {where}", warning=True)
 
 
 def _remarks(result: SearchResult) -> list[str]:
@@ -328,8 +380,11 @@ def classes(
     if out is not None:
         write_atomic(out, classes_png())
         on_event(Written(out))
-    file = None if out is None else str(out)
-    return Outcome({"classes": [_facts(kind) for kind in CLASSES.values()], "file": file})
+        on_event(Note(f"drawn in {out}"))
+    facts = [_facts(kind) for kind in CLASSES.values()]
+    rows = tuple(tuple(fact.values()) for fact in facts)
+    on_event(Table("The nine isohedral classes", tuple(facts[0]), rows))
+    return Outcome({"classes": facts, "file": None if out is None else str(out)})
 
 
 def _facts(kind: IsohedralClass) -> dict[str, str]:

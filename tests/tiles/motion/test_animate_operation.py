@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from jobs.searches import check_order
 from orbiflow.errors import OrbiflowError, SettingError
 from orbiflow.runtime import (
     Call,
@@ -20,6 +19,7 @@ from orbiflow.runtime import (
     call_from_json,
     find,
 )
+from runtime.searches import check_order
 
 BOOT = "[[60, 20], [210, 20], [230, 80], [170, 95], [160, 190], [100, 145], [45, 80]]"
 

@@ -1,3 +1,4 @@
+from .fitting import COLUMNS as COLUMNS
 from .saved import check_fits as check_fits
 from .saved import model_at as model_at
 from .saved import with_columns_of as with_columns_of

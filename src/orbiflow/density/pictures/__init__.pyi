@@ -1,3 +1,4 @@
+from .axes import space_title as space_title
 from .choice import MODEL as MODEL
 from .choice import PlotSettings as PlotSettings
 from .corner import corner_picture as corner_picture

@@ -12,6 +12,7 @@ from .rows import read_rows as read_rows
 from .settings import RowSettings as RowSettings
 from .settings import SpaceSettings as SpaceSettings
 from .settings import TableSettings as TableSettings
+from .settings import Unit as Unit
 from .settings import check_table_name as check_table_name
 from .table import MissingCellsError as MissingCellsError
 from .table import Table as Table

@@ -1,0 +1,16 @@
+from .executors import Executor as Executor
+from .executors import LocalProcesses as LocalProcesses
+from .executors import WorkSettings as WorkSettings
+from .folder import BatchFolder as BatchFolder
+from .items import Item as Item
+from .items import code_of as code_of
+from .journal import Entry as Entry
+from .kinds import Column as Column
+from .kinds import FolderKind as FolderKind
+from .kinds import Kind as Kind
+from .kinds import Summary as Summary
+from .overview import csv_bytes as csv_bytes
+from .parcels import Answer as Answer
+from .parcels import Parcel as Parcel
+from .work import run_files as run_files
+from .work import run_items as run_items

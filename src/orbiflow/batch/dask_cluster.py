@@ -1,0 +1,383 @@
+"""Work on the workers of a Dask cluster, on any number of machines.
+
+Dask sends functions as pickles, and whoever can reach a scheduler can run code on its workers: this is
+how Dask works. What orbiflow sends is a function by its name, text and bytes.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import concurrent.futures
+import contextlib
+import ctypes
+import importlib
+import os
+import secrets
+import time
+import warnings
+from collections.abc import Callable, Generator, Iterable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Any, Self, TypeAlias
+
+from orbiflow import __version__
+from orbiflow.batch.parcels import Answer, Parcel, carry_out
+from orbiflow.errors import OrbiflowError
+from orbiflow.runtime import Cancel, Note, Sink, one_thread
+
+Client: TypeAlias = Any
+Future: TypeAlias = Any
+"""Classes of `distributed`, which has no types and is not always installed."""
+
+POLL = 0.05
+"""Seconds between looks at the token while no answer comes."""
+
+LOOK = 2.0
+"""Seconds between looks at who works."""
+
+PATIENCE = 300.0
+"""Seconds without any worker after which the batch ends."""
+
+TRIM_THRESHOLD, MMAP_THRESHOLD = -1, -3  # of glibc's malloc.h
+KEPT_BYTES = 32 * 2**20  # the most that glibc itself would come to
+USUAL_MMAP_BYTES = 128 * 2**10
+TRIM_VARIABLE = "MALLOC_TRIM_THRESHOLD_"
+
+
+class DaskCluster:
+    """An `Executor` of the workers of the scheduler at an address.
+
+    Dask gives the work of a lost worker to another one, three times (the scheduler's setting
+    `distributed.scheduler.allowed-failures`), and then gives up all that the last one worked on. These
+    parcels are tried once more at the end, one at a time, so that only the one to blame has no result.
+
+    Args:
+        address: An address such as "tcp://10.0.0.5:8786", or "tls://..." with Dask's own settings.
+        timeout: Seconds to wait for an answer of the scheduler, and for a first worker.
+    """
+
+    def __init__(self, address: str, *, timeout: float = 15.0) -> None:
+        self.address, self.timeout = address, timeout
+        self._client: Client | None = None
+
+    def __enter__(self) -> Self:
+        """Connect.
+
+        Raises:
+            OrbiflowError: If dask.distributed is not installed, no scheduler answers, or there is no
+                worker or one with another version of orbiflow.
+        """
+        try:
+            importlib.import_module("distributed")
+        except ImportError as error:
+            raise OrbiflowError(
+                "a Dask scheduler needs dask.distributed: pip install distributed"
+            ) from error
+        try:
+            self._client = _connected(self.address, self.timeout)
+        except Exception as error:  # of many kinds, down to an AssertionError of its event loop
+            raise OrbiflowError(
+                f"no Dask scheduler answers at {self.address} within {self.timeout:g} s; start one "
+                "with `dask scheduler`, which prints its address (tcp://...:8786)"
+            ) from error
+        try:
+            self._check_workers(self._client)
+        except BaseException:
+            self._close()
+            raise
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+        /,
+    ) -> None:
+        """Disconnect; workers stop at their next step."""
+        self._close()
+
+    @property
+    def place(self) -> str:
+        count = _threads(self._working())
+        return f"{'one worker' if count == 1 else f'{count} workers'} of {self.address}"
+
+    def answers(
+        self, parcels: Iterable[Parcel], tell: Sink, cancel: Cancel
+    ) -> Generator[Answer, None, None]:
+        """Yield an answer for each parcel; see `Executor.answers`.
+
+        No more parcels are on the cluster than its workers have threads.
+        """
+        client = self._working()
+        out, crew = _Out(client), _Crew(client, self.address, tell)
+        waiting, suspects = iter(parcels), list[Parcel]()
+        alone = False
+        try:
+            while not cancel.cancelled:
+                room = crew.room()
+                out.fill(waiting, room)
+                if not len(out) and room:
+                    if not suspects:
+                        return
+                    alone = True
+                    out.send(suspects.pop())
+                came = out.came()
+                for one in came:
+                    out.fill(waiting, room)  # now: what comes next takes the caller its time
+                    answer = self._answer(one, alone)
+                    if answer is not None:
+                        yield answer
+                        continue
+                    key = one.parcel.key
+                    tell(Note(f"workers died while they were at {key}; it is tried again alone"))
+                    suspects.append(one.parcel)
+                if not came:
+                    time.sleep(POLL)
+        finally:
+            out.recall()
+
+    def _answer(self, one: _Sent, alone: bool) -> Answer | None:
+        """The answer that came, or None for a parcel that is only suspected of killing workers."""
+        from distributed import KilledWorker
+
+        try:
+            result = one.result.result()
+        except KilledWorker as error:
+            died = Answer.died(one.parcel.key, error.allowed_failures + 1)
+            return died if alone else None
+        except (OSError, concurrent.futures.CancelledError) as error:
+            raise OrbiflowError(
+                f"the scheduler at {self.address} has gone or dropped the work; the same command goes "
+                "on from here once it is back"
+            ) from error
+        except Exception as error:
+            raise OrbiflowError(
+                f"a worker of {self.address} could not begin: {type(error).__name__}: {error}; is the "
+                "same orbiflow installed there?"
+            ) from error
+        one.future.release()
+        return Answer.from_worker(one.parcel.key, *result)
+
+    def _check_workers(self, client: Client) -> None:
+        try:
+            client.wait_for_workers(1, timeout=self.timeout)
+        except TimeoutError as error:
+            raise OrbiflowError(
+                f"the scheduler at {self.address} has no worker; start some with `dask worker "
+                f"{self.address} --nthreads 1 --nworkers N`"
+            ) from error
+        try:
+            found = client.run(_version_asker())
+        except Exception as error:
+            raise OrbiflowError(
+                f"the workers of {self.address} cannot be asked: {error}"
+            ) from error
+        for worker, version in found.items():
+            if version != __version__:
+                has = "no orbiflow" if version is None else f"orbiflow {version}"
+                raise OrbiflowError(
+                    f"the worker at {worker} has {has}, here is {__version__}: install the same "
+                    "version on all machines"
+                )
+
+    def _working(self) -> Client:
+        if self._client is None:
+            raise OrbiflowError("connect first: `with DaskCluster(address) as cluster:`")
+        return self._client
+
+    def _close(self) -> None:
+        if self._client is not None:
+            with suppress(Exception):  # a scheduler that has gone
+                self._client.close(timeout=2)
+            self._client = None
+
+
+@dataclass(frozen=True, eq=False)
+class _Sent:
+    """A parcel that is on the cluster, and its result to come.
+
+    The future's own status does not tell: if a worker dies once its result has been fetched, the
+    status is "lost".
+    """
+
+    parcel: Parcel
+    future: Future
+    result: concurrent.futures.Future[Any]
+
+
+class _Out:
+    """The parcels that are on the cluster."""
+
+    def __init__(self, client: Client) -> None:
+        self.client = client
+        self.run = secrets.token_hex(4)
+        self.count = 0
+        self.sent: list[_Sent] = []
+
+    def __len__(self) -> int:
+        return len(self.sent)
+
+    def fill(self, waiting: Iterator[Parcel], room: int) -> None:
+        while len(self) < room and (parcel := next(waiting, None)) is not None:
+            self.send(parcel)
+
+    def send(self, parcel: Parcel) -> None:
+        key = f"orbiflow-{self.run}-{self.count}"
+        self.count += 1
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # that a picture is large
+            future = self.client.submit(
+                _serve, parcel.header(), parcel.data, key=key, pure=False, retries=0
+            )
+        loop = self.client.loop.asyncio_loop
+        fetched = asyncio.run_coroutine_threadsafe(_fetched(self.client, future), loop)
+        self.sent.append(_Sent(parcel, future, fetched))
+
+    def came(self) -> list[_Sent]:
+        """Those that have come back."""
+        came = [one for one in self.sent if one.result.done()]
+        self.sent = [one for one in self.sent if one not in came]
+        return came
+
+    def recall(self) -> None:
+        """Give up the rest; their workers stop at the next step."""
+        left, self.sent = self.sent, []
+        for one in left:
+            one.result.cancel()
+        with suppress(Exception):  # the scheduler may have gone
+            if left:
+                self.client.cancel([one.future for one in left], force=True)
+
+
+async def _fetched(client: Client, future: Future) -> Any:
+    """Wait for a result, whatever dies before it is here.
+
+    `distributed.as_completed` never yields a result that is lost while it fetches it and whose task
+    then fails, and `Client.get_executor` takes the status "lost" of a result for its failure.
+    """
+    return await client.gather(future, asynchronous=True)
+
+
+class _Crew:
+    """The number of threads that work, looked at now and then."""
+
+    def __init__(self, client: Client, address: str, tell: Sink) -> None:
+        self.client, self.address, self.tell = client, address, tell
+        self.threads = _threads(client)
+        self.looked = self.seen = time.monotonic()
+
+    def room(self) -> int:
+        """Return how many parcels may be on the cluster at a time.
+
+        Raises:
+            OrbiflowError: If nobody has worked for long.
+        """
+        now = time.monotonic()
+        if now - self.looked >= LOOK:
+            before, self.threads, self.looked = self.threads, _threads(self.client), now
+            if before and not self.threads:
+                self.tell(Note(f"no worker is left at {self.address}; waiting for one"))
+        if self.threads:
+            self.seen = now
+        elif now - self.seen > PATIENCE:
+            raise OrbiflowError(
+                f"no worker has been at {self.address} for {PATIENCE:.0f} s; the same command goes on "
+                "from here once there is one"
+            )
+        return self.threads
+
+
+def _connected(address: str, timeout: float) -> Client:
+    """Return a client; one that fails is closed at once.
+
+    The garbage collector would close it, too, but takes the lock of all clients' loops for this. If
+    another client is just starting, which holds the lock, that never ends.
+    """
+    import distributed
+
+    client: Client = distributed.Client.__new__(distributed.Client)
+    try:
+        client.__init__(address, timeout=timeout, set_as_default=False, name="orbiflow")
+    except BaseException:
+        with suppress(Exception):
+            client.close(timeout=2)
+        raise
+    return client
+
+
+def _threads(client: Client) -> int:
+    try:
+        return sum(client.nthreads().values())
+    except (OSError, RuntimeError, TimeoutError, AttributeError):  # the scheduler has gone
+        return 0
+
+
+def _serve(header: str, data: bytes) -> tuple[str, dict[str, bytes]]:
+    """Carry out a parcel in a worker."""
+    import torch  # noqa: F401  # what is not imported cannot be limited
+
+    with keeping_memory(), one_thread():
+        return carry_out(header, data, _Released())
+
+
+class _Released(Cancel):
+    """In a worker, a token that is cancelled once nobody waits for this thread's task any more."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        from distributed import get_worker
+
+        self._worker = get_worker()
+        self._key = self._worker.get_current_task()
+
+    @property
+    def cancelled(self) -> bool:
+        task = self._worker.state.tasks.get(self._key)
+        return task is None or task.state == "cancelled"
+
+
+def _version_asker() -> Callable[[], str | None]:
+    """Return a function that travels with its code: workers need no orbiflow to run it."""
+
+    def version() -> str | None:
+        try:
+            import orbiflow
+        except ImportError:
+            return None
+        return orbiflow.__version__
+
+    return version
+
+
+@contextlib.contextmanager
+def keeping_memory() -> Generator[None]:
+    """Keep freed memory with this process in the block, where glibc was told not to.
+
+    Dask's nannies start workers with MALLOC_TRIM_THRESHOLD_=65536: glibc then hands every freed block
+    of that size back to the system. A search frees such arrays all the time, and fetching the memory
+    again cost as much as its own work (2.4 s instead of 1.3 s for one class).
+    """
+    asked = os.environ.get(TRIM_VARIABLE, "")
+    set_option = getattr(_libc(), "mallopt", None) if asked.isdecimal() else None
+    if set_option is None or int(asked) >= KEPT_BYTES:
+        yield
+        return
+    set_option(TRIM_THRESHOLD, KEPT_BYTES)
+    set_option(MMAP_THRESHOLD, KEPT_BYTES)
+    try:
+        yield
+    finally:
+        set_option(TRIM_THRESHOLD, int(asked))
+        set_option(MMAP_THRESHOLD, USUAL_MMAP_BYTES)
+        trim = getattr(_libc(), "malloc_trim", None)
+        if trim is not None:
+            trim(0)
+
+
+def _libc() -> ctypes.CDLL | None:
+    try:
+        return ctypes.CDLL(None)
+    except (OSError, TypeError):
+        return None

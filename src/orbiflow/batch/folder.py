@@ -1,0 +1,185 @@
+"""The folder of a batch: a folder for each result, an overview of all, the journal."""
+
+from __future__ import annotations
+
+import io
+import time
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack, suppress
+from pathlib import Path, PurePosixPath
+from types import TracebackType
+from typing import Self
+
+from filelock import FileLock, Timeout
+
+from orbiflow.batch.journal import Entry, Journal
+from orbiflow.batch.kinds import Kind
+from orbiflow.batch.overview import PAGE, TABLE, ContactSheet, Overview
+from orbiflow.errors import OrbiflowError, OutputError
+from orbiflow.runtime import (
+    LITTER,
+    ResultFolder,
+    make_folder,
+    write_atomic,
+    write_set,
+)
+
+THUMBNAILS, LOCK = "thumbnails", ".batch.lock"
+RESERVED = (ContactSheet.journal, TABLE, PAGE, THUMBNAILS, LOCK)
+"""Names that no result has."""
+
+THUMBNAIL = (360, 240)
+"""Width and height in pixels: half as many again as the page shows."""
+
+PAUSE, REST = 1.0, 20.0
+"""The overview is written again after at least `PAUSE` seconds and `REST` times the seconds that it
+took, so that most of the time is for the work, however many results there are."""
+
+
+class BatchFolder:
+    """Where the results of a batch go; in a `with` block, no other batch can use it.
+
+    - `keys`: The keys of the items, in the order of the overview.
+    - `current`: The keys of those that have finished with the present settings; only these are in the
+      overview.
+
+    Args:
+        path: The folder, made if need be. An earlier batch there is resumed.
+        kind: The kind of batch.
+        overview: What shows all results.
+
+    Raises:
+        OutputError: If it holds something else, another batch works there, or it cannot be written.
+    """
+
+    def __init__(self, path: Path, kind: Kind, overview: Overview) -> None:
+        self.path, self.kind, self.overview = path, kind, overview
+        self._check()
+        make_folder(path)
+        self.journal = Journal(path / overview.journal)
+        self.keys: Sequence[str] = ()
+        self.current: set[str] = set()
+        self._open = ExitStack()
+        self._written, self._cost = 0.0, 0.0
+
+    def __enter__(self) -> Self:
+        lock = FileLock(self.path / LOCK, timeout=0)
+        try:
+            self._open.enter_context(lock)
+        except Timeout as error:
+            raise OutputError(
+                f"another {self.overview.what} is at work in {self.path}: wait for it or choose "
+                "another --out"
+            ) from error
+        except OSError as error:
+            raise OutputError(
+                f"cannot write into {self.path}: {error.strerror or error}"
+            ) from error
+        self.journal = Journal(self.path / self.overview.journal)  # as the last one left it
+        self._open.enter_context(self.journal)
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        """Write the overview, whatever has happened."""
+        with self._open:
+            if kind is None:
+                self.write_all(last=True)
+            else:
+                with suppress(OrbiflowError):  # the first error is the one to be told
+                    self.write_all(last=True)
+
+    def has(self, name: str) -> bool:
+        """Return whether the folder of a result exists."""
+        return (self.path / name).is_dir()
+
+    def keep(self, entry: Entry, files: Mapping[str, bytes], picture: str | None) -> None:
+        """Put a result where it belongs, and then add it to the journal.
+
+        Args:
+            entry: What came of the item.
+            files: The files of the result, by path; none leaves what was there.
+            picture: The path of the one that the page shows small.
+
+        Raises:
+            OutputError: If it cannot be written; the journal then does not have it.
+        """
+        if files:
+            folder = ResultFolder(self.path / entry.name, self.kind.written)
+            with folder.replaced() as staged:
+                _write(staged, files)
+        thumbnail = self.path / THUMBNAILS / f"{entry.name}.png"
+        if picture is not None and picture in files:
+            make_folder(thumbnail.parent)
+            write_atomic(thumbnail, _small(files[picture]))
+        elif files:
+            thumbnail.unlink(missing_ok=True)
+        self.journal.add(entry)
+        self.current.add(entry.file)
+        now = time.monotonic()
+        if now - self._written > max(PAUSE, REST * self._cost):
+            self.write_all()
+
+    def write_all(self, *, last: bool = False) -> None:
+        """Write the overview of all `keys` that are `current`.
+
+        Raises:
+            OutputError: If it cannot be written.
+        """
+        begin = time.monotonic()
+        entries = [self.journal.entries[key] for key in self.keys if key in self.current]
+        pictures = frozenset(path.stem for path in (self.path / THUMBNAILS).glob("*.png"))
+        waiting = len(self.keys) - len(entries)
+        files = self.overview.files(entries, waiting, pictures, last=last)
+        gone = [name for name, data in files.items() if data is None]
+        write_set(self.path, gone, {name: data for name, data in files.items() if data is not None})
+        self._written = time.monotonic()
+        self._cost = self._written - begin
+
+    def _check(self) -> None:
+        """Raise an `OutputError` for a folder that holds something other than a batch."""
+        try:
+            if not self.path.exists() or (self.path / self.overview.journal).exists():
+                return
+            found = next((p for p in sorted(self.path.iterdir()) if not _is_litter(p)), None)
+        except OSError as error:
+            raise OutputError(
+                f"cannot write into {self.path}: {error.strerror or error}; choose another --out"
+            ) from error
+        if found is not None:
+            raise OutputError(
+                f"{self.path} holds {found.name}, which is of no earlier {self.overview.what}: "
+                "choose another --out or move it"
+            )
+
+
+def _is_litter(path: Path) -> bool:
+    return path.name in LITTER or path.name == LOCK
+
+
+def _write(folder: Path, files: Mapping[str, bytes]) -> None:
+    for name, data in files.items():
+        path = folder / PurePosixPath(name)
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(data)
+        except OSError as error:
+            raise OutputError(
+                f"cannot write {name} into {folder}: {error.strerror or error}; free the disk or "
+                "choose another --out"
+            ) from error
+
+
+def _small(picture: bytes) -> bytes:
+    """A PNG that is small in pixels and bytes."""
+    from PIL import Image, ImageOps
+
+    out = io.BytesIO()
+    with Image.open(io.BytesIO(picture)) as image:
+        small = ImageOps.fit(image.convert("RGB"), THUMBNAIL, Image.Resampling.BOX)
+        small.quantize(64, dither=Image.Dither.NONE).save(out, "PNG", optimize=True)
+    return out.getvalue()

@@ -1,0 +1,145 @@
+"""What a batch has done: a line of JSON for each item, added when its result has its place.
+
+A line says what was done to which bytes, with which settings and version, so that a later batch knows
+what need not be done again. A line that was cut short is ignored.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterable, Iterator
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Literal, Self, cast, get_args
+
+from orbiflow.errors import OutputError
+from orbiflow.runtime import is_object, stays_inside, write_atomic
+
+MOST_BYTES = 2**30
+"""The largest size of a journal that is read."""
+
+State = Literal["done", "nothing found", "failed"]
+
+
+@dataclass(frozen=True)
+class Entry:
+    """What came of an item.
+
+    - `file`: Its key: for a file, its path in the folder of files.
+    - `name`: The name of its folder among the results.
+    - `code`: What its bytes are known by.
+    - `settings`, `version`: The settings of the call, and the version of orbiflow.
+    - `reason`: Why there is no result, in words.
+    - `best`: Figures of the best result, by column of the table.
+    - `seconds`: How long a worker took.
+    """
+
+    file: str
+    name: str
+    code: str
+    settings: dict[str, Any]
+    version: str
+    state: State
+    reason: str = ""
+    best: dict[str, Any] = field(default_factory=dict[str, Any])
+    seconds: float | None = None
+
+    def same_work(self, code: str, settings: dict[str, Any], version: str) -> bool:
+        """Return whether it is about these bytes, settings and version."""
+        return (self.code, self.settings, self.version) == (code, settings, version)
+
+    def line(self) -> str:
+        """Return its line in a journal."""
+        return json.dumps({"kind": "entry", **asdict(self)}, allow_nan=False) + "\n"
+
+
+class Journal:
+    """The last entry of each item; in a `with` block more can be added.
+
+    Args:
+        path: The file, which need not exist.
+
+    Raises:
+        OutputError: If it exists and is no journal.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.entries: dict[str, Entry] = {}
+        self._file: Any = None
+        if path.exists():
+            self._read()
+
+    def __enter__(self) -> Self:
+        """Write the last entries anew, and open the file for more."""
+        write_atomic(self.path, "".join(entry.line() for entry in self.entries.values()))
+        try:
+            self._file = self.path.open("ab")
+        except OSError as error:
+            raise _cannot(self.path, error) from error
+        return self
+
+    def __exit__(
+        self,
+        _kind: type[BaseException] | None,
+        _error: BaseException | None,
+        _traceback: TracebackType | None,
+    ) -> None:
+        self._file.close()
+
+    def add(self, entry: Entry) -> None:
+        """Add an entry, which is on the disk when this returns.
+
+        Raises:
+            OutputError: If it cannot be written.
+        """
+        try:
+            self._file.write(entry.line().encode())
+            self._file.flush()
+            os.fsync(self._file.fileno())
+        except OSError as error:
+            raise _cannot(self.path, error) from error
+        self.entries[entry.file] = entry
+
+    def _read(self) -> None:
+        try:
+            if self.path.stat().st_size > MOST_BYTES:
+                raise OutputError(f"{self.path} is too large to be a batch's; move it")
+            lines = self.path.read_bytes().splitlines()
+        except OSError as error:
+            raise _cannot(self.path, error) from error
+        read = list(_entries(lines))
+        if lines and not read and len(lines) > 1:
+            raise OutputError(
+                f"{self.path} is no journal of a batch; move it or choose another --out"
+            )
+        self.entries = {entry.file: entry for entry in read}
+
+
+def _entries(lines: Iterable[bytes]) -> Iterator[Entry]:
+    for line in lines:
+        try:
+            document = json.loads(line)
+            if is_object(document) and document.pop("kind", None) == "entry":
+                entry = Entry(**document)
+                if _is_sound(entry):
+                    yield entry
+        except (ValueError, TypeError, RecursionError):
+            continue  # cut short: to be done again
+
+
+def _is_sound(entry: Entry) -> bool:
+    """Whether what is used of it is of the right type, and its results stay in the folder."""
+    return (
+        stays_inside(entry.name)
+        and entry.state in get_args(State)
+        and isinstance(cast(object, entry.file), str)
+        and is_object(entry.best)
+        and is_object(entry.settings)
+    )
+
+
+def _cannot(path: Path, error: OSError) -> OutputError:
+    return OutputError(f"cannot write {path}: {error.strerror or error}; free the disk or its file")

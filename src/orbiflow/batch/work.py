@@ -1,0 +1,285 @@
+"""Doing many items: what is to be done, who does it, where the results go."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from orbiflow import __version__
+from orbiflow.batch.executors import WorkSettings, executor_for
+from orbiflow.batch.folder import RESERVED, BatchFolder
+from orbiflow.batch.items import FileSource, Item, code_of, folder_names, listed
+from orbiflow.batch.journal import Entry
+from orbiflow.batch.kinds import FolderKind, Kind
+from orbiflow.batch.overview import PAGE, TABLE, ContactSheet
+from orbiflow.batch.parcels import Answer, Parcel
+from orbiflow.errors import OrbiflowError, SettingError
+from orbiflow.runtime import (
+    Call,
+    Cancel,
+    Failed,
+    Finished,
+    ItemDone,
+    Note,
+    Outcome,
+    Progress,
+    Sink,
+    State,
+)
+
+MOST_NAMED = 5
+"""The number of items that a note names."""
+
+
+@dataclass(frozen=True)
+class Counts:
+    """How many items are `done`, gave `nothing`, `failed` or are `left`; how many were `kept`."""
+
+    done: int
+    nothing: int
+    failed: int
+    left: int
+    kept: int
+
+    @property
+    def state(self) -> State:
+        """How the batch ends."""
+        if self.left:
+            return "cancelled"
+        return "done" if self.done else "nothing found"
+
+    def outcome(
+        self, count: int, table: Path, page: Path, summary: dict[str, Any], tell: Sink
+    ) -> Outcome:
+        """Say what was done and what to do next, and return the outcome.
+
+        Args:
+            count: The number of items.
+            table: The table of all results.
+            page: The page of all results.
+            summary: What the summary has besides the counts; with `seconds`.
+            tell: Is told.
+        """
+        done = "nothing was left to do" if self.kept == count else f"{self.done} of {count} done"
+        tell(Note(f"{done}, in {summary['seconds']:.0f} s; look at {page}, or {table}"))
+        without = self.failed + self.nothing
+        if self.left:
+            text = f"interrupted with {self.left} still to do; the same command goes on from here"
+            tell(Note(text, warning=True))
+        elif without:
+            text = f"{without} without a result, for the reasons in {table}"
+            tell(Note(f"{text}; --retry-failed does them again", warning=True))
+        return Outcome({**summary, **asdict(self)}, self.state, without)
+
+
+def run_files(
+    source: Path,
+    out: Path,
+    kind: FolderKind,
+    title: str,
+    call_of: Callable[[str], Call],
+    match: str | None,
+    settings: WorkSettings,
+    tell: Sink,
+    cancel: Cancel,
+) -> Outcome:
+    """Make a call for every file of a folder, and put its result into a folder as it comes.
+
+    Args:
+        source: The folder of files.
+        out: The folder of results; an earlier batch there is resumed.
+        kind: The kind of batch.
+        title: The title of the page.
+        call_of: Returns the call for a file of this name.
+        match: A pattern of names. Default: all that can be read.
+        settings: Who works.
+        tell: Is told all that a user should see.
+        cancel: Ends the batch; what has finished is kept.
+
+    Returns:
+        An outcome whose summary has `folder`, `table` and `page`; the number of `files`, and how many
+        of them are `done`, gave `nothing`, `failed` or are `left`; how many were `kept` from before;
+        and `seconds`.
+
+    Raises:
+        OrbiflowError: For a mistake of the user; what has finished is kept.
+    """
+    begin = time.perf_counter()
+    if match is not None and not match.strip():
+        raise SettingError("{match} must be a pattern of names, such as *.svg")
+    files = listed(source, kind.endings, match, out)
+    with BatchFolder(out, kind, ContactSheet(kind, title)) as folder:
+        given = {file: entry.name for file, entry in folder.journal.entries.items()}
+        names = folder_names(files, given, RESERVED)
+        items = [
+            Item(name, names[name], call_of(name), FileSource(source / name, kind.most_bytes))
+            for name in files
+        ]
+        left_out = f" or that --match {match} leaves out" if match else ""
+        gone = f"of files that are not in {source}{left_out}"
+        counts = run_items(items, settings, folder, tell, cancel, gone=gone)
+    table, page = out / TABLE, out / PAGE
+    summary = {
+        "folder": str(out),
+        "table": str(table),
+        "page": str(page),
+        "files": len(files),
+        "seconds": time.perf_counter() - begin,
+    }
+    return counts.outcome(len(files), table, page, summary, tell)
+
+
+def run_items(
+    items: Sequence[Item],
+    settings: WorkSettings,
+    folder: BatchFolder,
+    tell: Sink,
+    cancel: Cancel,
+    *,
+    gone: str,
+) -> Counts:
+    """Do what has not been done, and put it into the folder as it comes.
+
+    Args:
+        items: Items with different keys.
+        settings: Who works.
+        folder: The folder, entered.
+        tell: Is told all that a user should see.
+        cancel: Ends the batch; what has finished is kept.
+        gone: What earlier results are of that belong to no item, in words.
+
+    Raises:
+        OrbiflowError: For a mistake of the user; what has finished is kept.
+    """
+    folder.keys = [item.key for item in items]
+    todo = list(_todo(items, settings, folder))
+    folder.current = set(folder.keys) - {item.key for item in todo}
+    kept = len(items) - len(todo)
+    for text in _said_before(items, todo, folder, gone):
+        tell(Note(text))
+    batch = _Batch(folder, tell, len(items), kept)
+    if todo and not cancel.cancelled:
+        batch.work(todo, settings, cancel)
+    left = {item.key for item in todo} - batch.finished
+    states = Counter(folder.journal.entries[k].state for k in folder.keys if k not in left)
+    return Counts(states["done"], states["nothing found"], states["failed"], len(left), kept)
+
+
+def _todo(items: Sequence[Item], settings: WorkSettings, folder: BatchFolder) -> Iterator[Item]:
+    """What is new or changed, has other settings, or has lost its result."""
+    for item in items:
+        before = folder.journal.entries.get(item.key)
+        if before is not None and not (settings.retry_failed and before.state != "done"):
+            try:
+                code = item.source.code()
+            except OrbiflowError:
+                code = ""
+            there = before.state == "failed" or folder.has(before.name)
+            if there and before.same_work(code, item.settings(folder.kind), __version__):
+                continue
+        yield item
+
+
+def _said_before(
+    items: Sequence[Item], todo: Sequence[Item], folder: BatchFolder, gone: str
+) -> Iterator[str]:
+    entries = folder.journal.entries
+    waiting = {item.key for item in todo}
+    states = Counter(entries[item.key].state for item in items if item.key not in waiting)
+    if states:
+        failed = states["failed"] + states["nothing found"]
+        text = f"{len(items)} {folder.kind.items}: {states['done']} are done already"
+        if failed:
+            text += f", {failed} have failed before (--retry-failed does them again)"
+        yield f"{text}, {len(todo)} to do"
+    known = set(folder.keys)
+    others = sorted(entry.name for key, entry in entries.items() if key not in known)
+    if others:
+        named = ", ".join(others[:MOST_NAMED]) + (", ..." if len(others) > MOST_NAMED else "")
+        yield f"{len(others)} earlier results are {gone}; they are kept and not listed: {named}"
+
+
+class _Batch:
+    """Items being done: keeps what comes, and says so."""
+
+    def __init__(self, folder: BatchFolder, tell: Sink, count: int, kept: int) -> None:
+        self.folder, self.kind, self.tell = folder, folder.kind, tell
+        self.count, self.kept, self.without = count, kept, 0
+        self.finished: set[str] = set()
+        self.at_work: dict[str, tuple[Item, str]] = {}
+        self._progress()
+
+    def work(self, todo: Sequence[Item], settings: WorkSettings, cancel: Cancel) -> None:
+        with executor_for(settings, len(todo), self.kind.modules) as executor:
+            self.tell(Note(f"{len(todo)} {self.kind.things} for {executor.place}"))
+            with closing(executor.answers(self._parcels(todo), self.tell, cancel)) as answers:
+                for answer in answers:
+                    self._keep(answer)
+
+    def _parcels(self, todo: Sequence[Item]) -> Iterator[Parcel]:
+        reads, writes = self.kind.reads, self.kind.writes
+        for item in todo:
+            try:
+                data = item.source.read()
+            except OrbiflowError as error:
+                known = (item.key, item.name, "", item.settings(self.kind), __version__)
+                self._finish(Entry(*known, "failed", str(error)), {}, None)
+                continue
+            self.at_work[item.key] = item, code_of(data)
+            yield Parcel(item.key, item.call, reads, writes, item.source.name, data)
+
+    def _keep(self, answer: Answer) -> None:
+        entry = _entry(answer, *self.at_work.pop(answer.key), self.kind)
+        if entry is None:
+            return
+        end = answer.end
+        picture = self.kind.picture(end.summary) if isinstance(end, Finished) else None
+        self._finish(entry, {} if entry.state == "failed" else answer.files, picture)
+
+    def _finish(self, entry: Entry, files: Any, picture: str | None) -> None:
+        self.folder.keep(entry, files, picture)
+        self.finished.add(entry.file)
+        self.without += entry.state != "done"
+        self.tell(ItemDone(entry.name, entry.state, entry.reason or _figures(entry, self.kind)))
+        self._progress()
+
+    def _progress(self) -> None:
+        finished = self.kept + len(self.finished)
+        what = f"{finished} of {self.count}"
+        if self.without:
+            what += f", {self.without} without a result"
+        self.tell(Progress(finished / self.count, what))
+
+
+def _entry(answer: Answer, item: Item, code: str, kind: Kind) -> Entry | None:
+    """What the journal says of an answer, None of what was interrupted."""
+    end = answer.end
+    known = (item.key, item.name, code, item.settings(kind), __version__)
+    if isinstance(end, Failed):
+        return Entry(*known, "failed", end.message)
+    if end.state == "cancelled":
+        return None
+    seconds = end.summary.get("seconds")
+    if end.state == "nothing found":
+        failed = end.summary.get("failed") or ()
+        reasons = Counter(str(failure["reason"]) for failure in failed).most_common(1)
+        reason = reasons[0][0] if reasons else "nothing was found"
+        return Entry(*known, "nothing found", reason, {}, seconds)
+    return Entry(*known, "done", "", kind.best(end.summary), seconds)
+
+
+def _figures(entry: Entry, kind: Kind) -> str:
+    """The figures of a result, in words."""
+    words = [
+        f"{column.title} {column.shown(value)}" if column.form else column.shown(value)
+        for column in kind.columns
+        if (value := entry.best.get(column.name)) is not None and not isinstance(value, bool)
+    ]
+    if entry.seconds is not None:
+        words.append(f"{entry.seconds:.1f} s")
+    return ", ".join(words)

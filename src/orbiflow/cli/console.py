@@ -1,6 +1,0 @@
-"""Where the command line writes."""
-
-from rich.console import Console
-
-output = Console()
-errors = Console(stderr=True)

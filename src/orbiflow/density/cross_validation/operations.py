@@ -1,0 +1,201 @@
+"""The operations of a cross-validation: all of it, and one of its fits, which workers do."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+from orbiflow.arguments import refusal
+from orbiflow.batch import WorkSettings
+from orbiflow.density.fitting import COMPONENTS, ComponentSettings
+from orbiflow.density.tables import RowSettings, SpaceSettings
+from orbiflow.errors import SettingError, literal
+from orbiflow.runtime import Cancel, Outcome, Sink, ignore, operation
+from orbiflow.settings import DefaultText, Option, Range, Repeated, Settings
+
+DEFAULT, UNIFORM = "default", "uniform"
+"""Names of what a fit chooses by itself, and of the density that is the same everywhere."""
+
+SEEDS = Range(0, 2**63 - 1)
+"""Seeds of splits, which are fewer than those of fits."""
+
+KERNELS = ("kernels",)
+"""What is compared if nothing else is asked for."""
+
+NEVER = Cancel()
+
+
+class CvSettings(Settings, group="Cross-validation"):
+    """How rows are split, what is compared, and how sure the comparison is."""
+
+    folds: Annotated[int, Range(2, 1000)] = 10
+    """Number of parts of the rows; each is held out once."""
+
+    times: Annotated[int, Range(1, 100)] = 1
+    """Number of splits; more of them take away the chance of one."""
+
+    against: Annotated[tuple[str, ...] | None, Repeated(), DefaultText("kernels")] = None
+    """Other components, such as kernels,mixture, that are fitted to the same folds and compared row by
+    row; also default, all components, and uniform. May be repeated."""
+
+    level: Annotated[float, Range(0.5, 0.999)] = 0.95
+    """Probability that all intervals hold at once."""
+
+    bootstrap: Annotated[int, Range(100, 1_000_000)] = 2000
+    """Number of resamples of rows or groups."""
+
+    def check(self) -> None:
+        for text in self.against or ():
+            if text != UNIFORM:
+                _setting_in(text)
+
+    @property
+    def others(self) -> dict[str, tuple[str, ...] | None]:
+        """The components of the other settings that are fitted, by name."""
+        asked = KERNELS if self.against is None else self.against
+        return dict(_setting_in(text) for text in asked if text != UNIFORM)
+
+
+@dataclass(frozen=True)
+class CrossValidation:
+    """What is asked for, checked.
+
+    - `data`, `out`: The table, and the folder for the results.
+    - `where`, `density`: The fit in question.
+    - `rows`: How the table is read.
+    - `group`: The column that names what rows belong to.
+    - `cv`: The splits and the comparison.
+    """
+
+    data: Path
+    out: Path
+    where: SpaceSettings
+    density: ComponentSettings
+    rows: RowSettings
+    group: str | None
+    cv: CvSettings
+
+    def __post_init__(self) -> None:
+        if self.density.seed not in SEEDS:
+            raise refusal("seed", f"from 0 to {SEEDS.most}", self.density.seed)
+        name, _ = setting_of(self.density.components, "components")
+        if self.cv.against is not None and name in self.cv.others:
+            raise SettingError(
+                f"{{components}} and {{against}} are both {name}; compare it with others, or with "
+                "uniform"
+            )
+
+    @property
+    def settings(self) -> dict[str, tuple[str, ...] | None]:
+        """The components by the name of each setting that is fitted, the one in question first."""
+        found = dict([setting_of(self.density.components, "components")])
+        for name, components in self.cv.others.items():
+            found.setdefault(name, components)
+        return found
+
+    @property
+    def beside_uniform(self) -> bool:
+        """Whether the uniform density is compared, too: if asked for, or if there is no other."""
+        return UNIFORM in (self.cv.against or ()) or len(self.settings) == 1
+
+    @property
+    def names(self) -> list[str]:
+        """The names of what is compared, the setting in question first."""
+        return [*self.settings, *([UNIFORM] if self.beside_uniform else [])]
+
+
+@operation("density cv", keeps_partial=True, starts_processes=True)
+def cross_validate(
+    data: Path,
+    where: SpaceSettings,
+    density: ComponentSettings = ComponentSettings(),
+    out: Annotated[Path, Option("-o")] = Path("cv"),
+    cv: CvSettings = CvSettings(),
+    rows: RowSettings = RowSettings(),
+    work: WorkSettings = WorkSettings(),
+    *,
+    group: str | None = None,
+    on_event: Sink = ignore,
+    cancel: Cancel = NEVER,
+) -> Outcome:
+    """Cross-validate: how well does a density foretell rows that its fit has not seen?
+
+    Fits to all folds but one, for each in turn, here or on a Dask cluster, and scores the one held out,
+    beside other settings at the same folds. Writes cv.csv, a line for each fold; rows.csv, the table
+    with the log densities of each row; report.json, the comparison; and index.html, a page to look at.
+    If it is interrupted, run the same command again to resume. The exit status is 1 if a fold has no
+    result.
+
+    Args:
+        data: CSV, TSV, NPY or Parquet.
+        out: Folder for the results; an earlier cross-validation there is resumed.
+        group: Column that names what rows belong to (a protein, a station, an event): all rows of one
+            are on the same side of every split.
+    """
+    asked = CrossValidation(data, out, where, density, rows, group, cv)
+
+    from orbiflow.density.cross_validation.fits import run
+
+    return run(asked, work, on_event, cancel)
+
+
+@operation("density fold")
+def fold(
+    data: Path,
+    where: SpaceSettings,
+    density: ComponentSettings = ComponentSettings(),
+    out: Annotated[Path, Option("-o")] = Path("fold"),
+    rows: RowSettings = RowSettings(),
+    *,
+    fold: int,
+    held: str = "fold",
+    group: str | None = None,
+    on_event: Sink = ignore,
+    cancel: Cancel = NEVER,
+) -> Outcome:
+    """Fit a density to all rows of a table but those of one fold, and score that fold.
+
+    Writes scores.csv, a line for each row held out, and report.json.
+
+    Args:
+        data: The table.
+        out: Folder for the results, made if need be.
+        fold: The fold that is held out.
+        held: Column that numbers the fold of each row.
+        group: Column that names what rows belong to.
+    """
+    from orbiflow.density.cross_validation.fold import fit_and_score
+
+    return fit_and_score(data, where, density, rows, out, fold, held, group, on_event, cancel)
+
+
+def setting_of(components: Sequence[str] | None, field: str) -> tuple[str, tuple[str, ...] | None]:
+    """Return the name of a setting, and its components in one order.
+
+    Raises:
+        SettingError: For components that there are not, by the field's name.
+
+    >>> setting_of(["mixture", "kernels"], "components")
+    ('kernels+mixture', ('kernels', 'mixture'))
+    """
+    if components is None:
+        return DEFAULT, None
+    unknown = [name for name in components if name not in COMPONENTS]
+    if unknown or not components:
+        others = ", default or uniform" if field == "against" else ""
+        raise SettingError(
+            f"{{{field}}} must be of {', '.join(COMPONENTS)} with commas between{others}, got "
+            + literal(repr(", ".join(unknown)))
+        )
+    own = tuple(name for name in COMPONENTS if name in components)
+    return (DEFAULT, None) if own == COMPONENTS else ("+".join(own), own)
+
+
+def _setting_in(text: str) -> tuple[str, tuple[str, ...] | None]:
+    """The setting that a word of `against` names."""
+    if text == DEFAULT:
+        return DEFAULT, None
+    pieces = [piece.strip() for piece in text.replace("+", ",").split(",")]
+    return setting_of([piece for piece in pieces if piece], "against")

@@ -1,0 +1,116 @@
+"""Small batches, an executor that stays in this process, and work that kills its worker."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+from collections.abc import Callable, Generator, Iterable
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+from orbiflow.batch import Answer, Parcel
+from orbiflow.batch.parcels import carry_out
+from orbiflow.runtime import Call, Cancel, Event, Failed, Finished, Sink, find
+from runtime.searches import BOOT, run
+
+QUICK: dict[str, Any] = {
+    "classes": ["IH4"],
+    "method": "occupancy",
+    "turns": 1,
+    "iterations": 2,
+    "max_frequency": 1,
+}
+
+
+def write_boot(path: Path, height: float = 145) -> None:
+    """A silhouette, which `height` makes another one."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(json.dumps([*BOOT[:5], (100, height), BOOT[6]]))
+
+
+def boot_parcels(count: int) -> list[Parcel]:
+    """Searches of less than a second."""
+    given = {**QUICK, "image": "boot.json", "workers": 1, "called": "boot"}
+    call = find("escherize").call(given)
+    data = json.dumps(BOOT).encode()
+    return [Parcel(f"boot {k}", call, "image", "out", "boot.json", data) for k in range(count)]
+
+
+class Here:
+    """An executor without processes; remembers the keys of what it has done."""
+
+    place = "this process"
+
+    def __init__(self) -> None:
+        self.done: list[str] = []
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+        /,
+    ) -> None: ...
+
+    def answers(
+        self,
+        parcels: Iterable[Parcel],
+        tell: Sink,  # noqa: ARG002
+        cancel: Cancel,
+    ) -> Generator[Answer, None, None]:
+        for parcel in parcels:
+            if cancel.cancelled:
+                return
+            self.done.append(parcel.key)
+            yield Answer.from_worker(parcel.key, *carry_out(parcel.header(), parcel.data, cancel))
+
+
+def run_call(call: Call, cancel: Cancel | None = None) -> tuple[dict[str, Any], list[Event]]:
+    """The summary and all events."""
+    events: list[Event] = []
+    return run(call, events.append, cancel).summary, events
+
+
+def rows(out: Path) -> dict[str, dict[str, str]]:
+    """Of the table, by file."""
+    with (out / "batch.csv").open(encoding="utf-8", newline="") as file:
+        return {row["file"]: row for row in csv.DictReader(file)}
+
+
+def without_seconds(files: dict[str, bytes]) -> dict[str, Any]:
+    """What two executors must agree in."""
+
+    def plain(value: Any) -> Any:
+        if isinstance(value, dict):
+            return {k: plain(v) for k, v in value.items() if k not in ("seconds", "timings")}
+        return [plain(part) for part in value] if isinstance(value, list) else value
+
+    return {
+        name: plain(json.loads(data)) if name.endswith(".json") else data
+        for name, data in files.items()
+    }
+
+
+def deadly_locally(
+    order: tuple[str, bytes], _tell: Callable[[Any], None], _cancel: Cancel
+) -> tuple[str, dict[str, bytes]]:
+    """The same as work of a local process."""
+    return deadly(*order)
+
+
+def deadly(header: str, data: bytes) -> tuple[str, dict[str, bytes]]:
+    """Kills the process that works on `b"deadly"`; all else is done at once."""
+    if data == b"deadly":
+        os._exit(3)
+    ended = Finished("done", {"name": json.loads(header)["name"]})
+    return json.dumps([ended.to_json()]), {"file": data}
+
+
+def state_of(answer: Answer) -> str:
+    """In a word."""
+    return answer.end.failure if isinstance(answer.end, Failed) else answer.end.state

@@ -1,0 +1,249 @@
+"""The same parcels by every executor: the same answers; deaths cost their time and nothing else."""
+
+from __future__ import annotations
+
+import gc
+import os
+import signal
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from batch.small_batches import (
+    Here,
+    boot_parcels,
+    deadly,
+    deadly_locally,
+    state_of,
+    without_seconds,
+)
+from orbiflow import __version__
+from orbiflow.batch import (
+    Answer,
+    Executor,
+    LocalProcesses,
+    Parcel,
+    dask_cluster,
+    executors,
+    parcels,
+)
+from orbiflow.batch.dask_cluster import TRIM_VARIABLE, DaskCluster, keeping_memory
+from orbiflow.batch.parcels import carry_out
+from orbiflow.errors import OrbiflowError
+from orbiflow.runtime import Cancel, Event, Failed, Finished, Note, find
+
+DEADLY = find("escherize").call({"image": "any.png"})
+
+
+@pytest.fixture(name="cluster", scope="module")
+def cluster_fixture() -> Iterator[Any]:
+    """A Dask cluster of two worker processes, on the loopback interface alone."""
+    dask = pytest.importorskip("dask", reason="the extra of Dask is not installed")
+    from distributed import LocalCluster
+
+    settings = {"distributed.scheduler.allowed-failures": 1, "distributed.admin.log-length": 0}
+    with (
+        dask.config.set(settings),
+        LocalCluster(
+            n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address="127.0.0.1:0"
+        ) as cluster,
+    ):
+        yield cluster
+
+
+def parcels_of(*data: bytes) -> list[Parcel]:
+    return [Parcel(f"{k}", DEADLY, "image", "out", f"{k}.png", d) for k, d in enumerate(data)]
+
+
+def answers(
+    executor: Executor, sent: list[Parcel], events: list[Event] | None = None
+) -> dict[str, Answer]:
+    tell = [].append if events is None else events.append
+    with executor:
+        return {answer.key: answer for answer in executor.answers(sent, tell, Cancel())}
+
+
+@pytest.fixture(name="expected", scope="module")
+def expected_fixture() -> dict[str, Any]:
+    (answer,) = answers(Here(), boot_parcels(1)).values()
+    assert state_of(answer) == "done"
+    return without_seconds(dict(answer.files))
+
+
+def test_local_processes_give_the_same(expected: dict[str, Any]) -> None:
+    found = answers(LocalProcesses(2, ("orbiflow.tiles.search",)), boot_parcels(3))
+    assert sorted(found) == ["boot 0", "boot 1", "boot 2"]
+    for answer in found.values():
+        assert without_seconds(dict(answer.files)) == expected
+
+
+def test_a_cluster_gives_the_same_though_a_worker_is_killed(
+    expected: dict[str, Any], cluster: Any
+) -> None:
+    executor, killed = DaskCluster(cluster.scheduler_address), []
+    with executor:
+        assert executor.place.startswith("2 workers of tcp://127.0.0.1:")
+        found = {}
+        for answer in executor.answers(boot_parcels(4), [].append, Cancel()):
+            found[answer.key] = answer
+            if not killed:
+                at_work = [w for w in cluster.scheduler.workers.values() if w.processing]
+                killed += [
+                    nanny
+                    for nanny in cluster.workers.values()
+                    if nanny.worker_address == at_work[0].address
+                ]
+                os.kill(killed[0].pid, signal.SIGKILL)
+    assert sorted(found) == [f"boot {k}" for k in range(4)]
+    for answer in found.values():
+        assert without_seconds(dict(answer.files)) == expected
+
+
+def test_what_kills_processes_fails_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(executors, "_serve", deadly_locally)
+    events: list[Event] = []
+    found = answers(LocalProcesses(2), parcels_of(b"a", b"deadly", b"b", b"c"), events)
+    assert {key: state_of(answer) for key, answer in found.items()} == {
+        "0": "done",
+        "1": "died",
+        "2": "done",
+        "3": "done",
+    }
+    end = found["1"].end
+    assert isinstance(end, Failed)
+    assert end.message.startswith("3 workers died while they were at it")
+    assert events == [Note("3 processes died of 1; the others go on")]
+
+
+def test_what_kills_workers_fails_alone(monkeypatch: pytest.MonkeyPatch, cluster: Any) -> None:
+    monkeypatch.setattr(dask_cluster, "_serve", deadly)
+    events: list[Event] = []
+    sent = parcels_of(b"a", b"deadly", b"b", b"c", b"d")
+    found = answers(DaskCluster(cluster.scheduler_address), sent, events)
+    assert {key: state_of(answer) for key, answer in found.items()} == {
+        "0": "done",
+        "1": "died",
+        "2": "done",
+        "3": "done",
+        "4": "done",
+    }
+    assert any(isinstance(e, Note) and "it is tried again alone" in e.text for e in events)
+    assert found["0"].files == {"file": b"a"}
+
+
+def test_a_worker_killed_once_its_result_is_fetched(
+    monkeypatch: pytest.MonkeyPatch, cluster: Any
+) -> None:
+    monkeypatch.setattr(dask_cluster, "_serve", deadly)
+    with DaskCluster(cluster.scheduler_address) as executor:
+        found = executor.answers(parcels_of(b"a", b"b", b"c"), [].append, Cancel())
+        keys = [next(found).key]
+        tasks = cluster.scheduler.tasks.values()
+        while not all(task.state == "memory" for task in tasks):
+            time.sleep(0.05)
+        time.sleep(0.2)  # most likely the results are here
+        for nanny in list(cluster.workers.values()):
+            os.kill(nanny.pid, signal.SIGKILL)
+        while any(task.state == "memory" for task in tasks):
+            time.sleep(0.05)
+        keys += [answer.key for answer in found]
+    assert sorted(keys) == ["0", "1", "2"]
+
+
+def test_stopping_a_cluster_leaves_nothing_on_it(
+    monkeypatch: pytest.MonkeyPatch, cluster: Any
+) -> None:
+    monkeypatch.setattr(dask_cluster, "_serve", deadly)
+    cancel = Cancel()
+    with DaskCluster(cluster.scheduler_address) as executor:
+        found = executor.answers(parcels_of(*[b"a"] * 9), [].append, cancel)
+        next(found)
+        cancel.cancel()
+        assert len(list(found)) <= 2  # those that had come
+    assert not [
+        c for c in cluster.scheduler.clients.values() if c.client_key.startswith("orbiflow")
+    ]
+
+
+def test_another_version_on_the_workers(monkeypatch: pytest.MonkeyPatch, cluster: Any) -> None:
+    monkeypatch.setattr(dask_cluster, "__version__", "999")
+    with pytest.raises(OrbiflowError, match=f"has orbiflow {__version__}, here is 999"):
+        DaskCluster(cluster.scheduler_address).__enter__()
+    (late,) = boot_parcels(1)
+    header = late.header().replace(f'"version": "{__version__}"', '"version": "999"')
+    text, files = carry_out(header, late.data, Cancel())
+    assert not files
+    end = Answer.from_worker("late", text, files).end
+    assert isinstance(end, Failed)
+    assert end.message == f"this worker has orbiflow {__version__}, not 999"
+
+
+@pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "127.0.0.1:1", "nonsense", "ftp://a:1"])
+def test_no_scheduler_there(address: str) -> None:
+    pytest.importorskip("distributed", reason="the extra of Dask is not installed")
+    with pytest.raises(OrbiflowError, match="no Dask scheduler answers at"):
+        DaskCluster(address, timeout=0.2).__enter__()
+
+
+def test_what_could_not_connect_is_closed() -> None:
+    """Its own end, in a garbage collection, could wait for the start of the next one for ever."""
+    pytest.importorskip("distributed", reason="the extra of Dask is not installed")
+    from distributed import Client
+
+    gc.disable()
+    try:
+        with pytest.raises(OrbiflowError, match="no Dask scheduler answers at"):
+            DaskCluster("ftp://a:1", timeout=0.2).__enter__()
+        found = [client for client in gc.get_objects() if issubclass(type(client), Client)]
+    finally:
+        gc.enable()
+    assert all(client.status == "closed" for client in found)
+
+
+@pytest.mark.parametrize("name", ["/etc/passwd", "../up", "a/../../b", "", "a\\b"])
+def test_an_answer_cannot_write_elsewhere(name: str) -> None:
+    text = '[{"kind": "finished", "state": "done", "summary": {}}]'
+    with pytest.raises(OrbiflowError, match="a name that cannot be used"):
+        Answer.from_worker("key", text, {name: b""})
+
+
+def test_an_answer_without_an_end() -> None:
+    with pytest.raises(OrbiflowError, match="without an end"):
+        Answer.from_worker("key", '[{"kind": "note", "text": ""}]', {})
+
+
+@given(st.binary(max_size=200))
+def test_whatever_the_bytes_are_there_is_an_answer(data: bytes) -> None:
+    one = Parcel("key", find("escherize").call({"image": "a.svg"}), "image", "out", "a.svg", data)
+    answer = Answer.from_worker("key", *carry_out(one.header(), one.data, Cancel()))
+    assert isinstance(answer.end, Failed)
+    assert answer.end.failure == "mistake"
+    assert "orbiflow-" not in answer.end.message  # the folder that it was in
+    assert not answer.files
+
+
+def test_what_is_too_large_is_not_sent(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(parcels, "MOST_WRITTEN", 1000)
+    (answer,) = answers(Here(), boot_parcels(1)).values()
+    assert state_of(answer) == "mistake"
+    assert not answer.files
+
+
+def test_memory_is_as_before(monkeypatch: pytest.MonkeyPatch) -> None:
+    for asked in ("65536", "", "nonsense", str(2**40)):
+        monkeypatch.setenv(TRIM_VARIABLE, asked)
+        with keeping_memory():
+            assert len(bytearray(2**20)) == 2**20
+
+
+def test_a_cancelled_parcel_says_so() -> None:
+    cancel = Cancel()
+    cancel.cancel()
+    (one,) = boot_parcels(1)
+    answer = Answer.from_worker("key", *carry_out(one.header(), one.data, cancel))
+    assert isinstance(answer.end, Finished)
+    assert answer.end.state == "cancelled"

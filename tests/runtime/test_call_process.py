@@ -1,0 +1,106 @@
+"""Calls in processes of their own."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import threading
+from pathlib import Path
+
+import pytest
+
+from orbiflow.runtime import (
+    ClassFailed,
+    Event,
+    Failed,
+    Finished,
+    Progress,
+    TileFound,
+    start,
+)
+from runtime.searches import ENDLESS, boot_call, check_order
+
+
+def test_a_search_in_a_process(tmp_path: Path) -> None:
+    with start(boot_call(tmp_path, "IH4", "IH6", workers=2)) as process:
+        events = list(process.events())
+        assert process.wait() == process.exitcode == 0
+    check_order(events, "IH4", "IH6")
+    assert isinstance(events[-1], Finished)
+    assert events[-1].state == "done"
+    assert (tmp_path / "out" / "overview.png").is_file()
+
+
+def test_two_calls_are_started_from_threads(tmp_path: Path) -> None:
+    found: dict[str, list[Event]] = {}
+
+    def work(name: str) -> None:
+        (tmp_path / name).mkdir()
+        with start(boot_call(tmp_path / name, name)) as process:
+            found[name] = list(process.events())
+
+    threads = [threading.Thread(target=work, args=(name,)) for name in ("IH4", "IH6")]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    for name in ("IH4", "IH6"):
+        check_order(found[name], name)
+        assert isinstance(found[name][-1], Finished)
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_cancelling_keeps_the_order_and_ends_the_process(workers: int, tmp_path: Path) -> None:
+    call = boot_call(tmp_path, "IH4", "IH6", iterations=ENDLESS, workers=workers)
+    events = []
+    with start(call) as process:
+        for event in process.events():
+            events.append(event)
+            if isinstance(event, Progress) and event.class_name:
+                process.cancel()
+        assert process.wait() == 0
+    check_order(events, "IH4", "IH6")
+    assert isinstance(events[-1], Finished)
+    assert events[-1].state == "cancelled"
+    reasons = {event.reason for event in events if isinstance(event, ClassFailed)}
+    assert reasons == {"interrupted"}
+    assert not any(isinstance(event, TileFound) for event in events)
+    document = json.loads((tmp_path / "out" / "result.json").read_text())
+    assert [entry["class"] for entry in document["failed"]] == ["IH4", "IH6"]
+
+
+def test_a_mistake_is_the_last_event(tmp_path: Path) -> None:
+    call = boot_call(tmp_path, "IH8")
+    with start(call) as process:
+        events = list(process.events())
+        assert process.wait() == 1
+    check_order(events)
+    assert isinstance(events[-1], Failed)
+    assert events[-1].failure == "mistake"
+    assert "unknown isohedral class 'IH8'" in events[-1].message
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals")
+def test_a_process_that_dies_is_the_last_event(tmp_path: Path) -> None:
+    events = []
+    with start(boot_call(tmp_path, "IH4", iterations=ENDLESS)) as process:
+        for event in process.events():
+            events.append(event)
+            if isinstance(event, Progress):
+                process.kill()
+        assert process.exitcode == -signal.SIGKILL
+        assert process.wait() == -signal.SIGKILL
+        process.cancel()  # no harm
+    check_order(events)
+    assert isinstance(events[-1], Failed)
+    assert events[-1].failure == "died"
+    assert "signal 9" in events[-1].message
+    assert not (tmp_path / "out").exists()
+
+
+def test_waiting_has_a_limit(tmp_path: Path) -> None:
+    with start(boot_call(tmp_path, "IH4", iterations=ENDLESS)) as process:
+        assert process.exitcode is None
+        with pytest.raises(TimeoutError, match="still runs"):
+            process.wait(timeout=0.01)

@@ -1,0 +1,86 @@
+"""Events go to JSON and back."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from orbiflow.errors import SettingError
+from orbiflow.runtime import (
+    ClassFailed,
+    Event,
+    Failed,
+    Finished,
+    ItemDone,
+    Note,
+    Preview,
+    Progress,
+    Started,
+    Table,
+    TileFound,
+    Written,
+    event_from_json,
+)
+
+numbers = st.floats(allow_nan=False, allow_infinity=False)
+words = st.text()
+plain = st.recursive(
+    st.none() | st.booleans() | st.integers() | numbers | words,
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(words, inner, max_size=3),
+    max_leaves=8,
+)
+EVENTS = st.one_of(
+    st.builds(Started, words),
+    st.builds(Note, words, st.booleans()),
+    st.builds(
+        Table,
+        words,
+        st.lists(words).map(tuple),
+        st.lists(st.lists(words).map(tuple)).map(tuple),
+    ),
+    st.builds(
+        Progress, numbers, words, st.none() | words, st.none() | numbers, st.none() | numbers
+    ),
+    st.builds(Preview, words, numbers, numbers),
+    st.builds(TileFound, words, numbers, numbers, st.booleans()),
+    st.builds(ClassFailed, words, words),
+    st.builds(ItemDone, words, st.sampled_from(["done", "nothing found", "failed"]), words),
+    st.builds(Written, st.text(st.characters(exclude_characters="\0"), min_size=1).map(Path)),
+    st.builds(
+        Finished,
+        st.sampled_from(["done", "nothing found", "cancelled"]),
+        st.dictionaries(words, plain, max_size=4),
+    ),
+    st.builds(Failed, words, st.sampled_from(["mistake", "error", "died"])),
+)
+
+
+@given(EVENTS)
+def test_to_json_and_back(event: Event) -> None:
+    text = json.dumps(event.to_json(), allow_nan=False)
+    assert "\n" not in text  # one line each
+    assert event_from_json(json.loads(text)) == event
+
+
+@pytest.mark.parametrize(
+    ("document", "message"),
+    [
+        ("note", "an? event is a JSON object"),
+        ({"kind": "escherize"}, "unknown kind of event 'escherize'"),
+        ({"kind": "note"}, "text is missing"),
+        ({"kind": "note", "text": 3}, "text must be text, got 3"),
+        ({"kind": "note", "text": "", "more": 1}, "note has no setting 'more'"),
+        (
+            {"kind": "progress", "share": float("nan"), "what": ""},
+            "share must be a (finite )?number",
+        ),
+        ({"kind": "finished", "state": "done", "summary": {"a": float("nan")}}, "summary must be"),
+    ],
+)
+def test_what_is_no_event(document: object, message: str) -> None:
+    with pytest.raises(SettingError, match=message):
+        event_from_json(document)

@@ -1,0 +1,184 @@
+"""Calls in this process: order of events, files, cancelling, failures."""
+
+from __future__ import annotations
+
+import json
+import threading
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from orbiflow.errors import OrbiflowError
+from orbiflow.runtime import (
+    Cancel,
+    ClassFailed,
+    Event,
+    Failed,
+    Finished,
+    Preview,
+    Progress,
+    TileFound,
+    Written,
+    find,
+)
+from orbiflow.tiles.pages.tile_folder import TILE_FILES
+from runtime.searches import BOOT, ENDLESS, boot_call, check_order, run
+
+
+def files(folder: Path) -> set[str]:
+    return {p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.is_file()}
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_search(workers: int, tmp_path: Path) -> None:
+    events: list[Event] = []
+    threads: set[int] = set()
+
+    def sink(event: Event) -> None:
+        events.append(event)
+        threads.add(threading.get_ident())
+
+    finished = run(boot_call(tmp_path, "IH4", "ih6", workers=workers), sink)
+    assert finished is events[-1]
+    assert finished.state == "done"
+    assert threads == {threading.get_ident()}
+    check_order(events, "IH4", "IH6")
+    found = {event.class_name: event.iou for event in events if isinstance(event, TileFound)}
+    tiles = finished.summary["tiles"]
+    assert {tile["class"]: tile["iou"] for tile in tiles} == found
+    written = {event.path for event in events if isinstance(event, Written)}
+    assert written == {tmp_path / "out" / name for name in files(tmp_path / "out")}
+    expected = {f"{name}/{file}" for name in ("IH4", "IH6") for file in TILE_FILES}
+    assert files(tmp_path / "out") == expected | {"index.html", "result.json", "overview.png"}
+
+
+def test_a_second_run_takes_the_place_of_the_first(tmp_path: Path) -> None:
+    run(boot_call(tmp_path, "IH4", "IH6"))
+    out = tmp_path / "out"
+    run(boot_call(tmp_path, "IH4"))
+    assert {p.name for p in out.iterdir()} == {"IH4", "index.html", "overview.png", "result.json"}
+    (out / "IH4" / "notes.txt").write_text("mine")
+    before = (out / "result.json").read_bytes()
+    with pytest.raises(OrbiflowError, match=r"holds IH4/notes.txt, which is of no earlier run"):
+        run(boot_call(tmp_path, "IH6"))
+    assert (out / "result.json").read_bytes() == before
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["boot.json", "out"]
+
+
+def test_a_folder_of_the_run_is_refused_before_any_work(tmp_path: Path) -> None:
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "notes.txt").write_text("mine")
+    events: list[Event] = []
+    with pytest.raises(OrbiflowError, match=r"holds notes\.txt"):
+        run(boot_call(tmp_path, "IH4", iterations=ENDLESS), events.append)
+    assert [type(event) for event in events[1:]] == [Failed]
+    assert (tmp_path / "out" / "notes.txt").read_text() == "mine"
+
+
+def test_a_search_cancelled_with_nothing_found_leaves_the_earlier_run(tmp_path: Path) -> None:
+    run(boot_call(tmp_path, "IH4"))
+    out = tmp_path / "out"
+    before = {name: (out / name).read_bytes() for name in files(out)}
+    cancel, events = Cancel(), []
+
+    def sink(event: Event) -> None:
+        events.append(event)
+        if isinstance(event, Progress):
+            cancel.cancel()
+
+    finished = run(boot_call(tmp_path, "IH6", iterations=ENDLESS), sink, cancel)
+    assert finished.state == "cancelled"
+    assert finished.summary["written"] is False
+    check_order(events, "IH6")
+    assert [e.reason for e in events if isinstance(e, ClassFailed)] == ["interrupted"]
+    assert {name: (out / name).read_bytes() for name in files(out)} == before
+
+
+def test_a_search_cancelled_on_the_way_keeps_what_was_found(tmp_path: Path) -> None:
+    cancel, events = Cancel(), []
+
+    def sink(event: Event) -> None:
+        events.append(event)
+        if isinstance(event, TileFound):
+            cancel.cancel()
+
+    finished = run(boot_call(tmp_path, "IH4", "IH6"), sink, cancel)
+    assert finished.state == "cancelled"
+    check_order(events, "IH4", "IH6")
+    document = json.loads((tmp_path / "out" / "result.json").read_text())
+    assert [tile["class"] for tile in document["tiles"]] == ["IH4"]
+    assert document["failed"] == [{"class": "IH6", "reason": "interrupted"}]
+    assert (tmp_path / "out" / "IH4" / "tile.svg").is_file()
+
+
+def test_a_first_look_alone_is_kept_unless_there_is_more(tmp_path: Path) -> None:
+    path = tmp_path / "boot.json"
+    path.write_text(json.dumps(BOOT))
+    given = {"image": path, "out": tmp_path / "out", "effort": "fast", "workers": 1}
+
+    def cancelled() -> Finished:
+        cancel, events = Cancel(), []
+
+        def sink(event: Event) -> None:
+            events.append(event)
+            if isinstance(event, Preview):
+                cancel.cancel()
+
+        call = find("escherize").call({**given, "classes": ["IH4", "IH6"]})
+        finished = run(call, sink, cancel)
+        check_order(events, "IH4", "IH6")
+        assert finished.state == "cancelled"
+        return finished
+
+    assert [tile["class"] for tile in cancelled().summary["tiles"]] == ["IH6"]
+    out = tmp_path / "out"
+    assert {p.name for p in out.iterdir()} == {"IH6", "index.html", "overview.png", "result.json"}
+    assert run(find("escherize").call({**given, "classes": ["IH4"]})).state == "done"
+    finished = cancelled()
+    assert not finished.summary["written"]
+    assert finished.summary["tiles"] == []
+    assert {p.name for p in out.iterdir()} == {"IH4", "index.html", "overview.png", "result.json"}
+
+
+def test_a_fit_that_is_cancelled_writes_nothing(tmp_path: Path) -> None:
+    data = tmp_path / "data.csv"
+    rows = np.random.default_rng(0).normal(0.0, 0.5, (50, 2))
+    data.write_text("\n".join(f"{a:.4f},{b:.4f}" for a, b in rows))
+    cancel, events = Cancel(), []
+
+    def sink(event: Event) -> None:
+        events.append(event)
+        if isinstance(event, Progress):
+            cancel.cancel()
+
+    call = find("density fit").call(
+        {"data": data, "space": "torus", "out": tmp_path / "out", "max_frequency": 2}
+    )
+    assert run(call, sink, cancel).state == "cancelled"
+    check_order(events)
+    assert [p.name for p in tmp_path.iterdir()] == ["data.csv"]
+
+
+def test_what_the_sink_raises_comes_out(tmp_path: Path) -> None:
+    told: list[Event] = []
+
+    def sink(event: Event) -> None:
+        told.append(event)
+        if isinstance(event, Progress):
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        run(boot_call(tmp_path, "IH4", "IH6"), sink)
+    assert not any(isinstance(event, Failed) for event in told)
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_mistake_is_told_and_raised(tmp_path: Path) -> None:
+    events: list[Event] = []
+    with pytest.raises(OrbiflowError, match="cannot read"):
+        run(find("density sample").call({"model": tmp_path / "none"}), events.append)
+    check_order(events)
+    assert isinstance(events[-1], Failed)
+    assert events[-1].failure == "mistake"
+    assert "cannot read" in events[-1].message
