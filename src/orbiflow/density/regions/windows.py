@@ -1,5 +1,8 @@
 """Windows in which regions of a space are drawn: rectangles that hold each point once."""
 
+# pyright: reportUnknownMemberType=false
+# shapely's stubs leave the keyword arguments of its functions of arrays without types.
+
 from __future__ import annotations
 
 from collections.abc import Callable
