@@ -76,9 +76,8 @@ def _wrong(
 ) -> NDArray[np.int64]:
     """Return cells (C, 2) with seeds on the wrong side, those with most first."""
     shapely.prepare(shape)
-    wrong: NDArray[np.bool_] = shapely.intersects_xy(shape, *seeds.points.T) != (
-        seeds.values >= level
-    )
+    inside = np.asarray(shapely.intersects_xy(shape, *seeds.points.T), bool)
+    wrong = inside != (seeds.values >= level)
     most = np.array(grid.values.shape) - 2
     at = np.clip(np.floor((seeds.points[wrong] - grid.low) / grid.step).astype(int), 0, most)
     cells, counts = np.unique(at, axis=0, return_counts=True)
