@@ -34,8 +34,7 @@ from reproduction.exhibit import Exhibit, Extent, Findings, Table, Work
 from reproduction.nested import equivariance_error
 from reproduction.published import animal
 
-OMEGA = 5
-"""The paper's maximum frequency for its figure of one animal."""
+OMEGA = 5  # the paper's maximum frequency for its figure of one animal
 
 
 def animal_tile(name: str, omega: int, affine: int, iterations: int) -> EscherTile | ClassFailure:
@@ -55,9 +54,8 @@ def animal_work(extent: Extent, omega: int) -> list[Work]:
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+# three pictures of three rows each
 PARTS = (("a", ("IH1", "IH2", "IH3")), ("b", ("IH4", "IH5", "IH6")), ("c", ("IH7", "IH21", "IH28")))
-"""Three pictures of three rows each."""
-
 COLUMNS = (
     "(a) tile, and the animal in red",
     "(b) tiling",

@@ -14,6 +14,7 @@ from reproduction.exhibit import Exhibit, Extent, Findings, Table, Work
 from reproduction.goal_fits import GoalTile, goal_work
 from reproduction.published import Goal, goals
 
+# rows of the picture and their fills
 ROWS = (
     ("goal", "#3b4754"),
     ("ARAP", "#b9a58c"),
@@ -21,7 +22,6 @@ ROWS = (
     ("overlap", "#8ab6d9"),
     ("likeness", "#5d97c9"),
 )
-"""Rows of the picture and their fills."""
 
 LABELS = {
     "goal": "goal",
@@ -30,12 +30,12 @@ LABELS = {
     "overlap": "here,\noverlap",
     "likeness": "here,\nlikeness",
 }
+# of the table
 HEADINGS = (
     "goal", "paper, “IoU”", "its ARAP, “IoU”", "paper, pixel accuracy", "its ARAP, pixel accuracy",
     "squared: class", "IoU", "Dice", "pixel accuracy", "true aspect: class", "IoU", "Dice",
     "pixel accuracy", "EST, best IoU", "ARAP, best IoU",
 )  # fmt: skip
-"""Of the table."""
 
 _LEFT, _HEAD = 0.075, 0.022
 

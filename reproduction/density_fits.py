@@ -33,8 +33,8 @@ TargetMeasure = Literal["flat", "round"]
 
 _SMOOTH = {"max_frequency": 6, "segments": 8, "roughness": (1e-3, 1e-3)}
 _SHARP = {"max_frequency": 8, "segments": 6, "roughness": (1e-4, 1e-4)}
+# the `FlowSettings` that suit each target
 FIT_SETTINGS = {"4-gaussian": _SMOOTH, "6-gaussian": _SMOOTH, "checkerboard": _SHARP}
-"""The `FlowSettings` that suit each target."""
 
 
 def target(name: str, points: Tensor) -> Tensor:

@@ -14,8 +14,7 @@ from reproduction.exhibit import Exhibit, Extent, Findings, Work
 from reproduction.spaces import TITLES
 
 EMBEDDED = ("torus", "sphere")
-TORUS_TURN = (3.9, 0.85)
-"""From where the ring is seen; spheres have their highest density in front."""
+TORUS_TURN = (3.9, 0.85)  # from where the ring is seen; spheres have their highest density in front
 
 
 def _needs(extent: Extent) -> list[Work]:

@@ -21,8 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-WIDTH = 1800
-"""The usual width of a picture in pixels."""
+WIDTH = 1800  # the usual width of a picture in pixels
 
 
 class Picture(NamedTuple):
@@ -123,9 +122,7 @@ def pdf_bytes(figure: Figure) -> bytes:
 
 
 INK, FAINT = "#16202a", "#56626e"
-
-SAMPLES = 200
-"""Number of samples of a field's magnitude along a panel's side."""
+SAMPLES = 200  # number of samples of a field's magnitude along a panel's side
 
 Box = tuple[float, float, float, float]
 """Left, bottom, width and height in shares of the figure."""
@@ -202,8 +199,8 @@ def tiny(value: float) -> str:
     return "0" if value == 0 else f"{value:.0e}"
 
 
+# A tile's fill, a goal's outline over it, a tile's outline
 TILE, GOAL, EDGE = "#8ab6d9", "#c2410c", "#16202a"
-"""A tile's fill, a goal's outline over it, a tile's outline."""
 
 
 def draw_over(axes: Axes, ring: Array, goal: Array, *, width: float = 1.0) -> None:
@@ -232,11 +229,8 @@ def window_of(rings: list[Array], aspect: float, margin: float = 0.05) -> Window
     return around((low + high) / 2, float(half[0]), float(half[1]))
 
 
-LIGHT = np.array([-0.45, 0.55, 0.70])
-"""The direction of the light, from the left above the eye."""
-
-EYE = 6.0
-"""The distance of the eye, in radii of the surface."""
+LIGHT = np.array([-0.45, 0.55, 0.70])  # the direction of the light, from the left above the eye
+EYE = 6.0  # the distance of the eye, in radii of the surface
 
 
 def draw_surface(

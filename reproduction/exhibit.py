@@ -37,6 +37,7 @@ class Extent(NamedTuple):
     resolution: int
 
 
+# everything, in about ten minutes on two cores
 FULL = Extent(
     name="full",
     frequencies=(0, 1, 2, 3, 5, 10),
@@ -50,8 +51,7 @@ FULL = Extent(
     grid=200,
     resolution=160,
 )
-"""Everything, in about ten minutes on two cores."""
-
+# A preview of a minute: every exhibit, with less work in each
 FAST = Extent(
     name="fast",
     frequencies=(0, 2, 5),
@@ -65,10 +65,9 @@ FAST = Extent(
     grid=100,
     resolution=100,
 )
-"""A preview of a minute: every exhibit, with less work in each."""
 
+# whether what the paper states agrees with what we find
 Verdict = Literal["agrees", "agrees in part", "differs"]
-"""Whether what the paper states agrees with what we find."""
 
 
 class Work(NamedTuple):
@@ -115,8 +114,8 @@ class Findings:
     tables: Sequence[Table] = ()
 
 
+# A function that draws into a canvas, given the values of the exhibit's work, in its order
 Draw = Callable[[Canvas, Extent, list[Any]], Findings]
-"""A function that draws into a canvas, given the values of the exhibit's work, in its order."""
 
 
 def no_work(_extent: Extent) -> list[Work]:

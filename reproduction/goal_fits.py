@@ -17,11 +17,11 @@ from orbiflow.tiles import (
 from reproduction.exhibit import Extent, Work
 from reproduction.published import goals
 
+# largest overlap with the goal, or with the goal stretched to a square as in the paper; likeness
 Objective = Literal["overlap", "squared", "likeness"]
-"""Largest overlap with the goal, or with the goal stretched to a square as in the paper; likeness."""
 
+# number of best classes of a quick search that are searched again with full effort
 SEARCHED_AGAIN = 2
-"""Number of best classes of a quick search that are searched again with full effort."""
 
 
 class GoalTile(NamedTuple):

@@ -22,9 +22,7 @@ if TYPE_CHECKING:
 
 CLASS = "IH4"
 COUNT = 2500
-HARDNESS = 70.0
-"""tau, as at the end of the fit."""
-
+HARDNESS = 70.0  # tau, as at the end of the fit
 INSIDE, OUTSIDE, WRONG = "#1d4e79", "#b8c4cf", "#d1242f"
 HEIGHT = 0.30
 

@@ -12,8 +12,8 @@ from torch import Tensor
 from orbiflow.fields import FourierField, VectorField, periodic_operator, symmetrize
 from orbiflow.symmetry import CrystallographicGroup, Isometry, identity
 
+# A generator g and the number K of terms: V -> sum over k < K of g^-k o V o g^k
 Operator = tuple[Isometry, int]
-"""A generator g and the number K of terms: V -> sum over k < K of g^-k o V o g^k."""
 
 UNIT_CELL = CrystallographicGroup.generate(np.eye(2))
 

@@ -17,7 +17,6 @@ from reproduction.exhibit import Extent, Shown
 
 NUMBERS, INDEX = "paper.json", "index.html"
 SCHEMA_VERSION = 1
-
 _OURS = re.compile(r"(figure|table)-[a-z0-9-]+\.(png|pdf|html)")
 _BADGES = {"agrees": "yes", "agrees in part": "partly", "differs": "no", "": "failed"}
 

@@ -12,17 +12,16 @@ import numpy as np
 from orbiflow.arrays import Array
 from orbiflow.tiles import Target
 
+# the paper's table of KL divergences, as printed
 KL = {
     "torus": {"4-gaussian": 0.03, "6-gaussian": 0.45, "checkerboard": 0.67},
     "sphere": {"4-gaussian": 0.03, "6-gaussian": 0.47, "checkerboard": 0.56},
 }
-"""The paper's table of KL divergences, as printed."""
-
+# the paper's table of symmetry groups, as printed
 GROUPS = {
     "IH1": "p1", "IH2": "pg", "IH3": "pg", "IH4": "p2", "IH5": "pgg", "IH6": "pgg", "IH7": "p3",
     "IH21": "p6", "IH28": "p4",
 }  # fmt: skip
-"""The paper's table of symmetry groups, as printed."""
 
 
 class PublishedTile(NamedTuple):

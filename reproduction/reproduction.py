@@ -28,6 +28,7 @@ from reproduction import (
 from reproduction.drawing import Canvas, Picture
 from reproduction.exhibit import Draw, Exhibit, Extent, Findings, Shown, Work
 
+# all exhibits, in the order of the paper
 EXHIBITS: tuple[Exhibit, ...] = (
     square.EXHIBIT,
     classes.TEMPLATES,
@@ -47,13 +48,11 @@ EXHIBITS: tuple[Exhibit, ...] = (
     density_surfaces.EXHIBIT,
     densities.CHECKERBOARD,
 )
-"""All exhibits, in the order of the paper."""
 
 Progress = Callable[[float, str], None]
 """Called with the share of everything that is done, and with what was done last."""
 
-DRAWING_COST = 4.0
-"""About how many seconds a drawing takes, for the progress."""
+DRAWING_COST = 4.0  # about how many seconds a drawing takes, for the progress
 
 
 class Outcome(NamedTuple):

@@ -24,20 +24,18 @@ TITLES = {
     "projective-plane": "projective plane",
 }
 EDGES = ("#c2410c", "#1d4e79")
-FILLS = ("#f4ecdc", "#c9dcec", "#f2cfa5", "#cfe3d4")
-"""Of cells, by coset."""
-
+FILLS = ("#f4ecdc", "#c9dcec", "#f2cfa5", "#cfe3d4")  # of cells, by coset
 CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 LETTER = np.array(
     [[0, 0], [0, 5], [3, 5], [3, 4], [1, 4], [1, 3], [2.4, 3], [2.4, 2], [1, 2], [1, 0]]
 )
+# from where the surfaces are seen: yaw and pitch
 TURNS = {
     "torus": (0.5, 0.75),
     "sphere": (0.6, 0.35),
     "klein-bottle": (0.3, 0.75),
     "projective-plane": (0.4, 0.5),
 }
-"""From where the surfaces are seen: yaw and pitch."""
 
 
 def euler_characteristic(group: CrystallographicGroup) -> int:

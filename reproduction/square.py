@@ -19,15 +19,9 @@ from reproduction.exhibit import Exhibit, Extent, Findings
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-SIDES = ("#1d4e79", "#c2410c")
-"""Of the pair left and right, and of the pair bottom and top."""
-
-TWICE, BARE = "#d33f49", "#2b3440"
-"""What copies cover twice, and what they leave bare."""
-
-POINTS = 120
-"""Along each side."""
-
+SIDES = ("#1d4e79", "#c2410c")  # of the pair left and right, and of the pair bottom and top
+TWICE, BARE = "#d33f49", "#2b3440"  # what copies cover twice, and what they leave bare
+POINTS = 120  # along each side
 _LARGER = CrystallographicGroup.generate(np.diag([2.7, 2.7]))
 
 

@@ -19,9 +19,7 @@ from reproduction.nested import Operator, nested, unit_field
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-HALF = 1.3
-"""Half the side of a panel's window."""
-
+HALF = 1.3  # half the side of a panel's window
 _MARKED, _FIRST = "#c2410c", "#7a1f00"
 _CELL = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]])
 

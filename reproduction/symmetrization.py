@@ -17,8 +17,7 @@ from reproduction.exhibit import Exhibit, Extent, Findings, Table
 from reproduction.nested import equivariance_error, nested_error, terms, unit_field
 
 OMEGA = 5
-TURN = 0.5
-"""The angle in radians by which the affine map A turns."""
+TURN = 0.5  # the angle in radians by which the affine map A turns
 
 
 def as_printed(kind: IsohedralClass, linear: Array) -> VectorField:

@@ -16,8 +16,8 @@ from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import CrystallographicGroup, cached_by_basis, checked_group
 
+# the largest number of real coefficients before symmetrization, for about a gigabyte of memory
 MAX_COEFFICIENTS = 2_000_000
-"""The largest number of real coefficients before symmetrization, for about a gigabyte of memory."""
 
 
 @dataclass(frozen=True, eq=False)

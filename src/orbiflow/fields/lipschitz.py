@@ -30,8 +30,8 @@ from orbiflow.arrays import Array
 from orbiflow.fields.invariants import InvariantBasis
 from orbiflow.symmetry import CrystallographicGroup
 
+# the largest number of terms whose signs are all tried; orbits of plane groups have no more
 MAX_SIGNED_TERMS = 6
-"""The largest number of terms whose signs are all tried; orbits of plane groups have no more."""
 
 
 def steepness(parameters: Tensor, magnitude: Tensor) -> Tensor:

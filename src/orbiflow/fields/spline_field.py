@@ -22,8 +22,8 @@ from orbiflow.fields.splines import padded, spline_sum, spline_sum_with_divergen
 from orbiflow.symmetry import CrystallographicGroup, cached_by_basis
 from orbiflow.typed_torch import fft, linalg
 
+# the least number of grid points on the shortest wave, for an error of about 2 per cent
 POINTS_PER_WAVE = 3
-"""The least number of grid points on the shortest wave, for an error of about 2 per cent."""
 
 
 class SplineField(InvariantField):

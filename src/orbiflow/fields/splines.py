@@ -19,8 +19,7 @@ from torch import Tensor
 from orbiflow.fields.transforms import plain_gradients, refuse_old_batches, transformed
 from orbiflow.typed_torch import applied
 
-TAPS = 4
-"""The number of coefficients along an axis that a cubic spline's value depends on."""
+TAPS = 4  # the number of coefficients along an axis that a cubic spline's value depends on
 
 
 @lru_cache(maxsize=16)

@@ -27,8 +27,8 @@ from orbiflow.typed_torch import linalg
 AnyField = VectorField | TimeDependentField
 State = tuple[Tensor, ...]
 
+# the number of coordinates from which several threads can be faster than one
 MULTITHREADED_COORDINATES = 2**17
-"""The number of coordinates from which several threads can be faster than one."""
 
 
 class _FunctionSegment(nn.Module):

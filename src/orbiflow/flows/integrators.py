@@ -124,17 +124,10 @@ def method(name: str) -> RungeKutta:
     return METHODS[name]
 
 
-CHECKED_POINTS = 128
-"""The number of points that are also moved with twice the steps."""
-
-COARSE_ERROR = 0.05
-"""The largest accepted error, as a share of the distance that the points move."""
-
-FINE_ERROR = 1e-4
-"""The largest error with the number of steps that a warning advises."""
-
-MAX_ADVISED_STEPS = 1024
-"""The largest number of steps that a warning tries."""
+CHECKED_POINTS = 128  # the number of points that are also moved with twice the steps
+COARSE_ERROR = 0.05  # the largest accepted error, as a share of the distance that the points move
+FINE_ERROR = 1e-4  # the largest error with the number of steps that a warning advises
+MAX_ADVISED_STEPS = 1024  # the largest number of steps that a warning tries
 
 
 class StepCheck:

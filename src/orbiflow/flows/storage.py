@@ -18,8 +18,8 @@ from orbiflow.flows.flow import Flow
 from orbiflow.runtime import is_list, read_tensors, tensor_bytes, write_atomic
 from orbiflow.symmetry import CrystallographicGroup, group_from_header, group_header
 
+# functions that create a user's own fields, by the name or the place of the field
 FieldFactories = Mapping[str, Callable[[], Any]]
-"""Functions that create a user's own fields, by the name or the place of the field."""
 
 MAX_GROUPS, MAX_LAYERS, MAX_NESTING, MAX_FREQUENCY = 64, 64, 4, 10**6
 

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 else:  # torch is imported by those who have tensors
     Points = TypeVar("Points")
 
+# the largest deviation from orthogonality, or from a lattice vector, that counts as rounding
 TOLERANCE = 1e-9
-"""The largest deviation from orthogonality, or from a lattice vector, that counts as rounding."""
 
 
 def cast_like(array: Array, like: Points) -> Points:

@@ -24,14 +24,9 @@ from orbiflow.tiles.geometry import (
 )
 from orbiflow.tiles.likeness.elastic import Elastic
 
-PLACES_PER_POINT = 6
-"""The number of places on the second outline for each point of the first."""
-
-MAX_STEP_RATIO = 6
-"""The largest step between places, in usual steps."""
-
-FIRST_PLACES = 6
-"""The number of places that are tried for the first point."""
+PLACES_PER_POINT = 6  # the number of places on the second outline for each point of the first
+MAX_STEP_RATIO = 6  # the largest step between places, in usual steps
+FIRST_PLACES = 6  # the number of places that are tried for the first point
 
 
 def corresponding(
@@ -119,17 +114,12 @@ def _best_of(cost: Array, begin: list[int], stretch: float) -> Array:
     return best
 
 
+# the values of `near` and `stretch` of `corresponding` that are tried
 STARTS = ((0.15, 0.5), (0.4, 1.0), (0.8, 2.0), (0.4, 4.0))
-"""The values of `near` and `stretch` of `corresponding` that are tried."""
-
+# the steps of each start, and of the best one: with the energy, then with the forgiving energy
 TRIAL_STEPS, ENERGY_STEPS, SOFTENINGS, STEPS_PER_SOFTENING = 3, 20, 4, 5
-"""The steps of each start, and of the best one: with the energy, then with the forgiving energy."""
-
-MAX_SLIDE = 2.0
-"""The largest slide of a point in one step, in spacings."""
-
-MIN_GAP = 0.02
-"""The least distance along the outline of consecutive points, in spacings."""
+MAX_SLIDE = 2.0  # the largest slide of a point in one step, in spacings
+MIN_GAP = 0.02  # the least distance along the outline of consecutive points, in spacings
 
 
 def bent_onto(body: Elastic, ring: Array) -> Complex:

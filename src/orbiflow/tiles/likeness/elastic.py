@@ -25,20 +25,13 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.geometry import best_similarity, complex_points, plane_points, signed_area
 from orbiflow.tiles.silhouette import Mesh, local_thickness, triangulate
 
+# the bounds of the weights of areas, which are negative for obtuse triangles
 COTANGENT_BOUNDS = (0.05, 40.0)
-"""The bounds of the weights of areas, which are negative for obtuse triangles."""
-
+# the radius of a part that is not thin, in square roots of the area; a disc has 0.56
 THICK_RADIUS = 0.25
-"""The radius of a part that is not thin, in square roots of the area; a disc has 0.56."""
-
-SALIENCE_BOUNDS = (0.25, 8.0)
-"""The bounds of the factor of thin parts' weights."""
-
-POSE_WEIGHT = 4.0
-"""The weight of the displacement relative to the energy, when shapes are ranked."""
-
-MAX_REWEIGHTINGS = 50
-"""The largest number of steps to the rotations of least forgiving energy."""
+SALIENCE_BOUNDS = (0.25, 8.0)  # the bounds of the factor of thin parts' weights
+POSE_WEIGHT = 4.0  # the weight of the displacement relative to the energy, when shapes are ranked
+MAX_REWEIGHTINGS = 50  # the largest number of steps to the rotations of least forgiving energy
 
 
 @dataclass(frozen=True)

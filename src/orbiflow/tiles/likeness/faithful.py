@@ -36,20 +36,14 @@ from orbiflow.tiles.likeness.metrics import as_region
 from orbiflow.tiles.likeness.overlap import Overlap, best_overlay
 from orbiflow.tiles.silhouette import sampled
 
-PIECE_LENGTHS = (0.04, 0.15, 0.4)
-"""The lengths of the pieces, as shares of the outline."""
-
+PIECE_LENGTHS = (0.04, 0.15, 0.4)  # the lengths of the pieces, as shares of the outline
+# the offset of widths, in square roots of the area, below which differences matter little
 WIDTH_OFFSET = 0.02
-"""The offset of widths, in square roots of the area, below which differences matter little."""
-
+# the values of three pieces, `notches`, `narrowed` and `cost` in a tile of medium likeness
 USUAL_VALUES = (0.12, 0.16, 0.13, 0.3, 0.037, 0.25)
-"""The values of three pieces, `notches`, `narrowed` and `cost` in a tile of medium likeness."""
-
+# the weights of their logarithms, the inverse of how much these vary over a silhouette's tiles
 WEIGHTS = (6.5, 6.5, 6.5, 2.6, 2.3, 6.5)
-"""The weights of their logarithms, the inverse of how much these vary over a silhouette's tiles."""
-
-NEGLIGIBLE_SHARE = 0.3
-"""The share of the usual values below which differences matter little."""
+NEGLIGIBLE_SHARE = 0.3  # the share of the usual values below which differences matter little
 
 
 @dataclass(frozen=True)
@@ -150,9 +144,7 @@ def _clearance(z: Complex, *, inside: bool = False) -> Array:
     return smooth[::-1] if inside else smooth
 
 
-TURNS = 24
-"""The number of rotations tried for each orientation; the best `REFINED_TURNS` are refined."""
-
+TURNS = 24  # number of rotations tried for each orientation; the best `REFINED_TURNS` are refined
 REFINED_TURNS = 3
 
 

@@ -18,8 +18,8 @@ from orbiflow.arguments import numbers
 from orbiflow.arrays import Array, Integers, Window
 from orbiflow.errors import OrbiflowError
 
+# the accuracy of Hausdorff distances, as a share of the diagonal of the box around both curves
 HAUSDORFF_TOLERANCE = 1e-6
-"""The accuracy of Hausdorff distances, as a share of the diagonal of the box around both curves."""
 
 
 def hausdorff_distance(a: Array, b: Array, *, tolerance: float) -> float:

@@ -26,32 +26,19 @@ from orbiflow.arrays import Array, Integers
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.geometry import arc_lengths, orient, polygons_in, ring_length
 
+# the least length of the outline beyond a neck, in its widths: 1 / sin(11.5 degrees)
 OUTLINE_PER_WIDTH = 5.0
-"""The least length of the outline beyond a neck, in its widths: 1 / sin(11.5 degrees)."""
-
-MIN_OUTLINE = 0.1
-"""The least length of the outline beyond a neck, in square roots of the area."""
-
-MAX_NECK_WIDTH = 0.5
-"""The largest width of a neck, in square roots of the area."""
-
+MIN_OUTLINE = 0.1  # the least length of the outline beyond a neck, in square roots of the area
+MAX_NECK_WIDTH = 0.5  # the largest width of a neck, in square roots of the area
+# the share of the silhouette's narrowest neck below which a tile looks cut through
 PINCHED_SHARE = 0.25
-"""The share of the silhouette's narrowest neck below which a tile looks cut through."""
-
+# the tolerance, in that unit, for simplifying a silhouette before necks are searched
 SIMPLIFICATION = 0.003
-"""The tolerance, in that unit, for simplifying a silhouette before necks are searched."""
-
-SOUND_NECK_WIDTH = 0.05
-"""The width, in square roots of the area, above which no neck looks cut through."""
-
+SOUND_NECK_WIDTH = 0.05  # width, in square roots of the area, above which no neck looks cut through
+# the distance of points on the outline, in square roots of the area: the error for tapering parts
 POINT_SPACING = 0.0125
-"""The distance of points on the outline, in square roots of the area: the error for tapering parts."""
-
-QUARTER_SEGMENTS = 16
-"""The number of sides of a quarter of a disc."""
-
-DISC_OVERREACH = 0.005
-"""What discs of `QUARTER_SEGMENTS` reach beyond themselves, in radii."""
+QUARTER_SEGMENTS = 16  # the number of sides of a quarter of a disc
+DISC_OVERREACH = 0.005  # what discs of `QUARTER_SEGMENTS` reach beyond themselves, in radii
 
 
 class Thinnest(NamedTuple):

@@ -18,8 +18,8 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.geometry import centroid, complex_points, orient, plane_points, signed_area
 from orbiflow.tiles.likeness.ranking import Similarity
 
+# the number of vertices beyond which a region of area 1 is simplified, and the tolerance
 MAX_REGION_VERTICES, REGION_TOLERANCE = 1500, 2e-3
-"""The number of vertices beyond which a region of area 1 is simplified, and the tolerance."""
 
 
 def prepared_region(ring: Array) -> shapely.Polygon:
@@ -139,8 +139,7 @@ def best_overlay(
     return best, complex(middle + found.x[2] + 1j * found.x[3]), -float(found.fun)
 
 
-MAX_IOU_GAIN = 0.15
-"""The largest gain in IoU that is expected from a better overlay of two tiles."""
+MAX_IOU_GAIN = 0.15  # the largest gain in IoU that is expected from a better overlay of two tiles
 
 
 def mutual_iou(tiles: Sequence[Array], decisive: float = 0.9) -> Similarity:

@@ -24,17 +24,10 @@ from orbiflow.tiles.geometry import best_similarity
 from orbiflow.tiles.likeness.elastic import Condensed, Elastic, Stiffness
 from orbiflow.tiles.silhouette import Mesh
 
-SHAPE_WEIGHT = 1e5
-"""The weight of the mean squared distance of the body's points from similar copies."""
-
-SIZE_WEIGHT = 30.0
-"""The weight of a part's change of size, for the whole body."""
-
-ANGLE_WEIGHT = 3e4
-"""The weight of a part's rotation, for the whole body, if it keeps its angle."""
-
-MIN_PART_POINTS = 3
-"""The least number of points of a part: a similarity can take two points anywhere."""
+SHAPE_WEIGHT = 1e5  # weight of the mean squared distance of the body's points from similar copies
+SIZE_WEIGHT = 30.0  # the weight of a part's change of size, for the whole body
+ANGLE_WEIGHT = 3e4  # the weight of a part's rotation, for the whole body, if it keeps its angle
+MIN_PART_POINTS = 3  # least number of points of a part: a similarity can take two points anywhere
 
 
 class Pinned(Elastic):

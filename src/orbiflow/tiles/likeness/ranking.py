@@ -16,8 +16,8 @@ OTHER_CLASS_FACTOR = 0.5  # how alike two equal tiles of different classes are
 TWIN_SIMILARITY = 0.97
 VARIETY_WEIGHT = 0.1
 
+# A symmetric function of two candidates' indices: how alike they are, 0 to 1
 Similarity = Callable[[int, int], float]
-"""A symmetric function of two candidates' indices: how alike they are, 0 to 1."""
 
 
 def rank_score(iou: float, recognisability: float) -> float:

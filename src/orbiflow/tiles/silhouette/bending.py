@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 MAX_POINTS, MAX_TRIANGLES = 100_000, 200_000
 """Beyond these a mesh is refused: real ones have some thousands."""
 
+# twice the area of a triangle, in squares of the whole's extent, that rounding can turn over
 FLAT = 1e-18
-"""Twice the area of a triangle, in squares of the whole's extent, that rounding can turn over."""
 
 
 @dataclass(frozen=True, eq=False)

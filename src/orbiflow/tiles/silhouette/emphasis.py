@@ -29,7 +29,6 @@ MIN_TOUCHING_LEVEL = (
     0.01  # of full emphasis: what is nowhere above this on the silhouette does not touch it
 )
 GRID_SIDE = 512  # pixels along a side of the grids that integrals are taken on
-
 _OUTLINE_BOX = "the outline's bounding box"
 
 

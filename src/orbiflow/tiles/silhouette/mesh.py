@@ -16,11 +16,8 @@ from orbiflow.arrays import Array, Integers
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.geometry import subdivided
 
-MAX_HALVINGS = 24
-"""The number of times that missing sides of the outline are halved."""
-
-FLAT_AREA = 1e-12
-"""Twice the area, in areas of the polygon, below which a triangle counts as flat."""
+MAX_HALVINGS = 24  # the number of times that missing sides of the outline are halved
+FLAT_AREA = 1e-12  # twice the area, in areas of the polygon, below which a triangle counts as flat
 
 
 class Mesh(NamedTuple):
@@ -227,11 +224,8 @@ class Locator:
         return Located(found, nearest)
 
 
-PIECES_PER_SIDE = 3
-"""The number of parts of each side of the outline: more make the medial axis finer."""
-
-DISC_OVERREACH = 1.02
-"""The factor of the discs' radii that makes up for the size of triangles."""
+PIECES_PER_SIDE = 3  # number of parts of each side of the outline: more make the medial axis finer
+DISC_OVERREACH = 1.02  # the factor of the discs' radii that makes up for the size of triangles
 
 
 def local_thickness(mesh: Mesh) -> Array:

@@ -28,11 +28,9 @@ MAX_COORDINATE = 1e12
 # Below these a shape has no digits left: relative to its distance from the origin, and absolute.
 MIN_RELATIVE_SIZE = 1e-9
 MIN_SIZE = 1e-100
-# Relative to the square of the longer side of the bounding box.
-MIN_RELATIVE_AREA = 1e-9
+MIN_RELATIVE_AREA = 1e-9  # Relative to the square of the longer side of the bounding box.
 # Of the box's longer side: a polygon that is simple by less would cross itself when it is rescaled.
 CLEARANCE_DIGITS = 12
-
 _POSITION = re.compile(r"\[(\S+) (\S+)\]")
 
 
@@ -182,20 +180,17 @@ def outer_outline(geometry: BaseGeometry) -> tuple[Polygon, list[str]]:
     return shape, notes
 
 
+# the length of an outline of area 1 that is sampled with the fewest points; a disc has 3.5
 SHORT_OUTLINE = 8.2
-"""The length of an outline of area 1 that is sampled with the fewest points; a disc has 3.5."""
-
 MIN_POINTS, MAX_POINTS = 60, 120
 """The least and the largest number of points for the search."""
 
+# the least height of a corner over the line past it to be kept, in square roots of the area
 CORNER_DEPTH = 0.004
-"""The least height of a corner over the line past it to be kept, in square roots of the area."""
-
+# the numbers of points of the tile for each point of the search, in order of trial
 FINE_MULTIPLES = (4, 6)
-"""The numbers of points of the tile for each point of the search, in order of trial."""
-
+# the number of middle points for each point of the search, a divisor of `FINE_MULTIPLES`
 MIDDLE_MULTIPLE = 2
-"""The number of middle points for each point of the search, a divisor of `FINE_MULTIPLES`."""
 
 
 class Samples(NamedTuple):

@@ -22,15 +22,10 @@ from orbiflow.tiles.silhouette.emphasis import Emphasis
 from orbiflow.tiles.silhouette.outlines import percent
 from orbiflow.tiles.silhouette.target import Target
 
-DEFAULT_RADIUS = 0.08
-"""The default radius of a spot, in longer sides of the silhouette's bounding box."""
-
+DEFAULT_RADIUS = 0.08  # default radius of a spot, in longer sides of the silhouette's bounding box
+# the shares of the outline beyond which the tile cannot be similar, and nothing is left to bend
 MUCH_PINNED, ALL_PINNED = 0.4, 0.9
-"""The shares of the outline beyond which the tile cannot be similar, and nothing is left to bend."""
-
-REACH_PAST_OUTLINE = 1.5
-"""The reach of a spot without a radius, in distances from the outline."""
-
+REACH_PAST_OUTLINE = 1.5  # the reach of a spot without a radius, in distances from the outline
 _NUMBER = r"\s*[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?\s*"
 _SPOT = re.compile(rf"{_NUMBER}(?:,{_NUMBER}){{1,2}}")
 

@@ -14,8 +14,7 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.silhouette.emphasis import Emphasis
 from orbiflow.tiles.silhouette.target import Target
 
-PIECES_PER_SIDE = 8
-"""The number of pieces of each side of a ring in integrals along it."""
+PIECES_PER_SIDE = 8  # the number of pieces of each side of a ring in integrals along it
 
 
 class SoftTarget:

@@ -14,8 +14,7 @@ from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.silhouette.mesh import Mesh
 
-MAX_SHARPENINGS = 30
-"""The largest number of times that the penalty on folds is sharpened."""
+MAX_SHARPENINGS = 30  # the largest number of times that the penalty on folds is sharpened
 
 
 def folded(mesh: Mesh, points: Array) -> NDArray[np.bool_]:

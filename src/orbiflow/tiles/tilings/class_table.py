@@ -58,6 +58,7 @@ class ClassRow(NamedTuple):
 
 _HEXAGON_CELL = LatticeVector({0: 3}), LatticeVector({1: 1, 2: 1})
 
+# source: the paper, table "The Symmetrization for the nine isohedral classes"
 CLASS_TABLE: dict[str, ClassRow] = {
     "IH1": ClassRow(
         group="p1",
@@ -144,4 +145,3 @@ CLASS_TABLE: dict[str, ClassRow] = {
         edges=((0, 4), (1, 2), (3, 3)),
     ),
 }
-"""Source: the paper, table "The Symmetrization for the nine isohedral classes"."""

@@ -14,8 +14,7 @@ from orbiflow.tiles.tilings.surroundings import neighbours
 from orbiflow.tiles.tilings.tile_copies import Copies, prototile_of
 from orbiflow.tiles.tilings.tiling import Cell, Tiles, Tiling, as_tiling
 
-Graph: TypeAlias = list[set[int]]
-"""The neighbours of each vertex, symmetric and without loops."""
+Graph: TypeAlias = list[set[int]]  # the neighbours of each vertex, symmetric and without loops
 
 
 def colour_graph(graph: Graph, count: int, *, max_steps: int = 4000) -> list[int] | None:
@@ -65,8 +64,8 @@ def _advance(trail: list[tuple[int, list[int]]], colours: list[int]) -> bool:
     return False
 
 
+# (a, b, c): spanned by a B_1 and b B_1 + c B_2, with 0 <= b < a; its index is a c
 Sublattice: TypeAlias = tuple[int, int, int]
-"""(a, b, c): spanned by a B_1 and b B_1 + c B_2, with 0 <= b < a; its index is a c."""
 
 _MAX_INDEX = 9
 

@@ -14,8 +14,7 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import CrystallographicGroup, reduced_basis
 from orbiflow.tiles.tilings.tiling import Tile, Tiling
 
-_SAME_DISTANCE = 1e-7
-"""The distance, in square roots of |det B|, below which points count as one."""
+_SAME_DISTANCE = 1e-7  # the distance, in square roots of |det B|, below which points count as one
 
 
 def dirichlet_tile(group: CrystallographicGroup, point: ArrayLike) -> Tile:

@@ -19,8 +19,8 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import CrystallographicGroup, Isometry
 from orbiflow.tiles.geometry import signed_area
 
+# the distance, in radii of the tile, below which consecutive vertices count as one
 _REPEATED_DISTANCE = 1e-12
-"""The distance, in radii of the tile, below which consecutive vertices count as one."""
 
 
 @dataclass(frozen=True, eq=False)

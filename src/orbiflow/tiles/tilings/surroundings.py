@@ -27,8 +27,8 @@ from orbiflow.tiles.tilings.tile_copies import (
 )
 from orbiflow.tiles.tilings.tiling import Tiles, Tiling, as_tiling
 
+# the largest radius, in square roots of the expected area, of a tile whose images are listed
 MAX_SPAN = 12.0
-"""The largest radius, in square roots of the expected area, of a tile whose images are listed."""
 
 
 def expected_area(tile: Tiles) -> float:

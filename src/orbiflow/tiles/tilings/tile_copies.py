@@ -54,8 +54,7 @@ def prototile_of(element: Isometry) -> int:
     return element.prototile if isinstance(element, Placed) else 0
 
 
-MAX_TILES = 20_000
-"""The largest number of tiles in a patch."""
+MAX_TILES = 20_000  # the largest number of tiles in a patch
 
 
 class CopiesAcross(NamedTuple):

@@ -81,8 +81,8 @@ class EdgeIdentification(NamedTuple):
         return f"{self.first}{sign}{self.second}"
 
 
+# the largest distance of equal vertices of two copies, in square roots of the area
 VERTEX_TOLERANCE = 1e-7
-"""The largest distance of equal vertices of two copies, in square roots of the area."""
 
 
 @dataclass(frozen=True, eq=False)

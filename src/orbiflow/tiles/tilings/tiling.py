@@ -16,8 +16,8 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import CrystallographicGroup, Isometry
 from orbiflow.tiles.tilings.prototile import Prototile, Stabiliser, stabiliser
 
+# the coordinates of a lattice vector in the basis of the group's lattice
 Cell: TypeAlias = tuple[int, int]
-"""The coordinates of a lattice vector in the basis of the group's lattice."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -28,16 +28,14 @@ MAX_BYTES = 64 * 2**20
 MAX_PIXELS = 40_000_000
 MAX_SIDE = 1500  # pixels; beyond this an image is averaged down before it is traced
 MIN_CONTRAST = 0.04  # of full scale, between the shape's and the background's usual level
-
 _FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "GIF", "TIFF")
 # What Pillow raises on a damaged file depends on the format.
 _DAMAGED = (
     *(OSError, SyntaxError, ValueError, EOFError, KeyError, IndexError, TypeError),
     *(OverflowError, MemoryError, ArithmeticError, Image.DecompressionBombError),
 )
-
+# channels that say by themselves where the shape is: their high part and their low part
 _PARTS = {"alpha": ("opaque", "transparent"), "mask": ("marked", "unmarked")}
-"""Channels that say by themselves where the shape is: their high part and their low part."""
 
 _Decoded = TypeVar("_Decoded")
 

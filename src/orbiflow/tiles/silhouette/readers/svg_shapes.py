@@ -17,7 +17,6 @@ from orbiflow.tiles.silhouette.readers.svg_paths import SubPath, sub_paths
 MAX_ELEMENTS = 20_000
 MAX_DEPTH = 100
 MAX_STYLE = 200_000  # characters
-
 _SELECTOR = re.compile(r"\*|[\w-]*(?:[.#][\w-]+)?")
 
 
@@ -140,7 +139,6 @@ PIXELS_PER_INCH = 96
 MAX_DRAWN = 10_000  # elements, those drawn again by <use> counted again
 MAX_TRANSFORM = 2000  # characters
 MAX_TOKENS = 400_000  # commands and numbers in all path data; one with a fraction counts twice
-
 _GROUPS = {"svg", "g", "a", "switch"}
 _SHAPES = {
     "path": (svgelements.Path, ("d",)),
@@ -156,8 +154,8 @@ _TOKEN = re.compile(r"[A-Za-z]|\.?\d+")
 _LENGTH = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)(e[-+]?\d+)?(px|pt|pc|mm|cm|in|%)?", re.IGNORECASE)
 
 
+# properties of paint that elements have from those around them
 PAINT = ("fill", "stroke", "stroke-width", "fill-opacity", "stroke-opacity", "color", "visibility")
-"""Properties of paint that elements have from those around them."""
 
 
 @dataclass(frozen=True)
