@@ -17,7 +17,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from orbiflow.fields.transforms import plain_gradients, refuse_old_batches, transformed
+from orbiflow.fields.protocol import plain_gradients, refuse_old_batches, transformed
 from orbiflow.typed_torch import applied
 
 # the size of the working arrays for one block of points; 1 to 3 MiB measured fastest
@@ -228,13 +228,7 @@ def evaluate(weights: Tensor, u: Tensor) -> Tensor:
 
 @torch.no_grad()
 def weight_cotangent(shape: tuple[int, ...], u: Tensor, grad: Tensor) -> Tensor:
-    """Return the gradient of sum grad . values in the weights, of their shape.
-
-    Args:
-        shape: The shape of the weights, (S, C, A_1, ..., A_d).
-        u: Fractional coordinates (S, d, N).
-        grad: Cotangents of the values, (S, C, N).
-    """
+    """Return the gradient of sum grad . values in the weights, of their shape."""
     weights = u.new_zeros(shape)
     if transformed():
         return torch.func.vjp(partial(evaluate_plainly, u=u), weights)[1](grad)[0]

@@ -139,11 +139,7 @@ class StepCheck:
         self._calls, self._next = 0, 1
 
     def look(self, flow: Flow, points: Tensor, *, inverse: bool) -> None:
-        """Warn if `flow` moves some of `points` (..., d) elsewhere with twice its steps.
-
-        Warns:
-            CoarseStepsWarning: with the error found and how many steps to take.
-        """
+        """Warn if `flow` moves some of `points` (..., d) elsewhere with twice its steps."""
         if self.warned or transformed() or points.numel() == 0 or not self._is_due(flow):
             return  # under the transforms of torch there are no numbers to check
         # the check must not break a flow that is being traced

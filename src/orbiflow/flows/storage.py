@@ -41,11 +41,7 @@ class Writer:
         self.groups: list[dict[str, Any]] = []
 
     def header(self, field: Any, place: str) -> dict[str, Any]:
-        """Return the field at `place` in the flow, ready for JSON.
-
-        Raises:
-            OrbiflowError: for a function without a name.
-        """
+        """Return the field at `place` in the flow, ready for JSON."""
         kind = type(cast(object, field))
         if kind in _SERIES_NAMES:
             return self._series(field)
@@ -100,11 +96,7 @@ class Reader:
         self.shapes, self.makers = shapes, makers
 
     def field(self, header: Mapping[str, Any], place: str, nesting: int = 0) -> Any:
-        """Return the field whose tensors' names begin with `place`.
-
-        Raises:
-            OrbiflowError, KeyError, TypeError, ValueError: for what does not fit.
-        """
+        """Return the field whose tensors' names begin with `place`."""
         if nesting > MAX_NESTING:
             raise OrbiflowError(f"fields are nested more than {MAX_NESTING} deep")
         kind = header["kind"]

@@ -124,9 +124,6 @@ def commutant(linear_parts: Array) -> Array:
     The basis is made by Gram-Schmidt in the order a, b, so that it depends only on the group; saved
     parameters are coordinates in it.
 
-    Args:
-        linear_parts: The linear parts (n, 2, 2) of all cosets.
-
     >>> commutant(np.array([np.eye(2), np.diag([1.0, -1.0])])).tolist()
     [[1.0, 0.0]]
     """

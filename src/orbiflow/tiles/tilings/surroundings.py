@@ -108,9 +108,6 @@ def surroundings(tiling: Tiling, prototile: int, margin: float) -> Surroundings:
     """Return the tiles whose bounding box comes within `margin` of a prototile's, nearest first.
 
     The unit is the side of a square of a tile's area.
-
-    Raises:
-        OrbiflowError: for a tile of span over `MAX_SPAN`, or with fewer than three vertices.
     """
     scale = math.sqrt(tiling.tile_area)
     if span(tiling) > MAX_SPAN:
@@ -194,10 +191,6 @@ def boundaries_cancel(
     tiling: Tiling, around: Sequence[Surroundings], matches: Sequence[SegmentMatch]
 ) -> bool:
     """Return whether the matched segments of all prototiles, with their signs, add up to zero.
-
-    Args:
-        tiling: The tiling.
-        around, matches: The surroundings and the match of each prototile.
 
     The boundary of all tiles together is, per orbit of the group, the sum of [e] / |S_k| over the
     segments e of each T_k. If e is the reverse of an image of its partner, it is also minus the sum

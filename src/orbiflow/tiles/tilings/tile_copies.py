@@ -289,11 +289,7 @@ def _cells_within(lattice: Array, least: Array, most: Array) -> tuple[Integers, 
 
 
 def _ranges(low: Array, high: Array) -> tuple[Integers, Array]:
-    """Return all whole numbers in some intervals, and one more at either end for rounding.
-
-    Returns:
-        The number (M,) of the interval, and the whole number (M,).
-    """
+    """Return all whole numbers in some intervals, and one more at either end for rounding."""
     first = np.ceil(low - 1e-9)
     counts = np.maximum(np.floor(high + 1e-9) + 1 - first, 0).astype(np.int64)
     own = np.repeat(np.arange(len(counts)), counts)

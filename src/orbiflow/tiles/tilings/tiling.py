@@ -75,11 +75,7 @@ class Aspects:
     def find(
         self, group: CrystallographicGroup, element: Isometry, prototile: int
     ) -> tuple[int, Cell, int]:
-        """Return (aspect, cell, turn) of the tile that `element` makes of a prototile.
-
-        Raises:
-            OrbiflowError: for an isometry that is not in the group.
-        """
+        """Return (aspect, cell, turn) of the tile that `element` makes of a prototile."""
         coset, (first, second) = coset_and_cell(group, element)
         step = self.steps[prototile, coset]
         cell = first + int(step[0]), second + int(step[1])
@@ -107,11 +103,7 @@ def _inverse(elements: tuple[Isometry, ...], s: Isometry) -> int:
 
 
 def coset_and_cell(group: CrystallographicGroup, element: Isometry) -> tuple[int, Cell]:
-    """Return (i, n) with element = translation by B n after the i-th coset representative.
-
-    Raises:
-        OrbiflowError: for an isometry that is not in the group.
-    """
+    """Return (i, n) with element = translation by B n after the i-th coset representative."""
     instance(element, Isometry, "an element of the group")
     steps = (element.translation - group.translations) @ group.inverse_lattice.T
     error = np.abs(steps - np.round(steps)).max(axis=1)
