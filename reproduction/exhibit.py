@@ -92,8 +92,8 @@ class Table(NamedTuple):
     """A table of texts; `caption` says what they are."""
 
     caption: str
-    headings: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
+    headings: Sequence[str]
+    rows: Sequence[Sequence[str]]
 
 
 @dataclass(frozen=True)
@@ -118,11 +118,6 @@ class Findings:
 Draw = Callable[[Canvas, Extent, list[Any]], Findings]
 
 
-def no_work(_extent: Extent) -> list[Work]:
-    """Return no work, for exhibits that are quick to draw."""
-    return []
-
-
 @dataclass(frozen=True)
 class Exhibit:
     """A figure or table of the paper.
@@ -140,7 +135,7 @@ class Exhibit:
     title: str
     states: str
     draw: Draw
-    needs: Callable[[Extent], list[Work]] = no_work
+    needs: Callable[[Extent], list[Work]] = lambda _extent: []
 
 
 @dataclass(frozen=True)

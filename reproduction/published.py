@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from functools import cache
 from importlib import resources
 from typing import Any, NamedTuple
@@ -61,30 +62,22 @@ class Goal(NamedTuple):
 def goals() -> dict[str, Goal]:
     """Return the nine goals by name, in the order of the paper's table."""
     document = json.loads(_data("nine_goals.json").read_text("utf-8"))
-    return {name: _goal(name, row) for name, row in document["goals"].items()}
+    return {
+        name: Goal(name, np.array(row["outline"]), _tiles(row), row["table"])
+        for name, row in document["goals"].items()
+    }
 
 
 def animal() -> Target:
     """Return the silhouette of the exhibits on one animal: a turtle, read from a picture."""
     with resources.as_file(_data("turtle.png")) as path:
         target = Target.read(path)
-    return Target(
-        target.outline,
-        target.y_down,
-        target.notes,
-        "turtle.png",
-        target.kind,
-        target.size,
-        target.corner,
-    )
+    return replace(target, source="turtle.png")
 
 
-def _goal(name: str, row: dict[str, Any]) -> Goal:
-    tiles = {
-        key: PublishedTile(row[key]["class"], np.array(row[key]["tile"]))
-        for key in ("est", "est_largest", "arap", "arap_largest")
-    }
-    return Goal(name, np.array(row["outline"]), tiles, row["table"])
+def _tiles(row: dict[str, Any]) -> dict[str, PublishedTile]:
+    keys = ("est", "est_largest", "arap", "arap_largest")
+    return {key: PublishedTile(row[key]["class"], np.array(row[key]["tile"])) for key in keys}
 
 
 def _data(name: str) -> Any:

@@ -12,9 +12,9 @@ from orbiflow.arrays import Array
 from orbiflow.drawing import CENTER_COLOURS, LINE_COLOUR, center_sign, evaluate, plane_axes
 from orbiflow.fields import VectorField, periodic_operator
 from orbiflow.symmetry import Isometry, Line, identity, rotation, transflection, translation
-from reproduction.drawing import INK, Canvas, around, caption, grid_box, text_size, tiny
+from reproduction.drawing import INK, Canvas, around, caption, grid_box, label, text_size, tiny
 from reproduction.exhibit import Exhibit, Extent, Findings, Table
-from reproduction.nested import Operator, nested, unit_field
+from reproduction.symmetrization import Operator, nested, unit_field
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -106,14 +106,8 @@ def _draw(canvas: Canvas, _extent: Extent, _values: list[Any]) -> Findings:
         _draw_field(axes, kind)
         _draw_element(axes, kind, text_size(figure))
         caption(figure, box, kind.title, size=1.1)
-        figure.text(
-            box[0] + box[2] / 2,
-            0.055,
-            re.sub(r"([A-Z])_(\w)", r"$\\mathrm{\1}_\\mathrm{\2}$", kind.equation),
-            ha="center",
-            fontsize=text_size(figure),
-            color=INK,
-        )
+        equation = re.sub(r"([A-Z])_(\w)", r"$\\mathrm{\1}_\\mathrm{\2}$", kind.equation)
+        label(figure, box[0] + box[2] / 2, 0.055, equation, va="baseline")
         found = residue(kind.before(), kind.images), residue(kind.after(), kind.images)
         after.append(found[1])
         rows.append((kind.title, kind.equation, f"{found[0]:.1f}", tiny(found[1])))
@@ -126,19 +120,14 @@ def _draw(canvas: Canvas, _extent: Extent, _values: list[Any]) -> Findings:
         "cell. R_c turns by a quarter about c, R_o vectors by as much; M is the mirror in ℓ, T "
         "moves along it by μ, M_o mirrors vectors.",
     )
+    title = "Largest violation of each equation, in root mean squares of the field."
     return Findings(
         "agrees" if max(after) < 1e-12 else "differs",
         "Each operator applied to a random Fourier field without the symmetry gives it to "
         f"rounding error: the equations hold to {tiny(max(after))} of the field's size at 300 "
         "points.",
         numbers={kind.title: value for kind, value in zip(KINDS, after, strict=True)},
-        tables=[
-            Table(
-                "Largest violation of each equation, in root mean squares of the field.",
-                ("symmetry", "equation", "before", "after"),
-                tuple(rows),
-            )
-        ],
+        tables=[Table(title, ("symmetry", "equation", "before", "after"), rows)],
     )
 
 

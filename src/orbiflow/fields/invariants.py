@@ -169,11 +169,12 @@ def invariant_basis(group: CrystallographicGroup, max_frequency: int) -> Invaria
             projector[:, d:] = projector[:, :, :, d:] = 0.0
         basis = _orthonormal_columns(projector.reshape(2 * d * m, 2 * d * m))
         row, column = np.nonzero(np.abs(basis) > 1e-14)
-        place = orbit[row // (2 * d)] * 2 * d + row % (2 * d)
+        place: Array = orbit[row // (2 * d)] * 2 * d + row % (2 * d)
         entries.append((place, column + size, basis[row, column]))
         kappa = np.linalg.norm(group.inverse_lattice.T @ frequencies[orbit[0]])
-        magnitude.append(np.full(basis.shape[1], kappa))
-        size += basis.shape[1]
+        count: int = basis.shape[1]
+        magnitude.append(np.full(count, kappa))
+        size += count
     rows, columns, values = (np.concatenate(part) for part in zip(*entries, strict=True))
     return InvariantBasis(frequencies, rows, columns, values, size, np.concatenate(magnitude))
 

@@ -31,17 +31,6 @@ from orbiflow.tiles.tilings.tiling import Tiles, Tiling, as_tiling
 MAX_SPAN = 12.0
 
 
-def expected_area(tile: Tiles) -> float:
-    """Return |det B| over the number of tiles in a lattice cell: the area of a tile of this group."""
-    return as_tiling(tile).tile_area
-
-
-def span(tile: Tiles) -> float:
-    """Return the tile's radius over the square root of the expected area: 0.6 for a hexagon."""
-    tiling = as_tiling(tile)
-    return tiling.radius / math.sqrt(tiling.tile_area)
-
-
 @dataclass(frozen=True, eq=False)
 class Surroundings:
     """A prototile and the tiles nearby, moved and scaled so that the expected area is one.
@@ -110,10 +99,10 @@ def surroundings(tiling: Tiling, prototile: int, margin: float) -> Surroundings:
     The unit is the side of a square of a tile's area.
     """
     scale = math.sqrt(tiling.tile_area)
-    if span(tiling) > MAX_SPAN:
+    if tiling.radius > MAX_SPAN * scale:
         raise OrbiflowError(
-            f"the tile's radius is {span(tiling):.0f} times the size that its group allows for: "
-            "check that polygon and group belong together and have the same units"
+            f"the tile's radius is {tiling.radius / scale:.0f} times the size that its group allows "
+            "for: check that polygon and group belong together and have the same units"
         )
     own = tiling.prototiles[prototile]
     if any(len(p.ring) < 3 for p in tiling.prototiles):
@@ -174,10 +163,8 @@ def match_segments(around: Surroundings, tolerance: float) -> SegmentMatch:
     plain = ~around.mirrored[around.owner, None]
     starts, ends = around.points, around.ahead
     reverse = np.concatenate([np.where(plain, ends, starts), np.where(plain, starts, ends)], axis=1)
-    low, high = ring.min(axis=0) - tolerance, ring.max(axis=0) + tolerance
-    inside = np.flatnonzero(
-        ((reverse >= np.tile(low, 2)) & (reverse <= np.tile(high, 2))).all(axis=1)
-    )
+    low, high = np.tile([ring.min(axis=0) - tolerance, ring.max(axis=0) + tolerance], 2)
+    inside = np.flatnonzero(((reverse >= low) & (reverse <= high)).all(axis=1))
     if not len(inside):
         nowhere = np.full(count, -1)
         return SegmentMatch(np.full(count, np.inf), nowhere, nowhere)
@@ -201,12 +188,8 @@ def boundaries_cancel(
     sizes = np.array([len(a.ring) for a in around])
     first: Integers = np.cumsum(sizes) - sizes
     weights = np.repeat([1.0 / own.order for own in tiling.stabilisers], sizes)
-    partners = np.concatenate(
-        [
-            first[a.copies.prototiles[match.tile]] + match.partner
-            for a, match in zip(around, matches, strict=True)
-        ]
-    )
+    pairs = zip(around, matches, strict=True)
+    partners = np.concatenate([first[a.copies.prototiles[m.tile]] + m.partner for a, m in pairs])
     labels = _orbits(tiling, first)
     if labels is None:
         return False
@@ -240,9 +223,9 @@ def curve_distance(around: Surroundings) -> float:
     """
     if not len(around):
         return float("inf")
-    tree = segment_tree(around)
-    _, distance = tree.query_nearest(
-        shapely.points(around.ring), all_matches=False, return_distance=True
+    points = shapely.points(around.ring)
+    _, distance = segment_tree(around).query_nearest(
+        points, all_matches=False, return_distance=True
     )
     return float(distance.max())
 
@@ -253,9 +236,8 @@ def segment_tree(around: Surroundings) -> shapely.STRtree:
     return shapely.STRtree(np.asarray(shapely.linestrings(ends)))
 
 
-_BOUNDARY_SAMPLES = (
-    200  # points on the boundary at least, so that coarse polygons are seen as curves
-)
+# points on the boundary at least, so that coarse polygons are seen as curves
+_BOUNDARY_SAMPLES = 200
 
 
 class Neighbours(NamedTuple):
@@ -313,12 +295,8 @@ def touching(around: Surroundings, tolerance: float) -> tuple[Surroundings, NDAr
 
 def _boundary_samples(ring: Array) -> Array:
     """Return interior points of the segments, midpoints among them: never the corners."""
-    per_segment = (
-        2 * math.ceil(_BOUNDARY_SAMPLES / (2 * len(ring))) + 1
-        if len(ring) < _BOUNDARY_SAMPLES
-        else 1
-    )
-    return subdivided(ring, per_segment, phase=0.5)
+    halves = math.ceil(_BOUNDARY_SAMPLES / (2 * len(ring)))
+    return subdivided(ring, 2 * halves + 1 if len(ring) < _BOUNDARY_SAMPLES else 1, phase=0.5)
 
 
 def patch(tile: Tiles, window: Sequence[float]) -> list[Placed]:

@@ -1,4 +1,7 @@
-"""The edges of a tiling and the isometries that identify them, from polygons and group alone."""
+"""The edges of a tiling and the isometries that identify them, from polygons and group alone.
+
+The skeleton of a tiling is the edges of a set of tiles, shared edges only once.
+"""
 
 # pyright: reportUnknownMemberType=false
 # shapely's stubs leave the keyword arguments of its functions of arrays without types.
@@ -25,7 +28,7 @@ from orbiflow.tiles.tilings.surroundings import (
     match_segments,
     surroundings,
 )
-from orbiflow.tiles.tilings.tile_copies import Placed
+from orbiflow.tiles.tilings.tile_copies import Copies, CopiesAcross, Placed
 from orbiflow.tiles.tilings.tiling import Tiles, Tiling, as_tiling
 
 EdgeKind: TypeAlias = Literal["translation", "rotation", "glide", "mirror"]
@@ -387,3 +390,80 @@ def _with_vertices(tiling: Tiling, k: int) -> Prototile:
     corners = np.searchsorted(own.kept, own.corners, side="left")
     moved = corners + np.searchsorted(at, corners, side="right")
     return Prototile(np.insert(ring, at, points, axis=0), tuple(int(c) for c in moved))
+
+
+@dataclass(frozen=True, eq=False)
+class Skeleton:
+    """S edges of copies of prototiles.
+
+    - `edges`, `copies`: The tiling's edges, and the copies.
+    - `copy`, `edge`: Edge `edge` of copy `copy`, (S,), in the direction of that copy's boundary.
+    - `other`: The copy (S,) across it, -1 if it is not in the set.
+    - `ends`: The numbers (S, 2) of its first and last vertex: edges that meet within the set share
+      them. A vertex where copies only touch may have several numbers.
+    """
+
+    edges: Edges
+    copies: Copies
+    copy: Integers
+    edge: Integers
+    other: Integers
+    ends: Integers
+
+    def __len__(self) -> int:
+        return len(self.copy)
+
+
+def skeleton(own: Edges, copies: Copies) -> Skeleton:
+    """Return each edge of each copy once.
+
+    Edge k of the copy g is edge partner(k) of g @ across(k).
+
+    The search uses only aspects and cells, no positions, so that no edge is drawn twice or lost,
+    however close edges come to each other.
+
+    Args:
+        own: The edges of the copies' tiling.
+        copies: Any of its tiles.
+
+    >>> from orbiflow.tiles import CLASSES, Tile, copies_inside, edges
+    >>> tile = Tile(CLASSES["IH1"].template(), CLASSES["IH1"].group())
+    >>> both = copies_inside(tile, (-1.01, -1, 2.6, 2))
+    >>> len(both), len(skeleton(edges(tile), both))
+    (2, 11)
+    """
+    beyond = copies.beyond(own.across, own.owners)
+    mine = copies.prototiles[:, None] == np.array(own.owners)
+    numbers = np.arange(len(copies))[:, None]
+    copy, edge = np.nonzero(mine & ((beyond.copy < 0) | (beyond.copy > numbers)))
+    vertices = _vertices(own, beyond)
+    ends = np.stack([vertices[copy, edge], vertices[copy, np.array(own.following)[edge]]], axis=1)
+    return Skeleton(own, copies, copy, edge, beyond.copy[copy, edge], ends)
+
+
+def _vertices(own: Edges, beyond: CopiesAcross) -> Integers:
+    """Return (M, E) number of the vertex in which edge k of each copy starts."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    count, sides = beyond.copy.shape
+    following = np.array(own.following)
+    links: list[Integers] = []
+    for k, (partner, element) in enumerate(zip(own.partners, own.across, strict=True)):
+        copy = np.flatnonzero(beyond.copy[:, k] >= 0)
+        there, turn = beyond.copy[copy, k], beyond.turn[copy, k]
+        # the copy beyond is its own image by an element of its stabiliser: so are its edges
+        mate = own.turned[element.prototile][turn, partner]
+        symmetries = own.tiling.stabilisers[element.prototile].elements
+        signs = np.array([s.determinant for s in symmetries])[turn] * element.determinant
+        begin: Integers = there * sides + mate
+        end: Integers = there * sides + following[mate]
+        start = np.where(signs > 0, end, begin)
+        stop = np.where(signs > 0, begin, end)
+        links.append(np.stack([copy * sides + k, start]))
+        links.append(np.stack([copy * sides + following[k], stop]))
+    first, second = np.concatenate(links, axis=1)
+    size = count * sides
+    graph = coo_array((np.ones(len(first), dtype=np.int8), (first, second)), shape=(size, size))
+    _, labels = connected_components(graph, directed=False)
+    return np.asarray(labels, dtype=np.int64).reshape(count, sides)
