@@ -57,10 +57,9 @@ from .likeness.necks import narrowest_neck as narrowest_neck
 from .likeness.necks import narrowest_slit as narrowest_slit
 from .likeness.necks import slit_share as slit_share
 from .likeness.overlap import Overlap as Overlap
+from .likeness.overlap import diverse as diverse
 from .likeness.overlap import prepared_region as prepared_region
-from .likeness.ranking import diverse as diverse
-from .likeness.ranking import rank_score as rank_score
-from .likeness.ranking import tile_similarity as tile_similarity
+from .likeness.overlap import rank_score as rank_score
 from .likeness.recognition import Recognisability as Recognisability
 from .likeness.recognition import Recogniser as Recogniser
 from .likeness.recognition import recognisability as recognisability
@@ -122,7 +121,6 @@ from .search.storage import as_model as as_model
 from .search.storage import load_model as load_model
 from .silhouette.bending import Bending as Bending
 from .silhouette.emphasis import Emphasis as Emphasis
-from .silhouette.frame import Frame as Frame
 from .silhouette.pins import Pins as Pins
 from .silhouette.readers.outline import read_outline as read_outline
 from .silhouette.readers.pictures import read_mask_array as read_mask_array
@@ -130,6 +128,7 @@ from .silhouette.readers.reading import FileContent as FileContent
 from .silhouette.readers.reading import Reading as Reading
 from .silhouette.soft_target import SoftTarget as SoftTarget
 from .silhouette.soft_target import signed_distance as signed_distance
+from .silhouette.target import Frame as Frame
 from .silhouette.target import Target as Target
 from .tile import EscherTile as EscherTile
 from .tile_map import TileMap as TileMap

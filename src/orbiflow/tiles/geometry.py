@@ -150,8 +150,10 @@ def points_along(ring: Array, at: ArrayLike) -> Array:
     [[0.5, 0.0], [0.5, 0.0]]
     """
     knots = arc_lengths(ring)
-    at, closed = np.asarray(at, dtype=np.float64) % knots[-1], np.concatenate([ring, ring[:1]])
-    return np.stack([np.interp(at, knots, closed[:, k]) for k in (0, 1)], axis=-1)
+    place = np.asarray(at, dtype=np.float64) % knots[-1]
+    closed = np.concatenate([ring, ring[:1]])
+    coordinates: list[Array] = [np.interp(place, knots, closed[:, k]) for k in (0, 1)]
+    return np.stack(coordinates, axis=-1)
 
 
 def resampled(ring: Array, count: int, phase: float = 0.0) -> Array:

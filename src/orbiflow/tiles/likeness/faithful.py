@@ -69,9 +69,7 @@ class Fidelity:
         """
         values = (*self.pieces, self.notches, self.narrowed, self.cost)
         relative = [value / usual for value, usual in zip(values, USUAL_VALUES, strict=True)]
-        parts = [
-            math.log((NEGLIGIBLE_SHARE + value) / (NEGLIGIBLE_SHARE + 1)) for value in relative
-        ]
+        parts = np.log((NEGLIGIBLE_SHARE + np.array(relative)) / (NEGLIGIBLE_SHARE + 1))
         return self.necks + float(np.dot(WEIGHTS, parts))
 
     @property
@@ -171,10 +169,11 @@ def faithfulness(silhouette: ArrayLike, shape: ArrayLike, *, mirror: bool = True
     """
     own, other = _ring(silhouette, "the silhouette"), _ring(shape, "the shape")
     body, overlap = _body(own.tobytes())
+    z = complex_points(other)
     turns = np.exp(2j * np.pi * np.arange(TURNS) / TURNS).tolist()
     rough = [
         _Overlay(overlap.iou(plane_points(turn * ring))[0], turn, ring)
-        for ring in _orientations(other, mirror=mirror)
+        for ring in ([z, np.conj(z[::-1])] if mirror else [z])
         for turn in turns
     ]
     rough.sort(key=lambda overlay: -overlay.iou)
@@ -193,11 +192,6 @@ class _Overlay(NamedTuple):
     iou: float
     turn: complex
     ring: Complex
-
-
-def _orientations(ring: Array, *, mirror: bool) -> list[Complex]:
-    z = complex_points(ring)
-    return [z, np.conj(z[::-1])] if mirror else [z]
 
 
 def _ring(points: ArrayLike, what: str) -> Array:

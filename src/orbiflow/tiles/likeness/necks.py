@@ -190,9 +190,8 @@ def _dense(ring: Array, step: float) -> Array:
     pieces = np.maximum(np.ceil(np.linalg.norm(after - ring, axis=1) / step), 1).astype(int)
     start = np.repeat(np.cumsum(pieces) - pieces, pieces)
     share = (np.arange(len(start)) - start) / np.repeat(pieces, pieces)
-    return np.repeat(ring, pieces, axis=0) + share[:, None] * np.repeat(
-        after - ring, pieces, axis=0
-    )
+    sides = np.repeat(after - ring, pieces, axis=0)
+    return np.repeat(ring, pieces, axis=0) + share[:, None] * sides
 
 
 def _nearest_within(
@@ -213,10 +212,8 @@ def _nearest_within(
     ends = points[j] + along[:, None] * steps[j]
     width = np.linalg.norm(points[i] - ends, axis=1)
     way = abs(knots[i] - knots[j] - along * lengths[j])
-    way = np.minimum(way, knots[-1] - way)
-    counts = np.flatnonzero(
-        (way >= np.maximum(apart, OUTLINE_PER_WIDTH * width)) & (width <= reach)
-    )
+    beyond = np.minimum(way, knots[-1] - way) >= np.maximum(apart, OUTLINE_PER_WIDTH * width)
+    counts = np.flatnonzero(beyond & (width <= reach))
     left = _on_the_left(steps, i[counts], j[counts], along[counts], (ends - points[i])[counts])
     counts = counts[left]
     counts = counts[_local_minima(i[counts], j[counts], width[counts])]
@@ -268,8 +265,6 @@ def _thin_share(
     lines, lengths = lines[lengths > 0], lengths[lengths > 0]
     if not parts or not len(lines):
         return 0.0
-    own = shapely.STRtree(parts).nearest(
-        shapely.line_interpolate_point(lines, 0.5, normalized=True)
-    )
-    totals = np.bincount(own, lengths)
+    middles = shapely.line_interpolate_point(lines, 0.5, normalized=True)
+    totals = np.bincount(shapely.STRtree(parts).nearest(middles), lengths)
     return float(totals[totals > OUTLINE_PER_WIDTH * width].sum() / polygon.exterior.length)

@@ -116,12 +116,17 @@ def _are_sides(ends: Integers, triangles: Integers, count: int) -> NDArray[np.bo
     return np.isin(wanted[:, 0] * count + wanted[:, 1], known)
 
 
+def doubled_areas(points: Array, triangles: Integers) -> Array:
+    """Return twice the area (M,) of triangles, negative where they are clockwise."""
+    corners = points[triangles]
+    u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    return u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
+
+
 def _kept(mesh: Mesh, polygon: shapely.Polygon) -> Mesh:
     """Return the triangles inside the polygon, counter-clockwise, and the points that they use."""
-    corners = mesh.points[mesh.triangles]
-    middle = corners.mean(axis=1)
-    u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    area = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
+    middle = mesh.points[mesh.triangles].mean(axis=1)
+    area = doubled_areas(mesh.points, mesh.triangles)
     triangles = np.where((area < 0)[:, None], mesh.triangles[:, ::-1], mesh.triangles)
     inside = cast(NDArray[np.bool_], shapely.contains_xy(polygon, *middle.T))
     flat = abs(area) < FLAT_AREA * polygon.area
@@ -238,11 +243,10 @@ def local_thickness(mesh: Mesh) -> Array:
         mesh: A mesh of the polygon.
     """
     polygon = shapely.Polygon(mesh.points[: mesh.size])
-    corners = mesh.points[mesh.triangles]
     dense = subdivided(mesh.points[: mesh.size], PIECES_PER_SIDE)
     centers = Voronoi(dense).vertices
     centers = centers[shapely.contains_xy(polygon, centers[:, 0], centers[:, 1])]
-    middle = corners.mean(axis=1)
+    middle = mesh.points[mesh.triangles].mean(axis=1)
     outline = polygon.exterior
     shapely.prepare(outline)
     own: Array = shapely.distance(cast(NDArray[np.object_], shapely.points(middle)), outline)

@@ -73,10 +73,8 @@ PENTAGONS: dict[str, PentagonGauge] = {
 
 def hexagon() -> Array:
     """Return (6, 2) vertices p_k = (cos 60k, sin 60k), float64, counter-clockwise."""
-    half, high = 0.5, math.sqrt(3.0) / 2
-    return np.array(
-        [(1.0, 0.0), (half, high), (-half, high), (-1.0, 0.0), (-half, -high), (half, -high)]
-    )
+    x, y = 0.5, math.sqrt(3.0) / 2
+    return np.array([(1.0, 0.0), (x, y), (-x, y), (-1.0, 0.0), (-x, -y), (x, -y)])
 
 
 def pentagon(gauge: PentagonGauge, shape: Points) -> Points:
@@ -163,25 +161,22 @@ def _functions(values: Any) -> Any:
     return torch
 
 
-class _OfTheCLibrary:
-    """Functions of NumPy arrays rounded as torch rounds them."""
-
-    cosh = np.vectorize(math.cosh, otypes=[float])
-    sinh = np.vectorize(math.sinh, otypes=[float])
+# of NumPy arrays, rounded as torch rounds them
+_cosh, _sinh = (np.vectorize(f, otypes=[float]) for f in (math.cosh, math.sinh))
 
 
 def _cosh_sinhc(square: Any) -> tuple[Any, Any]:
     """cosh r and sinh(r) / r as functions of r^2, by their series where the root would hurt."""
     own = _functions(square)
-    hyperbolic = own if is_tensor(square) else _OfTheCLibrary
+    hyperbolic_cosh, hyperbolic_sinh = (own.cosh, own.sinh) if is_tensor(square) else (_cosh, _sinh)
     small = square < 1e-2
     root = own.sqrt(own.where(small, own.ones_like(square), square))
     s = own.where(small, square, own.zeros_like(square))
     cosh = 1 + s / 2 * (1 + s / 12 * (1 + s / 30 * (1 + s / 56 * (1 + s / 90))))
     sinhc = 1 + s / 6 * (1 + s / 20 * (1 + s / 42 * (1 + s / 72 * (1 + s / 110))))
     return (
-        own.where(small, cosh, hyperbolic.cosh(root)),
-        own.where(small, sinhc, hyperbolic.sinh(root) / root),
+        own.where(small, cosh, hyperbolic_cosh(root)),
+        own.where(small, sinhc, hyperbolic_sinh(root) / root),
     )
 
 
@@ -262,9 +257,8 @@ class IsohedralClass:
         Raises:
             OrbiflowError: if the last axis of `parameters` is not `stretch_dim` long.
         """
-        return stretch_matrix(
-            self._freedom, self._parameters(parameters, self.stretch_dim, "stretch")
-        )
+        own = self._parameters(parameters, self.stretch_dim, "stretch")
+        return stretch_matrix(self._freedom, own)
 
     def group(self) -> CrystallographicGroup:
         """Return the group of the template; the same for all shape parameters."""

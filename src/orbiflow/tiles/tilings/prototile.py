@@ -163,14 +163,11 @@ def _image_order(element: Isometry, ring: Array) -> tuple[Integers | None, float
     order = (first + step * np.arange(count)) % count
     error = float(np.linalg.norm(image - ring[order], axis=1).max())
     curve = shapely.linearrings(ring)
-    there = shapely.distance(
-        curve, shapely.points(np.concatenate([image, element.inverse()(ring)]))
-    )
-    as_curve = float(there.max())
+    both = shapely.points(np.concatenate([image, element.inverse()(ring)]))
+    as_curve = float(shapely.distance(curve, both).max())
     # vertices correspond if they are about as near to vertices as to the curve
-    return (
-        (order, error) if error <= 4 * as_curve + 1e-9 * float(np.ptp(ring)) else (None, as_curve)
-    )
+    near = error <= 4 * as_curve + 1e-9 * float(np.ptp(ring))
+    return (order, error) if near else (None, as_curve)
 
 
 def _closed(elements: list[Isometry]) -> bool:

@@ -44,9 +44,7 @@ class Placed(Isometry):
         return Placed(product.linear, product.translation, self.prototile)
 
     def __repr__(self) -> str:
-        return f"{Isometry.__repr__(self)[:-1]}, prototile={self.prototile})".replace(
-            "Isometry", "Placed", 1
-        )
+        return f"Placed{Isometry.__repr__(self)[8:-1]}, prototile={self.prototile})"
 
 
 def prototile_of(element: Isometry) -> int:
@@ -276,10 +274,8 @@ def _cells_within(lattice: Array, least: Array, most: Array) -> tuple[Integers, 
         if abs(step) < 1e-12 * abs(inverse).max() * abs(np.linalg.det(lattice)):
             continue
         one, other = ((ends[box, axis] - across * second) / step for ends in (least, most))
-        low, high = (
-            np.maximum(low, np.minimum(one, other)),
-            np.minimum(high, np.maximum(one, other)),
-        )
+        low = np.maximum(low, np.minimum(one, other))
+        high = np.minimum(high, np.maximum(one, other))
     row, first = _ranges(low, high)
     cells = np.stack([first, second[row]], axis=1)
     box = box[row]
@@ -304,10 +300,10 @@ def _by_rows(copies: Copies) -> Copies:
 def _refuse_too_many(tiling: Tiling, window: Window) -> None:
     width, height = window[2] - window[0], window[3] - window[1]
     size, reach = tiling.tile_area, 2 * tiling.radius
-    expected = (width + reach) * (height + reach) / size
-    if expected > 2 * MAX_TILES or width * height / size > MAX_TILES:
+    count = width * height / size
+    if (width + reach) * (height + reach) / size > 2 * MAX_TILES or count > MAX_TILES:
         raise OrbiflowError(
-            f"the window of {width:.4g} by {height:.4g} would hold about "
-            f"{width * height / size:.0f} tiles; the most is {MAX_TILES}: choose larger tiles "
+            f"the window of {width:.4g} by {height:.4g} would hold about {count:.0f} "
+            f"tiles; the most is {MAX_TILES}: choose larger tiles "
             "or a smaller window"
         )

@@ -50,8 +50,6 @@ class Aspects:
     def of(cls, group: CrystallographicGroup, stabilisers: Sequence[Stabiliser]) -> Aspects:
         """Return the aspects of prototiles with these stabilisers."""
         count, order = len(stabilisers), group.order
-        if all(own.order == 1 for own in stabilisers):
-            return cls._of_all(count, order)
         table = np.zeros((count, order), dtype=np.int64)
         steps = np.zeros((count, order, 2), dtype=np.int64)
         turns = np.zeros((count, order), dtype=np.int64)
@@ -66,14 +64,6 @@ class Aspects:
             prototiles += [k] * len(kept)
             cosets += kept.tolist()
         return cls(np.array(prototiles), np.array(cosets), table, steps, turns)
-
-    @classmethod
-    def _of_all(cls, count: int, order: int) -> Aspects:
-        """Return the aspects of prototiles without symmetry: every pair."""
-        none = np.zeros((count, order), dtype=np.int64)
-        table = np.arange(count * order).reshape(count, order)
-        prototiles, cosets = np.divmod(table.ravel(), order)
-        return cls(prototiles, cosets, table, np.zeros((count, order, 2), dtype=np.int64), none)
 
     def find(
         self, group: CrystallographicGroup, element: Isometry, prototile: int
@@ -96,13 +86,9 @@ def _first_cosets(
         for s in own.elements[1:]:
             coset, cell = coset_and_cell(group, g @ s)
             if coset < first[i]:  # g s = (translation) h, so g = (translation) h s^-1
-                first[i], steps[i], turns[i] = coset, cell, _inverse(own.elements, s)
+                errors = [np.abs(s.linear @ t.linear - np.eye(2)).max() for t in own.elements]
+                first[i], steps[i], turns[i] = coset, cell, int(np.argmin(errors))
     return first, steps, turns
-
-
-def _inverse(elements: tuple[Isometry, ...], s: Isometry) -> int:
-    errors = [np.abs(s.linear @ t.linear - np.eye(2)).max() for t in elements]
-    return int(np.argmin(errors))
 
 
 def coset_and_cell(group: CrystallographicGroup, element: Isometry) -> tuple[int, Cell]:
