@@ -24,6 +24,7 @@ from reproduction.drawing import (
     caption,
     grid_box,
     panel,
+    same_orbit,
     text_size,
     tiny,
 )
@@ -176,16 +177,10 @@ def center_orbits(group: CrystallographicGroup) -> list[RotationCenter]:
     """
     orbits: list[RotationCenter] = []
     for center in sorted(symmetry_elements(group).centers, key=lambda c: -c.order):
-        if not any(_same_orbit(group, center, other) for other in orbits):
+        alike = [other.point for other in orbits if other.order == center.order]
+        if not same_orbit(group, center.point, alike, 1e-6):
             orbits.append(center)
     return orbits
-
-
-def _same_orbit(group: CrystallographicGroup, one: RotationCenter, other: RotationCenter) -> bool:
-    steps = (group.images(one.point) - other.point) @ group.inverse_lattice.T
-    return one.order == other.order and bool(
-        (np.abs(steps - steps.round()).max(axis=-1) < 1e-6).any()
-    )
 
 
 def _draw_tilings(canvas: Canvas, _extent: Extent, _values: list[Any]) -> Findings:

@@ -15,6 +15,7 @@ from orbiflow.arrays import Array, Window
 from orbiflow.density import Space, immersion, viewpoint
 from orbiflow.drawing import DPI, PALETTES, blank_figure, fill_rings, plane_axes, png_bytes
 from orbiflow.runtime import write_atomic
+from orbiflow.symmetry import CrystallographicGroup
 from orbiflow.tiles import Tile, colouring, copies_meeting
 
 if TYPE_CHECKING:
@@ -171,6 +172,14 @@ def around(middle: ArrayLike, half_width: float, half_height: float) -> Window:
     """Return the window around a point (2,)."""
     x, y = (float(value) for value in np.asarray(middle))
     return x - half_width, y - half_height, x + half_width, y + half_height
+
+
+def same_orbit(
+    group: CrystallographicGroup, point: Array, others: list[Array], tolerance: float
+) -> bool:
+    """Return whether a point (2,) is an image of one of the others."""
+    steps = [(group.images(point) - other) @ group.inverse_lattice.T for other in others]
+    return any((np.abs(s - s.round()).max(axis=-1) < tolerance).any() for s in steps)
 
 
 def tiny(value: float) -> str:

@@ -39,32 +39,14 @@ class Extent(NamedTuple):
 
 # everything, in about ten minutes on two cores
 FULL = Extent(
-    name="full",
-    frequencies=(0, 1, 2, 3, 5, 10),
-    affine=80,
-    iterations=200,
-    effort="normal",
-    classes=None,
-    points=65_536,
-    evaluations=150,
-    round_measure=True,
-    grid=200,
-    resolution=160,
-)
+    name="full", frequencies=(0, 1, 2, 3, 5, 10), affine=80, iterations=200, effort="normal",
+    classes=None, points=65_536, evaluations=150, round_measure=True, grid=200, resolution=160,
+)  # fmt: skip
 # A preview of a minute: every exhibit, with less work in each
 FAST = Extent(
-    name="fast",
-    frequencies=(0, 2, 5),
-    affine=30,
-    iterations=30,
-    effort="fast",
-    classes=("IH6",),
-    points=2_048,
-    evaluations=24,
-    round_measure=False,
-    grid=100,
-    resolution=100,
-)
+    name="fast", frequencies=(0, 2, 5), affine=30, iterations=30, effort="fast", classes=("IH6",),
+    points=2_048, evaluations=24, round_measure=False, grid=100, resolution=100,
+)  # fmt: skip
 
 # whether what the paper states agrees with what we find
 Verdict = Literal["agrees", "agrees in part", "differs"]

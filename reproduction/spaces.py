@@ -10,7 +10,16 @@ from orbiflow.arrays import Array
 from orbiflow.density import SPACES, Space, edge_pairs, make_space
 from orbiflow.drawing import mark_symmetry
 from orbiflow.symmetry import IDENTIFICATION_SPACES, CrystallographicGroup
-from reproduction.drawing import Canvas, around, caption, draw_surface, grid_box, panel, tiny
+from reproduction.drawing import (
+    Canvas,
+    around,
+    caption,
+    draw_surface,
+    grid_box,
+    panel,
+    same_orbit,
+    tiny,
+)
 from reproduction.exhibit import Exhibit, Extent, Findings, Table
 from reproduction.symmetrization import nested_error, terms
 
@@ -25,12 +34,7 @@ LETTER = np.array(
     [[0, 0], [0, 5], [3, 5], [3, 4], [1, 4], [1, 3], [2.4, 3], [2.4, 2], [1, 2], [1, 0]]
 )
 # from where the surfaces are seen: yaw and pitch
-TURNS = {
-    "torus": (0.5, 0.75),
-    "sphere": (0.6, 0.35),
-    "klein-bottle": (0.3, 0.75),
-    "projective-plane": (0.4, 0.5),
-}
+TURNS = dict(zip(SPACES, ((0.5, 0.75), (0.6, 0.35), (0.3, 0.75), (0.4, 0.5)), strict=True))
 
 
 def euler_characteristic(group: CrystallographicGroup) -> int:
@@ -42,9 +46,7 @@ def euler_characteristic(group: CrystallographicGroup) -> int:
     """
     orbits: list[Array] = []
     for corner in CORNERS:
-        images = group.images(corner)
-        steps = [(images - other) @ group.inverse_lattice.T for other in orbits]
-        if not any((np.abs(s - s.round()).max(axis=-1) < 1e-9).any() for s in steps):
+        if not same_orbit(group, corner, orbits, 1e-9):
             orbits.append(corner)
     return len(orbits) - len(edge_pairs(group)) + 1
 
@@ -56,7 +58,7 @@ def orientable(group: CrystallographicGroup) -> bool:
 
 def _draw_spaces(canvas: Canvas, extent: Extent, _values: list[Any]) -> Findings:
     figure = canvas.figure(0.80)
-    rows = []
+    rows, found = [], {}
     for column, name in enumerate(SPACES):
         space = make_space(name)
         box = grid_box(0, column, 3, 4, title=0.10, gap=0.02)
@@ -67,7 +69,7 @@ def _draw_spaces(canvas: Canvas, extent: Extent, _values: list[Any]) -> Findings
         _draw_cells(panel(figure, box, window), space.group)
         axes = figure.add_axes(grid_box(2, column, 3, 4, gap=0.0))
         draw_surface(axes, space, _checked(space, extent.resolution), turn=TURNS[name])
-        chi, sided = euler_characteristic(space.group), orientable(space.group)
+        found[name] = chi, sided = euler_characteristic(space.group), orientable(space.group)
         rows.append((TITLES[name], space.group.name, str(chi), "yes" if sided else "no"))
     canvas.add(
         figure,
@@ -81,14 +83,7 @@ def _draw_spaces(canvas: Canvas, extent: Extent, _values: list[Any]) -> Findings
         exact=True,
     )
     headings = ("space", "group", "Euler characteristic", "orientable")
-    wanted = {
-        "torus": (0, True),
-        "sphere": (2, True),
-        "klein-bottle": (0, False),
-        "projective-plane": (1, False),
-    }
-    groups = {name: make_space(name).group for name in SPACES}
-    found = {name: (euler_characteristic(g), orientable(g)) for name, g in groups.items()}
+    wanted = dict(zip(SPACES, ((0, True), (2, True), (0, False), (1, False)), strict=True))
     return Findings(
         "agrees" if found == wanted else "differs",
         "Each group identifies the square's edges in pairs, and counting vertices, edges and the "

@@ -56,32 +56,20 @@ def _kinds() -> tuple[Kind, ...]:
     turn = rotation((0.0, 0.0), 4)
     glide = transflection(Line((0.0, 0.0), (0.0, 1.0)), 0.75)
     steps = ((0, 0), (1, 0), (0, 1), (1, 1), (-1, 0), (0, -1), (-1, -1))
+    moves = tuple(translation(oblique @ np.array(step)) for step in steps)
+    turns = (identity(2), turn, turn @ turn, turn.inverse())
+    glides = (identity(2), glide, glide.inverse())
     return (
+        Kind("B-periodic", "V(p + m b₁ + n b₂) = V(p)", oblique, (), (-0.35, -0.12), moves),
         Kind(
-            "B-periodic",
-            "V(p + m b₁ + n b₂) = V(p)",
-            oblique,
-            (),
-            (-0.35, -0.12),
-            tuple(translation(oblique @ np.array(step)) for step in steps),
+            "(c, 4)-rotation equivariant", "V(R_c p) = R_o V(p)", 1.6 * np.eye(2), ((turn, 4),),
+            (0.62, 0.15), turns,
         ),
         Kind(
-            "(c, 4)-rotation equivariant",
-            "V(R_c p) = R_o V(p)",
-            1.6 * np.eye(2),
-            ((turn, 4),),
-            (0.62, 0.15),
-            (identity(2), turn, turn @ turn, turn.inverse()),
+            "(ℓ, μ)-transflection equivariant", "V(T M p) = M_o V(p)", np.diag([1.6, 1.5]),
+            ((glide, 2),), (0.42, -0.15), glides,
         ),
-        Kind(
-            "(ℓ, μ)-transflection equivariant",
-            "V(T M p) = M_o V(p)",
-            np.diag([1.6, 1.5]),
-            ((glide, 2),),
-            (0.42, -0.15),
-            (identity(2), glide, glide.inverse()),
-        ),
-    )
+    )  # fmt: skip
 
 
 KINDS = _kinds()

@@ -135,16 +135,9 @@ def _by_autograd(function: VectorField, points: Tensor, owner: object) -> tuple[
         values = function(inputs)
         if not values.requires_grad:  # a constant field
             return values, points.new_zeros(*points.shape, points.shape[-1])
-        rows = [
-            torch.autograd.grad(
-                values[..., i].sum(),
-                inputs,
-                create_graph=keep,
-                retain_graph=True,
-                materialize_grads=True,
-            )[0]
-            for i in range(points.shape[-1])
-        ]
+        options: Any = {"create_graph": keep, "retain_graph": True, "materialize_grads": True}
+        sums = [values[..., i].sum() for i in range(points.shape[-1])]
+        rows = [torch.autograd.grad(total, inputs, **options)[0] for total in sums]
     return values if keep else values.detach(), torch.stack(rows, dim=-2)
 
 

@@ -57,14 +57,8 @@ class Stiffness:
 class Elastic:
     """A triangulated silhouette of area about 1 and its energies.
 
-    Args:
-        ring: The outline (n, 2), counter-clockwise; the first n points of the body.
-        stiffness: The costs of deforming.
-        stiff: Factors (n,) or (N,) of the stiffness at the points, if some should deform less.
-        mesh: A mesh of the ring, if there is one already.
-
-    Raises:
-        OrbiflowError: for a ring that cannot be triangulated.
+    Its first n points are the counter-clockwise outline `ring` (n, 2). Where some should deform less,
+    `stiff` holds factors (n,) or (N,) of the stiffness at the points. `mesh` saves triangulating again.
     """
 
     def __init__(
@@ -221,13 +215,10 @@ class Elastic:
         return matrix
 
     def pulled(self, z: Complex, towards: Complex, strength: float, rounds: int) -> Complex:
-        """Return shapes whose outline is pulled towards other points by a spring at each point.
+        """Return shapes (N, C), from `z`, whose outline springs pull towards points (n, C).
 
-        Args:
-            z: The shapes (N, C) to start from.
-            towards: The points (n, C) that the outline is pulled towards.
-            strength: The strength of all springs together, in the unit of the energy.
-            rounds: The number of rounds of choosing rotations and solving.
+        All springs together have `strength`, in the unit of the energy. Each of the rounds chooses
+        rotations and solves.
         """
         mu = strength / self.size
         solve = self._pulled_solver(mu)

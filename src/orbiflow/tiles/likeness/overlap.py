@@ -121,15 +121,10 @@ class Overlap:
 def best_overlay(
     ring: Complex, overlap: Overlap, factor: complex = 1.0, middle: complex = 0.0
 ) -> tuple[complex, complex, float]:
-    """Find the similarity of largest IoU with a region near a first one, by L-BFGS.
+    """Find the similarity z -> factor z + middle of largest IoU with a region, by L-BFGS.
 
-    Args:
-        ring: A ring (n,) x + iy about the origin.
-        overlap: The overlap with the region.
-        factor, middle: The first similarity, z -> factor z + middle.
-
-    Returns:
-        The factor and middle of the best one, and its IoU.
+    The ring (n,) x + iy is about the origin. The result is near the first similarity: its factor and
+    middle, and the IoU.
     """
 
     def loss(x: Array) -> tuple[float, Array]:
@@ -152,14 +147,10 @@ MAX_IOU_GAIN = 0.15  # the largest gain in IoU that is expected from a better ov
 
 
 def mutual_iou(tiles: Sequence[Array], decisive: float = 0.9) -> Similarity:
-    """Return the mutual IoU of tiles by their indices, for `diverse`.
+    """Return the mutual IoU of tiles (N, 2) over one silhouette by their indices, for `diverse`.
 
     A better overlay is searched only where it can matter: for pairs whose IoU, with equal areas and
-    centroids, is at most `MAX_IOU_GAIN` below `decisive`.
-
-    Args:
-        tiles: The tiles (n,), simple rings (N, 2) that all lie over one silhouette.
-        decisive: The value that the IoU is compared with.
+    centroids, is at most `MAX_IOU_GAIN` below `decisive`, with which it is compared.
 
     >>> square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
     >>> turned = square @ [[0.98, 0.2], [-0.2, 0.98]] * 3 + 7

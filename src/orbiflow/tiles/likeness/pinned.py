@@ -34,16 +34,9 @@ class Pinned(Elastic):
     """A triangulated silhouette with parts that keep their shape.
 
     `energy` and `lenient_energy` include the parts' cost; `forgiving_energy` leaves it out, so that it
-    can be compared with that of bodies with other pins or none.
-
-    Args:
-        ring: The outline (n, 2), counter-clockwise; the first n points of the body.
-        parts: The indices of the points of each part; parts of fewer than three points are ignored.
-        keep_angle: Whether parts rotate only with the whole body.
-        stiffness, stiff, mesh: As in `Elastic`.
-
-    Raises:
-        OrbiflowError: for a ring that cannot be triangulated.
+    can be compared with that of bodies with other pins or none. `parts` are the indices of the points
+    of each part; parts of fewer than three points are ignored. With `keep_angle` they rotate only with
+    the whole body.
     """
 
     def __init__(
@@ -186,13 +179,10 @@ class PinnedCondensed(Condensed):
 
 
 class _Part:
-    """Points that keep their shape.
+    """Points `index` of a body at rest (N,) that keep their shape.
 
-    Args:
-        rest: The points (N,) of the body at rest.
-        index: The indices of the part's points.
-        weight: The weight of each point's squared distance from the part's similar copy.
-        held: The weight of |a - goal|^2.
+    `weight` is that of each point's squared distance from the part's similar copy, `held` that of
+    |a - goal|^2.
     """
 
     def __init__(self, rest: Complex, index: Integers, weight: float, held: float) -> None:

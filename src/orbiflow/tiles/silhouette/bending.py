@@ -168,22 +168,13 @@ def folded(mesh: Mesh, points: Array) -> NDArray[np.bool_]:
 
 
 def unfolded(mesh: Mesh, points: Array) -> Array:
-    """Move the inner points of a map until no triangle is turned over.
+    """Move the inner points of a map (N, 2) until no triangle is turned over.
 
     Foldover-free maps in few steps (Garanzha, Kaporin, Kudryavtseva, Protais, Ray and Sokolov,
     SIGGRAPH 2021): L-BFGS minimises the distortion |J|^2 / det J of each triangle, with det J bounded
     away from 0 by a shrinking parameter; if that fails, again from points each in the middle of its
-    neighbours. Points on the outline stay in place.
-
-    Args:
-        mesh: The triangles at rest.
-        points: The images (N, 2) of its points; those of the outline bound a simple polygon.
-
-    Returns:
-        The images (N, 2), unchanged if nothing was turned over.
-
-    Raises:
-        OrbiflowError: if triangles stay turned over.
+    neighbours. Points on the outline, which bound a simple polygon, stay in place; and all do if
+    nothing was turned over. Raises `OrbiflowError` if triangles stay turned over.
     """
     if not folded(mesh, points).any():
         return points

@@ -38,19 +38,13 @@ class Mesh(NamedTuple):
 
 
 def triangulate(ring: Array, spacing: float | None = None) -> Mesh:
-    """Triangulate the inside of a simple polygon, its sides among the triangles' sides.
+    """Triangulate the inside of a simple, counter-clockwise ring (n, 2), with its sides.
 
     This is a Delaunay triangulation of the vertices and of points inside. Sides of the polygon that
     are not sides of triangles are halved until they are (Ruppert's first rule). Sides of triangles
     that connect two points of the outline through the inside are halved, so that every triangle can
-    follow when the outline moves.
-
-    Args:
-        ring: A counter-clockwise ring (n, 2).
-        spacing: The spacing of inner points next to the outline. Default: the mean length of a side.
-
-    Raises:
-        OrbiflowError: for a ring that crosses itself, or too thin to be filled in double precision.
+    follow when the outline moves. Next to the outline inner points are `spacing` apart, by default the
+    mean length of a side. Raises `OrbiflowError` for a ring that crosses itself or is too thin.
     """
     polygon = shapely.Polygon(ring)
     if not polygon.is_valid or not polygon.area > 0:
@@ -204,12 +198,7 @@ class Located(NamedTuple):
 
 
 class Locator:
-    """A search tree of the triangles of a mesh.
-
-    Args:
-        points: The points (N, 2).
-        triangles: The indices (M, 3) of the corners; no triangle may be flat.
-    """
+    """A search tree of triangles (M, 3) over points (N, 2), none of them flat."""
 
     def __init__(self, points: Array, triangles: Integers) -> None:
         self._tree = shapely.STRtree(np.asarray(shapely.polygons(points[triangles])))
@@ -238,9 +227,6 @@ def local_thickness(mesh: Mesh) -> Array:
 
     This is the local thickness of Hildebrand and Rüegsegger (1997), over discs about the Voronoi
     vertices of points on the outline, which lie near the medial axis.
-
-    Args:
-        mesh: A mesh of the polygon.
     """
     polygon = shapely.Polygon(mesh.points[: mesh.size])
     dense = subdivided(mesh.points[: mesh.size], PIECES_PER_SIDE)

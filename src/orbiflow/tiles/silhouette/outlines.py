@@ -209,18 +209,12 @@ class Samples(NamedTuple):
 def sampled(
     ring: Array, phase: float = 0.0, multiples: tuple[int, ...] = FINE_MULTIPLES
 ) -> Samples:
-    """Sample an outline, more densely if it is long or rich in corners.
+    """Sample a counter-clockwise ring (M, 2) of area about 1, more densely if long or rich in corners.
 
-    If twice the coarse points make no simple polygon, or do not divide the fine ones, `middle` is
-    `fine`.
-
-    Args:
-        ring: A counter-clockwise ring (M, 2) of area about 1.
-        phase: The shift of the points, in coarse spacings.
-        multiples: The numbers of fine points for each coarse one, in order of trial.
-
-    Raises:
-        OrbiflowError: if all samplings cross themselves because the silhouette has hairs.
+    Points are shifted by `phase` coarse spacings; `multiples` are numbers of fine points for each
+    coarse one, in order of trial. If twice the coarse points make no simple polygon, or do not divide
+    the fine ones, `middle` is `fine`. Raises `OrbiflowError` if all cross themselves because there
+    are hairs.
     """
     longer = ring_length(ring) / SHORT_OUTLINE
     count = int(np.clip(6 * round(MIN_POINTS * longer / 6), MIN_POINTS, MAX_POINTS))
