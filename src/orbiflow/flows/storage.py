@@ -47,12 +47,8 @@ class Writer:
             return self._series(field)
         if kind is Symmetrized:
             inner = self.header(field.field, f"{place}.field")
-            return {
-                "kind": "symmetrized",
-                "group": self._group(field.group),
-                "periodic": field.periodic,
-                "field": inner,
-            }
+            own = {"group": self._group(field.group), "periodic": field.periodic, "field": inner}
+            return {"kind": "symmetrized", **own}
         if is_perceptron(field):
             features, *layers = field
             linear = [layer for layer in layers if isinstance(layer, nn.Linear)]
@@ -201,11 +197,6 @@ def _dtype(tensor: torch.Tensor) -> str:
     return name
 
 
-def finite(value: Any, name: str) -> float:
-    """Return `value` if it is a finite number."""
-    return number(value, name, -math.inf)
-
-
 FORMAT = "orbiflow-flow/1"
 MAX_SEGMENTS, MAX_STEPS = 256, 2**20
 
@@ -243,15 +234,9 @@ def save_flow(flow: Flow, path: str | Path) -> Path:
         segments.append(
             {"kind": "same", "segment": first} if first < index else writer.header(field, place)
         )
-    header = {
-        "format": FORMAT,
-        "groups": writer.groups,
-        "segments": segments,
-        "steps": flow.steps,
-        "method": flow.method,
-        "duration": flow.duration,
-        "warn": flow.warns,
-    }
+    settings = {name: getattr(flow, name) for name in ("steps", "method", "duration")}
+    header = {"format": FORMAT, "groups": writer.groups, "segments": segments, **settings}
+    header["warn"] = flow.warns
     return write_atomic(path, tensor_bytes(header, tensors, "a flow"))
 
 
@@ -305,7 +290,7 @@ def _restored(
         fields,
         steps=whole(header["steps"], "steps", 1, MAX_STEPS),
         method=str(header["method"]),
-        duration=finite(header["duration"], "duration"),
+        duration=number(header["duration"], "duration", -math.inf),
         warn=bool(header["warn"]),
     )
     _fill(flow, tensors)

@@ -260,23 +260,16 @@ class Elastic:
     def _pairs(self, stiff: Array | None) -> Any:
         triangles, count, n = self.mesh.triangles, len(self), self.size
         factors = self._salience()
-        rows: list[Integers] = []
-        columns: list[Integers] = []
-        values: list[Array] = []
-        for k in range(3):
-            i, j, apex = triangles[:, k], triangles[:, k - 2], triangles[:, k - 1]
-            u = np.conj(self.rest[i] - self.rest[apex]) * (self.rest[j] - self.rest[apex])
-            rows.append(i)
-            columns.append(j)
-            cotangent = np.clip(u.real / np.maximum(abs(u.imag), 1e-300), -5.0, 5.0)
-            values.append(factors * cotangent / 2)
-        areas = _symmetric(rows, columns, values, count)
+        i, j, apex = (np.roll(triangles, -k, axis=1).T.ravel() for k in range(3))
+        u = np.conj(self.rest[i] - self.rest[apex]) * (self.rest[j] - self.rest[apex])
+        cotangent = np.clip(u.real / np.maximum(abs(u.imag), 1e-300), -5.0, 5.0)
+        areas = _symmetric(i, j, np.tile(factors, 3) * cotangent / 2, count)
         areas.data = np.clip(areas.data, *COTANGENT_BOUNDS)
         own = np.arange(n)
         after = (own + 1) % n
         # each side counts twice, with either end's rotation
         sides = self.stiffness.stretch / np.maximum(abs(self.rest[after] - self.rest[own]), 1e-6)
-        total = (areas + _symmetric([own], [after], [sides], count)).tocoo()
+        total = (areas + _symmetric(own, after, sides, count)).tocoo()
         if stiff is not None:
             factors = self._everywhere(stiff)
             total.data = total.data * np.sqrt(factors[total.row] * factors[total.col])
@@ -364,9 +357,6 @@ def _squares(z: Complex) -> Array:
     return z.real**2 + z.imag**2
 
 
-def _symmetric(
-    rows: list[Integers], columns: list[Integers], values: list[Array], count: int
-) -> scipy.sparse.csr_matrix:
-    i, j, v = np.concatenate(rows), np.concatenate(columns), np.concatenate(values)
+def _symmetric(i: Integers, j: Integers, v: Array, count: int) -> scipy.sparse.csr_matrix:
     both = (np.concatenate([v, v]), (np.concatenate([i, j]), np.concatenate([j, i])))
     return scipy.sparse.csr_matrix(both, shape=(count, count))

@@ -148,9 +148,7 @@ class Emphasis:
 def _covered(target: Target) -> tuple[Window, str]:
     """Return what a mask covers, (xmin, ymin, xmax, ymax) in input units, and its name."""
     if target.size is None:
-        xmin, ymin = target.outline.min(axis=0)
-        xmax, ymax = target.outline.max(axis=0)
-        return (float(xmin), float(ymin), float(xmax), float(ymax)), _OUTLINE_BOX
+        return shapely.Polygon(target.outline).bounds, _OUTLINE_BOX
     width, height = target.size
     xmin, ymin = target.corner
     name = "the drawing's page" if target.kind == "svg" else "the input picture"
@@ -174,15 +172,9 @@ def _check_aspect(path: Path, picture: Picture, box: Window, covered: str) -> li
 def _normal_box(target: Target, box: Window, overhang: Array) -> Window:
     """Return `box` in the normal form, extended to the right and downwards by `overhang`."""
     corners = target.to_normal([box[:2], box[2:]])
-    xmin, ymin = corners.min(axis=0)
-    xmax, ymax = corners.max(axis=0)
-    right, down = overhang
-    return (
-        float(xmin),
-        float(ymax - down * (ymax - ymin)),
-        float(xmin + right * (xmax - xmin)),
-        float(ymax),
-    )
+    (xmin, ymin), (xmax, ymax) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
+    right, down = overhang.tolist()
+    return xmin, ymax - down * (ymax - ymin), xmin + right * (xmax - xmin), ymax
 
 
 def _smoothed(levels: Array, box: Window) -> NDArray[np.float32]:

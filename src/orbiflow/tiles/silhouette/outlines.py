@@ -66,15 +66,10 @@ def clean_ring(
 
 def _as_points(points: ArrayLike, where: str, error: type[OrbiflowError]) -> Array:
     try:
-        ring: Array = np.zeros(0)
-        if np.ndim(points):
-            ring = numbers(points, where, (...,), finite=False)
+        ring = numbers(points, where, ("N", 2), finite=False)
     except (TypeError, ValueError) as exc:
-        raise error(
-            f"{where}: the vertices are not numbers in pairs; give them as [[x, y], ...]"
-        ) from exc
-    if ring.ndim != 2 or ring.shape[1] != 2:
-        raise error(f"{where}: vertices must have shape (N, 2), got {ring.shape}")
+        what = "the vertices are not numbers in pairs, of shape (N, 2)"
+        raise error(f"{where}: {what}; give them as [[x, y], ...]") from exc
     if len(ring) > MAX_VERTICES:
         raise error(
             f"{where}: {len(ring)} vertices, at most {MAX_VERTICES} can be read; simplify the outline"

@@ -14,7 +14,7 @@ import scipy.sparse.csgraph
 import shapely
 from numpy.typing import ArrayLike, NDArray
 
-from orbiflow.arguments import instance, numbers
+from orbiflow.arguments import instance, number, numbers
 from orbiflow.arrays import Array, Integers
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.tiles.geometry import resampled
@@ -106,12 +106,8 @@ class Pins:
         scale = np.sqrt(target.area)
         placed = [(*target.to_normal(disc[:2]), disc[2] / scale) for disc in discs]
         sources = [",".join(f"{value:.6g}" for value in disc) for disc in discs]
-        pins = cls(
-            np.array(placed).reshape(-1, 3),
-            masks,
-            keep_angle,
-            (*sources, *(mask.source for mask in masks)),
-        )
+        sources += [mask.source for mask in masks]
+        pins = cls(np.array(placed).reshape(-1, 3), masks, keep_angle, tuple(sources))
         notes = [note for mask in masks for note in mask.notes]
         return replace(pins, notes=(*notes, *_warnings(pins, target)))
 
@@ -135,9 +131,8 @@ class Pins:
         held = self.holds(points)
         pairs = np.concatenate([triangles[:, [k - 1, k]] for k in range(3)])
         pairs = pairs[held[pairs].all(axis=1)]
-        links = scipy.sparse.coo_matrix(
-            (np.ones(len(pairs)), pairs.T), shape=(len(held), len(held))
-        )
+        shape = (len(held), len(held))
+        links = scipy.sparse.coo_matrix((np.ones(len(pairs)), pairs.T), shape=shape)
         _, label = scipy.sparse.csgraph.connected_components(links, directed=False)
         return [np.flatnonzero((label == k) & held) for k in np.unique(label[held])]
 
@@ -173,18 +168,11 @@ def _disc(spot: ArrayLike, target: Target) -> tuple[float, float, float]:
     x, y = (float(value) for value in values[:2])
     region = shapely.Polygon(target.outline)
     centre = shapely.Point(x, y)
+    radius = DEFAULT_RADIUS * float(np.ptp(target.outline, axis=0).max())
     if len(values) == 3:
-        radius = float(values[2])
-        if not radius > 0:
-            raise OrbiflowError(f"the radius of a pin must be positive, got {radius:g}")
-    else:
-        sides = np.ptp(target.outline, axis=0)
-        radius = max(
-            DEFAULT_RADIUS * float(sides.max()),
-            REACH_PAST_OUTLINE * centre.distance(region.exterior),
-        )
-        if not region.contains(centre):
-            radius = DEFAULT_RADIUS * float(sides.max())
+        radius = number(values[2], "the radius of a pin", 0, above=True)
+    elif region.contains(centre):
+        radius = max(radius, REACH_PAST_OUTLINE * centre.distance(region.exterior))
     if centre.distance(region) > radius:
         (xmin, ymin), (xmax, ymax) = target.outline.min(axis=0), target.outline.max(axis=0)
         raise OrbiflowError(

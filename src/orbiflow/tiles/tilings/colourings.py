@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -196,7 +196,5 @@ def _quotient(links: _Links, sublattice: Sublattice) -> Graph:
 
 
 def _most_frequent_first(colours: Integers) -> Integers:
-    order: Sequence[int] = np.argsort(-np.bincount(colours), kind="stable").tolist()
-    rank = np.empty(len(order), dtype=np.int64)
-    rank[order] = np.arange(len(order))
-    return rank[colours]
+    order = np.argsort(-np.bincount(colours), kind="stable")
+    return np.argsort(order)[colours]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -83,13 +83,12 @@ class Surroundings:
 
     def select(self, keep: NDArray[np.bool_]) -> Surroundings:
         """Return the tiles where `keep`, (M,), is true."""
-        return Surroundings(
-            self.prototile,
-            self.ring,
-            self.copies.select(keep),
-            self.points[keep[self.owner]],
-            self.counts[keep],
-            self.mirrored[keep],
+        return replace(
+            self,
+            copies=self.copies.select(keep),
+            points=self.points[keep[self.owner]],
+            counts=self.counts[keep],
+            mirrored=self.mirrored[keep],
         )
 
 
@@ -114,29 +113,14 @@ def surroundings(tiling: Tiling, prototile: int, margin: float) -> Surroundings:
     away[itself] = np.inf
     order = np.argsort(away, kind="stable")[: len(near) - int(itself.sum())]
     near = near.select(order)
-    rings = [p.ring for p in tiling.prototiles]
-    counts = np.array([len(ring) for ring in rings])[near.prototiles]
-    points = np.empty((int(counts.sum()), 2))
-    first = np.cumsum(counts) - counts
-    for k, ring in enumerate(rings):
-        mine = np.flatnonzero(near.prototiles == k)
-        rows = first[mine, None] + np.arange(len(ring))
-        points[rows] = near.select(mine).images(ring)
-    linear = tiling.group.linear_parts
-    signs = linear[:, 0, 0] * linear[:, 1, 1] - linear[:, 0, 1] * linear[:, 1, 0]
-    return Surroundings(
-        prototile,
-        _flushed((own.ring - own.center) / scale),
-        near,
-        _flushed((points - own.center) / scale),
-        counts,
-        (signs < 0)[near.cosets],
-    )
-
-
-def _flushed(points: Array) -> Array:
+    rings = near.rings([p.ring for p in tiling.prototiles])
+    counts = np.array([len(ring) for ring in rings], dtype=np.int64)
+    points = np.concatenate([*rings, np.empty((0, 2))])
+    local = ((part - own.center) / scale for part in (own.ring, points))
     # squares of coordinates such as 1e-200 underflow in GEOS and give areas that are plainly wrong
-    return np.where(np.abs(points) < 1e-15, 0.0, points)
+    ring, points = (np.where(np.abs(part) < 1e-15, 0.0, part) for part in local)
+    mirrored = (np.linalg.det(tiling.group.linear_parts) < 0)[near.cosets]
+    return Surroundings(prototile, ring, near, points, counts, mirrored)
 
 
 class SegmentMatch(NamedTuple):

@@ -113,12 +113,12 @@ class Copies:
         turned = np.einsum("gij,nj->gni", self.group.linear_parts, points)
         return turned[self.cosets] + self.translations[:, None, :]
 
-    def rings(self) -> list[Array]:
-        """Return each copy's polygon."""
+    def rings(self, of: Sequence[Array] | None = None) -> list[Array]:
+        """Return each copy's polygon, or the image of what is given for its prototile."""
         found: list[Array] = [np.empty((0, 2))] * len(self)
-        for k, prototile in enumerate(self.tiling.prototiles):
+        for k, points in enumerate(of or [p.polygon for p in self.tiling.prototiles]):
             own = np.flatnonzero(self.prototiles == k)
-            for index, ring in zip(own, self.select(own).images(prototile.polygon), strict=True):
+            for index, ring in zip(own, self.select(own).images(points), strict=True):
                 found[index] = ring
         return found
 

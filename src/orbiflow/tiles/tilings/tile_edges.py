@@ -160,24 +160,18 @@ def edges(tile: Tiles) -> Edges:
     _require_match(tiling, matches)
     begins = [_begins(tiling, a, match) for a, match in zip(around, matches, strict=True)]
     first = np.cumsum([0] + [len(b) for b in begins])
-    owners: list[int] = []
-    starts: list[int] = []
-    across: list[Placed] = []
-    partners: list[int] = []
+    found: list[tuple[int, int, Placed, int]] = []
     for k in numbers:
         match, near = matches[k], around[k].copies
         for segment in begins[k]:
             beyond = near.isometry(int(match.tile[segment]))
-            there = beyond.prototile
-            owners.append(k)
-            starts.append(int(tiling.prototiles[k].kept[segment]))
-            across.append(beyond)
-            partner = _edge_of(begins[there], int(match.partner[segment]))
-            partners.append(int(first[there]) + partner)
+            partner = _edge_of(begins[beyond.prototile], int(match.partner[segment]))
+            start = int(tiling.prototiles[k].kept[segment])
+            found.append((k, start, beyond, int(first[beyond.prototile]) + partner))
+    owners, starts, across, partners = zip(*found, strict=True)
     turned = tuple(_turned(tiling, k, begins[k], first) for k in numbers)
     # make partners mutual where possible, with isometries that are inverses of each other
-    own = Edges(tiling, tuple(owners), tuple(starts), tuple(across), tuple(partners), turned)
-    return _mutual(own)
+    return _mutual(Edges(tiling, owners, starts, across, partners, turned))
 
 
 def _require_match(tiling: Tiling, matches: Sequence[SegmentMatch]) -> None:
@@ -235,9 +229,8 @@ def _mutual(own: Edges) -> Edges:
         signs = [s.determinant for s in own.tiling.stabilisers[there].elements]
         choice = np.flatnonzero(images == edge)
         # prefer a mirror to a half-turn: it shows that the edge is straight
-        choice = choice[
-            np.argsort(np.array(signs)[choice] * across[edge].determinant, kind="stable")
-        ]
+        order = np.array(signs)[choice] * across[edge].determinant
+        choice = choice[np.argsort(order, kind="stable")]
         if not len(choice):
             choice = np.flatnonzero(~done[images])
         done[edge] = True

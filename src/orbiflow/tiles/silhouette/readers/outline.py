@@ -57,9 +57,8 @@ def read_outline(
         return read_image(path, threshold=threshold, invert=invert)
     for name, value in (("threshold", threshold), ("invert", invert)):
         if value is not None:
-            raise OrbiflowError(
-                f"{name} applies to images only and {path} is a polygon or drawing; leave it out"
-            )
+            where = f"images only and {path} is a polygon or drawing"
+            raise OrbiflowError(f"{name} applies to {where}; leave it out")
     # extreme coordinates overflow in the geometry, whose result is then refused
     with np.errstate(all="ignore"):
         return {"svg": read_svg, "json": read_json, "dat": read_dat}[kind](path)
@@ -128,10 +127,8 @@ def read_dat(path: Source) -> Reading:
     outline, notes = clean_ring(points, str(path), InputFileError)
     extra = len(lines) - 1 - n
     if extra:
-        first = lines[n + 1][0]
-        notes.append(
-            f"left {extra} line{'s' * (extra > 1)} after the vertices unread (line {first} on)"
-        )
+        what = f"left {extra} line{'s' * (extra > 1)} after the vertices unread"
+        notes.append(f"{what} (line {lines[n + 1][0]} on)")
     return Reading(outline, True, "dat", None, tuple(notes))
 
 

@@ -49,9 +49,12 @@ def trace(
             f"{path}: the shape fills the whole image ({size[0]} x {size[1]} pixels); leave a "
             "margin around it, or set invert to take the other part"
         )
-    if _touches_border(shape):
+    if shape[[0, -1]].any() or shape[:, [0, -1]].any():
         notes.append("the shape touches the image's border and may be cut off there")
-    polygon, stepped = _polygon(_isolate(level, mask, shape), level.cut, level.inside)
+    # the shape's holes filled and all other components taken out
+    values = np.where(shape & ~mask, level.inside, level.values)
+    values = np.where(mask & ~shape, 2 * level.cut - level.inside, values)
+    polygon, stepped = _polygon(values, level.cut, level.inside)
     area = polygon.area * scale**2
     if area < MIN_AREA:
         raise InputFileError(
@@ -85,16 +88,6 @@ def _largest(mask: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], list[str]]:
         share = holes.sum() / shape.sum()
         notes.append(f"filled {n_holes} hole{'s' * (n_holes > 1)} ({percent(share)} of the area)")
     return shape, notes
-
-
-def _touches_border(shape: NDArray[np.bool_]) -> bool:
-    return bool(shape[[0, -1]].any() or shape[:, [0, -1]].any())
-
-
-def _isolate(level: Level, mask: NDArray[np.bool_], shape: NDArray[np.bool_]) -> Array:
-    """Return the level with the shape's holes filled and all other components taken out."""
-    values = np.where(shape & ~mask, level.inside, level.values)
-    return np.where(mask & ~shape, 2 * level.cut - level.inside, values)
 
 
 def _polygon(values: Array, cut: float, inside: float) -> tuple[Polygon, bool]:
