@@ -3,8 +3,6 @@
 One page, DIR/index.html; each picture as PNG and PDF, all numbers in DIR/paper.json.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import sys

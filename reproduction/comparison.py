@@ -1,7 +1,5 @@
 """The comparison on the paper's nine goals: our searches, pictures of tiles, the table of overlaps."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from typing import Any, Literal, NamedTuple
 

@@ -4,8 +4,6 @@ They are four and six Gaussians of variance 0.005, and the 5 x 5 checkerboard (p
 round spaces they are also taken per round area: the same function times the area factor.
 """
 
-from __future__ import annotations
-
 import math
 import tempfile
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What an exhibit is: what the paper shows, the work that it needs, and how it is drawn."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal, NamedTuple

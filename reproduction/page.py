@@ -1,7 +1,5 @@
 """The folder of a reproduction: its page, `paper.json` with all numbers, and what a run wrote."""
 
-from __future__ import annotations
-
 import html
 import itertools
 import json

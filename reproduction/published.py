@@ -1,7 +1,5 @@
 """Data of the exhibits: nine goals, tiles of EST and ARAP, a silhouette, and printed figures."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from functools import cache

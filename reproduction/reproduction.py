@@ -1,7 +1,5 @@
 """The reproduction of all exhibits: first the work that they share, then the drawing of each."""
 
-from __future__ import annotations
-
 import contextlib
 import functools
 import time

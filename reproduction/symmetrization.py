@@ -3,8 +3,6 @@
 Its nested sums, as printed, are compared with the mean over the group.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Any

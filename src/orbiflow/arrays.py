@@ -1,7 +1,5 @@
 """The types of arrays, and rectangles of the plane."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, TypeAlias
 

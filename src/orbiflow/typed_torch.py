@@ -4,8 +4,6 @@ torch's compiled functions have no signatures and some of its Python functions n
 cannot replace this file: a partial stub package makes pyright lose the rest of torch's own types.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Fourier fields: trigonometric vector fields that commute with a crystallographic group."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

@@ -17,8 +17,6 @@ s_i in [-1, 1]. The spectral norm is convex in s, hence largest at a corner of t
 over all choices of signs is a bound, and there are few signs (design point 17).
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from abc import ABC, abstractmethod

@@ -19,8 +19,6 @@ ordinary operations compute the same sums: nested forward mode (`jacfwd` of `jac
 autograd function is silently wrong in torch 2.13, even if the function has its own rules.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, Protocol, runtime_checkable
 

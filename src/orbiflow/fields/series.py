@@ -7,8 +7,6 @@ product over the last axis does nearly all the work (design point 4). The backwa
 tables block by block: this is as fast as reading them back and needs no memory.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from functools import lru_cache, partial

@@ -1,7 +1,5 @@
 """Symmetric fields evaluated by splines, at a cost that does not grow with the frequency."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

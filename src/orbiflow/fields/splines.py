@@ -6,8 +6,6 @@ derivatives, because the divergence is a result too; cubic splines have them eve
 differentiates the backward pass itself.
 """
 
-from __future__ import annotations
-
 import math
 from functools import lru_cache, partial
 from typing import Any

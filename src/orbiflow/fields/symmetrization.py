@@ -5,8 +5,6 @@ operators (equations for P_B, R_c^K and G_l^mu of section 3), which are unnormal
 that are periodic by themselves.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Callable

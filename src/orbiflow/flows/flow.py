@@ -1,7 +1,5 @@
 """The flow of vector fields: a diffeomorphism, its inverse and its log-determinant."""
 
-from __future__ import annotations
-
 import contextlib
 import copy
 from collections.abc import Callable, Iterable, Iterator

@@ -1,7 +1,5 @@
 """Flows on disk: safetensors, never pickle."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from pathlib import Path

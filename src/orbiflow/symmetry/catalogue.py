@@ -1,7 +1,5 @@
 """The 17 wallpaper groups and the groups of the four identification spaces, as tables."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -3,8 +3,6 @@
 Dirichlet domains contain one point of each orbit. All are found from the group itself.
 """
 
-from __future__ import annotations
-
 from functools import cached_property
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """A check for tests: does a function commute with a crystallographic group?"""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Callable, Iterator
 from typing import Literal

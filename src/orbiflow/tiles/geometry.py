@@ -4,8 +4,6 @@ A ring is a float64 array (..., N, 2) whose last vertex does not repeat the firs
 stack of rings. Functions with `AnyRing` take tensors as well and are differentiable.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, TypeVar
 

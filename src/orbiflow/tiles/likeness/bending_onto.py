@@ -7,8 +7,6 @@ other outline, alternate with the choice of rotations. The descent starts from t
 an upper bound of the least one.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -17,8 +17,6 @@ People's judgement of bent silhouettes depends on six measures, most of them ind
 Outlines correspond point by point: this compares a shape with the one that was bent into it.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import lru_cache

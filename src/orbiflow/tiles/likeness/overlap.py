@@ -6,8 +6,6 @@ Tiles are ranked by their overlap and recognisability; a short list of the best 
 # pyright: reportUnknownMemberType=false
 # shapely's stubs leave the keyword arguments of its functions of arrays without types.
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from functools import cache
 

@@ -1,7 +1,5 @@
 """Emphasis, a mask painted over the input picture that gives the plane's points weights."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self

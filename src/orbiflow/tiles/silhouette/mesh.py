@@ -3,8 +3,6 @@
 # pyright: reportUnknownMemberType=false
 # shapely's stubs leave the keyword arguments of its functions of arrays without types.
 
-from __future__ import annotations
-
 from typing import NamedTuple, cast
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Outlines of silhouettes: checking, simplifying and sampling them."""
 
-from __future__ import annotations
-
 import re
 from typing import NamedTuple
 

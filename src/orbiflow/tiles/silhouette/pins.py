@@ -1,7 +1,5 @@
 """Pins, the parts of a silhouette that must not bend, given as spots or painted on a mask."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """A target as an image of signed distances, for the soft occupancy of thousands of points."""
 
-from __future__ import annotations
-
 import numpy as np
 import shapely
 import torch

@@ -3,8 +3,6 @@
 # pyright: reportUnknownMemberType=false
 # shapely's stubs leave the keyword arguments of its functions of arrays without types.
 
-from __future__ import annotations
-
 import math
 import re
 from dataclasses import dataclass, fields, replace

@@ -8,8 +8,6 @@ order times the template's area is |det B|, and that the identified edges are th
 onto each other.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Literal, NamedTuple, TypeAlias
 

@@ -1,7 +1,5 @@
 """Colourings in which tiles that share an edge differ: periodic, with few colours."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TypeAlias

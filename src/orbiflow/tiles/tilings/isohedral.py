@@ -1,7 +1,5 @@
 """The nine isohedral classes, with their templates, groups, operators and lattice freedom."""
 
-from __future__ import annotations
-
 import math
 import re
 from dataclasses import dataclass

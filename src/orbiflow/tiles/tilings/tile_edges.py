@@ -6,8 +6,6 @@ The skeleton of a tiling is the edges of a set of tiles, shared edges only once.
 # pyright: reportUnknownMemberType=false
 # shapely's stubs leave the keyword arguments of its functions of arrays without types.
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
