@@ -107,7 +107,7 @@ def iou(a: Shape, b: Shape) -> float:
     """
     one, other = as_region(a, "a"), as_region(b, "b")
     shared = one.intersection(other).area
-    return _share(shared / (one.area + other.area - shared))
+    return share(shared / (one.area + other.area - shared))
 
 
 def dice(a: Shape, b: Shape) -> float:
@@ -119,7 +119,7 @@ def dice(a: Shape, b: Shape) -> float:
     0.5
     """
     one, other = as_region(a, "a"), as_region(b, "b")
-    return _share(2 * one.intersection(other).area / (one.area + other.area))
+    return share(2 * one.intersection(other).area / (one.area + other.area))
 
 
 def pixel_accuracy(a: Shape, b: Shape, window: Shape | None = None) -> float:
@@ -136,7 +136,7 @@ def pixel_accuracy(a: Shape, b: Shape, window: Shape | None = None) -> float:
     """
     one, target = as_region(a, "a"), as_region(b, "b")
     view = default_window(target) if window is None else _window(window)
-    return _share(1 - one.symmetric_difference(target).intersection(view).area / view.area)
+    return share(1 - one.symmetric_difference(target).intersection(view).area / view.area)
 
 
 def default_window(target: Shape) -> Polygon:
@@ -190,7 +190,8 @@ def compare(tile: Shape, target: Shape, window: Shape | None = None) -> ShapeMet
     )
 
 
-def _share(value: float) -> float:
+def share(value: float) -> float:
+    """Return a share, 0 to 1."""
     # rounding in the overlay can exceed the bounds by an ulp
     return min(max(float(value), 0.0), 1.0)
 

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple, cast
 
 import numpy as np
 import shapely
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.spatial import KDTree
 
 from orbiflow.arguments import number, numbers
@@ -126,7 +126,7 @@ def narrowest_slit(ring: ArrayLike) -> Thinnest | None:
 
 
 def hair_share(ring: ArrayLike, width: float) -> float:
-    """Return the share of a polygon's outline that bounds parts thinner than `width`.
+    """Return the share, 0 to 1, of a polygon's outline that bounds parts thinner than `width`.
 
     A part is thin if no disc of that diameter inside the polygon covers it (the residue of a
     morphological opening). It counts if it has more than `OUTLINE_PER_WIDTH` widths of the outline, so
@@ -135,9 +135,6 @@ def hair_share(ring: ArrayLike, width: float) -> float:
     Args:
         ring: The vertices (n, 2) of a simple polygon, in either orientation.
         width: The width, in the polygon's own units.
-
-    Returns:
-        The share, 0 to 1.
 
     Raises:
         OrbiflowError: for a polygon that crosses itself or has no area, or a width of 0 or less.
@@ -212,8 +209,11 @@ def _nearest_within(
     way = abs(knots[i] - knots[j] - along * lengths[j])
     beyond = np.minimum(way, knots[-1] - way) >= np.maximum(apart, OUTLINE_PER_WIDTH * width)
     counts = np.flatnonzero(beyond & (width <= reach))
-    left = _on_the_left(steps, i[counts], j[counts], along[counts], (ends - points[i])[counts])
-    counts = counts[left]
+    # a quick filter: segments that may leave point i, and reach side j, on the left
+    segments, corner = (ends - points[i])[counts], (along[counts] <= 0) | (along[counts] >= 1)
+    before, after, side = (steps[k[counts]] for k in (i - 1, i, j))
+    leaves = np.maximum(_cross(after, segments), _cross(before, segments)) > 0
+    counts = counts[leaves & (corner | (_cross(side, segments) < 0))]
     counts = counts[_local_minima(i[counts], j[counts], width[counts])]
     counts = counts[np.argsort(width[counts], kind="stable")]
     for start in range(0, len(counts), 256):
@@ -225,15 +225,6 @@ def _nearest_within(
         if len(well):
             return both[well[0]]
     return None
-
-
-def _on_the_left(
-    steps: Array, i: Integers, j: Integers, along: Array, segments: Array
-) -> NDArray[np.bool_]:
-    """Return which segments may leave point i, and reach side j, on the left (a quick filter)."""
-    leaves = np.maximum(_cross(steps[i], segments), _cross(steps[i - 1], segments)) > 0
-    within = (along > 0) & (along < 1)
-    return leaves & (~within | (_cross(steps[j], segments) < 0))
 
 
 def _local_minima(i: Integers, j: Integers, width: Array) -> Integers:

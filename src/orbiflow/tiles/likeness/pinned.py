@@ -121,14 +121,10 @@ class Pinned(Elastic):
         plain, n = super().condensed, self.size
         low = self._low
         spread = _complex(plain.inverse @ low[n:])
-        return PinnedCondensed(
-            plain.outline,
-            plain.follow,
-            plain.inverse,
-            coupling=_complex(low[:n] + plain.follow.T @ low[n:]),
-            spread=spread,
-            solve=_complex(np.linalg.inv(_one_less(low[n:], spread))),
-        )
+        coupling = _complex(low[:n] + plain.follow.T @ low[n:])
+        solve = _complex(np.linalg.inv(_one_less(low[n:], spread)))
+        own = plain.outline, plain.follow, plain.inverse
+        return PinnedCondensed(*own, coupling, spread, solve)
 
     def pulled(self, z: Complex, towards: Complex, strength: float, rounds: int) -> Complex:
         """Let the outline be pulled towards other points, as `Elastic.pulled` does."""
