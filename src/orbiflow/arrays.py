@@ -22,8 +22,7 @@ Window: TypeAlias = tuple[float, float, float, float]
 def checked_window(window: Sequence[float]) -> Window:
     """Return `window` as four numbers xmin < xmax and ymin < ymax.
 
-    Raises:
-        OrbiflowError: for anything else.
+    Raises `OrbiflowError` for anything else.
     """
     try:
         values = numbers(window, "window", (4,)).tolist()

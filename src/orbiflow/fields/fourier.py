@@ -36,8 +36,7 @@ class FourierField(InvariantField):
     Shapes:
         `parameters_`: (P,) or (S, P). Points (..., d), or (S, ..., d) for a stack.
 
-    Raises:
-        OrbiflowError: for a negative, fractional or too large `max_frequency`.
+    Raises `OrbiflowError` for a negative, fractional or too large `max_frequency`.
 
     >>> from orbiflow.symmetry import rotation, wallpaper_group
     >>> field = FourierField(wallpaper_group("p4"), 5)

@@ -33,8 +33,7 @@ class SplineField(InvariantField):
     Shapes:
         `parameters_`: (P,). Points (..., d).
 
-    Raises:
-        OrbiflowError: for another group, or a `max_frequency` out of range.
+    Raises `OrbiflowError` for another group, or a `max_frequency` out of range.
 
     >>> from orbiflow.symmetry import wallpaper_group
     >>> SplineField(wallpaper_group("p4"), 5).sides

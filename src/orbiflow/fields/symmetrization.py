@@ -191,8 +191,7 @@ class PeriodicFeatures(nn.Module):
         max_frequency: The largest frequency. If d <= 3, all k in [-max, max]^d are taken up to sign,
             without 0; in higher dimensions only the multiples 1..max of each axis.
 
-    Raises:
-        OrbiflowError: if `max_frequency` < 1 or `group` is no group.
+    Raises `OrbiflowError` if `max_frequency` < 1 or `group` is no group.
     """
 
     frequencies: Tensor

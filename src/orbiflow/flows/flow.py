@@ -56,9 +56,8 @@ class Flow(nn.Module):
         duration: The length of time of each segment.
         warn: Whether to check, for new parameters, that the steps are fine enough.
 
-    Raises:
-        OrbiflowError: for no field, `steps` < 1 or an unknown method; when called, for points of a
-            dtype or shape that the fields do not take, or a field whose values have another shape.
+    Raises `OrbiflowError` for no field, `steps` < 1 or an unknown method; when called, for points
+    of a dtype or shape that the fields do not take, or a field whose values have another shape.
 
     Warns:
         CoarseStepsWarning: once, when called, if the steps are too coarse for the fields.
@@ -131,8 +130,7 @@ class Flow(nn.Module):
             steps: The number of Runge-Kutta steps in each segment.
             method: As in the constructor. Default: this flow's.
 
-        Raises:
-            OrbiflowError: for `steps` < 1 or an unknown method.
+        Raises `OrbiflowError` for `steps` < 1 or an unknown method.
 
         >>> flow = Flow(torch.sin, steps=8)
         >>> flow.with_steps(2 * flow.steps).steps, flow.steps

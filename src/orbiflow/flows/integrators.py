@@ -116,8 +116,7 @@ METHODS: dict[str, RungeKutta] = {
 def method(name: str) -> RungeKutta:
     """Look a method up.
 
-    Raises:
-        OrbiflowError: for an unknown name.
+    Raises `OrbiflowError` for an unknown name.
     """
     if name not in METHODS:
         raise OrbiflowError(f"unknown integrator {name!r}; choose from {', '.join(METHODS)}")

@@ -247,9 +247,8 @@ def load_flow(path: str | Path, *, modules: FieldFactories | None = None) -> Flo
             class or function, or by its place such as "segments.0.field". Its parameters are filled
             in. Nothing in a file is ever run.
 
-    Raises:
-        InputFileError: if the file is missing, too large, damaged or of another kind, or asks for a
-            field that is not among `modules`.
+    Raises `InputFileError` if the file is missing, too large, damaged or of another kind, or asks
+    for a field that is not among `modules`.
 
     >>> import tempfile
     >>> from orbiflow.fields import FourierField

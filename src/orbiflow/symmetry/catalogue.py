@@ -68,8 +68,7 @@ def wallpaper_group(name: str, lattice: ArrayLike | None = None) -> Crystallogra
         name: The group's name, one of `WALLPAPER_GROUPS`.
         lattice: The basis vectors as columns, shape (2, 2). Default: a lattice of the group's system.
 
-    Raises:
-        GroupError: for an unknown name, or a lattice that is not of the group's system.
+    Raises `GroupError` for an unknown name, or a lattice that is not of the group's system.
 
     >>> wallpaper_group("p6m").order
     12
@@ -122,8 +121,7 @@ IDENTIFICATION_SPACES: dict[str, IdentificationSpace] = {
 def identification_group(space: str) -> CrystallographicGroup:
     """Return the group of an identification space, with canonical square [0, 1]^2.
 
-    Raises:
-        GroupError: for an unknown space.
+    Raises `GroupError` for an unknown space.
     """
     if space not in IDENTIFICATION_SPACES:
         raise GroupError(

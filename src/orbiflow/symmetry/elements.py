@@ -52,8 +52,7 @@ def symmetry_elements(
         center: The centre (2,) of the disc. Default: the middle of the cell B [0, 1)^2.
         radius: The radius of the disc. Default: the cell's, so that every orbit is represented.
 
-    Raises:
-        GroupError: if the group is not one of the plane.
+    Raises `GroupError` if the group is not one of the plane.
 
     >>> from orbiflow.symmetry import wallpaper_group
     >>> found = symmetry_elements(wallpaper_group("p4"), np.zeros(2), 0.1)
@@ -128,8 +127,7 @@ class DirichletDomain:
         group: Any crystallographic group.
         site: A point (d,) that every element but the identity moves.
 
-    Raises:
-        GroupError: if an element fixes the site.
+    Raises `GroupError` if an element fixes the site.
     """
 
     def __init__(self, group: CrystallographicGroup, site: ArrayLike) -> None:

@@ -171,8 +171,7 @@ class CrystallographicGroup:
     def wrap(self, points: Points) -> Points:
         """Move points, shape (..., d), by lattice vectors into the cell B [0, 1)^d.
 
-        Raises:
-            GroupError: for points of another dimension.
+        Raises `GroupError` for points of another dimension.
         """
         check_dimension(points, self.dim)
         fractional = points @ cast_like(self.inverse_lattice, points).T
@@ -185,8 +184,7 @@ class CrystallographicGroup:
     def images(self, points: Points) -> Points:
         """Return images of points (..., d) under the coset representatives, shape (|G|, ..., d).
 
-        Raises:
-            GroupError: for points of another dimension.
+        Raises `GroupError` for points of another dimension.
         """
         check_dimension(points, self.dim)
         linear, shift = (cast_like(a, points) for a in (self.linear_parts, self.translations))
@@ -263,8 +261,7 @@ class CrystallographicGroup:
 def checked_group(group: object) -> CrystallographicGroup:
     """Return `group` if it is a group.
 
-    Raises:
-        GroupError: if it is anything else, such as a group's name.
+    Raises `GroupError` if it is anything else, such as a group's name.
     """
     if isinstance(group, CrystallographicGroup):
         return group
@@ -368,8 +365,7 @@ def group_header(group: CrystallographicGroup) -> dict[str, Any]:
 def group_from_header(header: Mapping[str, Any], name: str = "") -> CrystallographicGroup:
     """Return the group of a `group_header`, with bit-identical basis and representatives.
 
-    Raises:
-        GroupError: if the header does not describe a group.
+    Raises `GroupError` if the header does not describe a group.
     """
     try:
         lattice, linear, shifts = (

@@ -158,8 +158,7 @@ def faithfulness(silhouette: ArrayLike, shape: ArrayLike, *, mirror: bool = True
         The `Fidelity` of the best overlay; its `score` is 1 for the same shape, and near 0.5 for a
         tile of medium likeness.
 
-    Raises:
-        OrbiflowError: for a polygon that crosses itself, has no area, or is too thin to sample.
+    Raises `OrbiflowError` for a polygon that crosses itself, has no area, or is too thin to sample.
 
     >>> bar = [[0.0, 0.0], [4.0, 0.0], [4.0, 1.0], [0.0, 1.0]]
     >>> faithfulness(bar, [[5.0, 0.0], [5.0, 8.0], [3.0, 8.0], [3.0, 0.0]]).score > 0.99

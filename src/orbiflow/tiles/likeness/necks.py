@@ -94,8 +94,7 @@ def narrowest_neck(ring: ArrayLike) -> Thinnest:
     Args:
         ring: The vertices (n, 2) of a simple polygon, in either orientation.
 
-    Raises:
-        OrbiflowError: for a polygon that crosses itself or has no area.
+    Raises `OrbiflowError` for a polygon that crosses itself or has no area.
 
     >>> bar = [[0.0, 0.0], [8.0, 0.0], [8.0, 0.5], [0.0, 0.5]]
     >>> narrowest_neck(bar).width, narrowest_neck(bar).share

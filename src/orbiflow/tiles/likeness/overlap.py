@@ -218,8 +218,7 @@ def diverse(
     Returns:
         Indices of `scores`, in the order of choice.
 
-    Raises:
-        OrbiflowError: for scores that are not finite numbers, and for arguments out of range.
+    Raises `OrbiflowError` for scores that are not finite numbers, and for arguments out of range.
 
     >>> position = [0.0, 0.01, 0.5, 1.0]
     >>> diverse([0.9, 0.89, 0.8, 0.81], 3, lambda i, j: 1 - abs(position[i] - position[j]))

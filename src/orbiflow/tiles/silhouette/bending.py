@@ -42,9 +42,8 @@ class Bending:
         images: (N, 2) where they go.
         triangles: (M, 3) indices of the points, counter-clockwise in both.
 
-    Raises:
-        OrbiflowError: for arrays of other shapes, numbers that are not finite, indices out of range,
-            too many points, and triangles that are flat or turned over.
+    Raises `OrbiflowError` for arrays of other shapes, numbers that are not finite, indices out of
+    range, too many points, and triangles that are flat or turned over.
 
     >>> corners = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]
     >>> bending = Bending(corners, [[0.0, 0.0], [2.0, 0.0], [0.0, 1.0]], [[0, 1, 2]])

@@ -59,9 +59,8 @@ class Pins:
         The default radius of a spot is 8% of the longer side of the silhouette's bounding box, or 1.5
         times its distance from the outline if that is more, so that it holds some of the outline.
 
-        Raises:
-            OrbiflowError: for an invalid spot, a radius that is not positive, a spot that does not
-                reach the silhouette, no spot, and spots that hold nine tenths of the outline.
+        Raises `OrbiflowError` for an invalid spot, a radius that is not positive, a spot that does
+        not reach the silhouette, no spot, and spots that hold nine tenths of the outline.
         """
         return cls._create(target, list(spots), (), keep_angle)
 

@@ -94,8 +94,7 @@ class Certificate:
     def require(self) -> None:
         """Raise an error unless the tile is valid.
 
-        Raises:
-            CertificationError: with the reasons, if the tile is not valid.
+        Raises `CertificationError` with the reasons, if the tile is not valid.
         """
         if not self.valid:
             raise CertificationError(

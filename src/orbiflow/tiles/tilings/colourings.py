@@ -87,8 +87,7 @@ class Colouring:
     def colour(self, element: Isometry) -> int:
         """Return the colour, 0 ... count - 1, of the tile that `element` makes of its prototile.
 
-        Raises:
-            OrbiflowError: for an isometry that is not in the tile's group.
+        Raises `OrbiflowError` for an isometry that is not in the tile's group.
         """
         own = self.tiling
         aspect, cell, _ = own.aspects.find(own.group, element, prototile_of(element))
@@ -117,8 +116,7 @@ def colouring(tile: Tiles) -> Colouring:
     Args:
         tile: A tile or a tiling.
 
-    Raises:
-        OrbiflowError: if polygon and group are of very different size.
+    Raises `OrbiflowError` if polygon and group are of very different size.
 
     >>> from orbiflow.tiles import Tile
     >>> from orbiflow.tiles import isohedral_class

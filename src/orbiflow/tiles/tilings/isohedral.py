@@ -238,8 +238,7 @@ class IsohedralClass:
             shape: Parameters (..., shape_dim), NumPy or torch (then differentiable); for the pentagons
                 the displacement of p1 from its default. None means the default, as a NumPy array.
 
-        Raises:
-            OrbiflowError: if the last axis of `shape` is not `shape_dim` long.
+        Raises `OrbiflowError` if the last axis of `shape` is not `shape_dim` long.
         """
         if shape is None:
             return self._default.copy()
@@ -252,8 +251,7 @@ class IsohedralClass:
         Args:
             parameters: Parameters (..., stretch_dim), NumPy or torch (then differentiable).
 
-        Raises:
-            OrbiflowError: if the last axis of `parameters` is not `stretch_dim` long.
+        Raises `OrbiflowError` if the last axis of `parameters` is not `stretch_dim` long.
         """
         own = self._parameters(parameters, self.stretch_dim, "stretch")
         return stretch_matrix(self._freedom, own)
@@ -336,8 +334,7 @@ def isohedral_class(name: str | int | IsohedralClass) -> IsohedralClass:
 
     "IH4", "ih4", "IH04", "4" and 4 are the same; a class is returned as it is.
 
-    Raises:
-        OrbiflowError: for anything but the nine.
+    Raises `OrbiflowError` for anything but the nine.
 
     >>> isohedral_class("ih04")
     IsohedralClass(IH4, p2)

@@ -244,8 +244,7 @@ def neighbours(tile: Tiles, prototile: int = 0, *, tolerance: float = 1e-7) -> N
         prototile: The number of the prototile; each neighbour names the prototile that it is a copy of.
         tolerance: The distance that counts as touching, in square roots of the tile's area.
 
-    Raises:
-        OrbiflowError: if polygon and group are of very different size.
+    Raises `OrbiflowError` if polygon and group are of very different size.
 
     >>> from orbiflow.tiles import Tile
     >>> from orbiflow.tiles import isohedral_class
@@ -290,8 +289,7 @@ def patch(tile: Tiles, window: Sequence[float]) -> list[Placed]:
         tile: A tile or a tiling, which need not be certified.
         window: A rectangle (xmin, ymin, xmax, ymax) in the tile's units.
 
-    Raises:
-        OrbiflowError: for an empty window, or one of more than `MAX_TILES` tiles.
+    Raises `OrbiflowError` for an empty window, or one of more than `MAX_TILES` tiles.
 
     >>> from orbiflow.tiles import Tile
     >>> from orbiflow.tiles import isohedral_class
@@ -313,8 +311,7 @@ def aspects(tile: Tiles, elements: Sequence[Isometry]) -> list[int]:
         tile: A tile or a tiling.
         elements: The elements; a plain isometry moves prototile 0.
 
-    Raises:
-        OrbiflowError: for an isometry that is not in the tile's group.
+    Raises `OrbiflowError` for an isometry that is not in the tile's group.
     """
     tiling = as_tiling(tile)
     find, group = tiling.aspects.find, tiling.group

@@ -203,8 +203,7 @@ def copies_inside(tile: Tiles, window: Sequence[float]) -> Copies:
         tile: A tile or a tiling, which need not be certified.
         window: A rectangle (xmin, ymin, xmax, ymax) in the tile's units.
 
-    Raises:
-        OrbiflowError: for an empty window, or one of more than `MAX_TILES` tiles.
+    Raises `OrbiflowError` for an empty window, or one of more than `MAX_TILES` tiles.
     """
     tiling, box = as_tiling(tile), checked_window(window)
     _refuse_too_many(tiling, box)

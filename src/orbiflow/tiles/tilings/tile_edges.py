@@ -142,8 +142,7 @@ def edges(tile: Tiles) -> Edges:
         tile: A tile or tiling whose images match vertex by vertex, as for every tile that orbiflow
             finds; `edge_to_edge` adds the vertices that others lack.
 
-    Raises:
-        OrbiflowError: if the images do not match vertex by vertex.
+    Raises `OrbiflowError` if the images do not match vertex by vertex.
 
     >>> from orbiflow.tiles import Tile
     >>> from orbiflow.tiles import isohedral_class
@@ -348,8 +347,7 @@ def edge_to_edge(tile: Tiles) -> Tiling:
     Args:
         tile: A tile or a tiling.
 
-    Raises:
-        OrbiflowError: if polygon and group are of very different size.
+    Raises `OrbiflowError` if polygon and group are of very different size.
 
     >>> from orbiflow.symmetry import wallpaper_group
     >>> bricks = Tiling(wallpaper_group("p1", [[2, 1], [0, 1]]), [[[0, 0], [2, 0], [2, 1], [0, 1]]])

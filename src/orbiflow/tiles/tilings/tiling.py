@@ -118,9 +118,8 @@ class Tiling:
         prototiles: At least one `Prototile` or polygon (N, 2), none an image of another. All must
             have the same orientation.
 
-    Raises:
-        OrbiflowError: if the group is not planar, there is no prototile, a polygon is invalid, or
-            orientations differ.
+    Raises `OrbiflowError` if the group is not planar, there is no prototile, a polygon is invalid,
+    or orientations differ.
 
     >>> from orbiflow.symmetry import wallpaper_group
     >>> eighth = Tiling(wallpaper_group("p4m"), [[[0, 0], [0.5, 0], [0.5, 0.5]]])
@@ -215,8 +214,7 @@ class Tile:
         isohedral_class: The class, such as "IH4", or "" if it is unknown.
         corners: The indices in `polygon` of the tiling vertices of the class, in order.
 
-    Raises:
-        OrbiflowError: if the polygon is not (N >= 3, 2) finite numbers or the group not planar.
+    Raises `OrbiflowError` if the polygon is not (N >= 3, 2) finite numbers or the group not planar.
     """
 
     polygon: Array
@@ -261,8 +259,7 @@ Tiles: TypeAlias = Tile | Tiling
 def as_tiling(tiles: Tiles) -> Tiling:
     """Return a tile or a tiling as a tiling.
 
-    Raises:
-        OrbiflowError: for anything else.
+    Raises `OrbiflowError` for anything else.
     """
     if isinstance(tiles, Tiling):
         return tiles
@@ -286,8 +283,7 @@ def dirichlet_tile(group: CrystallographicGroup, point: ArrayLike) -> Tile:
         group: A group of the plane.
         point: A point (2,), in the group's units.
 
-    Raises:
-        OrbiflowError: if `point` is not a point, or the group is not of the plane.
+    Raises `OrbiflowError` if `point` is not a point, or the group is not of the plane.
 
     >>> from orbiflow.symmetry import wallpaper_group
     >>> hexagon = dirichlet_tile(wallpaper_group("p6m"), (0.0, 0.0))
@@ -305,9 +301,8 @@ def dirichlet_tiling(group: CrystallographicGroup, points: Sequence[ArrayLike]) 
         group: A group of the plane.
         points: Points (K, 2), none an image of another.
 
-    Raises:
-        OrbiflowError: if `points` are not points or are images of each other, or if the group is not
-            of the plane.
+    Raises `OrbiflowError` if `points` are not points or are images of each other, or if the group
+    is not of the plane.
 
     >>> from orbiflow.symmetry import wallpaper_group
     >>> squares = dirichlet_tiling(wallpaper_group("p4m"), [(0, 0), (0.5, 0.5)])
