@@ -99,13 +99,6 @@ def _half(k: Array) -> tuple[Array, Array]:
     return np.where(flipped[:, None], -k, k), flipped
 
 
-def _index(frequencies: Array, k: Array) -> Array:
-    """Return rows of `frequencies` (sorted lexicographically) at which the rows of `k` stand."""
-    base = int(np.abs(frequencies).max(initial=0)) * 2 + 3
-    radix = base ** np.arange(frequencies.shape[1] - 1, -1, -1, dtype=np.int64)
-    return np.searchsorted(frequencies @ radix, k @ radix)
-
-
 def _action(group: CrystallographicGroup, frequencies: Array) -> tuple[Array, Array]:
     """Return where each element sends each frequency, and the (2d, 2d) block it applies.
 
@@ -115,9 +108,11 @@ def _action(group: CrystallographicGroup, frequencies: Array) -> tuple[Array, Ar
     integral = _integral_parts(group)
     targets = np.empty((group.order, len(frequencies)), dtype=np.int64)
     blocks = np.zeros((group.order, len(frequencies), 2, d, 2, d))
+    base = int(np.abs(frequencies).max(initial=0)) * 2 + 3
+    radix = base ** np.arange(d - 1, -1, -1, dtype=np.int64)  # frequencies are sorted by digits
     for g, element in enumerate(group.cosets):
         image, flipped = _half(frequencies @ integral[g])
-        targets[g] = _index(frequencies, image)
+        targets[g] = np.searchsorted(frequencies @ radix, image @ radix)
         turns = frequencies @ (group.inverse_lattice @ element.translation)
         phase = 2 * np.pi * (turns - np.round(turns))
         c, s = np.cos(phase)[:, None, None], np.sin(phase)[:, None, None]
@@ -156,7 +151,9 @@ def invariant_basis(group: CrystallographicGroup, max_frequency: int) -> Invaria
     magnitude: list[Array] = []
     orbit_of = targets.min(axis=0)
     size = 0
-    for orbit in _members(orbit_of):
+    order = np.argsort(orbit_of, kind="stable")
+    cuts = np.flatnonzero(np.diff(orbit_of[order])) + 1
+    for orbit in np.split(order, cuts):  # positions that share an orbit, each ascending
         m = len(orbit)
         local = np.searchsorted(orbit, targets[:, orbit])
         projector = np.zeros((m, 2 * d, m, 2 * d))
@@ -175,13 +172,6 @@ def invariant_basis(group: CrystallographicGroup, max_frequency: int) -> Invaria
         size += count
     rows, columns, values = (np.concatenate(part) for part in zip(*entries, strict=True))
     return InvariantBasis(frequencies, rows, columns, values, size, np.concatenate(magnitude))
-
-
-def _members(labels: Array) -> list[Array]:
-    """Return positions that share a label, each list ascending, in the order of the labels."""
-    order = np.argsort(labels, kind="stable")
-    cuts = np.flatnonzero(np.diff(labels[order])) + 1
-    return np.split(order, cuts)
 
 
 class InvariantField(nn.Module, ABC):

@@ -11,7 +11,7 @@ from __future__ import annotations
 import contextlib
 import math
 import warnings
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, TypeVar
@@ -166,7 +166,10 @@ class StepCheck:
 def _warning(flow: Flow, points: Tensor, inverse: bool) -> str:
     if _provably_fine(flow):
         return ""
-    few = _sampled(points.detach())
+    # a sample of the points; the first axes may be those of a stack of fields
+    few, count = points.detach(), points.shape[-2] if points.dim() > 1 else 0
+    if count > CHECKED_POINTS:
+        few = few[..., [i * count // CHECKED_POINTS for i in range(CHECKED_POINTS)], :]
     error = _relative_error(flow, few, inverse)
     if not error > COARSE_ERROR:
         return ""
@@ -192,15 +195,6 @@ def _provably_fine(flow: Flow) -> bool:
     product = abs(flow.duration) / flow.steps * max(known)
     order = flow.integrator.order
     return product**order / math.factorial(order + 1) <= COARSE_ERROR / 10
-
-
-def _sampled(points: Tensor) -> Tensor:
-    """Return a sample of the points; the first axes may be those of a stack of fields."""
-    if points.dim() < 2 or points.shape[-2] <= CHECKED_POINTS:
-        return points
-    count = points.shape[-2]
-    chosen: Iterable[int] = (i * count // CHECKED_POINTS for i in range(CHECKED_POINTS))
-    return points[..., list(chosen), :]
 
 
 def _relative_error(flow: Flow, points: Tensor, inverse: bool) -> float:

@@ -92,7 +92,10 @@ class Emphasis:
         # the last row and column of an averaged mask may extend beyond the picture
         overhang = np.array(levels.shape[::-1]) * picture.reduced / picture.size
         own = _normal_box(target, box, overhang)
-        plain = cls(_smoothed(levels, own), own, strength, str(path))
+        pixel = np.array([own[3] - own[1], own[2] - own[0]]) / levels.shape
+        sigma = np.minimum(SMOOTHING / pixel, MAX_SMOOTHING)
+        smooth = np.clip(gaussian_filter(levels, tuple(sigma), mode="nearest"), 0, 1)
+        plain = cls(smooth.astype(np.float32), own, strength, str(path))
         share = _share_of(plain, target)
         notes = (*picture.notes, *placed, *_warnings(levels, share, plain.strength))
         return cls(plain.mask, own, strength, str(path), share, notes)
@@ -173,14 +176,6 @@ def _normal_box(target: Target, box: Window, overhang: Array) -> Window:
     (xmin, ymin), (xmax, ymax) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
     right, down = overhang.tolist()
     return xmin, ymax - down * (ymax - ymin), xmin + right * (xmax - xmin), ymax
-
-
-def _smoothed(levels: Array, box: Window) -> NDArray[np.float32]:
-    xmin, ymin, xmax, ymax = box
-    pixel = np.array([ymax - ymin, xmax - xmin]) / levels.shape
-    sigma = np.minimum(SMOOTHING / pixel, MAX_SMOOTHING)
-    smooth = gaussian_filter(levels, tuple(sigma), mode="nearest")
-    return np.clip(smooth, 0, 1).astype(np.float32)
 
 
 def _share_of(emphasis: Emphasis, target: Target) -> float:

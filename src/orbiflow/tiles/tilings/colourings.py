@@ -132,7 +132,9 @@ def colouring(tile: Tiles) -> Colouring:
             colours = colour_graph(graph, count)
             if colours is not None:
                 shape = (len(tiling.aspects), sublattice[0], sublattice[2])
-                table = _most_frequent_first(np.array(colours)).reshape(shape)
+                # the most frequent colour first
+                order = np.argsort(-np.bincount(colours), kind="stable")
+                table = np.argsort(order)[np.array(colours)].reshape(shape)
                 return Colouring(tiling, count, sublattice, table)
     raise RuntimeError("unreachable: maximal degree + 1 colours always suffice")
 
@@ -189,8 +191,3 @@ def _quotient(links: _Links, sublattice: Sublattice) -> Graph:
                 cells = [(k, reduce_cell((m + u, n + v), sublattice)) for k, (u, v) in near]
                 graph.append({(k * a + p) * c + q for k, (p, q) in cells})
     return graph
-
-
-def _most_frequent_first(colours: Integers) -> Integers:
-    order = np.argsort(-np.bincount(colours), kind="stable")
-    return np.argsort(order)[colours]

@@ -270,16 +270,14 @@ def touching(around: Surroundings, tolerance: float) -> tuple[Surroundings, NDAr
     near = around.select(np.asarray(shapely.dwithin(outline, around.rings, tolerance)))
     shares: NDArray[np.bool_] = np.zeros(len(near), dtype=bool)
     if len(near):
-        points = shapely.points(_boundary_samples(near.ring))
+        # interior points of the segments, midpoints among them: never the corners
+        count = len(near.ring)
+        pieces = 2 * math.ceil(_BOUNDARY_SAMPLES / (2 * count)) + 1
+        pieces = pieces if count < _BOUNDARY_SAMPLES else 1
+        points = shapely.points(subdivided(near.ring, pieces, phase=0.5))
         _, hits = segment_tree(near).query(points, predicate="dwithin", distance=tolerance)
         shares[near.owner[hits]] = True
     return near, shares
-
-
-def _boundary_samples(ring: Array) -> Array:
-    """Return interior points of the segments, midpoints among them: never the corners."""
-    halves = math.ceil(_BOUNDARY_SAMPLES / (2 * len(ring)))
-    return subdivided(ring, 2 * halves + 1 if len(ring) < _BOUNDARY_SAMPLES else 1, phase=0.5)
 
 
 def patch(tile: Tiles, window: Sequence[float]) -> list[Placed]:

@@ -310,7 +310,12 @@ def edge_classes(own: Edges) -> tuple[EdgeClass, ...]:
                 fold = EdgeImage(edge, loop, known.reversed != image.reversed)
                 folds.setdefault((loop.determinant, fold.reversed), fold)
         folds.pop((1, False), None)  # the identity
-        classes.append(EdgeClass(edge, tuple(_closed(edge, folds)), tuple(members)))
+        if len(folds) == 2:  # the third follows from both
+            one, other = folds.values()
+            product = one.isometry @ other.isometry
+            third = EdgeImage(edge, product, one.reversed != other.reversed)
+            folds[product.determinant, third.reversed] = third
+        classes.append(EdgeClass(edge, tuple(folds.values()), tuple(members)))
     return tuple(classes)
 
 
@@ -327,15 +332,6 @@ def _links(own: Edges) -> list[list[EdgeImage]]:
             for edge in np.flatnonzero(np.array(own.owners) == k).tolist():
                 links[edge].append(EdgeImage(int(turned[edge]), element, element.determinant < 0))
     return links
-
-
-def _closed(edge: int, folds: dict[tuple[int, bool], EdgeImage]) -> list[EdgeImage]:
-    """Return the folds, with the third one where there are two."""
-    if len(folds) == 2:
-        one, other = folds.values()
-        third = EdgeImage(edge, one.isometry @ other.isometry, one.reversed != other.reversed)
-        folds[third.isometry.determinant, third.reversed] = third
-    return list(folds.values())
 
 
 def edge_to_edge(tile: Tiles) -> Tiling:

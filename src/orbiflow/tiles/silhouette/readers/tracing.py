@@ -105,15 +105,12 @@ def _polygon(values: Array, cut: float, inside: float) -> tuple[Polygon, bool]:
     # A level that equals the cut at a pixel's centre can pinch the contour there.
     whole = largest if largest.is_valid else largest.buffer(0)
     parts = polygons_in(whole.intersection(box(0, 0, width, height)))
-    return max(parts, key=lambda part: part.area), _is_stepped(outer_ring(largest))
-
-
-def _is_stepped(ring: Array) -> bool:
-    """Return whether nearly every vertex cuts its grid line at the same fraction."""
-    # Each vertex lies on one line of pixel centres and anywhere between two of them.
-    fraction: Array = np.mod(ring - 0.5, 1.0).sum(axis=1)
+    # Each vertex lies on one line of pixel centres and anywhere between two of them: stepped if
+    # nearly all cut their line at the same fraction.
+    fraction: Array = np.mod(outer_ring(largest) - 0.5, 1.0).sum(axis=1)
     usual: float = np.median(fraction)
-    return float(np.mean(abs(fraction - usual) < 0.05)) > 0.95
+    stepped = float(np.mean(abs(fraction - usual) < 0.05)) > 0.95
+    return max(parts, key=lambda part: part.area), stepped
 
 
 def _simplify(polygon: Polygon, tolerance: float) -> tuple[Polygon, list[str]]:
