@@ -45,12 +45,11 @@ polygon_functions: dict[str, Call] = {
     "compare": lambda ring: tiles.compare(SQUARE, ring),
     "hausdorff": lambda ring: tiles.hausdorff(ring, SQUARE),
     "Recogniser": lambda ring: tiles.Recogniser(ring)(ring),
-    "tile_similarity": lambda ring: tiles.tile_similarity([ring], ["IH1"]),
     "prepared_region": tiles.prepared_region,
     "Overlap": tiles.Overlap,
     "overlay_png": lambda ring: tiles.overlay_png(TILE, ring, width_px=200),
 }
-MEASURING = ("Target", "iou", "compare", "hausdorff", "Recogniser", "tile_similarity")
+MEASURING = ("Target", "iou", "compare", "hausdorff", "Recogniser")
 
 
 @pytest.mark.parametrize("name", polygon_functions)
