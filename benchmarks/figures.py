@@ -25,7 +25,7 @@ from orbiflow.tiles import (
     tiling_svg,
     write_gallery,
 )
-from orbiflow.tiles.pages.tile_folder import overlay
+from orbiflow.tiles.pages.run_folder import overlay
 
 TURTLE = Path(__file__).parents[1] / "examples" / "silhouettes" / "turtle.png"
 

@@ -28,10 +28,8 @@ from orbiflow.tiles import (
     animation,
     escherize_class,
 )
-from orbiflow.tiles.motion.animations import motion
-from orbiflow.tiles.motion.kinds import eased, frames, morph, progress
-from orbiflow.tiles.motion.writers import picture
-from orbiflow.tiles.pictures import BendingWay
+from orbiflow.tiles.motion.kinds import BendingWay, eased, frames, morph, progress
+from orbiflow.tiles.motion.writers import motion, picture
 from swirled_tiles import is_sound, swirled, swirled_tile
 
 BOOT = [(60, 20), (210, 20), (230, 80), (170, 95), (160, 190), (100, 145), (45, 80)]

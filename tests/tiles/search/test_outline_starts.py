@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from orbiflow.arrays import Array
 from orbiflow.tiles import CLASSES, Target, Tile, TileModel, certify, resampled
+from orbiflow.tiles.search.candidates import Prototiles
 from orbiflow.tiles.search.placements import (
     Placements,
     _compositions,
@@ -18,7 +19,6 @@ from orbiflow.tiles.search.placements import (
     best_placements,
     edge_lengths,
 )
-from orbiflow.tiles.search.prototiles import Prototiles
 from orbiflow.tiles.search.starts import mirror_closed, outline_starts, template_starts
 from orbiflow.tiles.search.tile_space import nearest_tiles
 

@@ -25,7 +25,7 @@ from orbiflow.tiles import (
     certify,
     load_model,
 )
-from orbiflow.tiles.search.boundary import extract_tile
+from orbiflow.tiles.search.stored_models import extract_tile
 from orbiflow.tiles.tile_map import BENDING, FORMAT, MAX_BYTES
 from strategies import seeds
 

@@ -12,7 +12,7 @@ from orbiflow.arguments import instance
 from orbiflow.errors import CertificationError, OrbiflowError
 from orbiflow.runtime import one_thread
 from orbiflow.tiles.likeness import Pinned, Recogniser, compare, iou, least_neck, narrowest_neck
-from orbiflow.tiles.search.bending_fit import PlacedBent
+from orbiflow.tiles.search.bending import PlacedBent
 from orbiflow.tiles.search.bent_map import map_of_bent
 from orbiflow.tiles.search.candidates import Candidates, Fit
 from orbiflow.tiles.silhouette import Bending, Target

@@ -46,7 +46,7 @@ class LikenessSearch(SearchMethod):
 
     objective: ClassVar[str] = "likeness"
     takes_pins: ClassVar[bool] = True
-    modules: ClassVar[tuple[str, ...]] = ("orbiflow.tiles.search.bending_fit",)
+    modules: ClassVar[tuple[str, ...]] = ("orbiflow.tiles.search.bending",)
 
     placements: int = 300
     held: int = 80
@@ -84,7 +84,7 @@ class LikenessSearch(SearchMethod):
         cancel: Cancel | None = None,
     ) -> Fit:
         """Let the silhouette bend into tiles of the class."""
-        from orbiflow.tiles.search.bending_fit import fit_bending
+        from orbiflow.tiles.search.bending import fit_bending
         from orbiflow.tiles.search.co_deformation import shared_hands
 
         both = shared_hands(goal, self)
@@ -96,7 +96,7 @@ class LikenessSearch(SearchMethod):
         self, goal: Goal, names: Sequence[str], cancel: Cancel | None = None
     ) -> EscherTile | None:
         """Return a tile that the silhouette bends to in haste; None if none is simple."""
-        from orbiflow.tiles.search.bending_fit import fit_bending
+        from orbiflow.tiles.search.bending import fit_bending
         from orbiflow.tiles.search.certifying import best_tiles
         from orbiflow.tiles.search.co_deformation import shared_hands
 

@@ -18,7 +18,7 @@ from orbiflow.fields import FourierField
 from orbiflow.flows import Flow
 from orbiflow.symmetry import CrystallographicGroup
 from orbiflow.tiles.geometry import subdivided
-from orbiflow.tiles.search.prototiles import Prototiles
+from orbiflow.tiles.search.candidates import Prototiles
 from orbiflow.tiles.tile_map import TileMap
 from orbiflow.tiles.tilings import IsohedralClass, Tile
 from orbiflow.tiles.tilings import isohedral_class as class_of
@@ -280,8 +280,7 @@ class TileModel(nn.Module):
 
     def finished(self, index: int, *, force: bool = False) -> tuple[Tile, TileMap]:
         """Return the polygon of a candidate with its group, and the flow that made it."""
-        from orbiflow.tiles.search.boundary import extract_tile
-        from orbiflow.tiles.search.storage import as_map
+        from orbiflow.tiles.search.stored_models import as_map, extract_tile
 
         tile, fine = extract_tile(self.take([index]), force=force)
         return tile, as_map(fine)
@@ -317,3 +316,21 @@ class TileModel(nn.Module):
         for name, buffer in exact.items():
             setattr(self, name, buffer.to(getattr(self, name).device))
         return self
+
+
+def placed_field(model: TileModel) -> Callable[[Tensor], Tensor]:
+    """Return a single candidate's vector field, pushed forward by A o L to the target's normal form.
+
+    It is the mean over time if the flow has several segments.
+    """
+    linear = model.linear().detach()[0]
+    # fields are linear in their parameters: one evaluation for any number of segments
+    parameters = torch.stack([segment.parameters_.detach() for segment in model.fourier_fields()])
+    mean = model.with_fields([parameters.mean(dim=0)])
+
+    @torch.no_grad()
+    def field(points: Tensor) -> Tensor:
+        flat = points.to(linear).reshape(1, -1, 2)
+        return (mean.flow.segments[0](model.unplace(flat)) @ linear.mT).reshape(points.shape)
+
+    return field

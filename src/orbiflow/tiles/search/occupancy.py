@@ -18,7 +18,7 @@ from orbiflow.arguments import instance, whole
 from orbiflow.runtime import Cancel
 from orbiflow.tiles.search.candidates import Progress, silent
 from orbiflow.tiles.search.model import TileModel
-from orbiflow.tiles.search.occupancy_search import OccupancySearch
+from orbiflow.tiles.search.overlap_search import OccupancySearch
 from orbiflow.tiles.search.starts import initial_poses, template_symmetries
 from orbiflow.tiles.silhouette import Target, signed_distance
 from orbiflow.tiles.tilings import IsohedralClass, isohedral_class

@@ -26,8 +26,8 @@ from orbiflow.symmetry import (
 )
 from orbiflow.tiles.geometry import resampled, reverse, subdivided
 from orbiflow.tiles.likeness import boundary_iou, prepared_region
+from orbiflow.tiles.search.candidates import Prototiles
 from orbiflow.tiles.search.placements import Placements, best_placements
-from orbiflow.tiles.search.prototiles import Prototiles
 from orbiflow.tiles.search.tile_space import NearestTiles, nearest_tiles
 from orbiflow.tiles.silhouette import Target
 from orbiflow.tiles.tilings import EdgeIdentification, IsohedralClass, isohedral_class
