@@ -82,9 +82,9 @@ def escherize(
 ) -> Outcome:
     """Find tiles that look like a silhouette and tile the plane, and prove it.
 
-    Writes result.json, overview.png and index.html into the folder, and for each class a folder with
-    tile.svg, tiling.svg, tiling.png, overlay.png and model.safetensors; after a search for both,
-    front.png, too.
+    Writes result.json, overview.png and index.html into the folder, and for each class a folder
+    with tile.svg, tiling.svg, tiling.png, overlay.png and model.safetensors; after a search for
+    both, front.png, too.
 
     Args:
         image: The silhouette: PNG, JPEG, WebP, SVG, or a polygon (.json, .dat).

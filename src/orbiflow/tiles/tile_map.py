@@ -24,8 +24,7 @@ BENDING = ("bending.rest", "bending.images", "bending.triangles")
 """Arrays of the map from the silhouette. Earlier files have none, and earlier readers skip them."""
 FRAME = "frame"
 """Entry of the settings in a file. Files of version 0.1 lack it, and their readers skip it."""
-SAME = 1e-6
-"""Largest distance of the map's outline from the tile's, in square roots of its area."""
+SAME = 1e-6  # largest distance of the map's outline from the tile's, in square roots of its area
 
 
 @dataclass(frozen=True, eq=False)

@@ -29,7 +29,6 @@ from orbiflow.tiles import (
 from orbiflow.tiles.likeness import boundary_iou
 from orbiflow.tiles.search.descent import CALM, Descent
 from orbiflow.tiles.search.method import Goal
-from orbiflow.tiles.search.overlap_search import DESCENT_EFFORTS
 from orbiflow.tiles.search.starts import template_starts
 from orbiflow.tiles.search.stored_models import extract_tile
 
@@ -217,11 +216,10 @@ def test_soft_target_agrees_with_the_polygon(soft: SoftTarget) -> None:
     assert np.allclose(soft.weighted_iou(rings).numpy(), exact, atol=5e-3)
 
 
-@pytest.mark.parametrize("effort", DESCENT_EFFORTS)
+@pytest.mark.parametrize("effort", OverlapSearch.efforts)
 def test_efforts_are_valid_settings(effort: str) -> None:
     settings = OverlapSearch.for_effort(effort, seed=7)
     assert settings.seed == 7
-    assert settings.with_survivors(9).stages[-1][1] >= 9
 
 
 @pytest.mark.parametrize(

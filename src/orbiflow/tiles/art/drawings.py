@@ -44,11 +44,8 @@ FLATNESS = 1 / 4000
 LONGEST = 1 / 150
 """Longest straight piece that is carried, in sizes of the silhouette: lines bend with the tile."""
 
-MOST_CARRIED = 400_000
-"""Greatest number of points that are carried in all."""
-
-FARTHEST = 1e6
-"""Greatest reach of a drawing, in sizes of the silhouette."""
+MOST_CARRIED = 400_000  # greatest number of points that are carried in all
+FARTHEST = 1e6  # greatest reach of a drawing, in sizes of the silhouette
 
 
 class TooFar(Exception):
@@ -58,16 +55,8 @@ class TooFar(Exception):
 def read_drawing(path: Path, tile: EscherTile) -> tuple[Motif, tuple[str, ...]]:
     """Read an SVG file and carry its drawing onto a tile, in the tile's units; return it with notes.
 
-    Fills and strokes are kept and gradients become one colour; texts, pictures and clips are left out.
-    `currentColor` without a `color` is the ink that shows on each tile.
-
-    Args:
-        path: The file.
-        tile: A tile with a map.
-
-    Raises:
-        InputFileError: If the file is over 16 MB, is no SVG or cannot be understood, has another
-            aspect than the silhouette, or draws nothing.
+    Fills and strokes are kept and gradients become one colour; texts, pictures and clips are left
+    out. `currentColor` without a `color` is the ink that shows on each tile.
     """
     check_file(path)
     drawing = Drawing(path, parse_xml(path, read_bytes(path, MAX_BYTES)))
@@ -243,12 +232,7 @@ class Over(NamedTuple):
 
 
 def read_over(path: str | Path, tile: EscherTile) -> Over:
-    """Read the picture or drawing in a file, whichever its content is.
-
-    Raises:
-        InputFileError: As `read_picture` and `read_drawing`.
-        OrbiflowError: If the tile has no map.
-    """
+    """Read the picture or drawing in a file, whichever its content is, over a tile with a map."""
     tile.require_map()
     path = as_path(path, "the picture's file")
     check_file(path)

@@ -26,8 +26,7 @@ from orbiflow.tiles.geometry import (
 )
 from orbiflow.tiles.tile import EscherTile
 
-GRID_DENSITY = 420.0
-"""Cells of the raster along the square root of the area."""
+GRID_DENSITY = 420.0  # cells of the raster along the square root of the area
 
 LIGHT = np.array([-0.6, -0.8])
 """The direction from which light comes, with y down: from above, on the left."""
@@ -121,11 +120,8 @@ def stroke(points: Array, widths: Array) -> Array:
     return np.concatenate([points + side, (points - side)[::-1]])
 
 
-USUAL_EYE = 0.032
-"""Radius of an eye in square roots of the tile's area."""
-
-EYE_CLEARANCE = 1.7
-"""Distance, in radii of an eye, that lines keep from its middle."""
+USUAL_EYE = 0.032  # radius of an eye in square roots of the tile's area
+EYE_CLEARANCE = 1.7  # distance, in radii of an eye, that lines keep from its middle
 
 ECHO_STEP, ECHO_LEAST_STEPS = 0.008, 12
 """Step of an echo in square roots of the tile's area, and the least number of steps of a piece."""
@@ -144,13 +140,8 @@ def eyes(
 ) -> tuple[Eye, ...]:
     """Carry eyes from the silhouette onto the tile; they stay round.
 
-    Args:
-        tile: The tile, with a map if any eyes are given.
-        given: Each eye as (x, y) or (x, y, radius) in the silhouette's coordinates.
-        palette: The palette whose paper and outline they are drawn in.
-
-    Raises:
-        OrbiflowError: If an eye lies outside the silhouette.
+    Each is given as (x, y) or (x, y, radius) in the silhouette's coordinates, inside it, and drawn
+    in the palette's paper and outline.
     """
     return tuple(_eye(tile, eye, palette) for eye in given)
 
@@ -213,10 +204,7 @@ def engraved(tile: EscherTile, strokes: Strokes, around: tuple[Eye, ...] = ()) -
 
 
 def _hatch(body: Body, reach: float = 0.32, spacing: float = 0.017) -> list[Array]:
-    """Return ticks inwards from the outline as on a woodcut: long in the shade, short in the light.
-
-    None is longer than `reach`.
-    """
+    """Return ticks inwards from the outline as on a woodcut: long in the shade, up to `reach`."""
     count = int(arc_lengths(body.ring)[-1] / spacing)
     along = Along(body, count)
     dark = shade(along.normals)

@@ -38,11 +38,8 @@ from orbiflow.tiles.exporting import (
 from orbiflow.tiles.silhouette import Target
 from orbiflow.tiles.tile import EscherTile, TileSource
 
-TEXELS_PER_PIXEL = 1.5
-"""Texels of the tile's raster along a pixel of the page."""
-
-TILE_PER_OUTLINE = 120
-"""The tile's size over the outline's usual width."""
+TEXELS_PER_PIXEL = 1.5  # texels of the tile's raster along a pixel of the page
+TILE_PER_OUTLINE = 120  # the tile's size over the outline's usual width
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,8 +16,7 @@ from orbiflow.tiles.exporting import longer_side
 from orbiflow.tiles.tile import EscherTile
 from orbiflow.tiles.tilings import Copies, Tile, colouring, copies_meeting
 
-USUAL_TILES = 25
-"""Number of tiles on a page if no size of a tile is given."""
+USUAL_TILES = 25  # number of tiles on a page if no size of a tile is given
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,11 +80,7 @@ class _Colours:
 
 
 def art_page(given: EscherTile, settings: ArtSettings) -> ArtPage:
-    """Put the tile on a page of the settings' size, the same way up; or make the repeating cell.
-
-    Raises:
-        OrbiflowError: If there are more tiles than can be drawn, or no rectangle repeats.
-    """
+    """Put the tile on a page of the settings' size, the same way up; or make the repeating cell."""
     tile = given.tile
     colours = _Colours(tile, settings.colour)
     flip = np.diag([1.0, 1.0 if given.y_down else -1.0])
@@ -161,23 +156,15 @@ def _page(
     )
 
 
-REACH = 14
-"""Greatest multiple of a basis vector that is tried."""
-
-LARGEST = 60
-"""Greatest number of lattice cells in a rectangle."""
-
-EXACT = 1e-6
-"""Strain up to which a rectangle counts as exact: that of rounding."""
+REACH = 14  # greatest multiple of a basis vector that is tried
+LARGEST = 60  # greatest number of lattice cells in a rectangle
+EXACT = 1e-6  # strain up to which a rectangle counts as exact: that of rounding
 
 LARGEST_EXACT = 8
 """Number of lattice cells up to which an exact rectangle is preferred to a smaller inexact one."""
 
-SLENDER = 4.0
-"""Ratio of its sides beyond which a rectangle counts as larger than it is."""
-
-SIZE_TOLERANCE = 0.02
-"""Greatest relative change of the size so that the cell is whole pixels."""
+SLENDER = 4.0  # ratio of its sides beyond which a rectangle counts as larger than it is
+SIZE_TOLERANCE = 0.02  # greatest relative change of the size so that the cell is whole pixels
 
 
 class Rectangle(NamedTuple):
@@ -201,18 +188,11 @@ class Rectangle(NamedTuple):
 
 
 def rectangle(lattice: Array, scale: float, tolerance: float, *, flipped: bool) -> Rectangle:
-    """Find the smallest rectangle of lattice vectors that repeats, in pixels.
+    """Find the smallest rectangle of lattice vectors, as columns (2, 2), that repeats, in pixels.
 
-    An exact rectangle is preferred if it is not much larger.
-
-    Args:
-        lattice: The basis vectors as columns (2, 2).
-        scale: The approximate number of pixels per unit.
-        tolerance: The greatest strain by which a parallelogram may be made a rectangle.
-        flipped: Whether y points up in the lattice's units, so that the picture is flipped.
-
-    Raises:
-        OrbiflowError: If there is none.
+    There are about `scale` pixels per unit. An exact rectangle is preferred if it is not much
+    larger; others are strained by at most `tolerance`. The picture is `flipped` if y points up in
+    the lattice.
 
     >>> found = rectangle(np.array([[1.0, 0.5], [0.0, 0.75**0.5]]), 100, 0.02, flipped=False)
     >>> found.width, found.height, found.cells, abs(found.turn) < 1e-9, found.strain < 4e-4

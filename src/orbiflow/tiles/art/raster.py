@@ -15,8 +15,7 @@ from orbiflow.drawing import Palette
 from orbiflow.runtime import Cancel
 from orbiflow.tiles.art.page import ArtPage
 
-NOWHERE = -1
-"""The label of samples that lie in no region."""
+NOWHERE = -1  # the label of samples that lie in no region
 
 NUDGE = 3.1415926e-7
 """Distance, in samples, by which rows of samples are moved down: rounding would otherwise decide about
@@ -127,11 +126,8 @@ def runs(sides: Sides, top: int, rows: int, width: int) -> Runs:
     return Runs(label, row, begin, stop - begin)
 
 
-MARGIN = 3
-"""Width in texels of the margin around the tile."""
-
-MOST_TEXELS = 20_000_000
-"""Greatest number of texels in the rasters of all colours together."""
+MARGIN = 3  # width in texels of the margin around the tile
+MOST_TEXELS = 20_000_000  # greatest number of texels in the rasters of all colours together
 
 _AROUND = ((-1, -1), (-1, 1), (1, -1), (1, 1), (-1, 0), (1, 0), (0, -1), (0, 1))
 """The neighbours of a texel, those that share a side last, for the last one counts."""
@@ -173,8 +169,8 @@ class Grid:
 class Paint:
     """The painting of a tile in five channels (height, width, 5), from which colours are mixed.
 
-    They are red, green and blue, 0 to 1, already times their share; then the shares of the tile's own
-    colour and of its ink.
+    They are red, green and blue, 0 to 1, already times their share; then the shares of the tile's
+    own colour and of its ink.
     """
 
     def __init__(self, grid: Grid) -> None:
@@ -227,8 +223,7 @@ def rgb_of(colour: str) -> Array:
     return np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)]) / 255
 
 
-BAND = 2_000_000
-"""Number of samples that are computed at a time."""
+BAND = 2_000_000  # number of samples that are computed at a time
 
 
 def render_page(
@@ -242,15 +237,8 @@ def render_page(
 ) -> np.ndarray:
     """Return the picture of a page (height, width, 3) in 8 bits.
 
-    Every sample belongs to exactly one copy of the tile; a pixel is the mean of its samples.
-
-    Args:
-        page: The copies of the tile.
-        grid: The grid of the tile's raster.
-        coloured: The raster (colours, height, width, 3), as `Paint.coloured` returns it.
-        paper: The colour where there is no tile.
-        samples: The number of samples along each side of a pixel.
-        cancel: Stops the work.
+    Every sample belongs to exactly one copy of the tile, and has its colour in the raster (colours,
+    height, width, 3) that `Paint.coloured` returns; a pixel is the mean of `samples` x `samples`.
     """
     cancel = cancel or Cancel()
     look = _Lookup(page, grid, coloured, paper, samples)

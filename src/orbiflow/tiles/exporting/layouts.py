@@ -29,8 +29,7 @@ from orbiflow.tiles.geometry import polygons_in
 from orbiflow.tiles.likeness import Thinnest, narrowest_neck, narrowest_slit
 from orbiflow.tiles.tilings import Copies, Tile, colouring, copies_inside, copies_meeting
 
-STRIP = 8.0
-"""Height in mm of the strip at the page's foot that the calibration mark has for itself."""
+STRIP = 8.0  # height in mm of the strip at the page's foot that the calibration mark has for itself
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,16 +60,8 @@ MOST_TILES_TO_SHIFT = 1000
 def layout(tile: Tile, settings: ExportSettings, *, y_down: bool) -> Layout:
     """Scale the tile and put it on the page, the way up it has, turned as the settings say.
 
-    It lies in the middle; where tiles are not cut at the page's edge, it lies nearby, so that as many
-    as possible are whole.
-
-    Args:
-        tile: The tile, in any units.
-        settings: How it is exported.
-        y_down: Whether its y axis points down.
-
-    Raises:
-        OrbiflowError: If the page is smaller than the tile.
+    It lies in the middle; where tiles are not cut at the page's edge, it lies nearby, so that as
+    many as possible are whole.
     """
     width, height = settings.page
     box = Box(0.0, 0.0, width, height - (STRIP if settings.calibrate else 0.0))
@@ -186,11 +177,7 @@ def chosen_copies(layout: Layout) -> Copies:
 
 
 def tiling_scene(layout: Layout) -> Scene:
-    """Return a scene with the tile as a symbol, a use of it for each copy, a layer for each colour.
-
-    Raises:
-        OrbiflowError: If the page holds too many tiles.
-    """
+    """Return a scene with the tile as a symbol, a use of it for each copy, a layer for each colour."""
     settings = layout.settings
     copies = chosen_copies(layout)
     # relative to the symbol's own middle, so that rounding a transform moves no point by much
@@ -236,23 +223,14 @@ def line_style(layout: Layout) -> Style:
     return Style(None, settings.stroke or RED, settings.stroke_width or 0.1)
 
 
-MITRE = 4.0
-"""The greatest reach of a sharp corner of a cut, in offsets."""
+MITRE = 4.0  # the greatest reach of a sharp corner of a cut, in offsets
 
 
 def cut_ring(ring: Array, kerf: float, clearance: float) -> Array:
     """Return the line (M, 2) that the middle of the beam follows to cut a piece with this outline.
 
-    The piece that is left is `ring`, less half the clearance all around.
-
-    Args:
-        ring: The outline (N, 2), a simple polygon in mm.
-        kerf: The width in mm of what is burned away.
-        clearance: The gap in mm between two pieces put together.
-
-    Raises:
-        OrbiflowError: If a neck is no wider than kerf or clearance, or the beam would close a slit; the
-            message says where on the piece.
+    The piece that is left is `ring` (N, 2), less half the clearance all around. A neck no wider
+    than kerf or clearance is an error, and so is a slit that the beam would close.
 
     >>> bar = np.array([[0.0, 0.0], [20, 0], [20, 4], [0, 4]])
     >>> shapely.Polygon(cut_ring(bar, 0.2, 0.0)).bounds
@@ -301,23 +279,14 @@ def place_on(ring: Array, found: Thinnest) -> str:
     return f"{x:.1f} mm from its left and {y:.1f} mm from its top"
 
 
-LEAST_GAP = 0.01
-"""The least distance in mm between cuts: pieces never touch."""
-
-LEAST_EDGE = 0.1
-"""Twice the least distance in mm of cuts from the sheet's edge."""
+LEAST_GAP = 0.01  # the least distance in mm between cuts: pieces never touch
+LEAST_EDGE = 0.1  # twice the least distance in mm of cuts from the sheet's edge
 
 
 def pieces_scenes(layout: Layout, *, fine: bool = True) -> list[Scene]:
     """Return a scene for each sheet; there is one unless a bed is given and does not hold all copies.
 
-    Args:
-        layout: The tile's place on the page.
-        fine: Whether the cuts are smooth curves, or else polygons.
-
-    Raises:
-        OrbiflowError: If the piece is too thin for kerf or clearance, a sheet is smaller than a piece,
-            or the page does not hold all copies and no bed is given.
+    The cuts are smooth curves if `fine`, else polygons.
     """
     settings, box = layout.settings, layout.box
     flat = settings.deviation / 4

@@ -1,8 +1,8 @@
 """Dense lattice arrangements of a piece, and the sheets that are filled with them.
 
 There are three kinds of start: the tile's own tiling spread apart, which is dense where the gap is
-small; a lattice of pieces all one way up; and a lattice of pairs, one of each turned by 180 degrees.
-Each is made as tight as the gap allows, then improved by small random changes.
+small; a lattice of pieces all one way up; and a lattice of pairs, one of each turned by 180
+degrees. Each is made as tight as the gap allows, then improved by small random changes.
 """
 
 from __future__ import annotations
@@ -116,17 +116,10 @@ def _middle(ring: Array) -> Array:
 
 Mask = NDArray[np.bool_]
 
-CELLS = 48
-"""Raster cells along a piece."""
-
-DIRECTIONS = 30
-"""Directions of a lattice's first vector that are tried."""
-
-PAIRS = 24
-"""Places of the turned piece of a pair that are tried."""
-
-KEPT_LATTICES = 3
-"""Number of best lattices that are then tightened exactly."""
+CELLS = 48  # raster cells along a piece
+DIRECTIONS = 30  # directions of a lattice's first vector that are tried
+PAIRS = 24  # places of the turned piece of a pair that are tried
+KEPT_LATTICES = 3  # number of best lattices that are then tightened exactly
 
 
 def lattice_starts(ring: Array, gap: float) -> list[Arrangement]:
@@ -191,8 +184,8 @@ class _Raster:
     def lattices(self, region: Mask, pieces: int) -> list[tuple[float, Array]]:
         """Return the area and lattice, in mm, of lattices outside a region, the densest first.
 
-        Their basis vectors lie outside it; longer vectors may still lie in it. A cell smaller than so
-        many `pieces` is left out.
+        Their basis vectors lie outside it; longer vectors may still lie in it. A cell smaller than
+        so many `pieces` is left out.
         """
         half = (len(region) - 1) // 2
         axis = np.arange(-half, half + 1)
@@ -235,14 +228,9 @@ def _shifted(region: Mask, step: NDArray[np.int64]) -> Mask:
     return moved
 
 
-TRIALS = 400
-"""Random changes of each kind of start."""
-
-KEPT = 4
-"""Number of densest arrangements that are tried on a sheet."""
-
-ANGLES = 36
-"""Angles of an arrangement that are tried on a sheet."""
+TRIALS = 400  # random changes of each kind of start
+KEPT = 4  # number of densest arrangements that are tried on a sheet
+ANGLES = 36  # angles of an arrangement that are tried on a sheet
 
 
 @dataclass(frozen=True, eq=False)
@@ -269,13 +257,9 @@ class Placed:
 
 
 def dense_arrangements(tile: Tile, ring: Array, gap: float, *, seed: int = 0) -> list[Arrangement]:
-    """Return arrangements of pieces with the outline `ring`, the densest first.
+    """Return arrangements of pieces cut along `ring` (M, 2), at least `gap` apart, the densest first.
 
-    Args:
-        tile: The tile, in the same coordinates.
-        ring: The line (M, 2) that is cut, in mm.
-        gap: The least distance in mm between pieces, above 0.
-        seed: The seed of the small changes; the same seed gives the same arrangements.
+    The same seed, of the small changes, gives the same arrangements.
     """
     rng = np.random.default_rng(seed)
     coarse = _simplified(ring, gap)
@@ -328,8 +312,8 @@ def on_sheet(
 ) -> Placed:
     """Fill a rectangle from the origin with as many pieces as fit, in rows from the top.
 
-    Each arrangement is tried, turned and shifted in several ways; among equally good ones the first is
-    taken. A single piece goes in whichever way it fits.
+    Each arrangement is tried, turned and shifted in several ways; among equally good ones the first
+    is taken. A single piece goes in whichever way it fits.
     """
     best = Placed(np.zeros((0, 2, 2)), np.zeros((0, 2)), np.zeros(0, dtype=np.int64))
     turns = [(found, angle) for found in arrangements for angle in _angles(found, ring)]

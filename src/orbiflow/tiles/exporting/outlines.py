@@ -20,15 +20,10 @@ _SAMPLES, _ROUNDS = 48, 4
 
 
 def fitted(points: Array, tolerance: float) -> Curve:
-    """Fit a curve of smooth pieces to a polyline.
+    """Fit a curve of smooth pieces within `tolerance` to a polyline (n, 2), from end to end.
 
-    Args:
-        points: The polyline's vertices (n, 2), two or more.
-        tolerance: The greatest distance between curve and polyline, in the points' units. Where no
-            smooth piece is that close, the polyline's sides are taken.
-
-    Returns:
-        A curve from the first point to the last; the polyline's corners are ends of its pieces.
+    The polyline's corners are ends of its pieces. Where no smooth piece is that close, sides are
+    taken.
 
     >>> turns = np.linspace(0, np.pi, 40)
     >>> arc = fitted(np.stack([np.cos(turns), np.sin(turns)], axis=1), 3e-2)
@@ -201,16 +196,12 @@ class Outline:
 
 
 def outline(tile: Tile, tolerance: float) -> Outline:
-    """Fit smooth curves to a tile's polygon that tile the plane as exactly as it does.
+    """Fit smooth curves near a tile's polygon that tile the plane as exactly as it does.
 
-    One edge of each class of identified edges is fitted and the others are its images; an edge that is
-    its own image, by a half-turn or a mirror across it, is fitted up to its middle. Where curves would
-    touch each other within the tolerance, they are fitted more closely, at worst along the polygon
-    itself.
-
-    Args:
-        tile: The tile.
-        tolerance: The greatest distance from the polygon, in the tile's units.
+    One edge of each class of identified edges is fitted and the others are its images; an edge that
+    is its own image, by a half-turn or a mirror across it, is fitted up to its middle. Where curves
+    would touch each other within the tolerance, they are fitted more closely, at worst along the
+    polygon itself.
     """
     try:
         own = edges(tile)

@@ -303,22 +303,14 @@ class Scene:
         return self.window or Box(0.0, 0.0, self.width, self.height)
 
     def require_plain(self) -> None:
-        """Check that all symbols are single curves.
-
-        Raises:
-            OrbiflowError: If there are motifs, which only SVG can hold.
-        """
+        """Check that there are no motifs, which only SVG can hold."""
         if self.motifs:
             raise OrbiflowError(
                 "this format cannot hold artwork: write it as SVG, or render it as PNG"
             )
 
     def curves(self, layer: Layer) -> Iterator[Curve]:
-        """Yield every curve of a layer, including copies of symbols.
-
-        Raises:
-            OrbiflowError: If the scene is artwork, as `require_plain`.
-        """
+        """Yield every curve of a layer, including copies of symbols."""
         self.require_plain()
         for item in layer.items:
             if isinstance(item, Uses):

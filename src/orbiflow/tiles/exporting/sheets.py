@@ -22,11 +22,8 @@ from orbiflow.tiles.exporting.scene import (
     clipped_region,
 )
 
-OVERLAP = 12.0
-"""Width in mm of the strip that two neighbouring sheets share; the crosses lie in it."""
-
-ARM = 4.0
-"""Half the width of a cross, in mm."""
+OVERLAP = 12.0  # width in mm of the strip that two neighbouring sheets share; the crosses lie in it
+ARM = 4.0  # half the width of a cross, in mm
 
 MOST_SHEETS = 400
 
@@ -36,17 +33,9 @@ BLUE = Style(None, "#0000ff", 0.1)
 def split(scene: Scene, bed: tuple[float, float], tolerance: float) -> list[Scene]:
     """Split a scene into sheets no larger than the bed, row by row, unless the bed holds it.
 
-    Neighbouring sheets overlap by `OVERLAP`. Lines go from one sheet to the next in the middle of the
-    strip, where both sheets have the same crosses; no line is on two sheets.
-
-    Args:
-        scene: The page.
-        bed: The bed's width and height in mm.
-        tolerance: The greatest distance in mm between a curve and the polygon that replaces it where
-            sheets meet.
-
-    Raises:
-        OrbiflowError: If the bed is too small for sheets that overlap, or there are too many sheets.
+    Neighbouring sheets overlap by `OVERLAP`. Lines go from one sheet to the next in the middle of
+    the strip, where both sheets have the same crosses; no line is on two sheets. Curves become
+    polygons within `tolerance` where sheets meet.
     """
     if scene.width <= bed[0] and scene.height <= bed[1]:
         return [scene]
@@ -202,11 +191,7 @@ def _line(points: list[list[float]], back: np.ndarray) -> Curve:
 
 
 def calibrated(scene: Scene) -> Scene:
-    """Add a mark exactly 100 mm long at the foot of the scene, on a layer of its own.
-
-    Raises:
-        OrbiflowError: If the page is narrower than 110 mm.
-    """
+    """Add a mark exactly 100 mm long at the foot of the scene, on a layer of its own."""
     if scene.width < 110:
         raise OrbiflowError(
             f"the calibration mark is 100 mm long and needs a page at least 110 mm wide, got "

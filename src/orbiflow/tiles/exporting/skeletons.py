@@ -16,11 +16,7 @@ from orbiflow.tiles.tilings import skeleton
 
 
 def skeleton_scene(layout: Layout) -> Scene:
-    """Return a scene with each edge that tiles share once, in few long lines.
-
-    Raises:
-        OrbiflowError: If the page holds too many tiles, or the tile's edges do not match.
-    """
+    """Return a scene with each edge that tiles share once, in few long lines."""
     settings, box, own = layout.settings, layout.box, layout.outline.edges
     if own is None:
         raise OrbiflowError(
@@ -81,13 +77,10 @@ Trail = list[tuple[int, bool]]
 
 
 def trails(ends: NDArray[np.int64]) -> list[Trail]:
-    """Return the fewest trails that run every arc once, by Hierholzer's method.
+    """Return the fewest trails that run every arc, with the ends (S, 2), once, by Hierholzer's method.
 
-    A connected part with 2k odd vertices, where an odd number of arcs meet, falls into k trails; one
-    without odd vertices is a single closed trail (Euler).
-
-    Args:
-        ends: The numbers (S, 2) of the vertices that each arc leads from and to.
+    A connected part with 2k odd vertices, where an odd number of arcs meet, falls into k trails;
+    one without odd vertices is a single closed trail (Euler).
 
     >>> trails(np.array([[0, 1], [1, 2], [2, 0]]))
     [[(0, True), (1, True), (2, True)]]
@@ -168,8 +161,8 @@ def _without_joints(circuit: Trail, count: int) -> list[Trail]:
 def in_short_order(curves: list[Curve]) -> list[Curve]:
     """Return the curves in an order and in directions that make a tool's way between them short.
 
-    The way leads from the upper left corner to the nearest end, and from each curve's other end to the
-    nearest end of a curve that is left.
+    The way leads from the upper left corner to the nearest end, and from each curve's other end to
+    the nearest end of a curve that is left.
     """
     if not curves:
         return []

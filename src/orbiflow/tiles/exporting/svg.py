@@ -1,8 +1,8 @@
 """Scenes as SVG, for Inkscape, Illustrator, browsers and cutters; and the SVG of a tile or a tiling.
 
-One user unit is one millimetre, and layers are those of Inkscape. A scene's copies are one short line
-each; `tile_svg` and `tiling_svg` write plain paths without symbols, transforms or style sheets, which
-some programs drop.
+One user unit is one millimetre, and layers are those of Inkscape. A scene's copies are one short
+line each; `tile_svg` and `tiling_svg` write plain paths without symbols, transforms or style
+sheets, which some programs drop.
 """
 
 from __future__ import annotations
@@ -220,8 +220,8 @@ def tiling_svg(
 ) -> str:
     """Return the SVG of the tiles that meet a window, clipped to it: one closed path per tile.
 
-    Each colour's paths are a group, with the ids "colour-1", "colour-2" ... Every tile has a stroke,
-    so that no paper shines through between neighbours.
+    Each colour's paths are a group, with the ids "colour-1", "colour-2" ... Every tile has a
+    stroke, so that no paper shines through between neighbours.
 
     Args:
         tile: A tile or a tiling.

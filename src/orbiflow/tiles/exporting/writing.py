@@ -45,8 +45,8 @@ if TYPE_CHECKING:
 def write_dxf(scene: Scene, *, tolerance: float) -> str:
     """Return the scene as DXF (R2010), which cutters, CAD and Inkscape read.
 
-    Curves become polylines within `tolerance` (mm), which every reader takes. Tiles that the page cuts
-    are cut. DXF has y up, and the page's lower left corner is the origin.
+    Curves become polylines within `tolerance` (mm), which every reader takes. Tiles that the page
+    cuts are cut. DXF has y up, and the page's lower left corner is the origin.
     """
     from ezdxf import units
     from ezdxf.colors import RGB
@@ -93,13 +93,7 @@ SCHEMA_VERSION = 1
 
 
 def write_json(scene: Scene, *, tolerance: float, decimals: int = 4) -> str:
-    """Return the scene as JSON; all lengths in mm, y down from the page's upper left corner.
-
-    Args:
-        scene: The page.
-        tolerance: The greatest distance in mm between polygons and curves.
-        decimals: The decimals of coordinates.
-    """
+    """Return the scene as JSON; all lengths in mm, y down from the page's upper left corner."""
     prototile = scene.prototile
     document: dict[str, Any] = {
         "schema_version": SCHEMA_VERSION,
@@ -165,15 +159,7 @@ INCH = 25.4
 
 
 def drawn(scene: Scene, *, least_width: float = 0.0) -> Figure:
-    """Return a figure of the page in real size.
-
-    Args:
-        scene: The page.
-        least_width: The least width of strokes in mm, so that hairlines show on a screen.
-
-    Raises:
-        OrbiflowError: If the scene is artwork.
-    """
+    """Return a figure of the page in real size; strokes are at least `least_width` mm wide."""
     from matplotlib.collections import PathCollection
     from matplotlib.figure import Figure
     from matplotlib.patches import Rectangle
@@ -272,11 +258,7 @@ MOST_PIXELS = 100_000_000
 
 
 def write_png(scene: Scene, *, dpi: float = 300.0) -> bytes:
-    """Return the scene as a PNG that gives its resolution, so that it prints in real size.
-
-    Raises:
-        OrbiflowError: If it has more than `MOST_PIXELS`, or none.
-    """
+    """Return the scene as a PNG that gives its resolution, so that it prints in real size."""
     width, height = (side * dpi / INCH for side in (scene.width, scene.height))
     if width * height > MOST_PIXELS or max(width, height) >= 2**16:
         raise OrbiflowError(
@@ -292,8 +274,7 @@ def write_png(scene: Scene, *, dpi: float = 300.0) -> bytes:
     return buffer.getvalue()
 
 
-VISIBLE = 0.05
-"""The least width in mm of a line that shows on a screen."""
+VISIBLE = 0.05  # the least width in mm of a line that shows on a screen
 
 
 @dataclass(frozen=True, eq=False)
@@ -443,11 +424,7 @@ def _neck_notes(placed: Layout) -> list[str]:
 
 
 def write_scene(scene: Scene, settings: ExportSettings) -> str | bytes:
-    """Return the content of a sheet's file.
-
-    Raises:
-        OrbiflowError: If a PNG would have too many pixels.
-    """
+    """Return the content of a sheet's file."""
     fine = settings.deviation / 4
     match settings.file_format:
         case "pdf":

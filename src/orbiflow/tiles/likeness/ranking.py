@@ -24,9 +24,9 @@ def rank_score(iou: float, recognisability: float) -> float:
     """Return the score of a tile, 0 to 1: the geometric mean of both, IoU with weight 1/4.
 
     A geometric mean compares ratios, so it does not matter that IoU varies little between tiles (a
-    blob without limbs has nine tenths of the best tile's) and recognisability much; and a tile needs
-    some of both. With more weight on IoU blobs win; with none, a tile may lie beside its target.
-    docs/recognisability.md has the numbers.
+    blob without limbs has nine tenths of the best tile's) and recognisability much; and a tile
+    needs some of both. With more weight on IoU blobs win; with none, a tile may lie beside its
+    target. docs/recognisability.md has the numbers.
 
     Raises `OrbiflowError` for a value outside [0, 1].
 
@@ -50,8 +50,8 @@ def diverse(
 
     This is maximal marginal relevance (Carbonell, Goldstein, 1998): the first candidate has the
     largest score, each next one the largest score minus `variety` times its largest similarity to a
-    chosen one. Candidates with a similarity above `twin` to a chosen one are left out, so there may be
-    fewer than `count`.
+    chosen one. Candidates with a similarity above `twin` to a chosen one are left out, so there may
+    be fewer than `count`.
 
     Args:
         scores: The scores (n,), larger is better; of equal ones the earlier comes first.

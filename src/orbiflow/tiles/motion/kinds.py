@@ -67,8 +67,7 @@ class Motion:
             yield size[k] * outline @ linear[k].T + offset[k], int(self.colours[k]), size[k] == 1
 
 
-ALWAYS = (-1.0, -0.5)
-"""The birth of copies that are there from the start."""
+ALWAYS = (-1.0, -0.5)  # the birth of copies that are there from the start
 
 
 BEND = 0.45
@@ -111,17 +110,8 @@ class Page:
 def morph(tile: Tile, width: int, *, y_down: bool = False, steady: bool = False) -> Motion:
     """Return the tiling by the class's template, with straight edges, becoming the tile's.
 
-    It is a tiling throughout.
-
-    Args:
-        tile: A tile whose class and corners are known.
-        width: The picture's width in pixels.
-        y_down: Whether the tile's y axis points down.
-        steady: Whether the tile's lattice is there from the start: then the template is stretched as
-            the lattice is, and only edges move.
-
-    Raises:
-        OrbiflowError: If the tile has no known class.
+    It is a tiling throughout. If `steady`, the tile's lattice is there from the start: then the
+    template is stretched as the lattice is, and only edges move.
     """
     way, page = Morph(OwnFrame.of(tile)), Page(tile, width, y_down)
     end = way.end
@@ -175,15 +165,7 @@ def grow(tile: Tile, width: int, *, y_down: bool = False) -> Motion:
 
 
 def bend(given: EscherTile, width: int) -> Motion:
-    """Return the silhouette bending into the tile, and then the tiling growing around it.
-
-    Args:
-        given: A tile of a search for likeness, with its map.
-        width: The picture's width in pixels.
-
-    Raises:
-        OrbiflowError: If there is no map: the silhouette did not bend into this tile.
-    """
+    """Return the silhouette bending into the tile, and then the tiling growing around it."""
     tile, bending, frame = given.tile, given.bending, given.frame
     if bending is None or frame is None:
         raise OrbiflowError(
@@ -264,14 +246,7 @@ def _seen(
 
 
 class BendingWay:
-    """The silhouettes on the way from the one at rest to the tile.
-
-    Args:
-        bending: The map between the two.
-
-    Raises:
-        OrbiflowError: If its triangles have no single outline.
-    """
+    """The silhouettes on the way from the one at rest to the tile."""
 
     def __init__(self, bending: Bending) -> None:
         self.rest, self.images = bending.rest, bending.images

@@ -1,14 +1,15 @@
 """The way from a class's template to a tile through tiles: no frame overlaps, however limbs are bent.
 
 Both tiles are divided into triangles that correspond. Every vertex of the tiling is a mean of its
-neighbours with positive weights (mean value coordinates; Floater, 2003), and on a torus any positive
-weights give a plane drawing (Tutte, 1963; Gortler, Gotsman and Thurston, 2006). So the weights are
-interpolated instead of the places (Floater and Gotsman, How to morph tilings injectively, 1999), and
-the places are solved for. Weights that are invariant under the group give places that are, so there are
-two unknowns for each orbit of vertices.
+neighbours with positive weights (mean value coordinates; Floater, 2003), and on a torus any
+positive weights give a plane drawing (Tutte, 1963; Gortler, Gotsman and Thurston, 2006). So the
+weights are interpolated instead of the places (Floater and Gotsman, How to morph tilings
+injectively, 1999), and the places are solved for. Weights that are invariant under the group give
+places that are, so there are two unknowns for each orbit of vertices.
 
-If the group has no rotation, walks by such weights may drift, and the torus would have to change. The
-weights along the drift are then tilted by an exponential, which keeps them positive, until it stops.
+If the group has no rotation, walks by such weights may drift, and the torus would have to change.
+The weights along the drift are then tilted by an exponential, which keeps them positive, until it
+stops.
 """
 
 from __future__ import annotations
@@ -58,11 +59,7 @@ class OwnFrame:
 
     @classmethod
     def of(cls, tile: Tile) -> OwnFrame:
-        """Of a tile whose class and corners are known, as those of every search are.
-
-        Raises:
-            OrbiflowError: if they are not, or polygon and group are not of the class.
-        """
+        """Of a tile whose class and corners are known, as those of every search are."""
         instance(tile, Tile, "the tile", "read_result(folder) gives one")
         if not tile.isohedral_class:
             raise OrbiflowError("this tile's class is not known, so neither is what it comes from")
@@ -82,11 +79,7 @@ class OwnFrame:
         return own
 
     def check(self) -> None:
-        """Nothing, if identified edges are images of each other, vertex by vertex.
-
-        Raises:
-            OrbiflowError: if they are not.
-        """
+        """Check that identified edges are images of each other, vertex by vertex."""
         size = np.sqrt(self.kind.group().cell_volume / self.kind.group().order)
         for pair in self.kind.identified_edges:
             first, second = self.edge(pair.first), self.edge(pair.second)
@@ -256,11 +249,8 @@ def _links(own: OwnFrame) -> list[list[tuple[int, Isometry]]]:
     return links
 
 
-ROUNDS = 12
-"""Number of times that sides of the outline may be halved for the triangulation."""
-
-STIFF = 1e4
-"""How much more strongly edges pull than the inside where they are to be straight."""
+ROUNDS = 12  # number of times that sides of the outline may be halved for the triangulation
+STIFF = 1e4  # how much more strongly edges pull than the inside where they are to be straight
 
 TILTS, BALANCED, TINY = 12, 1e-9, 1e-4
 """Greatest number of steps in which weights are tilted, the force that counts as none, and the step
@@ -274,14 +264,7 @@ CHECKED = 96
 
 
 class Morph:
-    """The way from a tile's template to the tile: straight if it stays simple, else by weights.
-
-    Args:
-        own: The tile.
-
-    Raises:
-        OrbiflowError: If the tile cannot be triangulated.
-    """
+    """The way from a tile's template to the tile: straight if it stays simple, else by weights."""
 
     def __init__(self, own: OwnFrame) -> None:
         self.end, self.start = own, own.straight()

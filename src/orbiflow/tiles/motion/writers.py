@@ -112,11 +112,7 @@ def animation(
 
 
 def motion(tile: EscherTile, settings: AnimationSettings) -> Motion:
-    """Return what moves, before it is a file.
-
-    Raises:
-        OrbiflowError: if the tile lacks what the kind needs.
-    """
+    """Return what moves, before it is a file."""
     match settings.kind:
         case "morph":
             steady = settings.format == "svg"
@@ -127,8 +123,7 @@ def motion(tile: EscherTile, settings: AnimationSettings) -> Motion:
             return bend(tile, settings.size)
 
 
-OUTLINE = 0.0016
-"""Width of outlines, as a share of the picture's."""
+OUTLINE = 0.0016  # width of outlines, as a share of the picture's
 
 ProgressCall = Callable[[float], None]
 """Called with the share of the work that is done."""
@@ -154,14 +149,7 @@ def picture(motion: Motion, palette: Palette, progress: float) -> Raster:
 
 
 def write_gif(motion: Motion, palette: Palette, frames: list[Frame], told: ProgressCall) -> bytes:
-    """Return a GIF that repeats for ever, with one palette for all frames.
-
-    Args:
-        motion: What moves.
-        palette: The palette of paper, fills and outlines.
-        frames: The frames of the loop.
-        told: Called with the share of the work that is done.
-    """
+    """Return a GIF that repeats for ever, with one palette for all frames."""
     fills = [palette.fill(k) for k in range(int(motion.colours.max(initial=0)) + 1)]
     colours = (palette.paper, *fills, palette.outline)
     # few mixed colours, each of which costs bytes in every frame
@@ -184,11 +172,7 @@ def write_gif(motion: Motion, palette: Palette, frames: list[Frame], told: Progr
 
 
 def require_ffmpeg() -> str:
-    """Return the path of ffmpeg.
-
-    Raises:
-        OrbiflowError: If it is not installed.
-    """
+    """Return the path of ffmpeg, which must be installed."""
     found = shutil.which("ffmpeg")
     if found is None:
         raise OrbiflowError(
@@ -201,11 +185,7 @@ def require_ffmpeg() -> str:
 def write_mp4(
     motion: Motion, palette: Palette, frames: list[Frame], fps: float, told: ProgressCall
 ) -> bytes:
-    """Return an MP4 (H.264) of one loop, which every player and browser shows.
-
-    Raises:
-        OrbiflowError: If ffmpeg is not installed or fails.
-    """
+    """Return an MP4 (H.264) of one loop, which every player and browser shows."""
     ffmpeg = require_ffmpeg()
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "loop.mp4"
@@ -251,12 +231,7 @@ def write_motion_svg(
 ) -> str:
     """Return an animated SVG; readers who prefer less motion see the tiling at rest.
 
-    Args:
-        motion: What moves; it must be steady.
-        palette: The palette of paper, fills and outlines.
-        seconds: The time that the loop takes.
-        name: The beginning of all ids and classes, so that a page can hold several animations.
-        title: The title in words.
+    All ids and classes begin with `name`, so that a page can hold several animations.
     """
     key = re.sub(r"[^A-Za-z0-9]+", "-", name).strip("-").lower() or "tile"
     width, height = motion.width, motion.height

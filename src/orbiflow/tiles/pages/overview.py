@@ -184,7 +184,8 @@ def overview_png(
 def verdict(result: EscherTile) -> str:
     """Return how far a tile is from its silhouette, in a few words.
 
-    After a search for likeness this is what bending cost, else how well the silhouette is recognised.
+    After a search for likeness this is what bending cost, else how well the silhouette is
+    recognised.
     """
     if result.deformation is None:
         how = f"recognised {result.recognisability.score:.2f}"

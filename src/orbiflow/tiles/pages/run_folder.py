@@ -171,11 +171,7 @@ def write_gallery(
 def write_front(
     results: Sequence[EscherTile], found: Iterable[EscherTile], target: Target, out: Path
 ) -> None:
-    """Write `front.png`: the listed tiles among all that were found, by deformation and overlap.
-
-    Raises:
-        OutputError: If the file cannot be written.
-    """
+    """Write `front.png`: the listed tiles among all that were found, by deformation and overlap."""
     listed = {id(result.tile) for result in results}
     others = [result for result in found if id(result.tile) not in listed]
     points = [
@@ -230,11 +226,7 @@ def written_files(folder: Path) -> set[str]:
 
 
 def result_folder(out: str | Path) -> ResultFolder:
-    """Return the folder that a run is written to.
-
-    Raises:
-        OutputError: If it holds what orbiflow did not write.
-    """
+    """Return the folder that a run is written to, which holds nothing else."""
     return ResultFolder(as_path(out, "the folder to write into"), written_files)
 
 
@@ -243,8 +235,8 @@ def write_run(
 ) -> list[Path]:
     """Write what a search found as a result folder: a folder a class, overviews, `result.json`.
 
-    An earlier run there is replaced whole, unless the search was interrupted before any class had its
-    tile: a first look is less than an earlier run's tiles.
+    An earlier run there is replaced whole, unless the search was interrupted before any class had
+    its tile: a first look is less than an earlier run's tiles.
 
     Args:
         result: What the search found.

@@ -21,8 +21,7 @@ NAMES = {"likeness": "found for likeness", "overlap": "found for overlap"}
 SIZE, SMALL = 0.075, 0.03
 """Height of a listed tile's silhouette, and of another tile's, as a share of the width."""
 
-PUSHES = 400
-"""Number of steps in which the silhouettes make room for each other."""
+PUSHES = 400  # number of steps in which the silhouettes make room for each other
 
 
 class FrontPoint(NamedTuple):
@@ -48,9 +47,9 @@ class FrontPoint(NamedTuple):
 def front_png(points: Sequence[FrontPoint], *, width_px: int = 1600, y_down: bool = False) -> bytes:
     """Return a PNG of tiles by deformation (to the right) and overlap (upwards), as silhouettes.
 
-    Listed tiles are large and coloured by what they were found for, with a line to their place if they
-    had to make room; full colour means that no other beats them. Others are pale, and the dashed
-    steps are the border of what is beaten.
+    Listed tiles are large and coloured by what they were found for, with a line to their place if
+    they had to make room; full colour means that no other beats them. Others are pale, and the
+    dashed steps are the border of what is beaten.
 
     Args:
         points: All tiles that were found.

@@ -127,11 +127,8 @@ def _clean(geometry: BaseGeometry) -> BaseGeometry:
 
 
 TILE, GHOST, ARROW = "#d7dee6", "#9a8c7a", "#b0413e"
-STILL = 0.06
-"""Distance, in square roots of the area, up to which no arrow is drawn."""
-
-FAR = 0.3
-"""Distance, in square roots of the area, at which the outline has the ramp's last colour."""
+STILL = 0.06  # distance, in square roots of the area, up to which no arrow is drawn
+FAR = 0.3  # distance, in square roots of the area, at which the outline has the ramp's last colour
 
 _STEPS = 11
 _LINE, _GHOST = 0.0042, 0.0022  # widths of lines, as shares of the picture's

@@ -69,8 +69,7 @@ def default_window(tile: Tiles) -> Window:
     return float(x - half), float(y - high), float(x + half), float(y + high)
 
 
-PIXELS_PER_POINT = 200 / 72
-"""Pixels per point, where widths are given in points."""
+PIXELS_PER_POINT = 200 / 72  # pixels per point, where widths are given in points
 
 
 def tiling_png(
@@ -170,8 +169,7 @@ def tiling_picture(
     return vector_picture(raster, sheet or Sheet.column(), title=title, caption="")
 
 
-PANEL_ASPECT = 1.25
-"""Width over height of the part of a tiling that a panel of `tilings_png` shows."""
+PANEL_ASPECT = 1.25  # width over height of the part of a tiling that a panel of `tilings_png` shows
 
 _NAME, _GAP = 0.13, 0.05  # height of a panel's name, and the space around it, in panel widths
 
@@ -245,8 +243,8 @@ def classes_png(*, width_px: int = 2400) -> bytes:
     """Return a PNG of the nine classes, three by three (paper, figures of templates and symmetries).
 
     On the left of each panel is the template: identified edges have one colour and arrows that the
-    group maps onto each other; an arrow with one barb belongs to a glide reflection. On the right is
-    the tiling: a fill for each aspect, the lattice cell, rotation centres and glide lines.
+    group maps onto each other; an arrow with one barb belongs to a glide reflection. On the right
+    is the tiling: a fill for each aspect, the lattice cell, rotation centres and glide lines.
 
     Raises:
         OrbiflowError: If the picture would be too large or too small.

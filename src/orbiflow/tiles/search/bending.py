@@ -44,17 +44,10 @@ from orbiflow.tiles.search.tile_space import NearestTiles, TileSpace
 from orbiflow.tiles.silhouette import Target
 from orbiflow.tiles.tilings import IsohedralClass
 
-TWIN = 2e-4
-"""Mean squared distance of two bent outlines below which they are twins."""
-
-FIRST_ROUNDS = 6
-"""Steps of the minimisation for all that are held."""
-
-FOLLOWING = 60.0
-"""Strength of the springs by which a finer body follows a coarser one."""
-
-RELAXED = 1500.0
-"""Strength of the springs that keep a relaxed outline near its tile."""
+TWIN = 2e-4  # mean squared distance of two bent outlines below which they are twins
+FIRST_ROUNDS = 6  # steps of the minimisation for all that are held
+FOLLOWING = 60.0  # strength of the springs by which a finer body follows a coarser one
+RELAXED = 1500.0  # strength of the springs that keep a relaxed outline near its tile
 
 Item = TypeVar("Item")
 
@@ -98,21 +91,9 @@ def bent_tiles(
     *,
     wanted: int = 1,
 ) -> tuple[list[Bent], int]:
-    """The finalists of one class, best score first, no two of them twins.
+    """Return the finalists of one class, best score first and without twins, and how many crossed.
 
-    Args:
-        both: of the target.
-        kind: the class.
-        settings: of the search.
-        progress: told the share of the work done.
-        cancel: looked at before each step.
-        wanted: finalists of each hand at least, if there are as many.
-
-    Returns:
-        The finalists, and how many were dropped because they cross themselves.
-
-    Raises:
-        Cancelled: if it was told to stop.
+    There are at least `wanted` of each hand, if so many are found.
     """
     told, cancel = progress or _told_nobody, cancel or Cancel()
     found: list[Bent] = []
@@ -302,21 +283,7 @@ def fit_bending(
     progress: Progress | None = None,
     cancel: Cancel | None = None,
 ) -> Fit:
-    """Fit tiles of one class to a target by letting the silhouette bend (design point 15).
-
-    Args:
-        target: the silhouette.
-        kind: the class.
-        settings: of the search.
-        both: the target's hands, see `hands`.
-        per_class: certified tiles that are wanted.
-        progress: told the share of the work done.
-        cancel: looked at before each step.
-
-    Raises:
-        CertificationError: if every finalist crosses itself.
-        Cancelled: if it was told to stop.
-    """
+    """Fit tiles of one class to a target by letting the silhouette bend (design point 15)."""
     with one_blas_thread():  # many small systems
         return _fit(target, kind, settings, both, per_class, progress, cancel)
 
@@ -347,13 +314,9 @@ def _fit(
 
 
 def placed_best(bent: Bent, overlap: Overlap) -> PlacedBent:
-    """Lay a bent tile over the silhouette by the similarity of largest IoU.
+    """Lay a bent tile over the silhouette that was bent by the similarity of largest IoU.
 
     From the one that lays the bent points nearest to where they were, by L-BFGS on exact gradients.
-
-    Args:
-        bent: a tile.
-        overlap: with the silhouette that was bent: mirrored if the hand is.
     """
     rest, points = bent.hand.fine.rest, bent.points
     center = points.mean()

@@ -20,21 +20,14 @@ from orbiflow.tiles.search.bending import Bent
 from orbiflow.tiles.silhouette import Bending, Mesh, triangulate, unfolded
 from orbiflow.tiles.tilings import Tile
 
-SAME = 1e-9
-"""Distance along the outline, in outlines, below which points are one."""
+SAME = 1e-9  # distance along the outline, in outlines, below which points are one
 
 
 def map_of_bent(bent: Bent, factor: complex, shift: complex, tile: Tile) -> Bending:
     """Return the map that a bent silhouette and its similarity z -> factor z + shift make.
 
-    Args:
-        bent: a silhouette that is a tile.
-        factor, shift: of the similarity, in the frame of the hand that was bent.
-        tile: extracted from it, in the target's normal form: a mirrored hand's is reflected back.
-            It may have fewer vertices than the bent outline: the outline is laid onto it.
-
-    Raises:
-        OrbiflowError: if the silhouette's inside cannot follow without folds.
+    The tile, in the target's normal form, may have fewer vertices than the bent outline, which is
+    laid onto it. It is an `OrbiflowError` if the silhouette's inside cannot follow without folds.
     """
     hand = bent.hand
     flip = np.array([1.0, -1.0]) if hand.mirrored else np.ones(2)
@@ -56,24 +49,12 @@ def map_of_bent(bent: Bent, factor: complex, shift: complex, tile: Tile) -> Bend
 def onto_polygon(
     mesh: Mesh, images: Array, polygon: Array, corners: Integers, vertices: Integers
 ) -> tuple[Mesh, Array]:
-    """Move the outline's images so that together they are the polygon.
+    """Move the outline's images (of `images` (N, 2)) onto a polygon (Q, 2); return the mesh and images.
 
     Where a vertex of the polygon belongs to none of the outline's points, a point is put on the
-    outline and its triangle divided; points between two vertices are laid onto the side between them,
-    in proportion to where they were.
-
-    Args:
-        mesh: of the silhouette.
-        images: (N, 2) of its points; the outline's lie near the polygon.
-        polygon: (Q, 2), run through as the outline is.
-        corners: (K,) of the outline's points, in order.
-        vertices: (K,) of the polygon's vertices: where the corners go.
-
-    Returns:
-        The mesh, with more points where need be, and their images.
-
-    Raises:
-        OrbiflowError: if the corners do not run round the outline and the polygon once.
+    outline and its triangle divided; points between two vertices are laid onto the side between
+    them, in proportion to where they were. The outline's points `corners` (K,) go to the polygon's
+    `vertices` (K,), both in order round.
     """
     n, outline = mesh.size, mesh.size + len(mesh.sides)
     knots = arc_lengths(np.roll(images[:n], -corners[0], axis=0))
@@ -166,29 +147,20 @@ def _with_points(mesh: Mesh, at: Array, order: Integers, slots: Integers) -> Mes
     )
 
 
-TILE, SILHOUETTE = 240, 480
-"""Points along the two outlines that are matched."""
-
-STEPS = 12
-"""Most points of the silhouette that one step along the tile passes."""
-
-EVENNESS = 2e-3
-"""Cost of a step that is not the usual two points, in areas a point squared."""
+TILE, SILHOUETTE = 240, 480  # points along the two outlines that are matched
+STEPS = 12  # most points of the silhouette that one step along the tile passes
+EVENNESS = 2e-3  # cost of a step that is not the usual two points, in areas a point squared
 
 PROPORTION = 0.15
 """Share of the matching that goes evenly round: no part of the silhouette is squeezed to nothing."""
 
 
 def matched(silhouette: Array, polygon: Array) -> Bending:
-    """A map without folds from a silhouette to a tile that lies over it.
+    """Return a map without folds from a silhouette (N, 2) to a tile (M, 2) over it, in normal form.
 
     Points of the outlines are matched in order, near ones with near ones (dynamic programming over
     both outlines, from the two points that are nearest); the inside follows harmonically and
     is untangled.
-
-    Args:
-        silhouette: outline (N, 2) in the target's normal form.
-        polygon: (M, 2) of the tile, there.
 
     Raises:
         OrbiflowError: if the inside cannot follow without folds.

@@ -58,15 +58,10 @@ class Prototiles:
     def of(
         cls, kind: IsohedralClass, tiles: NearestTiles, count: int, *, mirrored: bool
     ) -> Prototiles:
-        """Turn placed polygons into start tiles.
+        """Turn placed polygons, whose `linear` keeps orientation, into start tiles of `count` vertices.
 
-        Args:
-            kind: their class.
-            tiles: whose `linear` keeps orientation.
-            count: vertices of each start tile, a multiple of the polygons' own number: each of their
-                sides is divided evenly.
-            mirrored: whether the polygons belong to the target's mirror image in the x axis; the
-                start tiles are placed on the target itself.
+        `count` is a multiple of the polygons' own number: their sides are divided evenly. Polygons
+        that belong to the target's mirror image in the x axis are placed on the target itself.
         """
         placed = np.stack([tiles.vertices.real, tiles.vertices.imag], axis=-1)
         inverse = np.linalg.inv(tiles.linear)
@@ -117,21 +112,11 @@ def simplest_tile(
 ) -> Tile:
     """Return the coarsest polygon along a boundary that is simple, with its group.
 
-    It is 5e-4 of the tile's size from the sampled curve, finer where parts of the boundary come close
-    to each other.
-
-    Args:
-        kind: The class.
-        vertices: (N, 2) the prototile, in the group's own frame.
-        corners: Indices of the template's corners, increasing from 0.
-        linear: (2, 2), with `offset` the map from the group's own frame.
-        offset: (2,).
-        moved: Takes points (M, 2) of that frame to where the flow carries them.
-        force: Return the finest polygon even if it crosses itself.
-
-    Raises:
-        CertificationError: if no sampling gives a simple polygon: the candidate has folded. With
-            `force`, only if coordinates are not finite.
+    It is 5e-4 of the tile's size from the sampled curve, finer where parts of the boundary come
+    close to each other. The prototile's `vertices` (N, 2) and points that `moved` carries lie in
+    the group's own frame, from which `linear` (2, 2) and `offset` (2,) lead. If no sampling gives a
+    simple polygon, the candidate has folded: a `CertificationError`, unless `force` takes the
+    finest.
     """
     tile = None
     for count in DENSE:
@@ -239,11 +224,7 @@ class Candidates(Protocol):
         ...
 
     def finished(self, index: int, *, force: bool = False) -> tuple[Tile, TileMap]:
-        """Return the polygon of a candidate with its group, and the flow that made it.
-
-        Raises:
-            CertificationError: if it has no simple polygon and `force` is not set.
-        """
+        """Return a candidate's polygon with its group, and its flow; it is simple unless forced."""
         ...
 
     def as_model(self) -> TileModel:
@@ -286,8 +267,7 @@ WAVES = {
 }
 """By class, the number of parameters of a symmetric field of frequency 1."""
 
-STEPS = 8
-"""Integration steps with which a flow's polygon is first computed."""
+STEPS = 8  # integration steps with which a flow's polygon is first computed
 
 
 @dataclass(frozen=True, eq=False)

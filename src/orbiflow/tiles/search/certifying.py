@@ -36,11 +36,7 @@ def best_tiles(
 ) -> list[EscherTile]:
     """Turn finalists into polygons and certify them, best first, until there are enough.
 
-    Returns:
-        Certified tiles, best score first.
-
-    Raises:
-        CertificationError: if no finalist is certified and `force` is not set.
+    Returns certified tiles, best score first; none, unless forced, is a `CertificationError`.
     """
     found: list[EscherTile] = []
     reasons: list[str] = []

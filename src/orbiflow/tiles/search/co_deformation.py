@@ -1,14 +1,14 @@
 """Co-deformation: a silhouette bends, as rigidly as it can, until it is a tile (design point 15).
 
-Hundreds of placements side by side. First springs draw each outline to the nearest tile of its class,
-which is taken anew after every step, and tighten; one factorization serves all placements and all
-classes. Then each outline is held in the linear space of its placement's tiles and the energy is
-minimised there: rotations in turn with one small linear system.
+Hundreds of placements side by side. First springs draw each outline to the nearest tile of its
+class, which is taken anew after every step, and tighten; one factorization serves all placements
+and all classes. Then each outline is held in the linear space of its placement's tiles and the
+energy is minimised there: rotations in turn with one small linear system.
 
-A search with few points knows a tile's corners to within a sixtieth of the outline. So each placement
-then moves to the best of its neighbours until none is better: the lengths of two pairs of edges change
-by a step, or all corners move along. Of the neighbours, those whose nearest tile is near the present
-outline are worked out, by springs.
+A search with few points knows a tile's corners to within a sixtieth of the outline. So each
+placement then moves to the best of its neighbours until none is better: the lengths of two pairs of
+edges change by a step, or all corners move along. Of the neighbours, those whose nearest tile is
+near the present outline are worked out, by springs.
 """
 
 from __future__ import annotations
@@ -35,11 +35,8 @@ from orbiflow.tiles.search.tile_space import TileSpace
 from orbiflow.tiles.silhouette import Emphasis, Pins, Samples, Target, sampled, triangulate
 from orbiflow.tiles.tilings import IsohedralClass
 
-TIGHTER = tuple(np.geomspace(1.2, 3000.0, 9))
-"""Strengths of the springs, stage by stage."""
-
-ROUNDS = 3
-"""Steps of choosing rotations and solving: in each stage, and of each neighbour."""
+TIGHTER = tuple(np.geomspace(1.2, 3000.0, 9))  # strengths of the springs, stage by stage
+ROUNDS = 3  # steps of choosing rotations and solving: in each stage, and of each neighbour
 
 
 class BentTiles(NamedTuple):
@@ -64,17 +61,9 @@ def drawn_to_tiles(
     strengths: tuple[float, ...] = TIGHTER,
     rounds: int = ROUNDS,
 ) -> tuple[Complex, TileSpace]:
-    """Bend a body towards tiles of a class by springs that tighten.
+    """Bend a body towards tiles of C placements of a class by springs that tighten.
 
-    Args:
-        body: whose outline has as many points as the placements have steps.
-        kind: the class.
-        placements: C of them.
-        strengths: of the springs, stage by stage.
-        rounds: steps of each stage.
-
-    Returns:
-        Shapes (N, C), nearly tiles, and the space of tiles with the glide axes turned to suit them.
+    Returns shapes (N, C), nearly tiles, and the space of tiles, its glide axes turned to suit them.
     """
     space = TileSpace(kind, placements)
     z = np.repeat(body.rest[:, None], space.count, axis=1)
@@ -87,14 +76,7 @@ def drawn_to_tiles(
 
 
 def held_on_tiles(body: Elastic, space: TileSpace, z: Complex, rounds: int) -> BentTiles:
-    """Minimise the energy among tiles: the outline moves in the space of its placement's tiles.
-
-    Args:
-        body: the silhouette.
-        space: of tiles, C placements.
-        z: shapes (N, C) to start from.
-        rounds: of choosing rotations and solving.
-    """
+    """Minimise the energy among tiles from shapes (N, C): outlines move in their placements' spaces."""
     condensed = body.condensed
     low = condensed.low
     parts = [_Reduced(condensed.outline, low, *space.matrices(k)) for k in range(space.count)]
@@ -190,17 +172,7 @@ def hands(
     emphasis: Emphasis | None = None,
     pins: Pins | None = None,
 ) -> tuple[Hand, Hand]:
-    """The silhouette and its mirror image in the x axis, ready to be bent.
-
-    Args:
-        target: the silhouette.
-        settings: of the search.
-        emphasis: what is to bend less, by as much as it matters more.
-        pins: what is not to bend.
-
-    Raises:
-        OrbiflowError: for a silhouette that cannot be sampled or triangulated.
-    """
+    """The silhouette and its mirror image in the x axis, ready to be bent."""
     phase = float(np.random.default_rng(settings.seed).random()) if settings.seed else 0.0
     samples = sampled(np.asarray(target.normal), phase, settings.multiples)
     # read backwards from the same first point: every k-th fine point stays beside a coarse one
@@ -244,14 +216,9 @@ def _hands(
 SPRINGS = 1500.0
 """Strength of the springs by which neighbours are compared: nearly tiles, yet one matrix for all."""
 
-CROSSED = 100.0
-"""Added to the cost of what crosses itself: more than anything sound costs."""
-
-BETTER = 0.998
-"""A neighbour is taken if it costs less than this much of what there is."""
-
-MOST_MOVES = 8
-"""Of each placement with each step."""
+CROSSED = 100.0  # added to the cost of what crosses itself: more than anything sound costs
+BETTER = 0.998  # a neighbour is taken if it costs less than this much of what there is
+MOST_MOVES = 8  # of each placement with each step
 
 
 class Drawn(NamedTuple):
@@ -292,19 +259,10 @@ def shifted(
     share: float,
     cancel: Cancel | None = None,
 ) -> Drawn:
-    """Move the corners of each placement until no neighbour is better.
+    """Move the corners of each placement of shapes (N, C) until no neighbour is better.
 
-    Args:
-        body: the silhouette.
-        kind: the class.
-        placements: C of them, of the body's outline.
-        points: (N, C) shapes to start from.
-        stages: one after the other.
-        share: of all neighbours that are worked out, those of the nearest tiles.
-        cancel: looked at before each move.
-
-    Returns:
-        The placements that are left, best first, no two the same.
+    Of all neighbours the `share` with the nearest tiles is worked out. Returns the placements that
+    are left, best first, no two the same.
     """
     cancel = cancel or Cancel()
     drawn = _drawn(body, kind, placements, points)
@@ -392,8 +350,8 @@ def _take_better(drawn: Drawn, owners: Integers, tried: Drawn) -> Integers:
 def _moves(kind: IsohedralClass, step: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Neighbours of a placement: what is added to lengths (M, K) and starts (M,).
 
-    One pair of edges becomes longer and another shorter, with the first corner where it is, or moved
-    so that one of the other corners stays; or all corners move.
+    One pair of edges becomes longer and another shorter, with the first corner where it is, or
+    moved so that one of the other corners stays; or all corners move.
     """
     pairs = kind.identified_edges
     still = np.zeros(len(kind.template()), dtype=np.int64)

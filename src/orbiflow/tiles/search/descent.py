@@ -3,8 +3,8 @@
 A tile's area is fixed by its group, so its overlap with the target is a boundary integral: its
 derivative in the boundary is (occupancy - 1/2) n ds. Each step projects that force on the invariant
 Fourier fields, damps it by (1 + |kappa|^2)^-s, adds momentum, and follows the field for a time in
-which no boundary point moves far and the map stays injective. The fields are kept: one segment each of
-the flow that is the result. No backpropagation through an equation, all starts side by side. The
+which no boundary point moves far and the map stays injective. The fields are kept: one segment each
+of the flow that is the result. No backpropagation through an equation, all starts side by side. The
 last percent is L-BFGS on the exact IoU of the polygon, through one more segment (design point 10).
 """
 
@@ -34,8 +34,7 @@ from orbiflow.tiles.silhouette import Emphasis, SoftTarget, Target
 from orbiflow.tiles.tilings import IsohedralClass, isohedral_class
 from orbiflow.typed_torch import linalg
 
-CALM = 0.4
-"""Step length times the field's steepness, at most; less where `calm` finds it too bold."""
+CALM = 0.4  # step length times the field's steepness, at most; less where `calm` finds it too bold
 
 
 def calm(field: FourierField) -> float:
@@ -46,13 +45,7 @@ def calm(field: FourierField) -> float:
 
 
 class Descent:
-    """Candidates on their way: boundary points in the group's frame, poses, momentum, the record.
-
-    Args:
-        kind: the class.
-        prototiles: the starts, of `settings.boundary` vertices each.
-        settings: of the descent.
-    """
+    """Candidates on their way: boundary points in the group's frame, poses, momentum, the record."""
 
     def __init__(
         self, kind: IsohedralClass, prototiles: Prototiles, settings: OverlapSearch
@@ -151,12 +144,7 @@ class Descent:
 
     @torch.no_grad()
     def keep(self, chosen: Sequence[int], iou: Array) -> None:
-        """Go on with the candidates `chosen` alone.
-
-        Args:
-            chosen: their indices.
-            iou: (S,) of all candidates as they are; below 0 if unknown.
-        """
+        """Go on with the candidates `chosen` alone; `iou` (S,) is that of all, below 0 if unknown."""
         index = list(chosen)
         known = torch.tensor(iou, dtype=torch.float32).clamp(0.5, 1.0)
         self.threshold = (known / (1 + known))[index]
@@ -174,14 +162,9 @@ def _between(ends: tuple[float, float], share: float) -> float:
     return ends[0] * (ends[1] / ends[0]) ** share
 
 
-SMOOTHNESS = 1.25
-"""Exponent s of the preconditioning (1 + |kappa|^2)^-s."""
-
-STEPS = 2
-"""Midpoint steps through the new segment; each stays injective."""
-
-STALL = 2e-5
-"""Polishing stops when ten iterations together gain less IoU than this."""
+SMOOTHNESS = 1.25  # exponent s of the preconditioning (1 + |kappa|^2)^-s
+STEPS = 2  # midpoint steps through the new segment; each stays injective
+STALL = 2e-5  # polishing stops when ten iterations together gain less IoU than this
 
 
 def polish(
@@ -189,18 +172,8 @@ def polish(
 ) -> TileModel:
     """Improve a single candidate: a last stationary segment and its pose, by exact gradients.
 
-    Args:
-        model: one candidate, float32 or float64; left as it is.
-        target: the silhouette.
-        iterations: of L-BFGS at most; it stops early where the IoU stalls.
-        cancel: looked at before each evaluation.
-
-    Returns:
-        A float64 model with one segment more, or as many if nothing was gained. Its sampled
-        boundary is simple and its IoU no smaller.
-
-    Raises:
-        Cancelled: if it was told to stop.
+    Returns a float64 model with one segment more, or as many if nothing was gained. Its sampled
+    boundary is simple and its IoU no smaller.
     """
     cancel = cancel or Cancel()
     work = _Polish(model, target)
@@ -300,8 +273,7 @@ class _Polish:
 FEW, POOR = 8, 0.4
 """Starts from the outline, and IoU of the best of them, below which the template's join them."""
 
-NEAR = 0.01
-"""IoU that a more recognisable candidate of a class may be behind the best."""
+NEAR = 0.01  # IoU that a more recognisable candidate of a class may be behind the best
 
 
 def fit_descent(
@@ -413,11 +385,7 @@ def _overlaps(goal: shapely.Polygon, soft: SoftTarget, descent: Descent) -> Arra
 
 
 def _best_first(target: Target, goal: shapely.Polygon, soft: SoftTarget, descent: Descent) -> float:
-    """Order the survivors by IoU and recognisability together, those that gave up IoU last.
-
-    Returns:
-        The IoU of the first.
-    """
+    """Order survivors by IoU and recognisability, those that gave up IoU last; the IoU of the first."""
     boundaries = descent.placed()
     iou = _overlaps(goal, soft, descent)
     recognise = Recogniser(target.normal)

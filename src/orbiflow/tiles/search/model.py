@@ -32,9 +32,10 @@ class TileModel(nn.Module):
     similarity A come after it, composed and not mixed in: the paper's V_sym(A^-1 z) loses the glide
     reflections as soon as A rotates (design point 6). A template of area 1 is the start.
 
-    Certificates outlive a change of precision: `.float()`, `.half()`, `.to(...)` round the parameters,
-    which only makes another tile, but `vertices`, whose identified edges must correspond, stay float64
-    whatever is asked, and the group's pose and the polygon (`extract_tile`) are computed in float64.
+    Certificates outlive a change of precision: `.float()`, `.half()`, `.to(...)` round the
+    parameters, which only makes another tile, but `vertices`, whose identified edges must
+    correspond, stay float64 whatever is asked, and the group's pose and the polygon
+    (`extract_tile`) are computed in float64.
 
     Args:
         isohedral_class: of all S tiles, or its name.

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from orbiflow.arguments import instance, number, numbers, whole
 from orbiflow.errors import CertificationError, OrbiflowError
@@ -16,23 +16,45 @@ from orbiflow.tiles.search.method import (
     SearchMethod,
     check_max_frequency,
     preferred_class,
-    settings_for,
 )
 from orbiflow.tiles.tile import EscherTile
 from orbiflow.tiles.tilings import CLASSES, IsohedralClass
 
-POINTS = 60
-"""Points of the outline that the preview looks at."""
+POINTS = 60  # points of the outline that the preview looks at
 
 PLAIN = 8.0
 """Length of an outline, in square roots of its area, up to which the settings are as they are."""
 
 
-RAGGED = 3.5
-"""Power of the length beyond, by which the number of starts grows."""
+RAGGED = 3.5  # power of the length beyond, by which the number of starts grows
+MOST_TIMES = 6.0  # what a ragged outline may multiply the starts by
 
-MOST_TIMES = 6.0
-"""What a ragged outline may multiply the starts by."""
+
+EFFORTS: Mapping[str, Mapping[str, Any]] = {
+    "fast": {
+        "candidates": 8,
+        "resolutions": (60,),
+        "projected": 800,
+        "measured": 150,
+        "stages": ((12, 2), (16, 1)),
+        "boundary": 120,
+        "polish": 0,
+        "finalists": 1,
+    },
+    "normal": {},
+    "best": {
+        "max_frequency": 15,
+        "candidates": 400,
+        "resolutions": (30, 48, 96, 120),
+        "boundary": 480,
+        "projected": 4000,
+        "measured": 1000,
+        "stages": ((20, 60), (35, 16), (45, 5), (40, 4)),
+        "polish": 100,
+        "finalists": 4,
+    },
+}
+"""What each level changes."""
 
 
 @dataclass(frozen=True)
@@ -61,6 +83,7 @@ class OverlapSearch(SearchMethod):
     """
 
     modules: ClassVar[tuple[str, ...]] = ("orbiflow.tiles.search.descent",)
+    efforts: ClassVar[Mapping[str, Mapping[str, Any]]] = EFFORTS
 
     max_frequency: int = 10
     starts: str = "outline"
@@ -96,7 +119,12 @@ class OverlapSearch(SearchMethod):
                     f"resolutions must be at least 24 and divide boundary = {self.boundary}, "
                     f"got {points:g}"
                 )
-        self._check_stages()
+        stages = numbers(self.stages, "stages", (...,))
+        pairs = stages.ndim == 2 and stages.shape[1] == 2
+        if not pairs or (stages < 1).any() or (stages % 1).any():
+            raise OrbiflowError(f"stages need steps and survivors of at least 1: {self.stages}")
+        if self.iterations >= MAX_SEGMENTS:
+            raise OrbiflowError(f"stages must have less than {MAX_SEGMENTS} steps in all")
         for name in ("smoothness", "reach", "blur"):
             for value in numbers(getattr(self, name), name, (2,)):
                 number(value, f"{name}, first and last,", 0, above=name != "smoothness")
@@ -104,14 +132,6 @@ class OverlapSearch(SearchMethod):
         number(self.stretch, "stretch", 0)
         whole(self.polish, "polish", 0, 1000)
         whole(self.seed, "seed", 0, 2**32 - 1)
-
-    def _check_stages(self) -> None:
-        stages = numbers(self.stages, "stages", (...,))
-        pairs = stages.ndim == 2 and stages.shape[1] == 2
-        if not pairs or (stages < 1).any() or (stages % 1).any():
-            raise OrbiflowError(f"stages need steps and survivors of at least 1: {self.stages}")
-        if self.iterations >= MAX_SEGMENTS:
-            raise OrbiflowError(f"stages must have less than {MAX_SEGMENTS} steps in all")
 
     @property
     def iterations(self) -> int:
@@ -130,11 +150,12 @@ class OverlapSearch(SearchMethod):
         """Let flows carry near tiles closer to the silhouette."""
         from orbiflow.tiles.search.descent import fit_descent, shared_soft_target
 
+        stages = tuple((steps, max(kept, 2 * per_class)) for steps, kept in self.stages)
         with one_thread():
             found = fit_descent(
                 goal.target,
                 kind,
-                self.with_survivors(2 * per_class),
+                replace(self, stages=stages),
                 soft=shared_soft_target(goal.target, goal.emphasis),
                 progress=progress,
                 cancel=cancel,
@@ -194,51 +215,6 @@ class OverlapSearch(SearchMethod):
             measured=round(share * self.measured),
             stages=((steps, round(share * kept)), *later),
         )
-
-    def with_survivors(self, least: int) -> OverlapSearch:
-        """The same, with at least that many candidates after each stage."""
-        stages = tuple((steps, max(kept, least)) for steps, kept in self.stages)
-        return replace(self, stages=stages)
-
-    @classmethod
-    def for_effort(cls, effort: str, **changes: object) -> OverlapSearch:
-        """The settings of a level of effort: "fast", "normal" or "best".
-
-        Args:
-            effort: the level.
-            changes: settings that differ from it, by name.
-
-        >>> OverlapSearch.for_effort("fast", seed=3).seed
-        3
-        """
-        return settings_for(cls, DESCENT_EFFORTS, effort, changes)
-
-
-DESCENT_EFFORTS: dict[str, dict[str, object]] = {
-    "fast": {
-        "candidates": 8,
-        "resolutions": (60,),
-        "projected": 800,
-        "measured": 150,
-        "stages": ((12, 2), (16, 1)),
-        "boundary": 120,
-        "polish": 0,
-        "finalists": 1,
-    },
-    "normal": {},
-    "best": {
-        "max_frequency": 15,
-        "candidates": 400,
-        "resolutions": (30, 48, 96, 120),
-        "boundary": 480,
-        "projected": 4000,
-        "measured": 1000,
-        "stages": ((20, 60), (35, 16), (45, 5), (40, 4)),
-        "polish": 100,
-        "finalists": 4,
-    },
-}
-"""What each level changes."""
 
 
 @dataclass(frozen=True)

@@ -4,8 +4,8 @@ An outline of n points is laid out along the template's edges: edge e gets `leng
 first corner sits at point `start`. The differences of a tile's boundary agree, up to the isometry,
 on identified edges; a placement's gain is how far those of the outline already do. This is the
 adjacent-difference distance of Nagata and Imahori (An Efficient Exhaustive Search Algorithm for the
-Escherization Problem, Algorithmica 2020) without its closing condition: all placements at once, from
-tables of sums along the outline. It ranks; `nearest_tile` is exact.
+Escherization Problem, Algorithmica 2020) without its closing condition: all placements at once,
+from tables of sums along the outline. It ranks; `nearest_tile` is exact.
 """
 
 from __future__ import annotations
@@ -45,13 +45,10 @@ class Placements(NamedTuple):
 
 
 def best_placements(kind: IsohedralClass, outline: Complex, keep: int) -> Placements:
-    """The `keep` placements of largest gain; of placements that differ by a relabelling, one.
+    """Return the `keep` placements of largest gain; of those that differ by a relabelling, one.
 
-    Args:
-        kind: the isohedral class.
-        outline: (n,) points x + iy, counter-clockwise, evenly spaced; n at least 4 times the
-            number of the template's edges.
-        keep: how many at most.
+    The outline has n points x + iy, counter-clockwise, evenly spaced; n is at least 4 times the
+    number of the template's edges.
     """
     n = len(outline)
     unit = _unit(kind, n)

@@ -24,8 +24,7 @@ from orbiflow.tiles.silhouette import Emphasis, Pins, Target
 from orbiflow.tiles.tile import EscherTile
 from orbiflow.tiles.tilings import CLASSES, IsohedralClass, isohedral_class
 
-INTERRUPTED = "interrupted"
-"""The reason given for a class that was left undone."""
+INTERRUPTED = "interrupted"  # the reason given for a class that was left undone
 
 ClassName = str | int | IsohedralClass
 """What `isohedral_class` takes."""
@@ -99,8 +98,8 @@ def fit_tile(
 ) -> Fit:
     """Fit tiles of one class to a target, in this process; `certified_tiles` makes polygons of them.
 
-    `escherize` does both, for several classes. This is for those who look at, or go on with, what was
-    fitted: `Fit.model` is a `TileModel`, a torch module whose candidates may be trained on.
+    `escherize` does both, for several classes. This is for those who look at, or go on with, what
+    was fitted: `Fit.model` is a `TileModel`, a torch module whose candidates may be trained on.
 
     Args:
         target: the silhouette.

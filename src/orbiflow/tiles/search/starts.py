@@ -34,13 +34,10 @@ from orbiflow.tiles.tilings import EdgeIdentification, IsohedralClass, isohedral
 
 
 def template_symmetries(isohedral_class: IsohedralClass) -> tuple[int, bool]:
-    """Rotations and reflections of the template that also leave its group alone.
+    """Return how many rotations of the template keep its group, and whether a mirror does.
 
-    Two starts that differ by such a map give the same tiles.
-
-    Returns:
-        The order of the rotations, and whether there is a reflection (then mirrored targets need
-        no starts of their own).
+    Two starts that differ by such a map give the same tiles: with a mirror, mirrored targets need
+    none.
     """
     vertices = isohedral_class.template()
     group = isohedral_class.group()
@@ -107,22 +104,11 @@ def outline_starts(
     phase: float = 0.0,
     cancel: Cancel | None = None,
 ) -> Starts:
-    """The best start tiles of one class for a target, no two of them twins.
+    """Return the best start tiles of one class for a target, no two of them twins.
 
-    Args:
-        target: the silhouette.
-        kind: the class.
-        count: how many at most; fewer if the rest cross themselves.
-        resolutions: points of the outline, several for the sake of thin limbs: the fewer, the
-            smoother the start. Each divides `vertices`.
-        projected: placements projected at each resolution.
-        measured: of these, the nearest tiles whose overlap is measured.
-        vertices: of every start tile.
-        phase: of the points along the outline, in spacings; what a seed changes.
-        cancel: looked at before each resolution.
-
-    Raises:
-        Cancelled: if it was told to stop.
+    At each of the `resolutions`, points of the outline that divide `vertices`, so many placements
+    are `projected` onto tiles and the nearest `measured`: several for the sake of thin limbs, for
+    the fewer, the smoother the start. A seed changes `phase`, the place of the points in spacings.
     """
     kind = isohedral_class(kind)
     instance(target, Target, "the target", "Target.read and Target.from_polygon make one")
@@ -157,15 +143,11 @@ def template_starts(
     vertices: int = 240,
     phase: float = 0.0,
 ) -> Prototiles:
-    """The template itself, turned and stretched: starts that know nothing of the target.
+    """Return the template itself, turned and stretched: starts that know nothing of the target.
 
-    Args:
-        kind: the class.
-        turns: angles, over the range in which the template does not look the same; twice as many
-            for classes without lattice freedom.
-        stretch: size of the starting stretches along each axis of the lattice freedom, besides none.
-        vertices: of every start tile, a multiple of the template's.
-        phase: of the angles, in steps.
+    There are so many `turns`, over the range in which the template does not look the same, twice as
+    many for classes without lattice freedom; and stretches of size `stretch` along each axis of
+    that freedom, besides none. `phase` moves the angles, in steps.
     """
     kind = isohedral_class(kind)
     order, symmetric = template_symmetries(kind)

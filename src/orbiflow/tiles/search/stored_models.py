@@ -20,30 +20,19 @@ from orbiflow.tiles.tile_map import TileMap, naming_file
 from orbiflow.tiles.tilings import Tile, isohedral_class
 from orbiflow.typed_torch import listed
 
-MAX_STEPS = 1024
-"""Integration steps of a segment beyond which a field counts as too steep."""
+MAX_STEPS = 1024  # integration steps of a segment beyond which a field counts as too steep
 
 
 @torch.no_grad()
 def converge(
     model: TileModel, points: torch.Tensor, *, tolerance: float = 1e-7, force: bool = False
 ) -> tuple[torch.Tensor, float]:
-    """Double the integration steps until the flow is accurate.
+    """Double the integration steps of a single candidate until the flow is accurate.
 
     Quality is judged at the steps set here, never at those of the optimisation (design point 5).
-
-    Args:
-        model: a single candidate; its number of steps is changed.
-        points: (1, N, 2) in the group's frame.
-        tolerance: on the change of the flow when its steps are doubled, in the group's units.
-        force: give what there is after `MAX_STEPS` steps, accurate or not.
-
-    Returns:
-        The points carried at the doubled steps, and the error estimate.
-
-    Raises:
-        CertificationError: if `MAX_STEPS` are not enough: the field is too steep; or if the flow
-            has no finite values.
+    Returns the points (1, N, 2) carried at the doubled steps, and the error estimate. With `force`
+    the flow is taken after `MAX_STEPS`, accurate or not; else a field that is too steep is a
+    `CertificationError`.
     """
     coarse = model.flow(points)
     while True:
@@ -65,21 +54,9 @@ def converge(
 
 @torch.no_grad()
 def extract_tile(model: TileModel, *, force: bool = False) -> tuple[Tile, TileModel]:
-    """The polygon and group of a single candidate, in the target's normal form, float64.
+    """Return the tile of a single candidate in normal form, and the float64 model that made it.
 
-    The polygon is the coarsest that is simple, see `simplest_tile`.
-
-    Args:
-        model: a single candidate; left as it is.
-        force: return the finest polygon even if it crosses itself or the flow is inaccurate.
-
-    Returns:
-        The tile, and the float64 model with the integration steps that made it.
-
-    Raises:
-        OrbiflowError: if the model holds more than one candidate.
-        CertificationError: if no sampling gives a simple polygon: the candidate has folded. With
-            `force`, only if coordinates are not finite.
+    The polygon is the coarsest that is simple, see `simplest_tile`; with `force`, the finest.
     """
     instance(model, TileModel, "the model", "load_model and the fits give one")
     model.require_single()

@@ -27,9 +27,9 @@ def unfolded(mesh: Mesh, points: Array) -> Array:
     """Move the inner points of a map until no triangle is turned over.
 
     Foldover-free maps in few steps (Garanzha, Kaporin, Kudryavtseva, Protais, Ray and Sokolov,
-    SIGGRAPH 2021): L-BFGS minimises the distortion |J|^2 / det J of each triangle, with det J bounded
-    away from 0 by a shrinking parameter; if that fails, again from points each in the middle of its
-    neighbours. Points on the outline stay in place.
+    SIGGRAPH 2021): L-BFGS minimises the distortion |J|^2 / det J of each triangle, with det J
+    bounded away from 0 by a shrinking parameter; if that fails, again from points each in the
+    middle of its neighbours. Points on the outline stay in place.
 
     Args:
         mesh: The triangles at rest.
