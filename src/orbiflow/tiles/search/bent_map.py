@@ -15,7 +15,7 @@ from scipy.sparse.linalg import spsolve
 
 from orbiflow.arrays import Array, Integers
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles.geometry import arc_lengths, orient, points_along
+from orbiflow.tiles.geometry import arc_lengths, orient, plane_points, points_along
 from orbiflow.tiles.search.bending import Bent
 from orbiflow.tiles.silhouette import Bending, Mesh, triangulate, unfolded
 from orbiflow.tiles.tilings import Tile
@@ -36,7 +36,7 @@ def map_of_bent(bent: Bent, factor: complex, shift: complex, tile: Tile) -> Bend
     first = np.cumsum(placement.lengths[0]) - placement.lengths[0]
     mesh, images = onto_polygon(
         hand.fine.mesh,
-        np.stack([z.real, z.imag], axis=-1),
+        plane_points(z),
         tile.polygon * flip,
         (first + placement.starts[0]) % n,
         np.array(tile.corners),

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from orbiflow.arrays import Array
 from orbiflow.errors import CertificationError
-from orbiflow.tiles.geometry import subdivided
+from orbiflow.tiles.geometry import plane_points, subdivided
 from orbiflow.tiles.search.tile_space import NearestTiles
 from orbiflow.tiles.tile_map import TileMap
 from orbiflow.tiles.tilings import EdgeIdentification, IsohedralClass, Tile
@@ -63,7 +63,7 @@ class Prototiles:
         `count` is a multiple of the polygons' own number: their sides are divided evenly. Polygons
         that belong to the target's mirror image in the x axis are placed on the target itself.
         """
-        placed = np.stack([tiles.vertices.real, tiles.vertices.imag], axis=-1)
+        placed = plane_points(tiles.vertices)
         inverse = np.linalg.inv(tiles.linear)
         own = (placed - tiles.offset[:, None]) @ np.swapaxes(inverse, 1, 2)
         pieces = count // placed.shape[1]
@@ -254,17 +254,7 @@ class Fit(NamedTuple):
         return self.candidates.as_model()
 
 
-WAVES = {
-    "IH1": 18,
-    "IH2": 9,
-    "IH3": 9,
-    "IH4": 8,
-    "IH5": 4,
-    "IH6": 4,
-    "IH7": 8,
-    "IH21": 4,
-    "IH28": 4,
-}
+WAVES = {"IH1": 18, "IH2": 9, "IH3": 9, "IH4": 8, "IH5": 4, "IH6": 4, "IH7": 8, "IH21": 4, "IH28": 4}
 """By class, the number of parameters of a symmetric field of frequency 1."""
 
 STEPS = 8  # integration steps with which a flow's polygon is first computed
@@ -292,7 +282,11 @@ class StillTiles:
             steps *= 2
             return points
 
-        linear = self._linear(own)
+        c, s = np.cos(own.angle[0]), np.sin(own.angle[0])
+        sign = -1.0 if own.mirrored[0] else 1.0
+        turn = np.exp(own.log_scale[0]) * np.array([[c, -s * sign], [s, c * sign]])
+        # einsum rounds each product, as torch does for a flow's tile; matmul does not
+        linear = np.einsum("ij,jk->ik", turn, self.kind.stretch(own.stretch[0]))
         tile = simplest_tile(
             self.kind, vertices, corners.tolist(), linear, offset, moved=moved, force=force
         )
@@ -317,24 +311,9 @@ class StillTiles:
         }
         return tile, TileMap(settings, {name: np.array(a) for name, a in arrays.items()})
 
-    def _linear(self, own: Prototiles) -> Array:
-        """Return the linear part (2, 2) of the placement of a single candidate."""
-        c, s = np.cos(own.angle[0]), np.sin(own.angle[0])
-        sign = -1.0 if own.mirrored[0] else 1.0
-        turn = np.array([[c, -s * sign], [s, c * sign]])
-        stretch = self.kind.stretch(own.stretch[0])
-        # einsum rounds each product, as torch does for a flow's tile; matmul does not
-        return np.einsum("ij,jk->ik", np.exp(own.log_scale[0]) * turn, stretch)
-
     def as_model(self) -> TileModel:
         """Return the candidates as a torch module, with a field of frequency 1 that is zero."""
         from orbiflow.tiles.search.model import TileModel
 
-        return TileModel(
-            self.kind,
-            max_frequency=1,
-            segments=1,
-            smoothness=0.0,
-            steps=1,
-            prototiles=self.prototiles,
-        )
+        own = self.prototiles
+        return TileModel(self.kind, max_frequency=1, smoothness=0.0, steps=1, prototiles=own)

@@ -13,7 +13,7 @@ import numpy as np
 
 from orbiflow.arguments import described, instance, is_a
 from orbiflow.errors import CertificationError, OrbiflowError
-from orbiflow.runtime import Cancel, Cancelled, one_thread, process_context, work
+from orbiflow.runtime import Cancel, Cancelled, ignore, one_thread, process_context, work
 from orbiflow.tiles.likeness import diverse, mutual_iou
 from orbiflow.tiles.search.both_search import ALIKE
 from orbiflow.tiles.search.candidates import Fit, Progress
@@ -66,24 +66,6 @@ class Task:
     per_class: int = 1
     force: bool = False
 
-    @classmethod
-    def checked(
-        cls,
-        target: Target,
-        method: SearchMethod | None,
-        emphasis: Emphasis | None,
-        pins: Pins | None,
-        per_class: int,
-        force: bool,
-    ) -> Task:
-        """Return the task, with what its method needs imported."""
-        instance(target, Target, "the target", HOW)
-        if pins is not None:
-            instance(pins, Pins, "pins", "Pins.read and Pins.at make one")
-        method = _checked(method, pins)
-        method.load()
-        return cls(Goal(target, emphasis, pins), method, per_class, force)
-
 
 def fit_tile(
     target: Target,
@@ -122,31 +104,36 @@ def fit_tile(
     >>> best.name, best.certificate.valid
     ('IH4', True)
     """
-    instance(target, Target, "the target", HOW)
-    method = _checked(method, pins)
-    method.load()
+    task = _task(target, method, emphasis, pins, per_class)
     with one_thread():
-        return method.fit(
-            Goal(target, emphasis, pins),
-            isohedral_class(kind),
-            per_class=per_class,
-            progress=progress,
-            cancel=cancel,
+        return task.method.fit(
+            task.goal, isohedral_class(kind), per_class=per_class, progress=progress, cancel=cancel
         )
 
 
-def _checked(method: SearchMethod | None, pins: Pins | None) -> SearchMethod:
-    """Return the method, by default a search for likeness of normal effort."""
+def _task(
+    target: Target,
+    method: SearchMethod | None,
+    emphasis: Emphasis | None,
+    pins: Pins | None,
+    per_class: int = 1,
+    force: bool = False,
+) -> Task:
+    """Return the task, checked, by default for likeness, with what its method needs imported."""
+    instance(target, Target, "the target", HOW)
     if method is None:
-        return LikenessSearch.for_effort("normal")
+        method = LikenessSearch.for_effort("normal")
     if not is_a(method, SearchMethod):
         raise OrbiflowError(
             f"the method must be a search such as LikenessSearch(), got {described(method)}; for a "
             'level of effort: LikenessSearch.for_effort("fast")'
         )
-    if pins is not None and not method.takes_pins:
-        raise OrbiflowError("pins belong to the search for likeness, where silhouettes bend")
-    return method
+    if pins is not None:
+        instance(pins, Pins, "pins", "Pins.read and Pins.at make one")
+        if not method.takes_pins:
+            raise OrbiflowError("pins belong to the search for likeness, where silhouettes bend")
+    method.load()
+    return Task(Goal(target, emphasis, pins), method, per_class, force)
 
 
 def search_classes(
@@ -190,23 +177,28 @@ def search_classes(
     Raises:
         OrbiflowError: for an unknown class, a setting out of range, or workers that die.
     """
-    names = _names(classes)
+    names = class_list(classes)
     if not names:
         raise OrbiflowError(f"no isohedral class was given; the nine are {', '.join(CLASSES)}")
     for what, number in (("workers", workers), ("per_class", per_class)):
         if number < 1:
             raise OrbiflowError(f"{what} must be at least 1, got {number}")
-    task = Task.checked(target, method, emphasis, pins, per_class, force)
+    task = _task(target, method, emphasis, pins, per_class, force)
     cancel = cancel or Cancel()
-    teller = _Teller(watch)
+    teller = _Teller(watch or ignore)
     count = min(workers, len(names))
     # asked before torch is limited here: a limit makes no fork safe
     preload = ("orbiflow.tiles.search.searching", *task.method.modules)
     context = process_context(preload) if count > 1 else None
     with contextlib.suppress(Cancelled):
-        _preview(task, names, teller.tell, cancel)
+        with one_thread():
+            first = task.method.preview(task.goal, names, cancel)
+        if first is not None:
+            teller.tell(Event(first.name, 0.0, 1 - first.metrics.iou, preview=first))
         if context is None:
-            _run_here(task, names, teller.tell, cancel)
+            for name in names:
+                cancel.check()
+                teller.tell(_finished(_work_on(task, name, teller.tell, cancel)))
         else:
             with contextlib.closing(_run_pool(task, names, count, context, cancel)) as found:
                 for event in found:
@@ -216,7 +208,8 @@ def search_classes(
     return task.method.short_list(results), failures
 
 
-def _names(classes: ClassName | Iterable[ClassName]) -> list[str]:
+def class_list(classes: ClassName | Iterable[ClassName]) -> list[str]:
+    """Return the names of classes, each once."""
     if isinstance(classes, str | int | IsohedralClass):
         classes = [classes]
     if not is_a(classes, Iterable):
@@ -243,15 +236,15 @@ def escherize_class(
     Raises:
         Cancelled: if it was told to stop.
     """
-    task = Task.checked(target, method, emphasis, pins, per_class, force)
-    return _work_on(task, name, watch or _ignore, cancel or Cancel())
+    task = _task(target, method, emphasis, pins, per_class, force)
+    return _work_on(task, name, watch or ignore, cancel or Cancel())
 
 
 class _Teller:
     """Keeps what was found, and the order of events."""
 
-    def __init__(self, watch: Watcher | None) -> None:
-        self.watch = watch or _ignore
+    def __init__(self, watch: Watcher) -> None:
+        self.watch = watch
         self.shares: dict[str, float] = {}
         self.outcomes: dict[str, Outcome] = {}
         self.preview: EscherTile | None = None
@@ -339,26 +332,8 @@ def _without_twins(tiles: Sequence[EscherTile], count: int) -> list[int]:
     return [sound[k] for k in chosen] or [0]
 
 
-def _preview(task: Task, names: Sequence[str], watch: Watcher, cancel: Cancel) -> None:
-    """A first tile to look at, while the others are on their way."""
-    with one_thread():
-        tile = task.method.preview(task.goal, names, cancel)
-    if tile is not None:
-        watch(Event(tile.name, 0.0, 1 - tile.metrics.iou, preview=tile))
-
-
-def _ignore(_event: Event) -> None:
-    """Nobody watches."""
-
-
 def _finished(outcome: Outcome) -> Event:
     return Event(outcome.name, 1.0, float("nan"), outcome)
-
-
-def _run_here(task: Task, names: Sequence[str], watch: Watcher, cancel: Cancel) -> None:
-    for name in names:
-        cancel.check()
-        watch(_finished(_work_on(task, name, watch, cancel)))
 
 
 def _run_pool(

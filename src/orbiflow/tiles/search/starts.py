@@ -24,7 +24,7 @@ from orbiflow.symmetry import (
     rotation,
     rotation_matrix,
 )
-from orbiflow.tiles.geometry import resampled, reverse, subdivided
+from orbiflow.tiles.geometry import plane_points, resampled, reverse, subdivided
 from orbiflow.tiles.likeness import boundary_iou, prepared_region
 from orbiflow.tiles.search.candidates import Prototiles
 from orbiflow.tiles.search.placements import Placements, best_placements
@@ -217,7 +217,7 @@ def _simple_tiles(
         if not len(placements.starts) or wanted < 1:
             return
         tiles = nearest_tiles(kind, _smoothed(outline, spread), placements)
-        rings = np.stack([tiles.vertices.real, tiles.vertices.imag], axis=-1)
+        rings = plane_points(tiles.vertices)
         valid = np.asarray(shapely.is_valid(shapely.polygons(rings)))
         simple = valid & (np.linalg.det(tiles.linear) > 1e-6)
         nearest = np.argsort(tiles.distance, kind="stable")
