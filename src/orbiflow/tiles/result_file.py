@@ -84,14 +84,7 @@ def folder_names(classes: Iterable[str]) -> list[str]:
 
 
 def read_document(path: str | Path) -> tuple[Path, dict[str, Any]]:
-    """The result.json of a run, and what it holds: an object with `tiles`.
-
-    Args:
-        path: the run's folder, or its result.json.
-
-    Raises:
-        InputFileError: if there is no such file, or it is none of orbiflow's.
-    """
+    """Return the result.json at a path, or in a run's folder, and the object with `tiles` that it holds."""
     given = as_path(path, "the result")
     file = given / RESULT if given.is_dir() else given
     try:
@@ -131,14 +124,9 @@ def _index(names: list[str], which: str | int, file: Path) -> int:
 
 
 def save_tiles(tiles: Sequence[EscherTile], folder: str | Path) -> Path:
-    """Write tiles as a run's folder: a result.json, and each one's map in a folder of its own.
+    """Write tiles, best first, as a run's folder: a result.json, and each one's map in its own folder.
 
-    Args:
-        tiles: Best first, at least one.
-        folder: Tiles that were saved there before are replaced.
-
-    Returns:
-        The folder.
+    Tiles that were saved there before are replaced. Returns the folder.
 
     Raises:
         OrbiflowError: without any tile.

@@ -47,12 +47,9 @@ class Along:
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """A tile at area 1 with y down, and how deep places in it lie.
+    """A tile at area 1 with y down, and how deep places in it lie."""
 
-    - `ring`: The outline (N, 2).
-    """
-
-    ring: Array
+    ring: Array  # the outline (N, 2)
 
     @cached_property
     def _grid(self) -> Grid:

@@ -87,8 +87,7 @@ def artwork(
     Args:
         tile: A tile in memory, or a run's folder; see `with_map`.
         settings: How it is drawn.
-        picture: A picture over the silhouette, as `read_over` returns it.
-        drawing: A drawing that is already carried onto the tile, as `read_over` returns it.
+        picture, drawing: What lies over the silhouette, as `read_over` returns it.
         notes: What the user should know of picture or drawing.
 
     Raises:
@@ -110,11 +109,7 @@ def artwork(
 
 
 def render_artwork(art: Artwork, *, cancel: Cancel | None = None) -> np.ndarray:
-    """Render the picture (height, width, 3) in 8 bits, antialiased.
-
-    Raises:
-        Cancelled: If it was cancelled.
-    """
+    """Render the picture (height, width, 3) in 8 bits, antialiased."""
     return render_on(art, art.page, cancel=cancel)
 
 
@@ -231,16 +226,7 @@ def _rasters(art: Artwork) -> tuple[Raster, ...]:
 
 
 def write_artwork(art: Artwork, ending: str, *, cancel: Cancel | None = None) -> bytes | str:
-    """Return the content of a file.
-
-    Args:
-        art: The artwork.
-        ending: The file's ending: ".svg", or ".png" for pixels.
-        cancel: Stops the work.
-
-    Raises:
-        Cancelled: If it was cancelled.
-    """
+    """Return the content of a file with this ending, .svg, or .png for pixels."""
     if ending.lower() == ".svg":
         return write_svg(art_scene(art))
     return png_of(render_artwork(art, cancel=cancel), art.settings.dpi)

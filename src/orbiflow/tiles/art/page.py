@@ -21,28 +21,18 @@ USUAL_TILES = 25  # number of tiles on a page if no size of a tile is given
 
 @dataclass(frozen=True, eq=False)
 class ArtPage:
-    """The tiles of a picture.
+    """The tiles of a picture."""
 
-    - `width`, `height`: The picture's size in pixels.
-    - `tile`: The tile in its own units.
-    - `copies`: All copies that the picture shows, and some beyond.
-    - `linear`, `offset`: The map from the tile's units to pixels, y down.
-    - `colours`: The number (M,) of each copy's colour.
-    - `count`: The number of colours.
-    - `tile_size`: The size of a tile in pixels.
-    - `notes`: What the user should know.
-    """
-
-    width: int
+    width: int  # with `height`: the picture's size in pixels
     height: int
-    tile: Tile
-    copies: Copies
-    linear: Array
+    tile: Tile  # the tile in its own units
+    copies: Copies  # all copies that the picture shows, and some beyond
+    linear: Array  # with `offset`: the map from the tile's units to pixels, y down
     offset: Array
-    colours: NDArray[np.int64]
-    count: int
-    tile_size: float
-    notes: tuple[str, ...] = ()
+    colours: NDArray[np.int64]  # the number (M,) of each copy's colour
+    count: int  # the number of colours
+    tile_size: float  # the size of a tile in pixels
+    notes: tuple[str, ...] = ()  # what the user should know
 
     @property
     def scale(self) -> float:
@@ -171,20 +161,15 @@ class Rectangle(NamedTuple):
     """A rectangular cell of whole pixels that repeats.
 
     - `linear`: The map (2, 2) from the lattice's units to pixels: a similarity, but for `strain`.
-    - `width`, `height`: The size in pixels.
-    - `cells`: The number of lattice cells in it.
-    - `strain`: How much longer one direction became than another; 0 for a similarity.
-    - `turn`: The angle in degrees, -45 to 45, by which the lattice is turned.
-    - `exact`: Whether it is a rectangle of the lattice: then only whole pixels strain it.
     """
 
     linear: Array
-    width: int
+    width: int  # with `height`: the size in pixels
     height: int
-    cells: int
-    strain: float
-    turn: float
-    exact: bool
+    cells: int  # the number of lattice cells in it
+    strain: float  # how much longer one direction became than another; 0 for a similarity
+    turn: float  # the angle in degrees, -45 to 45, by which the lattice is turned
+    exact: bool  # whether it is a rectangle of the lattice: then only whole pixels strain it
 
 
 def rectangle(lattice: Array, scale: float, tolerance: float, *, flipped: bool) -> Rectangle:

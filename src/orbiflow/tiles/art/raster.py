@@ -23,18 +23,12 @@ vertices that a symmetric placement puts exactly on a row."""
 
 
 class Runs(NamedTuple):
-    """R runs of samples, each in one region, row by row and from left to right.
+    """R runs of samples, each in one region, row by row and from left to right."""
 
-    - `label`: The region (R,), or `NOWHERE`.
-    - `row`: The row (R,), counted from 0.
-    - `start`: The first column (R,).
-    - `length`: The number (R,) of samples; those of a row add up to its width.
-    """
-
-    label: Integers
-    row: Integers
-    start: Integers
-    length: Integers
+    label: Integers  # the region (R,), or `NOWHERE`
+    row: Integers  # the row (R,), counted from 0
+    start: Integers  # the first column (R,)
+    length: Integers  # the number (R,) of samples; those of a row add up to its width
 
     def spread(self, values: NDArray) -> NDArray:
         """Return one value for each sample (rows x width,) from one for each run."""
@@ -45,12 +39,11 @@ class Sides(NamedTuple):
     """Sides of regions, each with the region to its right, at larger x.
 
     - `start`, `end`: The ends (S, 2) in samples, y down: sample (i, j) lies at (j + 1/2, i + 1/2).
-    - `label`: The region (S,).
     """
 
     start: Array
     end: Array
-    label: Integers
+    label: Integers  # the region (S,)
 
 
 def ring_sides(rings: Array) -> Sides:
@@ -135,16 +128,11 @@ _AROUND = ((-1, -1), (-1, 1), (1, -1), (1, 1), (-1, 0), (1, 0), (0, -1), (0, 1))
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """A grid of texels over a tile: texel (i, j) lies at corner + (j + 1/2, i + 1/2) / density.
+    """A grid of texels over a tile: texel (i, j) lies at corner + (j + 1/2, i + 1/2) / density."""
 
-    - `corner`: The corner (2,) in the tile's units.
-    - `density`: Texels per unit.
-    - `width`, `height`: The size in texels.
-    """
-
-    corner: Array
-    density: float
-    width: int
+    corner: Array  # the corner (2,) in the tile's units
+    density: float  # texels per unit
+    width: int  # with `height`: the size in texels
     height: int
 
     @classmethod

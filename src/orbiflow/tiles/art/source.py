@@ -24,12 +24,8 @@ def with_map(source: TileSource, target: Target | None = None) -> EscherTile:
     """Return a tile with a map from its silhouette, or with the reason why there is none.
 
     The map is the one that the search saved. Where there is none, as after a search for overlap,
-    the outlines of the silhouette and of the tile over it are matched.
-
-    Args:
-        source: A tile in memory, or a run's folder, or its result.json, whose best tile is meant.
-        target: The search's target, for a tile in memory without a map. The silhouette of a tile out
-            of a file is read again.
+    the outlines of the silhouette and of the tile over it are matched: that of the search's
+    `target`, for a tile in memory, or the silhouette that a tile out of a file names, read again.
 
     Raises:
         OrbiflowError: If `source` holds no tile.
@@ -143,16 +139,11 @@ THIN = 4.0
 
 @dataclass(frozen=True, eq=False)
 class Picture:
-    """A picture of the silhouette.
+    """A picture of the silhouette."""
 
-    - `image`: The image: RGBA, straight, 8 bits.
-    - `covered`: The rectangle that it covers in the silhouette's coordinates.
-    - `notes`: What was decided for the user.
-    """
-
-    image: Image.Image
-    covered: Covered
-    notes: tuple[str, ...] = ()
+    image: Image.Image  # the image: RGBA, straight, 8 bits
+    covered: Covered  # the rectangle that it covers in the silhouette's coordinates
+    notes: tuple[str, ...] = ()  # what was decided for the user
 
     @property
     def pixel(self) -> float:

@@ -34,20 +34,13 @@ STRIP = 8.0  # height in mm of the strip at the page's foot that the calibration
 
 @dataclass(frozen=True, eq=False)
 class Layout:
-    """A tile's place on the page, from which every kind of export starts.
-
-    - `settings`: The settings as they were given.
-    - `tile`: The tile in mm on the page, y down.
-    - `outline`: The tile's curves.
-    - `box`: The part of the page that tiles may use.
-    - `notes`: What the user should know.
-    """
+    """A tile's place on the page, from which every kind of export starts."""
 
     settings: ExportSettings
-    tile: Tile
-    outline: Outline
-    box: Box
-    notes: tuple[str, ...]
+    tile: Tile  # the tile in mm on the page, y down
+    outline: Outline  # the tile's curves
+    box: Box  # the part of the page that tiles may use
+    notes: tuple[str, ...]  # what the user should know
 
 
 SHIFTS = 10

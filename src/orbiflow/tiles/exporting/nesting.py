@@ -22,16 +22,11 @@ from orbiflow.tiles.tilings import Tile
 
 @dataclass(frozen=True, eq=False)
 class Arrangement:
-    """An arrangement of pieces, A of them in each cell of a lattice.
+    """An arrangement of pieces, A of them in each cell of a lattice."""
 
-    - `lattice`: The basis vectors in mm, as columns (2, 2).
-    - `linear`: How each piece of a cell is turned or mirrored (A, 2, 2).
-    - `offsets`: Where each piece is (A, 2): a point p of the piece goes to linear p + offset.
-    """
-
-    lattice: Array
-    linear: Array
-    offsets: Array
+    lattice: Array  # the basis vectors in mm, as columns (2, 2)
+    linear: Array  # how each piece of a cell is turned or mirrored (A, 2, 2)
+    offsets: Array  # where each piece is (A, 2): a point p of the piece goes to linear p + offset
 
     def scaled(self, stretch: Array, middle: Array) -> Arrangement:
         """Return the arrangement with the pieces' middles moved by the linear map `stretch` (2, 2)."""

@@ -178,16 +178,13 @@ _SHARES = (0.6, 0.15, 0.04)  # of the tolerance; finer where curves would otherw
 class Outline:
     """The outline of a tile in curves.
 
-    - `tile`: The tile.
     - `edges`: How its outline falls into edges; None if that is not known (`note` says why).
-    - `curves`: One curve for each edge, end to end; or a single closed curve.
-    - `note`: What the user should know, or "".
     """
 
     tile: Tile
     edges: Edges | None
-    curves: tuple[Curve, ...]
-    note: str = ""
+    curves: tuple[Curve, ...]  # one curve for each edge, end to end; or a single closed curve
+    note: str = ""  # what the user should know, or ""
 
     @property
     def closed(self) -> Curve:

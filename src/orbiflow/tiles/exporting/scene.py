@@ -142,16 +142,11 @@ class Style(NamedTuple):
 
 
 class Part(NamedTuple):
-    """Curves drawn as one.
+    """Curves drawn as one."""
 
-    - `curves`: The curves; closed ones are filled, holes run the other way.
-    - `style`: Fill and stroke, which may be `INK`.
-    - `opacity`: A number from 0 to 1.
-    """
-
-    curves: tuple[Curve, ...]
-    style: Style
-    opacity: float = 1.0
+    curves: tuple[Curve, ...]  # the curves; closed ones are filled, holes run the other way
+    style: Style  # fill and stroke, which may be `INK`
+    opacity: float = 1.0  # a number from 0 to 1
 
     @property
     def inked(self) -> bool:
@@ -183,16 +178,11 @@ class Raster(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Motif:
-    """A drawing of many parts that every copy of a tile carries.
+    """A drawing of many parts that every copy of a tile carries."""
 
-    - `parts`: What is drawn, from the bottom up.
-    - `rasters`: Pictures of pixels under the parts.
-    - `within`: The name of the symbol that cuts the drawing off, if any.
-    """
-
-    parts: tuple[Part, ...] = ()
-    rasters: tuple[Raster, ...] = ()
-    within: str | None = None
+    parts: tuple[Part, ...] = ()  # what is drawn, from the bottom up
+    rasters: tuple[Raster, ...] = ()  # pictures of pixels under the parts
+    within: str | None = None  # the name of the symbol that cuts the drawing off, if any
 
     def moved(self, linear: Array, offset: Array) -> Motif:
         """Return the image under a map p -> linear p + offset."""
@@ -255,19 +245,13 @@ class Layer:
 
 @dataclass(frozen=True, eq=False)
 class PlacedTile:
-    """A tile on the page, for programs that read the JSON file.
+    """A tile on the page, for programs that read the JSON file."""
 
-    - `aspect`: The index of its coset representative.
-    - `linear`, `offset`: The map from the prototile's place in the scene to this tile's.
-    - `neighbours`: The numbers of the scene's tiles that share an edge with it.
-    - `whole`: Whether all of it is on the page.
-    """
-
-    aspect: int
-    linear: Array
+    aspect: int  # the index of its coset representative
+    linear: Array  # with `offset`: the map from the prototile's place in the scene to this tile's
     offset: Array
-    neighbours: tuple[int, ...] = ()
-    whole: bool = True
+    neighbours: tuple[int, ...] = ()  # the numbers of the scene's tiles that share an edge with it
+    whole: bool = True  # whether all of it is on the page
 
 
 @dataclass(frozen=True, eq=False)

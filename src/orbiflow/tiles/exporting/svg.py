@@ -29,12 +29,9 @@ width="{width}mm" height="{height}mm" viewBox="0 0 {width} {height}">
 
 
 def write_svg(scene: Scene, *, decimals: int = 3) -> str:
-    """Return the scene as an SVG document.
+    """Return the scene as an SVG document, with so many decimals of coordinates in mm.
 
-    Args:
-        scene: The page.
-        decimals: The decimals of coordinates in mm. Edges that two tiles share have the same numbers up
-            to the last of them.
+    Edges that two tiles share have the same numbers up to the last of them.
     """
     number = _Numbers(decimals)
     parts = [_HEADER.format(width=number(scene.width), height=number(scene.height))]

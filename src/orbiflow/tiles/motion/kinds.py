@@ -33,25 +33,21 @@ class Motion:
 
     All lengths are in pixels, with y down; the progress of the animation runs from 0 to 1.
 
-    - `width`, `height`: The size of the picture.
     - `outline`: The outline (N, 2) at a progress, relative to a point of its own; N does not change.
     - `places`: The places of the copies at a progress; the first is the tile itself.
-    - `colours`: The numbers (M,) of the palette's fills.
     - `births`: The progress (M, 2) from which to which each copy grows; below 0 if always there.
-    - `steady`: Whether the places do not change.
     - `keys`: Values of the progress between which the outline moves in nearly straight lines.
-    - `what`: The motion in words, for titles.
     """
 
-    width: int
+    width: int  # with `height`: the size of the picture
     height: int
     outline: Callable[[float], Array]
     places: Callable[[float], Places]
-    colours: NDArray[np.int64]
+    colours: NDArray[np.int64]  # the numbers (M,) of the palette's fills
     births: Array
-    steady: bool
+    steady: bool  # whether the places do not change
     keys: tuple[float, ...]
-    what: str
+    what: str  # the motion in words, for titles
 
     def grown(self, progress: float) -> Array:
         """Return the size (M,) of each copy, 0 to 1."""

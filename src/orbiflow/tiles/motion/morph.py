@@ -40,15 +40,12 @@ TOLERANCE = 1e-6
 class OwnFrame:
     """A tile as an affine image of one whose group is its class's own.
 
-    - `kind`: the class.
-    - `points`: (N, 2) the polygon in the own frame, from corner 0 on.
-    - `starts`: indices of the corners in it, increasing from 0.
     - `linear`, `offset`: (2, 2) and (2,): a point p of the own frame lies at linear p + offset.
     """
 
     kind: IsohedralClass
-    points: Array
-    starts: tuple[int, ...]
+    points: Array  # (N, 2) the polygon in the own frame, from corner 0 on
+    starts: tuple[int, ...]  # indices of the corners in it, increasing from 0
     linear: Array
     offset: Array
 
@@ -173,17 +170,12 @@ def _next(starts: tuple[int, ...], edge: int) -> int:
 
 @dataclass(frozen=True, eq=False)
 class Orbits:
-    """The orbits of N vertices: vertex i lies at linear[i] p + shift[i], with p vertex `source[i]`.
+    """The orbits of N vertices: vertex i lies at linear[i] p + shift[i], with p vertex `source[i]`."""
 
-    - `source`: The number (N,) of a vertex that is its own source.
-    - `linear`, `shift`: The isometries (N, 2, 2) and (N, 2) of the own frame's group.
-    - `fixed`: Whether (N,) the vertex lies on a centre of rotation and cannot move.
-    """
-
-    source: NDArray[np.int64]
-    linear: Array
+    source: NDArray[np.int64]  # the number (N,) of a vertex that is its own source
+    linear: Array  # with `shift`: the isometries (N, 2, 2) and (N, 2) of the own frame's group
     shift: Array
-    fixed: NDArray[np.bool_]
+    fixed: NDArray[np.bool_]  # whether (N,) the vertex lies on a centre of rotation and cannot move
 
     @classmethod
     def of(cls, own: OwnFrame) -> Orbits:
@@ -304,18 +296,15 @@ class _Weights:
     """The weights of template and tile, from which places between them are solved for.
 
     - `own`: The tile with as many vertices as the triangles need; they are the first n points.
-    - `orbits`: The orbits of all points.
-    - `sides`: Each side (E, 2) of a triangle, from either end.
     - `first`, `last`: The weights (E,) of template and tile, which add up to one for each orbit.
-    - `guess`: The points (N, 2) of the tile.
     """
 
     own: OwnFrame
-    orbits: Orbits
-    sides: NDArray[np.int64]
+    orbits: Orbits  # the orbits of all points
+    sides: NDArray[np.int64]  # each side (E, 2) of a triangle, from either end
     first: Array
     last: Array
-    guess: Array
+    guess: Array  # the points (N, 2) of the tile
 
     @classmethod
     def of(cls, own: OwnFrame) -> _Weights:

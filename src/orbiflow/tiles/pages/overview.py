@@ -280,14 +280,9 @@ def index_page(
     failures: Sequence[ClassFailure] = (),
     figures: Sequence[Sequence[str]] = (),
 ) -> str:
-    """Return the page, to be written beside the folders.
+    """Return the page of one search's tiles, best first, to be written beside their `folders`.
 
-    Args:
-        results: The tiles of one search, best first.
-        target: The silhouette that was searched for.
-        folders: The name of each tile's folder.
-        failures: The classes without a tile.
-        figures: The names of the files in each folder besides the `TILE_FILES`. Default: none.
+    `figures` are the names of the files in each folder besides the `TILE_FILES`.
     """
     name = PurePath(target.source).name
     extra = figures or [()] * len(results)

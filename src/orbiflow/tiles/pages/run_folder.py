@@ -91,14 +91,7 @@ def write_tile_folder(
     colours: Colouring | None = None,
     figures: bool = False,
 ) -> list[Path]:
-    """Write the `TILE_FILES` of a tile.
-
-    Args:
-        result: The tile.
-        target: Its silhouette.
-        folder: The folder, which is made if need be.
-        colours: The tiling's colouring. Default: `colouring(result.tile)`.
-        figures: Write the `FIGURE_FILES`, too; they take much longer.
+    """Write the `TILE_FILES` of a tile into its folder, and the `FIGURE_FILES`, which take much longer.
 
     Raises:
         OutputError: If a file cannot be written.
@@ -137,16 +130,9 @@ def write_gallery(
     figures: bool = False,
     workers: int = 1,
 ) -> None:
-    """Write each class's folder, `overview.png` and `index.html`.
+    """Write each class's folder, `overview.png` and `index.html` for tiles, best first, one or more.
 
-    Args:
-        results: The tiles, best first, one or more.
-        target: The silhouette that was searched for.
-        out: The folder.
-        failures: The classes without a tile, which the page names.
-        figures: Write the figures, too.
-        workers: The number of processes that draw figures; without figures, starting one would take
-            longer than drawing.
+    So many `workers` draw `figures`; without figures, starting one would take longer than drawing.
 
     Raises:
         OutputError: If a file cannot be written.

@@ -25,23 +25,15 @@ PUSHES = 400  # number of steps in which the silhouettes make room for each othe
 
 
 class FrontPoint(NamedTuple):
-    """A tile in the picture.
+    """A tile in the picture."""
 
-    - `deformation`, `iou`: Its place in the picture.
-    - `polygon`: The polygon (N, 2) in the input's coordinates.
-    - `label`: The words beside it, such as its class.
-    - `objective`: What it was found for: "likeness" or "overlap".
-    - `listed`: Whether it is in the list; others are pale.
-    - `front`: Whether no other tile beats it in both.
-    """
-
-    deformation: float
+    deformation: float  # with `iou`: its place in the picture
     iou: float
-    polygon: Array
-    label: str
-    objective: str
-    listed: bool
-    front: bool
+    polygon: Array  # the polygon (N, 2) in the input's coordinates
+    label: str  # the words beside it, such as its class
+    objective: str  # what it was found for: "likeness" or "overlap"
+    listed: bool  # whether it is in the list; others are pale
+    front: bool  # whether no other tile beats it in both
 
 
 def front_png(points: Sequence[FrontPoint], *, width_px: int = 1600, y_down: bool = False) -> bytes:
@@ -49,12 +41,7 @@ def front_png(points: Sequence[FrontPoint], *, width_px: int = 1600, y_down: boo
 
     Listed tiles are large and coloured by what they were found for, with a line to their place if
     they had to make room; full colour means that no other beats them. Others are pale, and the
-    dashed steps are the border of what is beaten.
-
-    Args:
-        points: All tiles that were found.
-        width_px: The width in pixels; the height is seven tenths of it.
-        y_down: Whether the y axis of the polygons points down, as in images.
+    dashed steps are the border of what is beaten. The height is seven tenths of the width.
 
     Raises:
         OrbiflowError: If there are no points or the size is impossible.

@@ -53,25 +53,16 @@ Item = TypeVar("Item")
 
 
 class Bent(NamedTuple):
-    """A bent silhouette that is a tile.
+    """A bent silhouette that is a tile."""
 
-    - `hand`: what was bent.
-    - `points`: (N,) of the fine body; its outline is the tile, up to a similarity.
-    - `linear`, `offset`: the map from the group's own frame, of `points`.
-    - `placement`: one, of the fine outline.
-    - `relaxed`: (n,) the outline let go a little: bent as it would like to be near this tile.
-    - `fidelity`: what is left of the outline, and what bending costs.
-    - `neck`: width of the narrowest neck, in square roots of the area.
-    """
-
-    hand: Hand
-    points: Complex
-    linear: Array
+    hand: Hand  # what was bent
+    points: Complex  # (N,) of the fine body; its outline is the tile, up to a similarity
+    linear: Array  # with `offset`: the map from the group's own frame, of `points`
     offset: Array
-    placement: Placements
-    relaxed: Complex
-    fidelity: Fidelity
-    neck: float
+    placement: Placements  # one, of the fine outline
+    relaxed: Complex  # (n,) the outline let go a little: bent as it would like to be near this tile
+    fidelity: Fidelity  # what is left of the outline, and what bending costs
+    neck: float  # width of the narrowest neck, in square roots of the area
 
     def score(self, min_neck: float) -> float:
         """What finalists are ordered by: their fidelity's, less where a neck is too thin."""
@@ -248,11 +239,10 @@ def _apart(a: Complex, b: Complex) -> float:
 class PlacedBent(NamedTuple):
     """A bent silhouette that is a tile, laid over the target by a similarity.
 
-    - `bent`: the silhouette, in a frame of its own, mirrored if its hand is.
     - `factor`, `shift`: z -> factor z + shift, after which a mirrored one is reflected in the x axis.
     """
 
-    bent: Bent
+    bent: Bent  # the silhouette, in a frame of its own, mirrored if its hand is
     factor: complex
     shift: complex
 

@@ -15,7 +15,7 @@ from orbiflow.errors import CertificationError
 from orbiflow.tiles.geometry import plane_points, subdivided
 from orbiflow.tiles.search.tile_space import NearestTiles
 from orbiflow.tiles.tile_map import TileMap
-from orbiflow.tiles.tilings import EdgeIdentification, IsohedralClass, Tile
+from orbiflow.tiles.tilings import CLASSES, EdgeIdentification, IsohedralClass, Tile
 
 if TYPE_CHECKING:
     from orbiflow.tiles.search.bending import PlacedBent
@@ -26,13 +26,12 @@ if TYPE_CHECKING:
 class Prototiles:
     """S tiles of one class with as many vertices, any of which a flow can start from.
 
-    - `vertices`: (S, N, 2), in the group's own frame; those of identified edges correspond.
     - `corners`: (S, K) index of the vertex at each of the template's corners, increasing from 0.
     - `angle`, `log_scale`, `offset`, `stretch`, `mirrored`: the pose, as in `TileModel`; (S,), (S,),
       (S, 2), (S, stretch_dim) and (S,).
     """
 
-    vertices: Array
+    vertices: Array  # (S, N, 2), in the group's own frame; those of identified edges correspond
     corners: NDArray[np.int64]
     angle: Array
     log_scale: Array
@@ -254,7 +253,7 @@ class Fit(NamedTuple):
         return self.candidates.as_model()
 
 
-WAVES = {"IH1": 18, "IH2": 9, "IH3": 9, "IH4": 8, "IH5": 4, "IH6": 4, "IH7": 8, "IH21": 4, "IH28": 4}
+WAVES = dict(zip(CLASSES, (18, 9, 9, 8, 4, 4, 8, 4, 4), strict=True))
 """By class, the number of parameters of a symmetric field of frequency 1."""
 
 STEPS = 8  # integration steps with which a flow's polygon is first computed

@@ -110,14 +110,13 @@ def recogniser(target: Target) -> Recogniser:
 def certified_tiles(
     target: Target, found: Fit | Candidates, *, force: bool = False, min_neck: float = 0.0
 ) -> list[EscherTile]:
-    """Polygons of what was fitted, each proved to tile the plane, best first.
+    """Return polygons of what was fitted to a target, each proved to tile the plane, best first.
 
     Args:
-        target: that it was fitted to.
-        found: of `fit_tile`, `fit_descent` or `fit_bending`; the candidates of `fit_occupancy`, or any
-            others, trained further or loaded.
-        force: give tiles that are not certified, too; their certificates say why.
-        min_neck: narrowest neck that a tile's score forgives, a share of its size.
+        target: The silhouette.
+        found: What `fit_tile` gave, or candidates, such as a `TileModel` trained further or loaded.
+        force: Give tiles that are not certified, too; their certificates say why.
+        min_neck: The narrowest neck that a tile's score forgives, a share of its size.
 
     Raises:
         OrbiflowError: for what holds no candidates.

@@ -40,17 +40,12 @@ ROUNDS = 3  # steps of choosing rotations and solving: in each stage, and of eac
 
 
 class BentTiles(NamedTuple):
-    """C bent silhouettes that are tiles.
+    """C bent silhouettes that are tiles."""
 
-    - `points`: (N, C) of the body; the first n rows are the tile's vertices.
-    - `linear`, `offset`: (C, 2, 2) and (C, 2), the map from the group's own frame.
-    - `placements`: C of them, with the glide axes' final turns.
-    """
-
-    points: Complex
-    linear: Array
+    points: Complex  # (N, C) of the body; the first n rows are the tile's vertices
+    linear: Array  # with `offset`: (C, 2, 2) and (C, 2), the map from the group's own frame
     offset: Array
-    placements: Placements
+    placements: Placements  # C of them, with the glide axes' final turns
 
 
 def drawn_to_tiles(
@@ -139,13 +134,11 @@ class Bodies(NamedTuple):
 class Hand:
     """A silhouette or its mirror image.
 
-    - `mirrored`: whether the latter.
-    - `samples`: points of its outline, coarse to fine.
     - `made`: the elastic body of a level of points, "coarse", "middle" or "fine", and a stiffness.
     """
 
-    mirrored: bool
-    samples: Samples
+    mirrored: bool  # whether the latter
+    samples: Samples  # points of its outline, coarse to fine
     made: Callable[[str, Stiffness], Elastic]
     _bodies: dict[Stiffness, Bodies] = field(default_factory=dict[Stiffness, Bodies])
 
@@ -224,13 +217,11 @@ MOST_MOVES = 8  # of each placement with each step
 class Drawn(NamedTuple):
     """C shapes drawn to tiles of their placements by springs.
 
-    - `placements`: C of them.
-    - `points`: (N, C).
     - `costs`: (C,) energy, springs and displacement together; `CROSSED` more of what crosses itself.
     """
 
-    placements: Placements
-    points: Complex
+    placements: Placements  # C of them
+    points: Complex  # (N, C)
     costs: Array
 
     def take(self, index: Integers) -> Drawn:
@@ -239,14 +230,10 @@ class Drawn(NamedTuple):
 
 
 class Stage(NamedTuple):
-    """One stage of moving corners.
+    """One stage of moving corners."""
 
-    - `step`: points of the outline by which corners move.
-    - `keep`: placements that go on, the best and no two the same.
-    """
-
-    step: int
-    keep: int
+    step: int  # points of the outline by which corners move
+    keep: int  # placements that go on, the best and no two the same
 
 
 def shifted(

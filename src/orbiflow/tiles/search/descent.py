@@ -287,16 +287,8 @@ def fit_descent(
 ) -> Fit:
     """Fit tiles of one class to a target by Sobolev descent, all starts side by side.
 
-    Args:
-        target: the silhouette.
-        kind: the class, or its name.
-        settings: of the descent; default effort "normal".
-        soft: of the target, if it is at hand already.
-        progress: told 1 - IoU of the best so far as the loss.
-        cancel: looked at before each step.
-
-    Raises:
-        Cancelled: if it was told to stop.
+    `soft` is the target's soft edge, if it is at hand already; `progress` is told 1 - IoU as the
+    loss.
     """
     kind = isohedral_class(kind)
     instance(target, Target, "the target", "Target.read and Target.from_polygon make one")

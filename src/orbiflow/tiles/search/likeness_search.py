@@ -114,10 +114,9 @@ class LikenessSearch(SearchMethod):
         return least_neck(goal.target.normal, self.min_neck)
 
     def searches(self, wanted: int = 1) -> tuple[LikenessSearch, ...]:
-        """Those of the levels below, least first, and these: none with levels below.
+        """Those of the levels below, least first, and these, with so many finalists `wanted`.
 
-        Args:
-            wanted: finalists at least, for which each gets twice as many starts at least.
+        Each has twice as many starts as finalists at least, where more are wanted.
 
         >>> [own.starts for own in LikenessSearch.for_effort("best").searches()]
         [8, 32, 128]

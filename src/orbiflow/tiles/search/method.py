@@ -19,16 +19,11 @@ from orbiflow.tiles.tilings import IsohedralClass, isohedral_class
 
 @dataclass(frozen=True, eq=False)
 class Goal:
-    """What tiles are to look like.
-
-    - `target`: The silhouette.
-    - `emphasis`: What must survive.
-    - `pins`: What must not bend.
-    """
+    """What tiles are to look like."""
 
     target: Target
-    emphasis: Emphasis | None = None
-    pins: Pins | None = None
+    emphasis: Emphasis | None = None  # what must survive
+    pins: Pins | None = None  # what must not bend
 
 
 class SearchMethod(ABC):

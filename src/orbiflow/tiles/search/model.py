@@ -199,20 +199,13 @@ class TileModel(nn.Module):
         return self.vertices.to(self.angle.dtype), self.corners
 
     def boundary(self, pieces: int) -> Tensor:
-        """Points (S, N pieces, 2) along the prototile, `pieces` evenly spaced on each side.
-
-        Identified edges have as many sides each, so their samples correspond.
-        """
+        """Points (S, N pieces, 2) along the prototile, `pieces` evenly spaced on each side."""
         whole(pieces, "pieces", 1)
         vertices, _ = self.prototile()
         return subdivided(vertices, pieces)
 
     def take(self, indices: Sequence[int] | int) -> TileModel:
-        """A new model with the candidates at `indices` only, at the same parameters.
-
-        Raises:
-            OrbiflowError: for indices that are not candidates, and for none.
-        """
+        """A new model with the candidates at `indices` only, at the same parameters."""
         chosen = self._chosen(indices)
         fields = [field.parameters_.detach()[chosen] for field in self.fourier_fields()]
         return self.with_fields(fields, chosen)
@@ -227,11 +220,7 @@ class TileModel(nn.Module):
     @staticmethod
     @torch.no_grad()
     def joined(models: Sequence[TileModel]) -> TileModel:
-        """The candidates of models that differ in their parameters alone, as one stack.
-
-        Raises:
-            OrbiflowError: for no models, and for models of several classes.
-        """
+        """The candidates of models of one class that differ in their parameters alone, as one stack."""
         names = {model.isohedral_class.name for model in models}
         if len(names) != 1:
             raise OrbiflowError(f"models of one class can be joined, got {sorted(names) or 'none'}")
@@ -254,9 +243,7 @@ class TileModel(nn.Module):
     def with_fields(self, fields: list[Tensor], indices: list[int] | None = None) -> TileModel:
         """The candidates at `indices` (default all) with another flow: one segment for each field.
 
-        Args:
-            fields: parameters (len(indices), P) of each segment, under this model's smoothness.
-            indices: of the candidates.
+        Fields are parameters (len(indices), P), under this model's smoothness.
         """
         chosen = list(range(self.size)) if indices is None else indices
         model = TileModel(
@@ -291,20 +278,12 @@ class TileModel(nn.Module):
         return self
 
     def require_single(self) -> None:
-        """Do nothing if the model holds one candidate.
-
-        Raises:
-            OrbiflowError: if it holds more.
-        """
+        """Check that the model holds one candidate."""
         if self.size != 1:
             raise OrbiflowError(f"take one candidate first: this model holds {self.size}")
 
     def placed_group(self) -> CrystallographicGroup:
-        """The group of a single candidate's tile, in the target's normal form.
-
-        Raises:
-            OrbiflowError: if the model holds more than one candidate.
-        """
+        """The group of a single candidate's tile, in the target's normal form."""
         self.require_single()
         linear: Array = self._linear(torch.float64).detach().cpu().numpy()[0]
         offset: Array = self.offset.detach().double().cpu().numpy()[0]

@@ -65,15 +65,9 @@ def occupancy_loss(
 ) -> Tensor:
     """Mean binary cross-entropy of sigmoid(tau phi(D^-1 q)) against o(q), one value a candidate.
 
-    phi is the signed distance to the template, rescaled to the target's units. (Paper, equation of
-    L.)
-
-    Args:
-        model: S candidates.
-        points: (N, 2), in the target's normal form.
-        inside: (N,) occupancies, 0 or 1.
-        hardness: tau.
-        affine: leave the flow out.
+    phi is the signed distance to the template, rescaled to the target's units, tau the `hardness`
+    (paper, equation of L). The points (N, 2) are in the target's normal form, `inside` (N,) is 0 or
+    1, and `affine` leaves the flow out.
     """
     pulled = model.unplace(points) if affine else model.inverse(points)
     phi = signed_distance(pulled, model.template()) * model.log_scale.exp()[:, None]
@@ -91,11 +85,7 @@ def fit_occupancy(
 ) -> TileModel:
     """Fit tiles of one class to a target by the paper's method, all starts side by side.
 
-    Returns:
-        The surviving candidates, best loss first. They are not certified yet.
-
-    Raises:
-        Cancelled: if `cancel`, which is looked at before each step, says so.
+    Returns the surviving candidates, best loss first. They are not certified yet.
     """
     kind = isohedral_class(kind)
     instance(target, Target, "the target", "Target.read and Target.from_polygon make one")

@@ -203,8 +203,7 @@ class OverlapSearch(SearchMethod):
     def for_outline(self, length: float) -> OverlapSearch:
         """More starts for a ragged silhouette: there are more ways to lay it out, and more fail.
 
-        Args:
-            length: of the outline, in square roots of the silhouette's area; a disc has 3.5.
+        `length` is the outline's, in square roots of the silhouette's area; a disc has 3.5.
         """
         share = min(max((length / PLAIN) ** RAGGED, 1.0), MOST_TIMES)
         (steps, kept), *later = self.stages

@@ -26,16 +26,13 @@ MOST_PLACEMENTS = 4_000_000
 class Placements(NamedTuple):
     """Ways to lay an outline of n points along the edges of a template, best first.
 
-    - `lengths`: (C, K) steps of each edge, sum n.
-    - `starts`: (C,) point of the outline at the template's first corner.
     - `turns`: (C,) radians; turn of the glide axes, 0 in classes without glide reflections.
-    - `gains`: (C,) at most 1, which is an outline that is a tile already.
     """
 
-    lengths: Integers
-    starts: Integers
+    lengths: Integers  # (C, K) steps of each edge, sum n
+    starts: Integers  # (C,) point of the outline at the template's first corner
     turns: NDArray[np.float64]
-    gains: NDArray[np.float64]
+    gains: NDArray[np.float64]  # (C,) at most 1, which is an outline that is a tile already
 
     def take(self, index: Integers) -> Placements:
         """Those at `index`."""

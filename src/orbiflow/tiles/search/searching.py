@@ -35,19 +35,17 @@ Outcome = EscherTile | ClassFailure
 
 @dataclass(frozen=True)
 class Event:
-    """News from a search, told in the thread that called `search_classes`, in this order:
+    """News from a search, told in the thread that called `search_classes`.
 
-    1. at most one event with a `preview`;
-    2. of each class, any number of events whose `share` never falls, then exactly one with its
-       `outcome`; those of several classes come as they happen, in any mixture.
-
+    First comes at most one event with a `preview`; then, of each class, any number of events whose
+    `share` never falls and exactly one with its `outcome`, those of several classes in any mixture.
     Classes that a `Cancel` left undone have their outcome last, in the order asked for.
 
-    - `name`: of the class.
-    - `share`: of the class's work that is done; 1 at its end, unless it was interrupted.
-    - `loss`: best so far in the method's own measure; for the descent 1 - IoU.
-    - `outcome`: what the class gave.
-    - `preview`: a first certified tile, which the search is going to improve on.
+    - `name`: The class.
+    - `share`: The share of the class's work that is done; 1 at its end, unless it was interrupted.
+    - `loss`: The best so far in the method's own measure; for the descent 1 - IoU.
+    - `outcome`: What the class gave.
+    - `preview`: A first certified tile, which the search is going to improve on.
     """
 
     name: str
@@ -82,16 +80,8 @@ def fit_tile(
 
     `escherize` does both, for several classes. This is for those who look at, or go on with, what
     was fitted: `Fit.model` is a `TileModel`, a torch module whose candidates may be trained on.
-
-    Args:
-        target: the silhouette.
-        kind: the class, or its name.
-        method: how to search; default `LikenessSearch`.
-        emphasis: what must survive; the occupancy method takes no notice.
-        pins: what must not bend, in the search for likeness.
-        per_class: certified tiles that are wanted.
-        progress: told the share of the work done, and the loss.
-        cancel: looked at before each step.
+    Arguments are as in `search_classes`; `progress` is called with the share of the work done, and
+    the loss.
 
     Raises:
         OrbiflowError: for an argument that cannot be used.
@@ -149,30 +139,27 @@ def search_classes(
     watch: Watcher | None = None,
     cancel: Cancel | None = None,
 ) -> tuple[list[EscherTile], list[ClassFailure]]:
-    """Fit a tile of each class to the target, with knobs of one's own; see `escherize`.
+    """Fit a tile of each class to the target, with a method and events of one's own; see `escherize`.
 
     Args:
-        target: the silhouette.
-        classes: name of one, such as "IH4", or several; each is done once, in its own process.
-        method: how to search: for likeness (`LikenessSearch`, the default), for overlap
-            (`OverlapSearch`), for both (`BothSearch`), or by the paper's method (`OccupancySearch`).
-        emphasis: what must survive.
-        pins: what must not bend, in the search for likeness.
-        per_class: tiles of each class at most, no two of them with a mutual IoU of .9; in a search
+        target: The silhouette.
+        classes: The name of one, such as "IH4", or several; each is done once, in its own process.
+        method: How to search. Default: `LikenessSearch` of normal effort.
+        emphasis: What must survive; the occupancy method takes no notice.
+        pins: What must not bend, in the search for likeness.
+        per_class: Tiles of each class at most, no two of them with a mutual IoU of .9; in a search
             for both, those of either kind that it chooses from, at least three.
-        workers: processes; 1 stays in this process. A script that asks for more must do its work
+        workers: Processes; 1 stays in this process. A script that asks for more must do its work
             under `if __name__ == "__main__":`, as always with multiprocessing.
-        force: return tiles that are not certified, too; their certificates say why.
-        watch: called in this thread with every `Event`, in the order that `Event` states. What it
-            raises ends the search and comes out of this function; so does `KeyboardInterrupt`.
-        cancel: ends the search early, from another thread, a signal handler or `watch`; looked at
-            before each step of every fit.
+        force: Return tiles that are not certified, too; their certificates say why.
+        watch: Called in this thread with every `Event`. What it raises ends the search and comes out
+            of this function; so does `KeyboardInterrupt`.
+        cancel: Ends the search early; looked at before each step of every fit.
 
     Returns:
-        Certified tiles, best first (`EscherTile.score`), and the classes that gave none. Of
-        `BothSearch` at most twelve tiles in all, those for likeness first: see `front_list`. The
-        same seed gives the same tiles, whatever the number of workers. If it was cancelled: what was
-        found by then, and the other classes as failures with the reason `INTERRUPTED`.
+        Certified tiles, best first, and the classes that gave none, with the reason `INTERRUPTED` for
+        those that were not finished. Of `BothSearch` at most twelve tiles in all, those for likeness
+        first. The same seed gives the same tiles, whatever the number of workers.
 
     Raises:
         OrbiflowError: for an unknown class, a setting out of range, or workers that die.

@@ -82,14 +82,10 @@ SMOOTHING = (0.0, 1.0, 2.0)
 
 @dataclass(frozen=True)
 class Starts:
-    """The best starts of a search.
+    """The best starts of a search."""
 
-    - `prototiles`: best overlap first.
-    - `iou`: (S,) of each before the descent.
-    """
-
-    prototiles: Prototiles
-    iou: Array
+    prototiles: Prototiles  # best overlap first
+    iou: Array  # (S,) of each before the descent
 
 
 def outline_starts(

@@ -83,11 +83,7 @@ MAX_SIDES = 100_000
 
 
 def as_map(model: TileModel, frame: Frame | None = None, bending: Bending | None = None) -> TileMap:
-    """Return a single candidate as plain arrays; `frame` and `bending` go with it.
-
-    Raises:
-        OrbiflowError: for a model that holds more than one candidate.
-    """
+    """Return a single candidate as plain arrays; `frame` and `bending` go with it."""
     instance(model, TileModel, "the model", "load_model and the fits give one").require_single()
     settings = {
         "class": model.isohedral_class.name,
@@ -109,11 +105,7 @@ def as_map(model: TileModel, frame: Frame | None = None, bending: Bending | None
 
 
 def as_model(stored: TileMap) -> TileModel:
-    """Return the model again, float64, one candidate, in the target's normal form.
-
-    Raises:
-        OrbiflowError: if settings or arrays do not fit together.
-    """
+    """Return the model again, float64, one candidate, in the target's normal form."""
     settings, arrays = stored.settings, stored.arrays
     _check_segments(settings, arrays)
     try:

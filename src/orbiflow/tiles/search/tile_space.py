@@ -24,19 +24,14 @@ from orbiflow.tiles.tilings import IsohedralClass
 class NearestTiles(NamedTuple):
     """C tiles, each the nearest to an outline under its placement.
 
-    - `vertices`: (C, n) x + iy, vertex i near point `start + i` of the outline.
-    - `linear`, `offset`: (C, 2, 2) and (C, 2), the map from the group's own frame.
-    - `corners`: (C, K) vertices at the template's corners.
-    - `distance`: (C,) sum of squared distances.
-
     A tile may cross itself, and `linear` may reverse orientation: then it is of no use.
     """
 
-    vertices: Complex
-    linear: Array
+    vertices: Complex  # (C, n) x + iy, vertex i near point `start + i` of the outline
+    linear: Array  # with `offset`: (C, 2, 2) and (C, 2), the map from the group's own frame
     offset: Array
-    corners: Integers
-    distance: Array
+    corners: Integers  # (C, K) vertices at the template's corners
+    distance: Array  # (C,) sum of squared distances
 
     def take(self, index: Integers) -> NearestTiles:
         """Those at `index`."""
