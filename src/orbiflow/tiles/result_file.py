@@ -84,7 +84,7 @@ def folder_names(classes: Iterable[str]) -> list[str]:
 
 
 def read_document(path: str | Path) -> tuple[Path, dict[str, Any]]:
-    """Return the result.json at a path, or in a run's folder, and the object with `tiles` that it holds."""
+    """Return the result.json at a path, or in a run's folder, and the object that it holds."""
     given = as_path(path, "the result")
     file = given / RESULT if given.is_dir() else given
     try:

@@ -46,41 +46,10 @@ FIGURE_FILES = ("tiling.pdf", "overlay.pdf", *FIELD_FILES)
 of the flow if there is one."""
 
 
-def overlay(result: EscherTile, target: Target, *, label: str = "", width_px: int = 1200) -> bytes:
-    """Return a PNG of a tile and its silhouette: how it bent, or what is missing and added."""
-    y_down = target.y_down
-    label = label or result.isohedral_class
-    if result.bent is None or result.rest is None:
-        return overlay_png(
-            result.tile, target.outline, y_down=y_down, label=label, width_px=width_px
-        )
-    label = f"{label}  IoU {result.metrics.iou:.3f}"
-    return bending_png(
-        result.tile, result.rest, result.bent, y_down=y_down, label=label, width_px=width_px
-    )
-
-
 def figure_files(result: EscherTile) -> tuple[str, ...]:
     """Return the `FIGURE_FILES` of a tile: there is no flow where the silhouette bent into the tile."""
     likeness = result.objective == "likeness"
     return tuple(file for file in FIGURE_FILES if not (likeness and file in FIELD_FILES))
-
-
-def _overlay_picture(result: EscherTile, target: Target) -> Picture:
-    """Return the picture of `overlay` for print."""
-    y_down = target.y_down
-    if result.bent is None or result.rest is None:
-        return overlay_picture(result.tile, target.outline, y_down=y_down)
-    return bending_picture(result.tile, result.rest, result.bent, y_down=y_down)
-
-
-def _field_picture(result: EscherTile, sheet: Sheet) -> Picture:
-    field = placed_field(result.model())
-    return field_picture(field, result.normal_tile.group, result.normal_tile, sheet=sheet)
-
-
-def _map(result: EscherTile) -> TileMap:
-    return result.map or TileMap()
 
 
 def write_tile_folder(
@@ -97,22 +66,37 @@ def write_tile_folder(
         OutputError: If a file cannot be written.
     """
     make_folder(folder)
-    y_down = target.y_down
-    colours = colours or colouring(result.tile)
-    title = f"{target.source.rsplit('/', 1)[-1]}, {result.isohedral_class} ({result.group_name})"
+    tile, colours, y_down = result.tile, colours or colouring(result.tile), target.y_down
+    label = f"{result.isohedral_class} ({result.group_name})"
+    title = f"{target.source.rsplit('/', 1)[-1]}, {label}"
     if not result.certificate.valid:
         title += ", NOT CERTIFIED"
-    label = f"{result.isohedral_class} ({result.group_name})"
+
+    def overlay() -> bytes:
+        if result.bent is None or result.rest is None:
+            return overlay_png(tile, target.outline, y_down=y_down, label=label)
+        text = f"{label}  IoU {result.metrics.iou:.3f}"
+        return bending_png(tile, result.rest, result.bent, y_down=y_down, label=text)
+
+    def overlay_for_print() -> Picture:
+        if result.bent is None or result.rest is None:
+            return overlay_picture(tile, target.outline, y_down=y_down)
+        return bending_picture(tile, result.rest, result.bent, y_down=y_down)
+
+    def field(sheet: Sheet) -> bytes:
+        normal = result.normal_tile
+        return field_picture(placed_field(result.model()), normal.group, normal, sheet=sheet).file()
+
     contents: dict[str, Callable[[], str | bytes]] = {
-        "tile.svg": lambda: tile_svg(result.tile, y_down=y_down, title=title),
-        "tiling.svg": lambda: tiling_svg(result.tile, y_down=y_down, title=title, colours=colours),
-        "tiling.png": lambda: tiling_png(result.tile, y_down=y_down, colours=colours),
-        "overlay.png": lambda: overlay(result, target, label=label),
-        "tiling.pdf": lambda: tiling_picture(result.tile, y_down=y_down, colours=colours).file(),
-        "overlay.pdf": lambda: _overlay_picture(result, target).file(),
-        "field.png": lambda: _field_picture(result, Sheet.screen(1200)).file(),
-        "field.pdf": lambda: _field_picture(result, Sheet.column()).file(),
-        "model.safetensors": lambda: _map(result).to_bytes(),
+        "tile.svg": lambda: tile_svg(tile, y_down=y_down, title=title),
+        "tiling.svg": lambda: tiling_svg(tile, y_down=y_down, title=title, colours=colours),
+        "tiling.png": lambda: tiling_png(tile, y_down=y_down, colours=colours),
+        "overlay.png": overlay,
+        "tiling.pdf": lambda: tiling_picture(tile, y_down=y_down, colours=colours).file(),
+        "overlay.pdf": lambda: overlay_for_print().file(),
+        "field.png": lambda: field(Sheet.screen(1200)),
+        "field.pdf": lambda: field(Sheet.column()),
+        "model.safetensors": (result.map or TileMap()).to_bytes,
     }
     names = (*TILE_FILES, *(figure_files(result) if figures else ()))
     return [write_atomic(folder / name, contents[name]()) for name in names]
@@ -138,20 +122,28 @@ def write_gallery(
         OutputError: If a file cannot be written.
     """
     names = folder_names([result.isohedral_class for result in results])
-    folders = [out / name for name in names]
     colours = [colouring(result.tile) for result in results]
-    draw = functools.partial(_draw, results, target, folders, colours, figures)
+    draw = functools.partial(_draw, target, figures)
+    items = [(*each, out / name) for *each, name in zip(results, colours, names, strict=True)]
     if workers == 1 or len(results) == 1 or not figures:
-        for k in range(len(results)):
-            draw(k)
+        for item in items:
+            draw(item)
     else:
-        with contextlib.closing(work(draw, range(len(results)), workers)) as news:
+        with contextlib.closing(work(draw, items, workers)) as news:
             for _ in news:
                 pass
     write_atomic(out / OVERVIEW, overview_png(results, target, colours, failures=failures))
     extra = [figure_files(result) if figures else () for result in results]
     page = index_page(results, target, names, failures=failures, figures=extra)
     write_atomic(out / INDEX, page)
+
+
+def _draw(
+    target: Target, figures: bool, item: tuple[EscherTile, Colouring, Path], *_: object
+) -> None:
+    """Write the folder of one tile; this may run in a worker process."""
+    tile, colours, folder = item
+    write_tile_folder(tile, target, folder, colours=colours, figures=figures)
 
 
 def write_front(
@@ -175,21 +167,6 @@ def write_front(
     ]
     if points:
         write_atomic(out / FRONT, front_png(points, y_down=target.y_down))
-
-
-def _draw(
-    results: Sequence[EscherTile],
-    target: Target,
-    folders: Sequence[Path],
-    colours: Sequence[Colouring],
-    figures: bool,
-    index: int,
-    *_: object,
-) -> None:
-    """Write the folder of one tile; this may run in a worker process."""
-    write_tile_folder(
-        results[index], target, folders[index], colours=colours[index], figures=figures
-    )
 
 
 def written_files(folder: Path) -> set[str]:
@@ -246,22 +223,20 @@ def write_run(
     if tiles and figures and not any(FIELD_FILES[0] in figure_files(tile) for tile in tiles):
         on_event(Note("no flow made these tiles, so there is none to draw: the silhouette bent"))
     with folder.replaced() as staged:
-        _fill(staged, result, figures=figures)
+        if tiles:
+            write_gallery(
+                tiles,
+                result.target,
+                staged,
+                failures=result.failures,
+                figures=figures,
+                workers=result.workers if figures else 1,
+            )
+            if result.method.objective == "both":
+                write_front(tiles, result.found or tiles, result.target, staged)
+        write_atomic(staged / RESULT, json.dumps(report(result), allow_nan=False))
         files = [path.relative_to(staged) for path in staged.rglob("*") if path.is_file()]
     written = [folder.path / path for path in sorted(files)]
     for path in written:
         on_event(Written(path))
     return written
-
-
-def _fill(folder: Path, result: SearchResult, *, figures: bool) -> None:
-    """Write all files of a run into an empty folder."""
-    tiles, target = result.tiles, result.target
-    document = report(result)
-    if tiles:
-        workers = result.workers if figures else 1
-        failures = result.failures
-        write_gallery(tiles, target, folder, failures=failures, figures=figures, workers=workers)
-        if document["objective"] == "both":
-            write_front(tiles, result.found or tiles, target, folder)
-    write_atomic(folder / RESULT, json.dumps(document, allow_nan=False))

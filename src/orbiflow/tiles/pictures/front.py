@@ -94,23 +94,14 @@ def _axes(figure: object, points: Sequence[FrontPoint]) -> Axes:
         spine.set_color("#8a949e")
         spine.set_linewidth(0.7)
     kinds = [kind for kind in COLOURS if any(p.objective == kind for p in points)]
+    names = {COLOURS[kind]: NAMES[kind] for kind in kinds}
+    names[PALE] = "left out: beaten, or much like one that is shown"
     marks = [
-        Line2D([], [], marker="o", ls="", ms=5, color=COLOURS[k], label=NAMES[k]) for k in kinds
+        Line2D([], [], marker="o", ls="", ms=5, color=colour, label=name)
+        for colour, name in names.items()
     ]
-    marks.append(
-        Line2D(
-            [],
-            [],
-            marker="o",
-            ls="",
-            ms=5,
-            color=PALE,
-            label="left out: beaten, or much like one that is shown",
-        )
-    )
-    axes.legend(
-        handles=marks, fontsize=7.5, frameon=False, ncols=3, loc="lower left", bbox_to_anchor=(0, 1)
-    )
+    corner = {"loc": "lower left", "bbox_to_anchor": (0, 1)}
+    axes.legend(handles=marks, fontsize=7.5, frameon=False, ncols=3, **corner)
     return axes
 
 
