@@ -174,6 +174,7 @@ def group_json(group: CrystallographicGroup) -> dict[str, Any]:
 
 def tile_json(tile: EscherTile) -> dict[str, Any]:
     """Return one entry of `tiles`: polygon and group in the input's own coordinates."""
+    thin = tile.thinnest
     return {
         "class": tile.isohedral_class,
         "score": _or_none(tile.score),
@@ -190,7 +191,7 @@ def tile_json(tile: EscherTile) -> dict[str, Any]:
         "certificate": tile.certificate.as_dict(),
         "polygon": _closed(tile.tile.polygon),
         "bent": None if tile.bent is None else _closed(tile.bent),
-        "thinnest": _thinnest_json(tile.thinnest),
+        "thinnest": thin if thin is None else {**thin._asdict(), "ends": thin.ends.tolist()},
         "corners": list(tile.tile.corners),
         "group": group_json(tile.tile.group),
         "starts": tile.starts,
@@ -210,12 +211,6 @@ def _or_none(value: Any) -> Any:
 
 def _closed(ring: Array) -> list[list[float]]:
     return np.concatenate([ring, ring[:1]]).tolist()
-
-
-def _thinnest_json(found: Thinnest | None) -> dict[str, Any] | None:
-    if found is None:
-        return None
-    return {"width": found.width, "share": found.share, "ends": found.ends.tolist()}
 
 
 def _measurements(entry: dict[str, Any]) -> dict[str, Any]:

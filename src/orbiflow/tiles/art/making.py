@@ -16,7 +16,7 @@ from orbiflow.drawing import palette
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import Cancel, Progress, Sink, ignore, write_atomic
 from orbiflow.tiles.art.drawings import Over, paint_motif, read_over
-from orbiflow.tiles.art.engraving import engraved, eyes
+from orbiflow.tiles.art.engraving import engraved, eye
 from orbiflow.tiles.art.page import ArtPage, art_page
 from orbiflow.tiles.art.raster import Grid, Paint, render_page
 from orbiflow.tiles.art.settings import ArtSettings
@@ -99,10 +99,10 @@ def artwork(
         tile.require_map()
     page = art_page(tile, settings)
     parts: tuple[Part, ...] = () if drawing is None else drawing.parts
-    around = eyes(tile, settings.eyes, palette(settings.palette))
+    around = [eye(tile, given, palette(settings.palette)) for given in settings.eyes]
     if settings.strokes is not None:
         parts += engraved(tile, settings.strokes, around)
-    parts += tuple(part for eye in around for part in eye.parts)
+    parts += tuple(part for one in around for part in one.parts)
     short = palette(settings.palette).shortage(page.count)
     said = (*tile.notes, *notes, *page.notes, *short)
     return Artwork(tile, settings, page, picture, Motif(parts), said)

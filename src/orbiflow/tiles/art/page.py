@@ -75,9 +75,12 @@ def art_page(given: EscherTile, settings: ArtSettings) -> ArtPage:
     colours = _Colours(tile, settings.colour)
     flip = np.diag([1.0, 1.0 if given.y_down else -1.0])
     size = longer_side(tile.polygon)
-    scale = _scale(tile, settings) if settings.tile_size is None else settings.tile_size / size
+    width, height = settings.size
+    scale = float(np.sqrt(width * height / USUAL_TILES / abs(tile.signed_area)))
+    if settings.tile_size is not None:
+        scale = settings.tile_size / size
     if not settings.repeat:
-        linear, (width, height) = scale * flip, settings.size
+        linear = scale * flip
         offset = np.array([width, height]) / 2 - linear @ tile.center
         return _page(tile, colours, linear, offset, (width, height), ())
     found = rectangle(colours.lattice, scale, settings.tolerance, flipped=not given.y_down)
@@ -90,7 +93,13 @@ def art_page(given: EscherTile, settings: ArtSettings) -> ArtPage:
     note = f"the cell that repeats is {found.width} x {found.height} pixels and holds {tiles:.0f} tiles"
     if abs(found.turn) > 0.05:
         note += f"; the tiling is turned by {found.turn:.1f} degrees"
-    note += "; " + _strain_in_words(found.strain, exact=found.exact)
+    share = f"{100 * found.strain:.2g} %" if found.strain >= 5e-5 else "less than 0.01 %"
+    if found.strain < 1e-9:
+        note += "; nothing is stretched"
+    elif found.exact:
+        note += f"; whole pixels stretch it by {share}"
+    else:
+        note += f"; it is stretched by {share} to be a rectangle"
     return _page(tile, colours, found.linear, offset, (found.width, found.height), (note,))
 
 
@@ -101,20 +110,6 @@ def spread_page(
     colours = _Colours(given.tile, settings.colour)
     size = page.width * across, page.height * down
     return _page(given.tile, colours, page.linear, page.offset, size, ())
-
-
-def _strain_in_words(strain: float, *, exact: bool) -> str:
-    if strain < 1e-9:
-        return "nothing is stretched"
-    share = f"{100 * strain:.2g} %" if strain >= 5e-5 else "less than 0.01 %"
-    if exact:
-        return f"whole pixels stretch it by {share}"
-    return f"it is stretched by {share} to be a rectangle"
-
-
-def _scale(tile: Tile, settings: ArtSettings) -> float:
-    width, height = settings.size
-    return float(np.sqrt(width * height / USUAL_TILES / abs(tile.signed_area)))
 
 
 def _page(

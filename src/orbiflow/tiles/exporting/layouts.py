@@ -64,7 +64,15 @@ def layout(tile: Tile, settings: ExportSettings, *, y_down: bool) -> Layout:
     middle = np.array([(box.left + box.right) / 2, (box.top + box.bottom) / 2])
     placed = tile.transformed(linear, middle - linear @ tile.center)
     if settings.cut != "pieces":
-        _check_room(placed, settings, box)
+        need = np.ptp(placed.polygon, axis=0) + 2 * bleed(settings)
+        if need[0] > box.width or need[1] > box.height:
+            extra = height - box.height
+            strip = f", {extra:g} mm of it for the calibration mark" if extra else ""
+            raise OrbiflowError(
+                f"a tile of {settings.tile_size:g} mm does not fit on the page of {width:g} x "
+                f"{height:g} mm: it needs {need[0]:.1f} x {need[1] + extra:.1f} mm{strip}; choose "
+                "a larger area or a smaller tile size"
+            )
         if not settings.clip:
             placed = _with_most_whole(placed, inner_box(box, settings))
     curves = outline(placed, settings.deviation)
@@ -121,19 +129,6 @@ def _with_most_whole(tile: Tile, box: Box) -> Tile:
         if count > best:
             best, shift = count, step
     return tile.transformed(np.eye(2), shift)
-
-
-def _check_room(tile: Tile, settings: ExportSettings, box: Box) -> None:
-    need = np.ptp(tile.polygon, axis=0) + 2 * bleed(settings)
-    if need[0] <= box.width and need[1] <= box.height:
-        return
-    extra = settings.page[1] - box.height
-    strip = f", {extra:g} mm of it for the calibration mark" if extra else ""
-    raise OrbiflowError(
-        f"a tile of {settings.tile_size:g} mm does not fit on the page of {settings.page[0]:g} x "
-        f"{settings.page[1]:g} mm: it needs {need[0]:.1f} x {need[1] + extra:.1f} mm{strip}; choose "
-        "a larger area or a smaller tile size"
-    )
 
 
 def placed_tiles(copies: Copies, layout: Layout) -> tuple[PlacedTile, ...]:
@@ -293,7 +288,11 @@ def pieces_scenes(layout: Layout, *, fine: bool = True) -> list[Scene]:
     placed = on_sheet(arrangements, line, box.width - 2 * edge, box.height - 2 * edge)
     placed = replace(placed, offsets=placed.offsets + edge)
     if not len(placed):
-        _refuse_sheet(line, box)
+        short, long = rectangle_sides(line)
+        raise OrbiflowError(
+            f"the page of {box.width:g} x {box.height:g} mm does not hold a single piece, which takes "
+            f"{long:.1f} x {short:.1f} mm; choose a larger area or bed, or a smaller tile size"
+        )
     return [
         _scene(layout, part, curve, line, box, gap) for part in _shared_out(placed, layout, box)
     ]
@@ -355,11 +354,3 @@ def _require_clear(rings: Array, box: Box, gap: float) -> None:
     low, high = rings.min(axis=(0, 1)), rings.max(axis=(0, 1))
     if (first != second).any() or (low < 0).any() or (high > (box.width, box.height)).any():
         raise RuntimeError("the nesting broke its promise: pieces too close or off the sheet")
-
-
-def _refuse_sheet(line: Array, box: Box) -> None:
-    short, long = rectangle_sides(line)
-    raise OrbiflowError(
-        f"the page of {box.width:g} x {box.height:g} mm does not hold a single piece, which takes "
-        f"{long:.1f} x {short:.1f} mm; choose a larger area or bed, or a smaller tile size"
-    )

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from operator import attrgetter
 
 import numpy as np
 import shapely
@@ -47,7 +48,10 @@ class Arrangement:
 
     def clear(self, ring: Array, gap: float) -> bool:
         """Return whether no two pieces with the outline `ring` come closer than `gap`."""
-        pieces = self._own(ring)
+        pieces = [
+            shapely.Polygon(ring @ linear.T + offset)
+            for linear, offset in zip(self.linear, self.offsets, strict=True)
+        ]
         reach = float(np.linalg.norm(ring - _middle(ring), axis=1).max())
         centers = self.linear @ _middle(ring) + self.offsets
         steps = self._steps(2 * reach + gap, centers)
@@ -59,15 +63,12 @@ class Arrangement:
                 near = np.hypot(*moved.T) <= 2 * reach + gap
                 if second == first:  # one of each pair of opposite shifts, and not the piece itself
                     near &= (steps[:, 0] > 0) | ((steps[:, 0] == 0) & (steps[:, 1] > 0))
-                if near.any() and self._touched(piece, pieces[second], shifts[near], gap):
-                    return False
+                if near.any():
+                    points = np.asarray(pieces[second].exterior.coords)
+                    others = shapely.polygons(points + shifts[near][:, None, :])
+                    if shapely.dwithin(piece, others, gap).any():
+                        return False
         return True
-
-    def _own(self, ring: Array) -> list[shapely.Polygon]:
-        return [
-            shapely.Polygon(ring @ linear.T + offset)
-            for linear, offset in zip(self.linear, self.offsets, strict=True)
-        ]
 
     def _steps(self, reach: float, centers: Array) -> Array:
         """Return the integer coordinates of all lattice vectors that can bring two pieces together."""
@@ -76,12 +77,6 @@ class Arrangement:
         bound = np.minimum(bound, 40)
         ranges = [np.arange(-b, b + 1) for b in bound]
         return np.stack(np.meshgrid(*ranges, indexing="ij"), axis=-1).reshape(-1, 2)
-
-    @staticmethod
-    def _touched(piece: shapely.Polygon, other: shapely.Polygon, shifts: Array, gap: float) -> bool:
-        points = np.asarray(other.exterior.coords)
-        moved = shapely.polygons(points + shifts[:, None, :])
-        return bool(shapely.dwithin(piece, moved, gap).any())
 
 
 def tightened(start: Arrangement, ring: Array, gap: float, *, most: float = 4.0) -> Arrangement:
@@ -129,7 +124,8 @@ def pair_starts(ring: Array, gap: float) -> list[Arrangement]:
     """Return dense lattices of pairs, the piece and the piece turned by 180 degrees."""
     raster = _Raster(ring, gap)
     found = []
-    for place in raster.edge_of(raster.turned):
+    for angle in np.arange(PAIRS) * 2 * np.pi / PAIRS:
+        place = raster.first_outside(raster.turned, angle)
         # the pair's no-fit region: like with like, and unlike either way round
         there = _shifted(raster.turned, -place)
         pair = raster.same | there | there[::-1, ::-1]
@@ -163,18 +159,14 @@ class _Raster:
         self.turned = np.pad(fftconvolve(piece, piece) > 0.5, pad)
         self.half = (len(self.same) - 1) // 2
 
-    def edge_of(self, region: Mask) -> list[NDArray[np.int64]]:
-        """Return translations (2,) in cells just outside a region, in all directions."""
-        found = []
-        for angle in np.arange(PAIRS) * 2 * np.pi / PAIRS:
-            found.append(self._first_outside(region, angle))
-        return found
-
-    def _first_outside(self, region: Mask, angle: float) -> NDArray[np.int64]:
+    def first_outside(self, region: Mask, angle: float) -> NDArray[np.int64]:
+        """Return the translation (2,) in cells just outside a region in a direction."""
         way = np.array([np.cos(angle), np.sin(angle)])
         steps = np.round(np.arange(1, self.half + 2)[:, None] * way).astype(int)
-        free = np.logical_not(_values_at(region, steps))
-        return steps[int(np.argmax(free))]
+        index = steps + (np.array(region.shape) - 1) // 2
+        known = ((index >= 0) & (index < region.shape)).all(axis=1)
+        index = np.where(known[:, None], index, 0)
+        return steps[int(np.argmin(known & region[index[:, 0], index[:, 1]]))]
 
     def lattices(self, region: Mask, pieces: int) -> list[tuple[float, Array]]:
         """Return the area and lattice, in mm, of lattices outside a region, the densest first.
@@ -187,7 +179,7 @@ class _Raster:
         grid = np.stack(np.meshgrid(axis, axis, indexing="ij"), axis=-1)
         found = []
         for angle in np.arange(DIRECTIONS) * np.pi / DIRECTIONS:
-            first = self._first_outside(region, angle)
+            first = self.first_outside(region, angle)
             blocked = np.zeros_like(region)
             most = 1 + int(2 * half / max(1.0, float(np.hypot(*first))))
             for k in range(-most, most + 1):
@@ -201,14 +193,6 @@ class _Raster:
                 found.append((float(area[place]) * self.cell**2, lattice))
         found.sort(key=lambda item: item[0])
         return found
-
-
-def _values_at(region: Mask, steps: NDArray[np.int64]) -> Mask:
-    half = (np.array(region.shape) - 1) // 2
-    index = steps + half
-    known = np.asarray(((index >= 0) & (index < region.shape)).all(axis=1))
-    index = np.where(known[:, None], index, 0)
-    return known & region[index[:, 0], index[:, 1]]
 
 
 def _shifted(region: Mask, step: NDArray[np.int64]) -> Mask:
@@ -261,17 +245,13 @@ def dense_arrangements(tile: Tile, ring: Array, gap: float, *, seed: int = 0) ->
     group = tile.group
     own = Arrangement(group.lattice, group.linear_parts, group.translations)
     starts = [own, *lattice_starts(coarse, gap), *pair_starts(coarse, gap)]
-    tight = sorted((tightened(start, coarse, gap) for start in starts), key=_area)
+    tight = sorted((tightened(start, coarse, gap) for start in starts), key=attrgetter("cell_area"))
     clear = [found for found in tight if found.clear(ring, gap)]
     improved = [_improved(found, coarse, gap, rng) for found in clear[:3]]
-    best = sorted((*improved, *clear), key=_area)[:KEPT]
+    best = sorted((*improved, *clear), key=attrgetter("cell_area"))[:KEPT]
     # the coarse ring holds the fine one, so there is a little room left
     exact = (tightened(found, ring, gap) for found in best)
-    return sorted((found for found in exact if found.clear(ring, gap)), key=_area)
-
-
-def _area(arrangement: Arrangement) -> float:
-    return arrangement.cell_area
+    return sorted((found for found in exact if found.clear(ring, gap)), key=attrgetter("cell_area"))
 
 
 def _simplified(ring: Array, gap: float) -> Array:
@@ -316,7 +296,8 @@ def on_sheet(
         turned = arrangement.turned(angle)
         rings = np.einsum("aij,mj->ami", turned.linear, ring) + turned.offsets[:, None]
         low, high = rings.min(axis=1), rings.max(axis=1)
-        for shift in _shifts(low):
+        # one piece at the left edge and one at the top, a hair inside
+        for shift in (np.array([1e-6 - x, 1e-6 - y]) for x in low[:, 0] for y in low[:, 1]):
             placed = _within(turned, low + shift, high + shift, shift, width, height)
             if len(placed) > len(best):
                 best = placed
@@ -329,11 +310,6 @@ def _angles(arrangement: Arrangement, ring: Array) -> list[float]:
     along = [-np.arctan2(y, x) + turn for x, y in sides for turn in (0, np.pi / 2)]
     even = np.arange(ANGLES) * np.pi / ANGLES
     return sorted({round(float(a % np.pi), 9) for a in (*along, *even)})
-
-
-def _shifts(low: Array) -> list[Array]:
-    """Return shifts that bring one piece to the left edge and one to the top, a hair inside."""
-    return [np.array([1e-6 - x, 1e-6 - y]) for x in low[:, 0] for y in low[:, 1]]
 
 
 def _within(

@@ -88,14 +88,17 @@ def _tangents(run: Array) -> Array:
 def _cubic(part: Array, start: Array, end: Array, tolerance: float) -> tuple[Array | None, int]:
     """Return the cubic along a polyline, or None and the vertex at which to divide it."""
     samples = _samples(part)
-    share = _arc_shares(samples)
+    knots = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(samples, axis=0), axis=1))])
+    share = knots / max(knots[-1], 1e-300)
     piece = _least_squares(samples, share, start, end)
     for _ in range(_ROUNDS):
         share = _closer(piece, samples, share)
         piece = _least_squares(samples, share, start, end)
     error = np.linalg.norm(_points(piece, share) - samples, axis=1)
-    if error.max() <= tolerance and _deviation(piece, part) <= tolerance:
-        return piece, 0
+    if error.max() <= tolerance:
+        along = _points(piece, np.linspace(0, 1, 4 * min(len(part), 24) + 9))
+        if shapely.distance(shapely.points(along), shapely.LineString(part)).max() <= tolerance:
+            return piece, 0
     inner = part[1:-1]
     if not len(inner):
         return None, 0
@@ -107,11 +110,6 @@ def _cubic(part: Array, start: Array, end: Array, tolerance: float) -> tuple[Arr
     return None, int(np.argmax(off * np.minimum(balance / len(part), 0.2))) + 1
 
 
-def _deviation(piece: Array, part: Array) -> float:
-    samples = shapely.points(_points(piece, np.linspace(0, 1, 4 * min(len(part), 24) + 9)))
-    return float(shapely.distance(samples, shapely.LineString(part)).max())
-
-
 def _samples(part: Array) -> Array:
     """Return the vertices, and points on long sides: a fit to vertices alone sways between them."""
     lengths = np.linalg.norm(np.diff(part, axis=0), axis=1)
@@ -120,11 +118,6 @@ def _samples(part: Array) -> Array:
     share = (np.arange(count.sum()) - (np.cumsum(count) - count)[own]) / count[own]
     points = part[own] + share[:, None] * (part[own + 1] - part[own])
     return np.concatenate([points, part[-1:]])
-
-
-def _arc_shares(samples: Array) -> Array:
-    knots = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(samples, axis=0), axis=1))])
-    return knots / max(knots[-1], 1e-300)
 
 
 def _least_squares(samples: Array, share: Array, start: Array, end: Array) -> Array:

@@ -12,7 +12,6 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 import shapely
 from numpy.typing import ArrayLike, NDArray
-from shapely.geometry.base import BaseGeometry
 
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
@@ -311,12 +310,9 @@ def rectangle(box: Box) -> Curve:
 
 def inside(curve: Curve, box: Box, *, slack: float = 1e-9) -> bool:
     """Return whether a box holds a curve with all its control points."""
-    (left, top), (right, bottom) = curve.bounds()
+    low, high = curve.bounds()
     return bool(
-        left >= box.left - slack
-        and top >= box.top - slack
-        and right <= box.right + slack
-        and bottom <= box.bottom + slack
+        (low >= np.array(box[:2]) - slack).all() and (high <= np.array(box[2:]) + slack).all()
     )
 
 
@@ -328,8 +324,7 @@ def clipped_region(curve: Curve, box: Box, tolerance: float) -> list[Curve]:
     if inside(curve, box):
         return [curve]
     polygon = shapely.Polygon(curve.flattened(tolerance))
-    if not polygon.is_valid:
-        polygon = shapely.make_valid(polygon)
+    polygon = polygon if polygon.is_valid else shapely.make_valid(polygon)
     common = shapely.intersection(polygon, shapely.box(*box))
     return [
         Curve.polyline(np.asarray(part.exterior.coords)[:-1], closed=True)
@@ -343,11 +338,6 @@ def clipped_line(curve: Curve, box: Box, tolerance: float) -> list[Curve]:
         return [curve]
     points = curve.flattened(tolerance)
     line = shapely.LineString(np.concatenate([points, points[:1]]) if curve.closed else points)
-    common = shapely.intersection(line, shapely.box(*box))
-    return [Curve.polyline(part) for part in _lines(common)]
-
-
-def _lines(geometry: BaseGeometry) -> list[np.ndarray]:
-    if geometry.geom_type == "LineString":
-        return [] if geometry.is_empty else [shapely.get_coordinates(geometry)]
-    return [line for part in getattr(geometry, "geoms", ()) for line in _lines(part)]
+    parts = shapely.get_parts(shapely.intersection(line, shapely.box(*box)))
+    lines = [part for part in parts if part.geom_type == "LineString" and not part.is_empty]
+    return [Curve.polyline(shapely.get_coordinates(part)) for part in lines]

@@ -20,7 +20,6 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import Cancel, Progress, Sink, ignore, write_atomic
 from orbiflow.tiles.exporting.layouts import Layout, layout, pieces_scenes, place_on, tiling_scene
 from orbiflow.tiles.exporting.scene import (
-    Booleans,
     Curve,
     Layer,
     PlacedTile,
@@ -224,7 +223,9 @@ def _points_and_codes(curve: Curve) -> tuple[Array, Array]:
     from matplotlib.path import Path
 
     move, line, cubic = (np.uint8(code) for code in (Path.MOVETO, Path.LINETO, Path.CURVE4))
-    kept = _kept(curve.straight)
+    # of straight pieces only the end is kept
+    kept = np.repeat(~curve.straight, 3)
+    kept[2::3] = True
     points = curve.pieces[:, 1:].reshape(-1, 2)[kept]
     codes = np.where(np.repeat(curve.straight, 3), line, cubic)[kept]
     points, codes = np.concatenate([curve.start[None], points]), np.concatenate([[move], codes])
@@ -232,13 +233,6 @@ def _points_and_codes(curve: Curve) -> tuple[Array, Array]:
         points = np.concatenate([points, curve.start[None]])
         codes = np.concatenate([codes, [np.uint8(Path.CLOSEPOLY)]])
     return points, codes
-
-
-def _kept(straight: Booleans) -> Booleans:
-    """Return which control points (3 n,) after the first to keep: of straight pieces only the end."""
-    keep = np.ones((len(straight), 3), dtype=bool)
-    keep[straight, :2] = False
-    return keep.ravel()
 
 
 def write_pdf(scene: Scene) -> bytes:

@@ -198,13 +198,9 @@ def _still_places(tile: Tile, page: Page) -> tuple[Places, Array]:
     offset = (moved - page.center) @ page.linear.T + page.middle
     order = np.argsort(np.linalg.norm(offset - page.middle, axis=1), kind="stable")
     places = Places(linear[copies.cosets[order]], offset[order])
-    return places, _first_dark(colouring(tile).colours(copies)[order])
-
-
-def _first_dark(colours: Array) -> Array:
-    """Exchange two colours, so that the tile that is alone at first has the palette's second."""
-    own = colours[0]
-    return np.where(colours == own, 1, np.where(colours == 1, own, colours))
+    colours = colouring(tile).colours(copies)[order]
+    # the tile that is alone at first has the palette's second colour
+    return places, np.where(colours == colours[0], 1, np.where(colours == 1, colours[0], colours))
 
 
 def _births(places: Places, begin: float) -> Array:
@@ -258,7 +254,9 @@ class BendingWay:
         self._angle = np.arctan2(
             linear[:, 1, 0] - linear[:, 0, 1], linear[:, 0, 0] + linear[:, 1, 1]
         )
-        self._angle = _continuous(self._angle)
+        # within half a turn of their mean: beyond it a limb has turned the other way
+        mean = float(np.angle(np.exp(1j * self._angle).sum()))
+        self._angle = mean + np.angle(np.exp(1j * (self._angle - mean)))
         self._stretch = _rotations(-self._angle) @ linear
         # rows of a triangle's gradient: J = P @ gradient, P the three corners as columns
         gradient = np.concatenate([-inverse.sum(axis=1, keepdims=True), inverse], axis=1)
@@ -288,12 +286,6 @@ class BendingWay:
 def _rotations(angles: Array) -> Array:
     c, s = np.cos(angles), np.sin(angles)
     return np.stack([np.stack([c, -s], -1), np.stack([s, c], -1)], -2)
-
-
-def _continuous(angles: Array) -> Array:
-    """Return the angles within half a turn of their mean: beyond it a limb has turned the other way."""
-    mean = float(np.angle(np.exp(1j * angles).sum()))
-    return mean + np.angle(np.exp(1j * (angles - mean)))
 
 
 def _outline(triangles: NDArray[np.int64]) -> NDArray[np.int64]:

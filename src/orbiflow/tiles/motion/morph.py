@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 import shapely
 from numpy.typing import NDArray
+from scipy.linalg import polar
 from scipy.sparse import bmat, coo_array, csc_array
 from scipy.sparse.linalg import spsolve
 
@@ -135,12 +136,6 @@ class OwnFrame:
         return Tile(placed, group, self.kind.name, self.starts)
 
 
-def polar(linear: Array) -> tuple[Array, Array]:
-    """An orthogonal and a positive symmetric matrix whose product `linear` (2, 2) is."""
-    u, values, v = np.linalg.svd(linear)
-    return u @ v, v.T @ np.diag(values) @ v
-
-
 def _offset(kind: IsohedralClass, placed: Array, starts: tuple[int, ...], linear: Array) -> Array:
     """Where the own frame's origin lies, from the edges that the group identifies.
 
@@ -153,7 +148,7 @@ def _offset(kind: IsohedralClass, placed: Array, starts: tuple[int, ...], linear
         element = pair.isometry
         turned = linear @ element.linear @ inverse
         begin = placed[starts[pair.first]]
-        end = starts[pair.second] if not pair.reversed else _next(starts, pair.second)
+        end = starts[(pair.second + pair.reversed) % len(starts)]
         rows.append(np.eye(2) - turned)
         values.append(placed[end] - turned @ begin - linear @ element.translation)
     matrix = np.concatenate(rows)
@@ -162,10 +157,6 @@ def _offset(kind: IsohedralClass, placed: Array, starts: tuple[int, ...], linear
     open_ways = ways[np.concatenate([sizes, np.zeros(2 - len(sizes))]) < 1e-6]
     away = placed[list(starts)].mean(axis=0) - kind.template().mean(axis=0) @ linear.T - offset
     return offset + open_ways.T @ (open_ways @ away)
-
-
-def _next(starts: tuple[int, ...], edge: int) -> int:
-    return starts[(edge + 1) % len(starts)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,7 +191,8 @@ class Orbits:
                         fixed[root] = True  # two ways there: an element leaves it where it is
             fixed[orbit] = fixed[root]
         found = [element or identity(2) for element in elements]
-        linear, shift = (np.stack(part) for part in zip(*map(_parts, found), strict=True))
+        linear = np.stack([element.linear for element in found])
+        shift = np.stack([element.translation for element in found])
         return cls(source, linear, shift, fixed)
 
     def with_inner(self, count: int) -> Orbits:
@@ -217,10 +209,6 @@ class Orbits:
         """Return the vertices (N, 2), with sources and fixed ones taken from `points` (N, 2)."""
         images = np.einsum("nij,nj->ni", self.linear, points[self.source]) + self.shift
         return np.where(self.fixed[:, None], points, images)
-
-
-def _parts(element: Isometry) -> tuple[Array, Array]:
-    return element.linear, element.translation
 
 
 def _links(own: OwnFrame) -> list[list[tuple[int, Isometry]]]:
@@ -262,11 +250,15 @@ class Morph:
         self.end, self.start = own, own.straight()
         self._weights: _Weights | None = None
         shares = np.linspace(0, 1, CHECKED + 1)
-        if not all(_is_simple(self._straight_way(float(s))) for s in shares):
+        if not all(shapely.Polygon(self._straight_way(float(s))).is_valid for s in shares):
             self._weights = _Weights.of(own)
             self.end = self._weights.own
             self.start = replace(self.end.straight(), points=self._weights.points(0.0))
-            self._even = _evenly(self._weights)
+            # how far the outline has moved, 0 to 1, at even shares of the weights' way
+            found = [self._weights.points(float(s)) for s in np.linspace(0, 1, EVEN + 1)]
+            steps = [np.sqrt(((b - a) ** 2).sum(axis=1).mean()) for a, b in pairwise(found)]
+            far = np.concatenate([[0], np.cumsum(steps)])
+            self._even = far / far[-1]
 
     @property
     def is_straight(self) -> bool:
@@ -316,7 +308,8 @@ class _Weights:
         else:
             raise OrbiflowError("the tile is too thin somewhere to be animated")
         orbits = Orbits.of(own).with_inner(len(mesh.points) - mesh.size)
-        sides = _sides(mesh.triangles)
+        pairs = [(a, b) for a in range(3) for b in range(3) if a != b]
+        sides = np.unique(np.concatenate([mesh.triangles[:, pair] for pair in pairs]), axis=0)
         first, last = (
             weights / _sums(weights, sides, orbits)
             for weights in (
@@ -409,11 +402,6 @@ def _open_ways(own: OwnFrame) -> Array:
     return ways[sizes < 1e-6]
 
 
-def _sides(triangles: NDArray[np.int64]) -> NDArray[np.int64]:
-    ends = np.concatenate([triangles[:, [a, b]] for a in range(3) for b in range(3) if a != b])
-    return np.unique(ends, axis=0)
-
-
 def _sums(weights: Array, sides: NDArray[np.int64], orbits: Orbits) -> Array:
     """Return for each side (E,) the sum of the weights over all sides at the same orbit."""
     own = orbits.source[sides[:, 0]]
@@ -447,15 +435,3 @@ def _mean_values(points: Array, triangles: NDArray[np.int64], sides: NDArray[np.
         for end, length in zip((one, other), lengths, strict=True):
             np.add.at(total, np.searchsorted(codes, at * len(points) + end), half / length)
     return total
-
-
-def _evenly(weights: _Weights) -> Array:
-    """Return how far the outline has moved, 0 to 1, at even shares of the weights' way."""
-    found = [weights.points(float(s)) for s in np.linspace(0, 1, EVEN + 1)]
-    steps = [np.sqrt(((b - a) ** 2).sum(axis=1).mean()) for a, b in pairwise(found)]
-    far = np.concatenate([[0], np.cumsum(steps)])
-    return far / far[-1]
-
-
-def _is_simple(ring: Array) -> bool:
-    return bool(shapely.is_valid(shapely.Polygon(ring)))

@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from itertools import accumulate
 from pathlib import Path
 from xml.sax.saxutils import escape
@@ -237,11 +238,10 @@ def write_motion_svg(
     width, height = motion.width, motion.height
     still = motion.places(1.0)
     # growing tiles lie below whole ones
-    order = reversed(range(len(motion.colours)))
+    order = range(len(motion.colours))[::-1]
     moving = [_copy(motion, still, k, f"{key}-moving", palette, seconds) for k in order]
-    fixed = [
-        _still_copy(still, k, f"{key}-still", palette, motion) for k in range(len(motion.colours))
-    ]
+    grown = replace(motion, births=np.full_like(motion.births, -1.0))
+    fixed = [_copy(grown, still, k, f"{key}-still", palette, seconds) for k in reversed(order)]
     stroke = f'stroke="{palette.outline}" stroke-width="{OUTLINE * width:.2f}"'
     return f"""<?xml version="1.0" encoding="UTF-8"?>
 <svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" \
@@ -308,14 +308,6 @@ def _copy(
     return (
         f'<g transform="translate({_number(x)},{_number(y)})"><g>{grows}'
         f'{use} transform="matrix({_matrix(linear)},0,0)"/></g></g>\n'
-    )
-
-
-def _still_copy(places: Places, k: int, symbol: str, palette: Palette, motion: Motion) -> str:
-    x, y = places.offset[k].tolist()
-    return (
-        f'<use href="#{symbol}" fill="{palette.fill(int(motion.colours[k]))}" '
-        f'transform="matrix({_matrix(places.linear[k])},{_number(x)},{_number(y)})"/>\n'
     )
 
 

@@ -200,7 +200,9 @@ def bending_raster(
     size = float(np.sqrt(abs(tile.signed_area)))
     moved = np.linalg.norm(bent - rest, axis=1) / size
     unit = thick * width_px
-    _ghost(raster, np.concatenate([rest, rest[:1]]), unit)
+    closed = raster.to_pixels(np.concatenate([rest, rest[:1]]))
+    for piece in dashes(closed, 0.009 * unit, 0.006 * unit):
+        raster.line(piece, GHOST, _GHOST * unit, pixels=True)
     _arrows(raster, rest, bent, moved, size, _GHOST * unit)
     values = np.clip((moved + np.roll(moved, -1)) / 2 / FAR, 0, 1)
     steps = np.rint(values * (_STEPS - 1)).astype(int)
@@ -233,11 +235,6 @@ def _runs(ring: Array, steps: Array) -> Iterator[tuple[int, Array]]:
     for first, last in zip(starts, np.roll(starts, -1), strict=True):
         count = (last - first - 1) % len(ring) + 2
         yield int(steps[first]), ring[(first + np.arange(count)) % len(ring)]
-
-
-def _ghost(raster: Raster, points: Array, unit: float) -> None:
-    for piece in dashes(raster.to_pixels(points), 0.009 * unit, 0.006 * unit):
-        raster.line(piece, GHOST, _GHOST * unit, pixels=True)
 
 
 def _arrows(

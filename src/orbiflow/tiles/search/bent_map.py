@@ -88,21 +88,16 @@ def _places(ring: Array, polygon: Array, knots: Array, own: Integers, goal: Inte
         edge = shapely.LineString(closed[a : b + 1])
         at = knots[a] + shapely.line_locate_point(edge, shapely.points(loop[p : q + 1]))
         at[0], at[-1] = knots[a], knots[b]
-        at = _on_vertices(at, loop[p : q + 1], closed[a : b + 1], knots[a : b + 1])
+        # vertices that are points of the edge lie exactly there
+        apart = abs(loop[p : q + 1, None] - closed[None, a : b + 1]).max(axis=2)
+        same = apart.min(axis=1) < SAME
+        same[[0, -1]] = False
+        at = np.where(same, knots[a : b + 1][apart.argmin(axis=1)], at)
         if (np.diff(at) <= SAME * knots[-1]).any():
             # where the edge comes back to itself the nearest point may be out of order
             at = np.interp(lengths[p : q + 1], lengths[[p, q]], knots[[a, b]])
         found[p:q] = at[:-1]
     return found
-
-
-def _on_vertices(at: Array, vertices: Array, points: Array, knots: Array) -> Array:
-    """Put those vertices that are points of the edge exactly there."""
-    apart = abs(vertices[:, None] - points[None]).max(axis=2)
-    nearest = apart.argmin(axis=1)
-    same = apart.min(axis=1) < SAME
-    same[[0, -1]] = False
-    return np.where(same, knots[nearest], at)
 
 
 def _snapped(places: Array, known: Array, total: float) -> tuple[Array, NDArray[np.bool_]]:
@@ -173,7 +168,10 @@ def matched(silhouette: Array, polygon: Array) -> Bending:
     steps = _matching(np.roll(tile, -first, axis=0), np.roll(goal, -start, axis=0))
     even = np.linspace(0, SILHOUETTE, TILE + 1)
     places = (1 - PROPORTION) * steps + PROPORTION * even
-    share = _shares(mesh, ring)
+    # how far round the polygon each point of the mesh on its outline lies
+    knots = arc_lengths(ring)
+    vertex = np.concatenate([np.arange(mesh.size), mesh.sides + mesh.shares])
+    share = np.interp(vertex, np.arange(len(knots)), knots) / knots[-1]
     turn = (share * TILE - first) % TILE
     place = (np.interp(turn, np.arange(TILE + 1), places) + start) % SILHOUETTE
     lengths = arc_lengths(rest)
@@ -217,13 +215,6 @@ def _matching(tile: Array, goal: Array) -> Array:
         found[i] = place
         place -= taken[i, place]
     return found
-
-
-def _shares(mesh: Mesh, ring: Array) -> Array:
-    """(B,) how far round the polygon, 0 to 1, each point of the mesh on its outline lies."""
-    lengths = arc_lengths(ring)
-    vertex = np.concatenate([np.arange(mesh.size), mesh.sides + mesh.shares])
-    return np.interp(vertex, np.arange(len(lengths)), lengths) / lengths[-1]
 
 
 def _harmonic(mesh: Mesh, outline: Array) -> Array:

@@ -18,7 +18,7 @@ from orbiflow.runtime import Cancel
 from orbiflow.tiles.geometry import orient
 from orbiflow.tiles.likeness import bent_onto, mutual_iou
 from orbiflow.tiles.search.candidates import Fit
-from orbiflow.tiles.search.co_deformation import Hand, shared_hands
+from orbiflow.tiles.search.co_deformation import Hand, hands
 from orbiflow.tiles.search.likeness_search import LikenessSearch
 from orbiflow.tiles.search.method import Goal, SearchMethod
 from orbiflow.tiles.search.overlap_search import OverlapSearch
@@ -75,7 +75,7 @@ class BothSearch(SearchMethod):
 
     def finish(self, tiles: Sequence[EscherTile], goal: Goal) -> Sequence[EscherTile]:
         """Return the tiles with their deformation measured."""
-        hand, _ = shared_hands(goal, self.likeness)
+        hand, _ = hands(goal.target, self.likeness, emphasis=goal.emphasis, pins=goal.pins)
         return [measured(tile, hand) for tile in tiles]
 
     def short_list(self, tiles: Sequence[EscherTile]) -> list[EscherTile]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
@@ -122,9 +122,14 @@ def simplest_tile(
         pieces = 2 * -(-count // (2 * len(vertices)))  # even: centres are sampled
         edges = _moved_edges(kind, vertices, corners, pieces, moved)
         placed = [edge @ linear.T + offset for edge in edges]
-        for polygon, starts in _polygons(kind, placed):
+        for tolerance in TOLERANCES:
+            chosen = _chosen_samples(kind, placed, tolerance)
+            kept = [edge[:-1][mask[:-1]] for edge, mask in zip(placed, chosen, strict=True)]
+            starts = np.cumsum([0] + [len(edge) for edge in kept[:-1]])
+            polygon = np.concatenate(kept)
             # not before: a fit that ran away has no group, and says so above
-            tile = Tile(polygon, kind.group().conjugate(linear, offset), kind.name, starts)
+            group = kind.group().conjugate(linear, offset)
+            tile = Tile(polygon, group, kind.name, tuple(int(start) for start in starts))
             if shapely.Polygon(polygon).is_valid:
                 return tile
     if force and tile is not None:
@@ -163,14 +168,6 @@ def _moved_edges(
             edges[pair.first] = own
             edges[pair.second] = image[::-1] if pair.reversed else image
     return [edges[i] for i in range(len(edges))]
-
-
-def _polygons(kind: IsohedralClass, edges: list[Array]) -> Iterator[tuple[Array, tuple[int, ...]]]:
-    for tolerance in TOLERANCES:
-        chosen = _chosen_samples(kind, edges, tolerance)
-        kept = [edge[:-1][mask[:-1]] for edge, mask in zip(edges, chosen, strict=True)]
-        starts = np.cumsum([0] + [len(edge) for edge in kept[:-1]])
-        yield np.concatenate(kept), tuple(int(start) for start in starts)
 
 
 def _chosen_samples(kind: IsohedralClass, closed: list[Array], tolerance: float) -> list[Array]:

@@ -29,7 +29,6 @@ from orbiflow.runtime import Cancel
 from orbiflow.tiles.geometry import plane_points, signed_area
 from orbiflow.tiles.likeness import Elastic, Pinned, Stiffness
 from orbiflow.tiles.search.likeness_search import LikenessSearch
-from orbiflow.tiles.search.method import Goal
 from orbiflow.tiles.search.placements import Placements
 from orbiflow.tiles.search.tile_space import TileSpace
 from orbiflow.tiles.silhouette import Emphasis, Pins, Samples, Target, sampled, triangulate
@@ -158,6 +157,7 @@ class Hand:
         return found
 
 
+@lru_cache(maxsize=2)  # one serves all classes
 def hands(
     target: Target,
     settings: LikenessSearch,
@@ -187,23 +187,6 @@ def hands(
         return Hand(mirrored, points, made)
 
     return hand(samples, False), hand(mirror, True)
-
-
-def shared_hands(goal: Goal, search: LikenessSearch) -> tuple[Hand, Hand]:
-    """Return the target's hands, made once for all classes."""
-    return _hands(goal.target, search.seed, search.multiples, goal.emphasis, goal.pins)
-
-
-@lru_cache(maxsize=2)
-def _hands(
-    target: Target,
-    seed: int,
-    multiples: tuple[int, ...],
-    emphasis: Emphasis | None,
-    pins: Pins | None,
-) -> tuple[Hand, Hand]:
-    settings = LikenessSearch(seed=seed, multiples=multiples)
-    return hands(target, settings, emphasis=emphasis, pins=pins)
 
 
 SPRINGS = 1500.0

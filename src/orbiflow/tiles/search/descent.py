@@ -67,7 +67,7 @@ class Descent:
         self.points = self.model.prototile()[0]
         self.momentum = torch.zeros_like(self.field.parameters_)
         self.pose_momentum = {name: torch.zeros_like(p) for name, p in self._pose().items()}
-        self.threshold = torch.full((self.size,), 0.45)
+        self.threshold = torch.full((self.model.size,), 0.45)
 
     def _set_up(self, model: TileModel) -> None:
         self.model = model
@@ -80,15 +80,10 @@ class Descent:
         every = dict(self.model.named_parameters())
         return {name: every[name] for name in names if every[name].numel()}
 
-    @property
-    def size(self) -> int:
-        """Number of candidates."""
-        return self.model.size
-
     def step(self, soft: SoftTarget) -> None:
         """One step of all candidates: another segment of their flows."""
         share = self.done / max(1, self.settings.iterations - 1)
-        reach, blur = (_between(ends, share) for ends in (self.settings.reach, self.settings.blur))
+        reach, blur = (between(ends, share) for ends in (self.settings.reach, self.settings.blur))
         first, last = self.settings.smoothness
         damping = (1 + self.magnitude**2) ** -(first + share * (last - first))
         pose = self._pose()
@@ -158,7 +153,8 @@ class Descent:
         return self.model.with_fields(self.record)
 
 
-def _between(ends: tuple[float, float], share: float) -> float:
+def between(ends: tuple[float, float], share: float) -> float:
+    """Return the geometric interpolation between two ends."""
     return ends[0] * (ends[1] / ends[0]) ** share
 
 
@@ -228,7 +224,8 @@ class _Polish:
         parameters = self._set(values)
         placed = self.model.place(self.flow(self.points))
         ring = placed.detach()[0].numpy()
-        if not (self._calm() and shapely.Polygon(ring).is_valid):
+        calm = steepness(self.field.parameters_.detach(), self.magnitude) <= self.limit
+        if not (calm and shapely.Polygon(ring).is_valid):
             return 1.0, self.gradient  # a barrier: the line search turns back
         value, gradient = self.overlap.iou(ring)
         if value > self.best_iou:
@@ -265,9 +262,6 @@ class _Polish:
                 parameter.copy_(start + step)
                 at += parameter.numel()
         return [self.field.parameters_, *self.pose]
-
-    def _calm(self) -> bool:
-        return float(steepness(self.field.parameters_.detach(), self.magnitude)) <= self.limit
 
 
 FEW, POOR = 8, 0.4

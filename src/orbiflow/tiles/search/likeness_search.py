@@ -81,9 +81,9 @@ class LikenessSearch(SearchMethod):
     ) -> Fit:
         """Let the silhouette bend into tiles of the class."""
         from orbiflow.tiles.search.bending import fit_bending
-        from orbiflow.tiles.search.co_deformation import shared_hands
+        from orbiflow.tiles.search.co_deformation import hands
 
-        both = shared_hands(goal, self)
+        both = hands(goal.target, self, emphasis=goal.emphasis, pins=goal.pins)
         return fit_bending(
             goal.target, kind, self, both, per_class=per_class, progress=progress, cancel=cancel
         )
@@ -94,9 +94,12 @@ class LikenessSearch(SearchMethod):
         """Return a tile that the silhouette bends to in haste; None if none is simple."""
         from orbiflow.tiles.search.bending import fit_bending
         from orbiflow.tiles.search.certifying import best_tiles
-        from orbiflow.tiles.search.co_deformation import shared_hands
+        from orbiflow.tiles.search.co_deformation import hands
 
-        both, quick = shared_hands(goal, self), replace(self, below=0, **SKETCH)
+        both, quick = (
+            hands(goal.target, self, emphasis=goal.emphasis, pins=goal.pins),
+            replace(self, below=0, **SKETCH),
+        )
         try:
             found = fit_bending(goal.target, preferred_class(names), quick, both, cancel=cancel)
             return best_tiles(goal.target, found._replace(enough=1))[0]
@@ -105,9 +108,9 @@ class LikenessSearch(SearchMethod):
 
     def prepare(self, goal: Goal) -> None:
         """Triangulate the silhouette and its mirror image."""
-        from orbiflow.tiles.search.co_deformation import shared_hands
+        from orbiflow.tiles.search.co_deformation import hands
 
-        shared_hands(goal, self)
+        hands(goal.target, self, emphasis=goal.emphasis, pins=goal.pins)
 
     def least_neck(self, goal: Goal) -> float:
         """Return `min_neck`, or a part of the silhouette's own narrowest neck."""

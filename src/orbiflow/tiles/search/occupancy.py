@@ -17,6 +17,7 @@ from torch import Tensor
 from orbiflow.arguments import instance, whole
 from orbiflow.runtime import Cancel
 from orbiflow.tiles.search.candidates import Progress, silent
+from orbiflow.tiles.search.descent import between
 from orbiflow.tiles.search.model import TileModel
 from orbiflow.tiles.search.overlap_search import OccupancySearch
 from orbiflow.tiles.search.starts import initial_poses, template_symmetries
@@ -93,7 +94,19 @@ def fit_occupancy(
     # the mean over the candidates is all that couples them: separate fits, one tensor
     samples = OccupancySamples(target, 16384, seed=settings.seed)
     cancel = cancel or Cancel()
-    model = _affine_phase(_start(kind, settings), samples, settings, cancel)
+    angles, mirrored = initial_poses(kind, settings.turns)
+    model = TileModel(
+        kind,
+        angles,
+        mirrored=mirrored,
+        max_frequency=settings.max_frequency,
+        segments=settings.segments,
+        smoothness=settings.smoothness,
+        steps=settings.steps,
+        method=settings.method,
+        dtype=torch.float32,
+    )
+    model = _affine_phase(model, samples, settings, cancel)
     first = replace(settings, iterations=max(1, settings.iterations // 3))
     told = progress or silent
 
@@ -106,21 +119,6 @@ def fit_occupancy(
         model = _ranked(model, samples, settings.hardness[1], keep=(model.size + 1) // 2)
     model = _flow_phase(model, samples, settings, first.iterations, settings.iterations, report)
     return _ranked(model, samples, settings.hardness[1], keep=model.size)
-
-
-def _start(isohedral_class: IsohedralClass, settings: OccupancySearch) -> TileModel:
-    angles, mirrored = initial_poses(isohedral_class, settings.turns)
-    return TileModel(
-        isohedral_class,
-        angles,
-        mirrored=mirrored,
-        max_frequency=settings.max_frequency,
-        segments=settings.segments,
-        smoothness=settings.smoothness,
-        steps=settings.steps,
-        method=settings.method,
-        dtype=torch.float32,
-    )
 
 
 def _pose(model: TileModel) -> list[torch.nn.Parameter]:
@@ -136,7 +134,8 @@ def _affine_phase(
         points, inside = samples.draw(512)
         optimizer.zero_grad()
         loss = occupancy_loss(model, points, inside, 15.0, affine=True)
-        torch.autograd.backward((loss + _shape_penalty(model)).sum())
+        bent = SHAPE_PENALTY * model.shape.square().sum(dim=-1)
+        torch.autograd.backward((loss + bent).sum())
         optimizer.step()
     ranked = _ranked(model, samples, 15.0, keep=model.size, affine=True)
     return ranked.take(_distinct(ranked, settings.finalists))
@@ -183,25 +182,14 @@ def _flow_phase(
             group["lr"] = group["peak"] * warm * (0.51 + 0.49 * math.cos(math.pi * done))
         optimizer.zero_grad()
         points, inside = samples.draw(settings.points)
-        loss = occupancy_loss(model, points, inside, _between(settings.hardness, done))
-        energy = _between(settings.penalty, done) * _energy(model)
-        torch.autograd.backward((loss + energy + _shape_penalty(model)).sum())
+        loss = occupancy_loss(model, points, inside, between(settings.hardness, done))
+        squares = [p.square().sum(dim=-1) for p in model.flow.parameters()]
+        energy = between(settings.penalty, done) * torch.stack(squares).sum(dim=0)
+        bent = SHAPE_PENALTY * model.shape.square().sum(dim=-1)
+        torch.autograd.backward((loss + energy + bent).sum())
         optimizer.step()
         report((i + 1) / settings.iterations, float(loss.detach().min()))
     return model
-
-
-def _energy(model: TileModel) -> Tensor:
-    squares = [p.square().sum(dim=-1) for p in model.flow.parameters()]
-    return torch.stack(squares).sum(dim=0)
-
-
-def _shape_penalty(model: TileModel) -> Tensor:
-    return SHAPE_PENALTY * model.shape.square().sum(dim=-1)
-
-
-def _between(ends: tuple[float, float], share: float) -> float:
-    return ends[0] * (ends[1] / ends[0]) ** share
 
 
 @torch.no_grad()

@@ -48,7 +48,10 @@ def best_placements(kind: IsohedralClass, outline: Complex, keep: int) -> Placem
     number of the template's edges.
     """
     n = len(outline)
-    unit = _unit(kind, n)
+    parts = _multiplicities(kind)
+    units = (u for u in range(1, n + 1) if n % u == 0)
+    most = MOST_PLACEMENTS
+    unit = next(u for u in units if u == n or _count(parts, n // u) * (n // u) <= most)
     lengths = edge_lengths(kind, n // unit) * unit
     starts = np.arange(0, n, unit)
     gains, turns = _gains(kind, np.roll(outline, -1) - outline, lengths, starts)
@@ -61,14 +64,6 @@ def best_placements(kind: IsohedralClass, outline: Complex, keep: int) -> Placem
     best = best[fresh][:keep]
     rows, columns = np.unravel_index(best, gains.shape)
     return Placements(lengths[rows], starts[columns], turns.ravel()[best], flat[best])
-
-
-def _unit(kind: IsohedralClass, n: int) -> int:
-    multiplicities = _multiplicities(kind)
-    for unit in (u for u in range(1, n + 1) if n % u == 0):
-        if _count(multiplicities, n // unit) * (n // unit) <= MOST_PLACEMENTS:
-            return unit
-    return n
 
 
 def _multiplicities(kind: IsohedralClass) -> list[int]:

@@ -212,7 +212,12 @@ def _simple_tiles(
     for spread in SMOOTHING:
         if not len(placements.starts) or wanted < 1:
             return
-        tiles = nearest_tiles(kind, _smoothed(outline, spread), placements)
+        smooth = outline
+        if spread:
+            parts = (outline.real, outline.imag)
+            x, y = (np.asarray(gaussian_filter1d(z, spread, mode="wrap")) for z in parts)
+            smooth = (x + 1j * y).astype(np.complex128)
+        tiles = nearest_tiles(kind, smooth, placements)
         rings = plane_points(tiles.vertices)
         valid = np.asarray(shapely.is_valid(shapely.polygons(rings)))
         simple = valid & (np.linalg.det(tiles.linear) > 1e-6)
@@ -221,16 +226,6 @@ def _simple_tiles(
         yield tiles.take(chosen), placements.take(chosen), boundary_iou(goal, rings[chosen])
         wanted -= len(chosen)
         placements = placements.take(np.flatnonzero(~simple))
-
-
-def _smoothed(outline: Complex, spread: float) -> Complex:
-    if spread == 0.0:
-        return outline
-    x, y = (
-        np.asarray(gaussian_filter1d(part, spread, mode="wrap"))
-        for part in (outline.real, outline.imag)
-    )
-    return (x + 1j * y).astype(np.complex128)
 
 
 def _apart(scores: Array, places: Array, mirrored: NDArray[np.bool_], count: int) -> list[int]:

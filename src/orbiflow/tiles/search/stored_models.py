@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import torch
 
-from orbiflow.arguments import instance
+from orbiflow.arguments import instance, number, whole
 from orbiflow.arrays import Array
 from orbiflow.errors import CertificationError, OrbiflowError
 from orbiflow.tiles.search.candidates import CORNERS, VERTICES, simplest_tile
@@ -107,16 +106,22 @@ def as_map(model: TileModel, frame: Frame | None = None, bending: Bending | None
 def as_model(stored: TileMap) -> TileModel:
     """Return the model again, float64, one candidate, in the target's normal form."""
     settings, arrays = stored.settings, stored.arrays
-    _check_segments(settings, arrays)
+    # before anything is built: each segment takes time and memory
+    segments = sum(name.startswith("flow.") for name in arrays)
+    if settings.get("segments") != segments:
+        raise OrbiflowError(
+            f"the model's settings say {settings.get('segments')!r} segments, "
+            f"its arrays hold {segments}"
+        )
     try:
         model = TileModel(
             isohedral_class(settings["class"]),
             torch.zeros(1, dtype=torch.float64),
             mirrored=torch.tensor([bool(settings["mirrored"])]),
-            max_frequency=_whole(settings["max_frequency"], MAX_FREQUENCY, least=0),
-            segments=_whole(settings["segments"], MAX_SEGMENTS),
-            smoothness=_exponent(settings["smoothness"]),
-            steps=_whole(settings["steps"], 1_000_000),
+            max_frequency=whole(settings["max_frequency"], "max_frequency", 0, MAX_FREQUENCY),
+            segments=whole(settings["segments"], "segments", 1, MAX_SEGMENTS),
+            smoothness=number(settings["smoothness"], "smoothness", 0, 100),
+            steps=whole(settings["steps"], "steps", 1, 1_000_000),
             method=str(settings["method"]),
         )
     except (KeyError, TypeError) as error:
@@ -172,26 +177,3 @@ def _prototile(arrays: dict[str, Array], count: int) -> tuple[Array, Array]:
             f"less than {len(vertices)}"
         )
     return vertices, corners.astype(np.int64)
-
-
-def _check_segments(settings: dict[str, Any], arrays: dict[str, Array]) -> None:
-    # before anything is built: each segment takes time and memory
-    stored = sum(name.startswith("flow.") for name in arrays)
-    if settings.get("segments") != stored:
-        raise OrbiflowError(
-            f"the model's settings say {settings.get('segments')!r} segments, "
-            f"its arrays hold {stored}"
-        )
-
-
-def _exponent(value: Any) -> float:
-    number = float(value)
-    if not 0.0 <= number <= 100.0:
-        raise OrbiflowError(f"expected a smoothness from 0 to 100, got {value!r}")
-    return number
-
-
-def _whole(value: Any, most: int, least: int = 1) -> int:
-    if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
-        raise OrbiflowError(f"expected a whole number from {least} to {most}, got {value!r}")
-    return value
