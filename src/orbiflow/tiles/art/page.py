@@ -53,13 +53,9 @@ class _Colours:
     """A way to colour the copies of a tile, and the translations that keep the colours."""
 
     def __init__(self, tile: Tile, how: str) -> None:
-        self.how = how
-        order = tile.group.order
-        self.count = {"one": 1, "aspect": order}.get(how, 0)
-        self.lattice = tile.group.lattice
+        self.how, self.own, self.lattice = how, colouring(tile), tile.group.lattice
+        self.count = {"one": 1, "aspect": tile.group.order}.get(how, self.own.count)
         if how == "neighbour":
-            self.own = colouring(tile)
-            self.count = self.own.count
             a, b, c = self.own.sublattice
             self.lattice = tile.group.lattice @ np.array([[a, b], [0.0, c]])
 

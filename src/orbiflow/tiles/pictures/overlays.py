@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import pairwise
 
 import numpy as np
 import shapely
@@ -66,15 +67,7 @@ def overlay_picture(
     y_down: bool = False,
     sheet: Sheet | None = None,
 ) -> Picture:
-    """Return the picture of `overlay_png` for print, in curves; the caption has its legend.
-
-    Args:
-        tile, target, y_down: As for `overlay_png`.
-        sheet: The sheet it is drawn on. Default: a journal's single column, as PDF.
-
-    Raises:
-        OrbiflowError: As `overlay_png`.
-    """
+    """Return the picture of `overlay_png` for print, in curves; the caption has its legend."""
     raster = overlay_raster(tile, target, width_px=1600, y_down=y_down)
     title = f"Tile {tile.isohedral_class} over the silhouette".replace("  ", " ")
     caption = "Grey: in both. Orange: missing, in the silhouette alone. Blue: added."
@@ -102,12 +95,16 @@ def overlay_raster(
 
 def _legend(raster: Raster) -> None:
     entries = [("in both", COMMON, 0.40), ("missing", MISSING, 0.58), ("added", ADDED, 0.76)]
-    y, high = strip_middle(raster), 0.014 * raster.width
     for name, colour, x in entries:
-        left, right = x * raster.width, (x + 0.03) * raster.width
-        ring = [[left, y - high], [right, y - high], [right, y + high], [left, y + high]]
-        raster.fill_pixels(np.array(ring), colour)
+        _swatch(raster, x, x + 0.03, 0.014, colour)
         caption(raster, x + 0.04, name)
+
+
+def _swatch(raster: Raster, left: float, right: float, high: float, colour: str) -> None:
+    """Fill a rectangle in the strip, in shares of the picture's width."""
+    y, ends = strip_middle(raster), np.array([left, right, right, left]) * raster.width
+    sides = y + np.array([-high, -high, high, high]) * raster.width
+    raster.fill_pixels(np.stack([ends, sides], axis=1), colour)
 
 
 def _target(target: ArrayLike | BaseGeometry) -> BaseGeometry:
@@ -150,9 +147,7 @@ def bending_png(
     Args:
         tile: The tile in the input's coordinates, which is filled.
         rest, bent: The outlines (n, 2) of the silhouette as it was and bent, point by point.
-        width_px: The width in pixels; the height follows.
-        y_down: Whether the y axis points down, as in images.
-        label: The words in front of the legend. Default: the class.
+        width_px, y_down, label: As for `overlay_png`.
     """
     text = label or tile.isohedral_class or " "
     raster = bending_raster(tile, rest, bent, width_px=width_px, y_down=y_down, text=text)
@@ -163,12 +158,7 @@ def bending_png(
 def bending_picture(
     tile: Tile, rest: Array, bent: Array, *, y_down: bool = False, sheet: Sheet | None = None
 ) -> Picture:
-    """Return the picture of `bending_png` for print, in curves; the caption has its legend.
-
-    Args:
-        tile, rest, bent, y_down: As for `bending_png`.
-        sheet: The sheet it is drawn on. Default: a journal's single column, as PDF.
-    """
+    """Return the picture of `bending_png` for print, in curves; the caption has its legend."""
     raster = bending_raster(tile, rest, bent, width_px=1600, y_down=y_down)
     title = f"Silhouette bent into a tile {tile.isohedral_class}".strip()
     caption = (
@@ -190,10 +180,7 @@ def bending_raster(
 ) -> Raster:
     """Return the picture of `bending_png` without its legend, and without a strip if `text` is empty.
 
-    Args:
-        tile, rest, bent, width_px, y_down: As for `bending_png`.
-        text: The words in the strip.
-        thick: A factor of all lines' widths, for small pictures.
+    Lines are `thick` times as wide, for small pictures.
     """
     raster = captioned([rest, bent, tile.polygon], width_px, y_down=y_down, text=text)
     raster.fill([tile.polygon], TILE)
@@ -258,9 +245,8 @@ def _bending_legend(raster: Raster) -> None:
     for piece in dashes(sample, 0.009 * wide, 0.006 * wide):
         raster.line(piece, GHOST, _GHOST * wide, pixels=True)
     caption(raster, 0.53, "as it was")
-    edges, high = np.linspace(0.68, 0.78, _STEPS + 1) * wide, 0.009 * wide
-    for k, colour in enumerate(RAMP):
-        left, right = edges[k], edges[k + 1]
-        ring = [[left, y - high], [right, y - high], [right, y + high], [left, y + high]]
-        raster.fill_pixels(np.array(ring), colour)
+    for (left, right), colour in zip(
+        pairwise(np.linspace(0.68, 0.78, _STEPS + 1)), RAMP, strict=True
+    ):
+        _swatch(raster, left, right, 0.009, colour)
     caption(raster, 0.79, "moved, little to far")

@@ -121,10 +121,7 @@ def tiling_raster(
 ) -> Raster:
     """Return the picture of `tiling_png` as a raster that can be drawn on.
 
-    Args:
-        tile, window, width_px, palette_name, colours, y_down: As for `tiling_png`.
-        outline_px: The outline's width in pixels; 0 for none.
-        strip_px: The height in pixels of a strip below it, for words.
+    Below it is a strip of `strip_px` for words.
     """
     chosen, tiling = palette(palette_name), as_tiling(tile)
     colours = colours or colouring(tiling)
@@ -149,23 +146,15 @@ def tiling_picture(
     y_down: bool = False,
     sheet: Sheet | None = None,
 ) -> Picture:
-    """Return the picture of `tiling_png` for print, in curves.
-
-    Args:
-        tile, window, palette_name, colours, y_down: As for `tiling_png`.
-        sheet: The sheet it is drawn on. Default: a journal's single column, as PDF.
-
-    Raises:
-        OrbiflowError: As `tiling_png`.
-    """
+    """Return the picture of `tiling_png` for print, in curves."""
     raster = tiling_raster(
         tile, window, width_px=1600, palette_name=palette_name, colours=colours, y_down=y_down,
         outline_px=3.0,
     )  # fmt: skip
     kind = tile.isohedral_class if isinstance(tile, Tile) else ""
-    several = f"{len(as_tiling(tile).prototiles)} tiles"
-    name = "a tile" if len(as_tiling(tile).prototiles) == 1 else several
-    title = f"Tiling by copies of {name}" + (f" of class {kind}" if kind else "")
+    count = len(as_tiling(tile).prototiles)
+    title = f"Tiling by copies of {'a tile' if count == 1 else f'{count} tiles'}"
+    title += f" of class {kind}" if kind else ""
     return vector_picture(raster, sheet or Sheet.column(), title=title, caption="")
 
 
@@ -280,13 +269,8 @@ def _class_panel(
 
 
 def _around(middle: Array, half_width: float, half_height: float) -> Window:
-    x, y = middle
-    return (
-        float(x - half_width),
-        float(y - half_height),
-        float(x + half_width),
-        float(y + half_height),
-    )
+    (x, y), w, h = middle.tolist(), half_width, half_height
+    return x - w, y - h, x + w, y + h
 
 
 def draw_template(axes: Axes, kind: IsohedralClass) -> None:

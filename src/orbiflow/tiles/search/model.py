@@ -32,28 +32,24 @@ class TileModel(nn.Module):
     similarity A come after it, composed and not mixed in: the paper's V_sym(A^-1 z) loses the glide
     reflections as soon as A rotates (design point 6). A template of area 1 is the start.
 
-    Certificates outlive a change of precision: `.float()`, `.half()`, `.to(...)` round the
-    parameters, which only makes another tile, but `vertices`, whose identified edges must
-    correspond, stay float64 whatever is asked, and the group's pose and the polygon
-    (`extract_tile`) are computed in float64.
+    Certificates outlive a change of precision: `.float()`, `.half()`, `.to(...)` round the parameters,
+    which only makes another tile, but `vertices`, whose identified edges must correspond, stay float64,
+    and the group's pose and the polygon (`extract_tile`) are computed in float64.
+
+    Points are (S, N, 2) throughout; arrays and lists are taken as tensors of the model's dtype.
 
     Args:
-        isohedral_class: of all S tiles, or its name.
-        angles: (S,) turn of each start, in radians; a number is one.
-        mirrored: (S,) whether A reverses orientation; default no.
-        max_frequency: Omega of the fields.
-        segments: stationary pieces of the flow.
-        smoothness: Sobolev exponent of the fields' parameters.
-        steps, method: of the integrator.
-        dtype: of all parameters.
-        prototiles: S start tiles with their poses, in place of the template; `angles` and `mirrored`
-            are then taken from them.
-
-    Shapes:
-        points (S, N, 2) throughout; arrays and lists are taken as tensors of the model's dtype.
+        isohedral_class: The class of all S tiles, or its name.
+        angles: The turn (S,) of each start, in radians; a number is one.
+        mirrored: Whether (S,) A reverses orientation. Default: no.
+        max_frequency, segments, smoothness: Omega of the fields, the number of stationary pieces of the
+            flow, and the Sobolev exponent of the fields' parameters.
+        steps, method: Steps and method of the integrator.
+        dtype: The type of all parameters.
+        prototiles: S start tiles with their poses, in place of the template, `angles` and `mirrored`.
 
     Raises:
-        OrbiflowError: for arguments that cannot be used, by name.
+        OrbiflowError: For arguments that cannot be used, by name.
     """
 
     mirror: Tensor
@@ -115,23 +111,24 @@ class TileModel(nn.Module):
 
     @torch.no_grad()
     def _start_from(self, prototiles: Prototiles | None) -> None:
-        if prototiles is None:
-            self.register_buffer("vertices", None)
-            self.register_buffer("corners", None)
-            self.recentre()
+        self.register_buffer("vertices", None)
+        self.register_buffer("corners", None)
+        if prototiles is None:  # each template's centre at the target's centroid
+            center = self.template().mean(dim=-2, keepdim=True) @ self.linear().mT
+            self.offset.copy_(-center[:, 0])
             return
         kind = self.isohedral_class
         own = prototiles.corners.shape[-1], prototiles.stretch.shape[-1]
         if own != (len(kind.template()), kind.stretch_dim):
             raise OrbiflowError(f"the prototiles are not of class {kind.name}")
-        self.register_buffer("vertices", torch.tensor(prototiles.vertices, dtype=torch.float64))
-        self.register_buffer("corners", torch.tensor(prototiles.corners))
+        self.vertices = torch.tensor(prototiles.vertices, dtype=torch.float64)
+        self.corners = torch.tensor(prototiles.corners)
         for name in ("log_scale", "offset", "stretch"):
             getattr(self, name).copy_(torch.as_tensor(getattr(prototiles, name)))
 
     @property
     def size(self) -> int:
-        """Number S of candidates."""
+        """The number S of candidates."""
         return len(self.angle)
 
     def template(self) -> Tensor:
@@ -150,12 +147,6 @@ class TileModel(nn.Module):
         sign = torch.where(self.mirror, -1.0, 1.0).to(dtype)
         turn = torch.stack([torch.stack([c, -s * sign], -1), torch.stack([s, c * sign], -1)], -2)
         return log_scale.exp()[:, None, None] * turn @ self.isohedral_class.stretch(stretch)
-
-    @torch.no_grad()
-    def recentre(self) -> None:
-        """Put each template's centre at the target's centroid, by the offset."""
-        center = self.template().mean(dim=-2, keepdim=True) @ self.linear().mT
-        self.offset.copy_(-center[:, 0])
 
     def place(self, points: Tensor) -> Tensor:
         """A o L at points (S, N, 2) of the group's frame."""
@@ -206,16 +197,12 @@ class TileModel(nn.Module):
 
     def take(self, indices: Sequence[int] | int) -> TileModel:
         """A new model with the candidates at `indices` only, at the same parameters."""
-        chosen = self._chosen(indices)
-        fields = [field.parameters_.detach()[chosen] for field in self.fourier_fields()]
-        return self.with_fields(fields, chosen)
-
-    def _chosen(self, indices: Sequence[int] | int) -> list[int]:
         several = indices if isinstance(indices, Sequence | np.ndarray) else [indices]
         chosen = [whole(i, "a candidate's index", 0, self.size - 1) for i in several]
         if not chosen:
             raise OrbiflowError(f"choose at least one of the {self.size} candidates")
-        return chosen
+        fields = [field.parameters_.detach()[chosen] for field in self.fourier_fields()]
+        return self.with_fields(fields, chosen)
 
     @staticmethod
     @torch.no_grad()
