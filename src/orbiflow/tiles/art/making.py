@@ -11,7 +11,6 @@ from PIL import Image
 
 from orbiflow import __version__
 from orbiflow.arguments import path as as_path
-from orbiflow.arrays import Array
 from orbiflow.drawing import palette
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import Cancel, Progress, Sink, ignore, write_atomic
@@ -110,15 +109,10 @@ def artwork(
 
 def render_artwork(art: Artwork, *, cancel: Cancel | None = None) -> np.ndarray:
     """Render the picture (height, width, 3) in 8 bits, antialiased."""
-    return render_on(art, art.page, cancel=cancel)
-
-
-def render_on(art: Artwork, page: ArtPage, *, cancel: Cancel | None = None) -> np.ndarray:
-    """Render another part of the same plane, as `render_artwork` does."""
-    settings, chosen = art.settings, palette(art.settings.palette)
+    page, chosen, samples = art.page, palette(art.settings.palette), art.settings.samples
     grid = raster_grid(art)
-    coloured = painted(art, grid).coloured(chosen, art.page.count)
-    return render_page(page, grid, coloured, chosen.paper, samples=settings.samples, cancel=cancel)
+    coloured = painted(art, grid).coloured(chosen, page.count)
+    return render_page(page, grid, coloured, chosen.paper, samples=samples, cancel=cancel)
 
 
 def raster_grid(art: Artwork) -> Grid:
@@ -144,14 +138,11 @@ def painted(art: Artwork, grid: Grid) -> Paint:
         paint_motif(paint, art.motif)
         paint.bleed(grid.inside(polygon))
     if art.outline > 0:
-        paint_motif(paint, outlined(polygon, art.outline / art.page.scale, art))
+        # half of its width inside
+        colour, width = palette(art.settings.palette).outline, art.outline / art.page.scale
+        line = Part((Curve.polyline(polygon, closed=True),), Style(None, colour, width))
+        paint_motif(paint, Motif((line,)))
     return paint
-
-
-def outlined(polygon: Array, width: float, art: Artwork) -> Motif:
-    """Return the line around a tile, half of its width inside."""
-    style = Style(None, palette(art.settings.palette).outline, width)
-    return Motif((Part((Curve.polyline(polygon, closed=True),), style),))
 
 
 TILE, MOTIF = "tile", "motif"

@@ -99,15 +99,6 @@ def art_page(given: EscherTile, settings: ArtSettings) -> ArtPage:
     return _page(tile, colours, found.linear, offset, (found.width, found.height), (note,))
 
 
-def spread_page(
-    page: ArtPage, given: EscherTile, settings: ArtSettings, across: int, down: int
-) -> ArtPage:
-    """Return a page with the plane of a repeating cell over `across` x `down` cells, computed anew."""
-    colours = _Colours(given.tile, settings.colour)
-    size = page.width * across, page.height * down
-    return _page(given.tile, colours, page.linear, page.offset, size, ())
-
-
 def _page(
     tile: Tile,
     colours: _Colours,

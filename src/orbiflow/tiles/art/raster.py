@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation
 
 from orbiflow.arrays import Array, Integers
-from orbiflow.drawing import Palette
+from orbiflow.drawing import Palette, rgb
 from orbiflow.runtime import Cancel
 from orbiflow.tiles.art.page import ArtPage
 
@@ -36,12 +36,9 @@ class Runs(NamedTuple):
 
 
 class Sides(NamedTuple):
-    """Sides of regions, each with the region to its right, at larger x.
+    """Sides of regions, each with the region to its right, at larger x."""
 
-    - `start`, `end`: The ends (S, 2) in samples, y down: sample (i, j) lies at (j + 1/2, i + 1/2).
-    """
-
-    start: Array
+    start: Array  # with `end`: (S, 2) in samples, y down: sample (i, j) lies at (j + 1/2, i + 1/2)
     end: Array
     label: Integers  # the region (S,)
 
@@ -176,10 +173,6 @@ class Paint:
         self.values *= (1 - alpha)[..., None]
         self.values[..., 4] += alpha
 
-    def line(self, colour: str, alpha: Array) -> None:
-        """Lay one colour over all, with this opacity (height, width)."""
-        self.lay(alpha[..., None] * rgb_of(colour).astype(np.float32), alpha)
-
     def bleed(self, inside: NDArray[np.bool_]) -> None:
         """Copy colours from just inside to the texels around, which lookups blend in."""
         known = inside.copy()
@@ -208,7 +201,7 @@ class Paint:
 
 def rgb_of(colour: str) -> Array:
     """Return the colour #rrggbb as three numbers (3,) from 0 to 1."""
-    return np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)]) / 255
+    return np.array(rgb(colour)) / 255
 
 
 BAND = 2_000_000  # number of samples that are computed at a time

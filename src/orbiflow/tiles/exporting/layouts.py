@@ -40,7 +40,6 @@ class Layout:
     tile: Tile  # the tile in mm on the page, y down
     outline: Outline  # the tile's curves
     box: Box  # the part of the page that tiles may use
-    notes: tuple[str, ...]  # what the user should know
 
 
 SHIFTS = 10
@@ -75,8 +74,7 @@ def layout(tile: Tile, settings: ExportSettings, *, y_down: bool) -> Layout:
             )
         if not settings.clip:
             placed = _with_most_whole(placed, inner_box(box, settings))
-    curves = outline(placed, settings.deviation)
-    return Layout(settings, placed, curves, box, (curves.note,) if curves.note else ())
+    return Layout(settings, placed, outline(placed, settings.deviation), box)
 
 
 def longer_side(ring: Array) -> float:

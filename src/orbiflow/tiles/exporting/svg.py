@@ -92,7 +92,10 @@ def _definitions(scene: Scene, number: _Numbers) -> str:
     for name, motif in scene.motifs.items():
         parts.append(_motif(name, motif, number))
     if any(layer.clipped for layer in scene.layers):
-        parts.append(f'    <clipPath id="window">{_rectangle(scene.clip, number)}</clipPath>\n')
+        box = scene.clip
+        x, y, width, height = map(number, (box.left, box.top, box.width, box.height))
+        window = f'<rect x="{x}" y="{y}" width="{width}" height="{height}"/>'
+        parts.append(f'    <clipPath id="window">{window}</clipPath>\n')
     return "  <defs>\n" + "".join(parts) + "  </defs>\n" if parts else ""
 
 
@@ -131,11 +134,6 @@ def _reach(scene: Scene, name: str) -> float:
     else:
         curves = [curve for part in scene.motifs[name].parts for curve in part.curves]
     return max((float(np.abs(curve.bounds()).max()) for curve in curves), default=1.0)
-
-
-def _rectangle(box: Box, number: _Numbers) -> str:
-    x, y, width, height = map(number, (box.left, box.top, box.width, box.height))
-    return f'<rect x="{x}" y="{y}" width="{width}" height="{height}"/>'
 
 
 def _layer_start(layer: Layer) -> str:

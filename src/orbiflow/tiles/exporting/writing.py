@@ -349,7 +349,9 @@ def scenes(
         force=force, otherwise="so it is not exported; --force exports it, marked so"
     )
     placed = layout(given.tile, settings, y_down=given.y_down)
-    notes = (*placed.notes, *_neck_notes(placed), *_colour_notes(given, settings))
+    notes = (*_neck_notes(placed), *_colour_notes(given, settings))
+    if placed.outline.note:
+        notes = (placed.outline.note, *notes)
     made = [_described(scene, given, settings, certificate) for scene in _made(placed, settings)]
     if settings.calibrate:
         # the strip at the foot is the last sheet's; pieces have one on each

@@ -15,7 +15,7 @@ from scipy.sparse.linalg import spsolve
 
 from orbiflow.arrays import Array, Integers
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles.geometry import arc_lengths, orient, plane_points, points_along
+from orbiflow.tiles.geometry import arc_lengths, orient, plane_points, points_along, resampled
 from orbiflow.tiles.search.bending import Bent
 from orbiflow.tiles.silhouette import Bending, Mesh, triangulate, unfolded
 from orbiflow.tiles.tilings import Tile
@@ -163,7 +163,7 @@ def matched(silhouette: Array, polygon: Array) -> Bending:
     rest = orient(silhouette, counter_clockwise=True)
     ring = orient(polygon, counter_clockwise=True)
     mesh = triangulate(ring)
-    tile, goal = _spread(ring, TILE), _spread(rest, SILHOUETTE)
+    tile, goal = resampled(ring, TILE), resampled(rest, SILHOUETTE)
     first, start = np.unravel_index(_apart(tile, goal).argmin(), (TILE, SILHOUETTE))
     steps = _matching(np.roll(tile, -first, axis=0), np.roll(goal, -start, axis=0))
     even = np.linspace(0, SILHOUETTE, TILE + 1)
@@ -183,11 +183,6 @@ def matched(silhouette: Array, polygon: Array) -> Bending:
         raise OrbiflowError(
             "the silhouette cannot be carried to this tile without folds: they differ too much"
         ) from error
-
-
-def _spread(ring: Array, count: int) -> Array:
-    total = arc_lengths(ring)[-1]
-    return points_along(ring, np.arange(count) / count * total)
 
 
 def _apart(first: Array, second: Array) -> Array:

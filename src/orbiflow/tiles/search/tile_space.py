@@ -56,6 +56,7 @@ class TileSpace:
         self.kind, self.placements = kind, placements
         self.count, self.size = len(placements.starts), int(placements.lengths[0].sum())
         self._orbits = _Orbits(kind, placements.lengths)
+        self.corners = self._orbits.corners  # (C, K) vertices at the template's corners
         self.order = (np.arange(self.size) + placements.starts[:, None]) % self.size
         """(C, n): the outline's point at each vertex."""
         self._place = np.argsort(self.order, axis=1)
@@ -63,11 +64,6 @@ class TileSpace:
         self._flat = flat.ravel()
         self._total = np.maximum(np.bincount(self._flat, minlength=flat.size), 1).astype(float)
         self.turn(placements.turns)
-
-    @property
-    def corners(self) -> Integers:
-        """(C, K) vertices at the template's corners."""
-        return self._orbits.corners
 
     @property
     def glides(self) -> bool:
@@ -194,15 +190,9 @@ class _Element(NamedTuple):
         )
 
 
-class _Layout(NamedTuple):
-    """What a class identifies, in complex numbers: of each edge pair and of each corner."""
-
-    edges: tuple[_Element, ...]
-    corners: tuple[tuple[int, _Element], ...]  # first corner of the orbit; -1: a fixed point
-
-
 @lru_cache(maxsize=16)
-def _layout(kind: IsohedralClass) -> _Layout:
+def _layout(kind: IsohedralClass) -> tuple[tuple[_Element, ...], tuple[tuple[int, _Element], ...]]:
+    """The elements of edge pairs; of each corner its orbit's first corner (-1: fixed), and how."""
     group, vertices = kind.group(), kind.template()
     corners: list[tuple[int, _Element]] = []
     for k, vertex in enumerate(vertices):
@@ -215,7 +205,7 @@ def _layout(kind: IsohedralClass) -> _Layout:
                 corners.append((first, _Element.of(images[0])))
                 break
     edges = tuple(_Element.of(pair.isometry) for pair in kind.identified_edges)
-    return _Layout(edges, tuple(corners))
+    return edges, tuple(corners)
 
 
 class _Orbits:
@@ -223,7 +213,7 @@ class _Orbits:
 
     def __init__(self, kind: IsohedralClass, lengths: Integers) -> None:
         count, n = len(lengths), int(lengths[0].sum())
-        layout = _layout(kind)
+        edges, corners = _layout(kind)
         self.corners = np.cumsum(lengths, axis=1) - lengths
         self.source = np.tile(np.arange(n), (count, 1))
         self.factor = np.ones((count, n), dtype=complex)
@@ -231,7 +221,7 @@ class _Orbits:
         self.shift = np.zeros((count, n), dtype=complex)
         self.fixed = np.zeros((count, n), dtype=bool)
         vertices = kind.template() @ [1, 1j]
-        for pair, element in zip(kind.identified_edges, layout.edges, strict=True):
+        for pair, element in zip(kind.identified_edges, edges, strict=True):
             middle = (vertices[pair.first] + vertices[(pair.first + 1) % len(vertices)]) / 2
             own = self.corners[:, [pair.first]]
             other = self.corners[:, [pair.second]]
@@ -245,7 +235,7 @@ class _Orbits:
                 mate = other + (length - j if pair.reversed else j)
                 self._map(j < length, mate, own + j, element)
         rows = np.arange(count)
-        for k, (first, element) in enumerate(layout.corners):
+        for k, (first, element) in enumerate(corners):
             if first < 0:
                 self._fix(rows, self.corners[:, k], element.shift)
             else:
