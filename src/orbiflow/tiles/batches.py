@@ -11,8 +11,8 @@ from orbiflow.settings import Option
 from orbiflow.tiles.operations import ReadingSettings
 from orbiflow.tiles.search import SearchSettings
 
+# Endings of silhouettes that are no pictures: how these are read does not apply to them
 OUTLINES = (".svg", ".json", ".geojson", ".dat")
-"""Endings of silhouettes that are no pictures: how these are read does not apply to them."""
 
 NEVER = Cancel()
 

@@ -236,8 +236,8 @@ def _measurements(entry: dict[str, Any]) -> dict[str, Any]:
     return {"known_score": entry.get("score"), **found, **known}
 
 
+# Fields of an `EscherTile` that an entry states under the same name
 _PLAIN = ("objective", "front", "starts", "dropped", "seconds")
-"""Fields of an `EscherTile` that an entry states under the same name."""
 
 
 def _tile(entry: dict[str, Any]) -> Tile:

@@ -34,12 +34,10 @@ from orbiflow.tiles.silhouette import (
 )
 from orbiflow.tiles.tile import EscherTile
 
+# Greatest distance of flattened curves from the drawing's, in sizes of the silhouette
 FLATNESS = 1 / 4000
-"""Greatest distance of flattened curves from the drawing's, in sizes of the silhouette."""
-
+# Longest straight piece that is carried, in sizes of the silhouette: lines bend with the tile
 LONGEST = 1 / 150
-"""Longest straight piece that is carried, in sizes of the silhouette: lines bend with the tile."""
-
 MOST_CARRIED = 400_000  # greatest number of points that are carried in all
 FARTHEST = 1e6  # greatest reach of a drawing, in sizes of the silhouette
 

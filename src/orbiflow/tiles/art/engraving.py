@@ -28,9 +28,8 @@ from orbiflow.tiles.geometry import (
 from orbiflow.tiles.tile import EscherTile
 
 GRID_DENSITY = 420.0  # cells of the raster along the square root of the area
-
+# The direction from which light comes, with y down: from above, on the left
 LIGHT = np.array([-0.6, -0.8])
-"""The direction from which light comes, with y down: from above, on the left."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,9 +106,8 @@ def stroke(points: Array, widths: Array) -> Array:
 
 USUAL_EYE = 0.032  # radius of an eye in square roots of the tile's area
 EYE_CLEARANCE = 1.7  # distance, in radii of an eye, that lines keep from its middle
-
+# Step of an echo in square roots of the tile's area, and the least number of steps of a piece
 ECHO_STEP, ECHO_LEAST_STEPS = 0.008, 12
-"""Step of an echo in square roots of the tile's area, and the least number of steps of a piece."""
 
 
 class Eye(NamedTuple):

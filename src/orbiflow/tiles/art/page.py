@@ -131,10 +131,8 @@ def _page(
 REACH = 14  # greatest multiple of a basis vector that is tried
 LARGEST = 60  # greatest number of lattice cells in a rectangle
 EXACT = 1e-6  # strain up to which a rectangle counts as exact: that of rounding
-
+# Number of lattice cells up to which an exact rectangle is preferred to a smaller inexact one
 LARGEST_EXACT = 8
-"""Number of lattice cells up to which an exact rectangle is preferred to a smaller inexact one."""
-
 SLENDER = 4.0  # ratio of its sides beyond which a rectangle counts as larger than it is
 SIZE_TOLERANCE = 0.02  # greatest relative change of the size so that the cell is whole pixels
 

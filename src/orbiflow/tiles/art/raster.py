@@ -118,9 +118,8 @@ def runs(sides: Sides, top: int, rows: int, width: int) -> Runs:
 
 MARGIN = 3  # width in texels of the margin around the tile
 MOST_TEXELS = 20_000_000  # greatest number of texels in the rasters of all colours together
-
+# The neighbours of a texel, those that share a side last, for the last one counts
 _AROUND = ((-1, -1), (-1, 1), (1, -1), (1, 1), (-1, 0), (1, 0), (0, -1), (0, 1))
-"""The neighbours of a texel, those that share a side last, for the last one counts."""
 
 
 @dataclass(frozen=True, eq=False)

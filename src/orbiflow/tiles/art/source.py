@@ -129,12 +129,10 @@ def _border(points: Array, triangles: np.ndarray) -> Array:
 
 
 SAME_ASPECT = 0.01  # relative difference up to which two aspect ratios count as the same
-
+# Width in pixels of the strip inside the outline that its background may have mixed with
 FRINGE = 1.5
-"""Width in pixels of the strip inside the outline that its background may have mixed with."""
-
+# Distance in pixels from what the fringe leaves beyond which pixels are kept: thin limbs
 THIN = 4.0
-"""Distance in pixels from what the fringe leaves beyond which pixels are kept: thin limbs."""
 
 
 @dataclass(frozen=True, eq=False)

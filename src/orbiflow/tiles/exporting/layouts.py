@@ -42,11 +42,10 @@ class Layout:
     box: Box  # the part of the page that tiles may use
 
 
+# Places along each side of a lattice cell that are tried for a page with most whole tiles
 SHIFTS = 10
-"""Places along each side of a lattice cell that are tried for a page with most whole tiles."""
-
+# Number of tiles on a page beyond which a few more are not worth looking for
 MOST_TILES_TO_SHIFT = 1000
-"""Number of tiles on a page beyond which a few more are not worth looking for."""
 
 
 def layout(tile: Tile, settings: ExportSettings, *, y_down: bool) -> Layout:

@@ -13,8 +13,8 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.exporting.scene import Curve
 from orbiflow.tiles.tilings import EdgeImage, Edges, Tile, edge_classes, edges
 
+# The angle in radians by which a polyline turns at a vertex that stays a corner
 CORNER = np.radians(30.0)
-"""The angle in radians by which a polyline turns at a vertex that stays a corner."""
 
 _SAMPLES, _ROUNDS = 48, 4
 

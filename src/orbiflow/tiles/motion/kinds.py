@@ -66,11 +66,10 @@ class Motion:
 ALWAYS = (-1.0, -0.5)  # the birth of copies that are there from the start
 
 
+# Share of the progress of a bending in which the silhouette bends; then the tiling grows
 BEND = 0.45
-"""Share of the progress of a bending in which the silhouette bends; then the tiling grows."""
-
+# Values of the progress at which the copies that come into the picture are collected
 LOOKS = (0.0, 0.25, 0.5, 0.75, 1.0)
-"""Values of the progress at which the copies that come into the picture are collected."""
 
 
 class Page:
@@ -301,8 +300,8 @@ def _outline(triangles: NDArray[np.int64]) -> NDArray[np.int64]:
     return np.array(ring)
 
 
+# Shares of the loop: the rest at the start, each way, and the rest at the end, at the tile
 REST, MOVE, SHOW = 0.07, 0.37, 0.19
-"""Shares of the loop: the rest at the start, each way, and the rest at the end, at the tile."""
 
 
 class Frame(NamedTuple):

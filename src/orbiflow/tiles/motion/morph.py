@@ -33,8 +33,8 @@ from orbiflow.symmetry import Isometry, identity
 from orbiflow.tiles.silhouette import triangulate
 from orbiflow.tiles.tilings import IsohedralClass, Tile, isohedral_class
 
+# How far corresponding vertices of identified edges may lie apart, in square roots of the area
 TOLERANCE = 1e-6
-"""How far corresponding vertices of identified edges may lie apart, in square roots of the area."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -232,8 +232,8 @@ TILTS, BALANCED, TINY = 12, 1e-9, 1e-4
 """Greatest number of steps in which weights are tilted, the force that counts as none, and the step
 of the finite differences."""
 
+# Number of places at which the way of the weights is measured, so that the outline moves evenly
 EVEN = 24
-"""Number of places at which the way of the weights is measured, so that the outline moves evenly."""
 
 CHECKED = 96
 """Number of places at which the straight way is checked."""

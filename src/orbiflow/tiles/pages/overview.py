@@ -57,8 +57,8 @@ def measures(result: EscherTile) -> list[Measure]:
     return found
 
 
+# Scores up to which a tile is called poor, after a search for overlap and for likeness
 POOR_MATCH, POOR_LIKENESS = 0.4, 0.2
-"""Scores up to which a tile is called poor, after a search for overlap and for likeness."""
 
 
 def is_poor(result: EscherTile) -> bool:
@@ -192,8 +192,8 @@ def _fitting(window: Window) -> int:
     return max(16, round(_THUMB * min(1.0, aspect)), round(17 * aspect))
 
 
+# The files in every tile's folder
 TILE_FILES = ("tile.svg", "tiling.svg", "tiling.png", "overlay.png", "model.safetensors")
-"""The files in every tile's folder."""
 
 CHOICES = {
     "tile.svg": "the tile (SVG)",

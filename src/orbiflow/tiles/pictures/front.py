@@ -18,9 +18,8 @@ INK, PALE, GRID = "#1a1a1a", "#c4ccd4", "#eceff2"
 COLOURS = {"likeness": "#1d4e79", "overlap": "#c8702a"}
 NAMES = {"likeness": "found for likeness", "overlap": "found for overlap"}
 
+# Height of a listed tile's silhouette, and of another tile's, as a share of the width
 SIZE, SMALL = 0.075, 0.03
-"""Height of a listed tile's silhouette, and of another tile's, as a share of the width."""
-
 PUSHES = 400  # number of steps in which the silhouettes make room for each other
 
 

@@ -27,8 +27,8 @@ from orbiflow.drawing import (
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.tilings import Tile
 
+# Fills of the overlay: in both, in the target only, in the tile only
 COMMON, MISSING, ADDED = "#c9d3dc", "#d95f02", "#2b6cb0"
-"""Fills of the overlay: in both, in the target only, in the tile only."""
 
 
 def overlay_png(
@@ -209,8 +209,8 @@ def _ramp(stops: tuple[str, ...], count: int) -> tuple[str, ...]:
     )
 
 
+# Colours of the outline, from where it stayed to where it moved far
 RAMP = _ramp(("#1d4e79", "#d98a2b", ARROW), _STEPS)
-"""Colours of the outline, from where it stayed to where it moved far."""
 
 
 def _runs(ring: Array, steps: Array) -> Iterator[tuple[int, Array]]:

@@ -159,7 +159,6 @@ def tiling_picture(
 
 
 PANEL_ASPECT = 1.25  # width over height of the part of a tiling that a panel of `tilings_png` shows
-
 _NAME, _GAP = 0.13, 0.05  # height of a panel's name, and the space around it, in panel widths
 
 

@@ -145,9 +145,8 @@ def _with_points(mesh: Mesh, at: Array, order: Integers, slots: Integers) -> Mes
 TILE, SILHOUETTE = 240, 480  # points along the two outlines that are matched
 STEPS = 12  # most points of the silhouette that one step along the tile passes
 EVENNESS = 2e-3  # cost of a step that is not the usual two points, in areas a point squared
-
+# Share of the matching that goes evenly round: no part of the silhouette is squeezed to nothing
 PROPORTION = 0.15
-"""Share of the matching that goes evenly round: no part of the silhouette is squeezed to nothing."""
 
 
 def matched(silhouette: Array, polygon: Array) -> Bending:

@@ -92,11 +92,10 @@ def _pose(kind: IsohedralClass, linear: Array) -> tuple[Array, Array, Array]:
     return angle, log_scale, entries
 
 
+# Least number of samples around the tile from which vertices are chosen; the second if need be
 DENSE = (960, 4320)
-"""Least number of samples around the tile from which vertices are chosen; the second if need be."""
-
+# Largest deviation of the polygon from the sampled curve, in square roots of the tile's area
 TOLERANCES = (5e-4, 1e-4, 2e-5, 0.0)
-"""Largest deviation of the polygon from the sampled curve, in square roots of the tile's area."""
 
 
 def simplest_tile(
@@ -203,8 +202,8 @@ def _simplified(curve: Array, tolerance: float) -> Array:
 Progress = Callable[[float, float], None]
 """Called with the share of the work done and the best loss so far."""
 
+# Names under which the arrays of a map hold the start tile, if it is not the template
 VERTICES, CORNERS = "prototile.outline", "prototile.corners"
-"""Names under which the arrays of a map hold the start tile, if it is not the template."""
 
 
 def silent(_share: float, _loss: float) -> None:
@@ -250,9 +249,8 @@ class Fit(NamedTuple):
         return self.candidates.as_model()
 
 
+# By class, the number of parameters of a symmetric field of frequency 1
 WAVES = dict(zip(CLASSES, (18, 9, 9, 8, 4, 4, 8, 4, 4), strict=True))
-"""By class, the number of parameters of a symmetric field of frequency 1."""
-
 STEPS = 8  # integration steps with which a flow's polygon is first computed
 
 

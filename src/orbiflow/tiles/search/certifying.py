@@ -19,8 +19,8 @@ from orbiflow.tiles.search.candidates import Candidates, Fit
 from orbiflow.tiles.silhouette import Target
 from orbiflow.tiles.tile import EscherTile
 
+# How a target is made, for messages
 HOW = "Target.read, Target.from_mask and Target.from_polygon make one"
-"""How a target is made, for messages."""
 
 
 @dataclass(frozen=True)

@@ -117,8 +117,8 @@ Tiles bent so cost more by the usual stiffness than the least, and are seen to b
 silhouette: docs/likeness.md has the comparison.
 """
 
+# Of the search where too few tiles of a firm body are simple: many long limbs, which cross
 SOFT = Stiffness(salience=0.0)
-"""Of the search where too few tiles of a firm body are simple: many long limbs, which cross."""
 
 
 class Bodies(NamedTuple):
@@ -189,9 +189,8 @@ def hands(
     return hand(samples, False), hand(mirror, True)
 
 
+# Strength of the springs by which neighbours are compared: nearly tiles, yet one matrix for all
 SPRINGS = 1500.0
-"""Strength of the springs by which neighbours are compared: nearly tiles, yet one matrix for all."""
-
 CROSSED = 100.0  # added to the cost of what crosses itself: more than anything sound costs
 BETTER = 0.998  # a neighbour is taken if it costs less than this much of what there is
 MOST_MOVES = 8  # of each placement with each step

@@ -264,9 +264,8 @@ class _Polish:
         return [self.field.parameters_, *self.pose]
 
 
+# Starts from the outline, and IoU of the best of them, below which the template's join them
 FEW, POOR = 8, 0.4
-"""Starts from the outline, and IoU of the best of them, below which the template's join them."""
-
 NEAR = 0.01  # IoU that a more recognisable candidate of a class may be behind the best
 
 

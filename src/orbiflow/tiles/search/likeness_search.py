@@ -15,8 +15,8 @@ from orbiflow.tiles.search.method import Goal, SearchMethod, preferred_class
 from orbiflow.tiles.tile import EscherTile
 from orbiflow.tiles.tilings import IsohedralClass
 
+# Settings of the preview
 SKETCH = {"placements": 60, "held": 6, "starts": 1, "share": 0.1, "finalists": 1, "rounds": 10}
-"""Settings of the preview."""
 
 FAST = {"placements": 80, "held": 20, "starts": 8, "share": 0.15, "finalists": 2, "rounds": 12}
 BEST = {"placements": 1500, "held": 300, "starts": 128, "share": 1.0, "finalists": 12, "rounds": 40}

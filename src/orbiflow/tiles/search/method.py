@@ -129,8 +129,8 @@ class SearchMethod(ABC):
         return list(tiles)
 
 
+# The classes by how often they come near a silhouette at once, for the time that they take
 PREFERRED = ("IH6", "IH5", "IH4", "IH2", "IH3", "IH7", "IH21", "IH28", "IH1")
-"""The classes by how often they come near a silhouette at once, for the time that they take."""
 
 
 def preferred_class(names: Sequence[str]) -> IsohedralClass:

@@ -25,8 +25,8 @@ from orbiflow.tiles.silhouette import Target, signed_distance
 from orbiflow.tiles.tilings import IsohedralClass, isohedral_class
 from orbiflow.typed_torch import adam, linalg, listed
 
+# Factor of the squared displacement of a pentagon's free vertex: keeps the template simple
 SHAPE_PENALTY = 0.02
-"""Factor of the squared displacement of a pentagon's free vertex: keeps the template simple."""
 
 
 class OccupancySamples:

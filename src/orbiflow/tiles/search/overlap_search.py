@@ -21,9 +21,8 @@ from orbiflow.tiles.tile import EscherTile
 from orbiflow.tiles.tilings import CLASSES, IsohedralClass
 
 POINTS = 60  # points of the outline that the preview looks at
-
+# Length of an outline, in square roots of its area, up to which the settings are as they are
 PLAIN = 8.0
-"""Length of an outline, in square roots of its area, up to which the settings are as they are."""
 
 
 RAGGED = 3.5  # power of the length beyond, by which the number of starts grows

@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from orbiflow.arrays import Complex, Integers
 from orbiflow.tiles.tilings import IsohedralClass
 
+# Beyond this many, lengths and starts run in steps of more than one point
 MOST_PLACEMENTS = 4_000_000
-"""Beyond this many, lengths and starts run in steps of more than one point."""
 
 
 class Placements(NamedTuple):

@@ -73,11 +73,10 @@ def _keeps(isometry: Isometry, vertices: Array, group: CrystallographicGroup) ->
     )
 
 
+# Starts differ by this share of the outline in where some corner sits, or they are twins
 APART = 0.025
-"""Starts differ by this share of the outline in where some corner sits, or they are twins."""
-
+# Standard deviations, in points, of the smoothing of outlines whose nearest tile crosses itself
 SMOOTHING = (0.0, 1.0, 2.0)
-"""Standard deviations, in points, of the smoothing of outlines whose nearest tile crosses itself."""
 
 
 @dataclass(frozen=True)
