@@ -45,17 +45,20 @@ class Sides(NamedTuple):
 
 def ring_sides(rings: Array) -> Sides:
     """Return the sides of rings (M, N, 2) that have the inside to their right; ring m has label m."""
-    ahead = np.roll(rings, -1, axis=1)
-    area = (rings[..., 0] * ahead[..., 1] - rings[..., 1] * ahead[..., 0]).sum(axis=1)
-    entering = (ahead[..., 1] - rings[..., 1]) * np.sign(area)[:, None] < 0
+    ahead, entering = _entering(rings)
     return Sides(rings[entering], ahead[entering], np.nonzero(entering)[0])
+
+
+def _entering(rings: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Return the ends of the sides of rings (..., N, 2), and which have the inside to their right."""
+    ahead = np.roll(rings, -1, axis=-2)
+    area = (rings[..., 0] * ahead[..., 1] - rings[..., 1] * ahead[..., 0]).sum(axis=-1)
+    return ahead, (ahead[..., 1] - rings[..., 1]) * np.sign(area)[..., None] < 0
 
 
 def polygon_sides(ring: Array) -> Sides:
     """Return the sides of one ring (N, 2): 0 where they enter it, `NOWHERE` where they leave it."""
-    ahead = np.roll(ring, -1, axis=0)
-    area = (ring[:, 0] * ahead[:, 1] - ring[:, 1] * ahead[:, 0]).sum()
-    entering = (ahead[:, 1] - ring[:, 1]) * np.sign(area) < 0
+    ahead, entering = _entering(ring)
     return Sides(ring, ahead, np.where(entering, 0, NOWHERE))
 
 

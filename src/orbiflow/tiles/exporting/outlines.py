@@ -10,7 +10,7 @@ import shapely
 
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles.exporting.scene import Curve
+from orbiflow.tiles.exporting.scene import Curve, bezier
 from orbiflow.tiles.tilings import EdgeImage, Edges, Tile, edge_classes, edges
 
 # The angle in radians by which a polyline turns at a vertex that stays a corner
@@ -94,16 +94,16 @@ def _cubic(part: Array, start: Array, end: Array, tolerance: float) -> tuple[Arr
     for _ in range(_ROUNDS):
         share = _closer(piece, samples, share)
         piece = _least_squares(samples, share, start, end)
-    error = np.linalg.norm(_points(piece, share) - samples, axis=1)
+    error = np.linalg.norm(bezier(piece[None], share) - samples, axis=1)
     if error.max() <= tolerance:
-        along = _points(piece, np.linspace(0, 1, 4 * min(len(part), 24) + 9))
+        along = bezier(piece[None], np.linspace(0, 1, 4 * min(len(part), 24) + 9))
         if shapely.distance(shapely.points(along), shapely.LineString(part)).max() <= tolerance:
             return piece, 0
     inner = part[1:-1]
     if not len(inner):
         return None, 0
     off = shapely.distance(
-        shapely.points(inner), shapely.LineString(_points(piece, np.linspace(0, 1, 40)))
+        shapely.points(inner), shapely.LineString(bezier(piece[None], np.linspace(0, 1, 40)))
     )
     balance = np.minimum(np.arange(1, len(part) - 1), np.arange(len(part) - 2, 0, -1))
     # the farthest vertex, unless a sliver would be left
@@ -141,12 +141,6 @@ def _least_squares(samples: Array, share: Array, start: Array, end: Array) -> Ar
     return np.stack([first, first + lengths[0] * start, last - lengths[1] * end, last])
 
 
-def _points(piece: Array, share: Array) -> Array:
-    t = share[:, None]
-    u = 1 - t
-    return u**3 * piece[0] + 3 * u**2 * t * piece[1] + 3 * u * t**2 * piece[2] + t**3 * piece[3]
-
-
 def _closer(piece: Array, samples: Array, share: Array) -> Array:
     """Return parameters nearer to the samples, by one step of Newton's method."""
     t = share[:, None]
@@ -155,7 +149,7 @@ def _closer(piece: Array, samples: Array, share: Array) -> Array:
     second = np.diff(piece, n=2, axis=0)
     slope = 3 * (u**2 * first[0] + 2 * u * t * first[1] + t**2 * first[2])
     bend = 6 * (u * second[0] + t * second[1])
-    off = _points(piece, share) - samples
+    off = bezier(piece[None], share) - samples
     top = (off * slope).sum(axis=1)
     bottom = (slope**2).sum(axis=1) + (off * bend).sum(axis=1)
     step = np.where(np.abs(bottom) > 1e-300, top / np.where(bottom == 0, 1, bottom), 0.0)

@@ -91,7 +91,7 @@ class Curve:
         own = np.repeat(np.arange(len(count)), count)
         first = np.cumsum(count) - count
         share = (np.arange(count.sum()) - first[own]) / count[own]
-        points = _at(self.pieces[own], share)
+        points = bezier(self.pieces[own], share)
         return points if self.closed else np.concatenate([points, self.end[None]])
 
     def bounds(self) -> Array:
@@ -100,7 +100,7 @@ class Curve:
         return np.stack([points.min(axis=0), points.max(axis=0)])
 
 
-def _at(pieces: Array, share: Array) -> Array:
+def bezier(pieces: Array, share: Array) -> Array:
     """Return the point of each piece (n, 4, 2) at its parameter `share` (n,)."""
     t = share[:, None]
     u = 1 - t

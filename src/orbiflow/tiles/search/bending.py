@@ -69,10 +69,6 @@ class Bent(NamedTuple):
         return self.fidelity.score * neck_factor(self.neck, min_neck)
 
 
-def _told_nobody(_share: float) -> None:
-    """No progress wanted."""
-
-
 def bent_tiles(
     both: Sequence[Hand],
     kind: IsohedralClass,
@@ -86,7 +82,7 @@ def bent_tiles(
 
     There are at least `wanted` of each hand, if so many are found.
     """
-    told, cancel = progress or _told_nobody, cancel or Cancel()
+    told, cancel = progress or (lambda _share: None), cancel or Cancel()
     found: list[Bent] = []
     dropped = done = 0
     sides = both[:1] if mirror_closed(kind) else both
@@ -274,30 +270,21 @@ def fit_bending(
     cancel: Cancel | None = None,
 ) -> Fit:
     """Fit tiles of one class to a target by letting the silhouette bend (design point 15)."""
-    with one_blas_thread():  # many small systems
-        return _fit(target, kind, settings, both, per_class, progress, cancel)
-
-
-def _fit(
-    target: Target,
-    kind: IsohedralClass,
-    settings: LikenessSearch,
-    both: Sequence[Hand],
-    per_class: int,
-    progress: Progress | None,
-    cancel: Cancel | None,
-) -> Fit:
     told = progress or silent
     enough = 1 if per_class == 1 else 3 * per_class
     settings = replace(settings, min_neck=least_neck(target.normal, settings.min_neck))
-    found, dropped = bent_tiles(
-        both, kind, settings, lambda share: told(0.9 * share, float("nan")), cancel, wanted=enough
-    )
+
+    def report(share: float) -> None:
+        told(0.9 * share, float("nan"))
+
+    with one_blas_thread():  # many small systems
+        found, dropped = bent_tiles(both, kind, settings, report, cancel, wanted=enough)
     if not found:
         raise CertificationError("all tiles near the silhouette cross themselves")
     found = found[: enough + 1]  # one to spare, if one is not certified
     overlaps = [Overlap(target.normal * (1.0, -1.0 if hand.mirrored else 1.0)) for hand in both]
-    placed = [placed_best(bent, overlaps[bent.hand.mirrored]) for bent in found]
+    with one_blas_thread():
+        placed = [placed_best(bent, overlaps[bent.hand.mirrored]) for bent in found]
     starts = Prototiles.joined([prototile(kind, one) for one in placed])
     candidates = StillTiles(kind, starts)
     return Fit(candidates, settings.placements, dropped, enough, tuple(placed))

@@ -36,9 +36,7 @@ class Placements(NamedTuple):
 
     def take(self, index: Integers) -> Placements:
         """Those at `index`."""
-        return Placements(
-            self.lengths[index], self.starts[index], self.turns[index], self.gains[index]
-        )
+        return Placements(*(part[index] for part in self))
 
 
 def best_placements(kind: IsohedralClass, outline: Complex, keep: int) -> Placements:

@@ -35,13 +35,7 @@ class NearestTiles(NamedTuple):
 
     def take(self, index: Integers) -> NearestTiles:
         """Those at `index`."""
-        return NearestTiles(
-            self.vertices[index],
-            self.linear[index],
-            self.offset[index],
-            self.corners[index],
-            self.distance[index],
-        )
+        return NearestTiles(*(part[index] for part in self))
 
 
 class TileSpace:
