@@ -164,7 +164,7 @@ class _Raster:
         way = np.array([np.cos(angle), np.sin(angle)])
         steps = np.round(np.arange(1, self.half + 2)[:, None] * way).astype(int)
         index = steps + (np.array(region.shape) - 1) // 2
-        known = ((index >= 0) & (index < region.shape)).all(axis=1)
+        known = np.asarray(((index >= 0) & (index < region.shape)).all(axis=1))
         index = np.where(known[:, None], index, 0)
         return steps[int(np.argmin(known & region[index[:, 0], index[:, 1]]))]
 

@@ -38,7 +38,7 @@ from orbiflow.tiles.tilings import Certificate, colouring
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-    from matplotlib.path import Path
+    from matplotlib.path import Path as PlotPath
 
 
 def write_dxf(scene: Scene, *, tolerance: float) -> str:
@@ -189,7 +189,7 @@ def drawn(scene: Scene, *, least_width: float = 0.0) -> Figure:
     return figure
 
 
-def _paths(scene: Scene, layer: Layer) -> list[Path]:
+def _paths(scene: Scene, layer: Layer) -> list[PlotPath]:
     paths = []
     for item in layer.items:
         if isinstance(item, Uses):
@@ -201,28 +201,30 @@ def _paths(scene: Scene, layer: Layer) -> list[Path]:
     return paths
 
 
-def curves_path(curves: Iterable[Curve]) -> Path:
+def curves_path(curves: Iterable[Curve]) -> PlotPath:
     """Return several curves as one path of matplotlib's, filled together."""
-    from matplotlib.path import Path
+    from matplotlib.path import Path as PlotPath
 
     parts = [_points_and_codes(curve) for curve in curves]
     if not parts:
-        return Path(np.zeros((0, 2)))
+        return PlotPath(np.zeros((0, 2)))
     return _path(*(np.concatenate(part) for part in zip(*parts, strict=True)))
 
 
-def _path(points: Array, codes: Array) -> Path:
-    from matplotlib.path import Path
+def _path(points: Array, codes: Array) -> PlotPath:
+    from matplotlib.path import Path as PlotPath
 
-    path = Path(points, codes)
+    path = PlotPath(points, codes)
     path.should_simplify = False
     return path
 
 
 def _points_and_codes(curve: Curve) -> tuple[Array, Array]:
-    from matplotlib.path import Path
+    from matplotlib.path import Path as PlotPath
 
-    move, line, cubic = (np.uint8(code) for code in (Path.MOVETO, Path.LINETO, Path.CURVE4))
+    move, line, cubic = (
+        np.uint8(code) for code in (PlotPath.MOVETO, PlotPath.LINETO, PlotPath.CURVE4)
+    )
     # of straight pieces only the end is kept
     kept = np.repeat(~curve.straight, 3)
     kept[2::3] = True
@@ -231,7 +233,7 @@ def _points_and_codes(curve: Curve) -> tuple[Array, Array]:
     points, codes = np.concatenate([curve.start[None], points]), np.concatenate([[move], codes])
     if curve.closed:
         points = np.concatenate([points, curve.start[None]])
-        codes = np.concatenate([codes, [np.uint8(Path.CLOSEPOLY)]])
+        codes = np.concatenate([codes, [np.uint8(PlotPath.CLOSEPOLY)]])
     return points, codes
 
 

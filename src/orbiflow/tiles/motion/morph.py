@@ -73,17 +73,21 @@ class OwnFrame:
         offset = _offset(kind, placed, starts, linear)
         points = (placed - offset) @ np.linalg.inv(linear).T
         own = cls(kind, points, starts, linear, offset)
-        size = np.sqrt(own.kind.group().cell_volume / own.kind.group().order)
-        for pair in own.kind.identified_edges:
-            first, second = own.edge(pair.first), own.edge(pair.second)
+        own.check()
+        return own
+
+    def check(self) -> None:
+        """Check that identified edges are images of each other, vertex by vertex."""
+        size = np.sqrt(self.kind.group().cell_volume / self.kind.group().order)
+        for pair in self.kind.identified_edges:
+            first, second = self.edge(pair.first), self.edge(pair.second)
             image = pair.isometry(first)
             image = image[::-1] if pair.reversed else image
             if len(image) != len(second) or np.abs(image - second).max() > TOLERANCE * size:
                 raise OrbiflowError(
                     f"this tile's edges {pair.first} and {pair.second} are not images of each other "
-                    f"as class {own.kind.name} has them"
+                    f"as class {self.kind.name} has them"
                 )
-        return own
 
     def edge(self, number: int) -> Array:
         """(M, 2) vertices of an edge, both ends included."""

@@ -124,7 +124,7 @@ def write_gallery(
     names = folder_names([result.isohedral_class for result in results])
     colours = [colouring(result.tile) for result in results]
     draw = functools.partial(_draw, target, figures)
-    items = [(*each, out / name) for *each, name in zip(results, colours, names, strict=True)]
+    items = list(zip(results, colours, (out / name for name in names), strict=True))
     if workers == 1 or len(results) == 1 or not figures:
         for item in items:
             draw(item)

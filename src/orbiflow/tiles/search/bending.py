@@ -82,7 +82,8 @@ def bent_tiles(
 
     There are at least `wanted` of each hand, if so many are found.
     """
-    told, cancel = progress or (lambda _share: None), cancel or Cancel()
+    told: Callable[[float], None] = progress or (lambda _share: None)
+    cancel = cancel or Cancel()
     found: list[Bent] = []
     dropped = done = 0
     sides = both[:1] if mirror_closed(kind) else both

@@ -170,7 +170,7 @@ def matched(silhouette: Array, polygon: Array) -> Bending:
     # how far round the polygon each point of the mesh on its outline lies
     knots = arc_lengths(ring)
     vertex = np.concatenate([np.arange(mesh.size), mesh.sides + mesh.shares])
-    share = np.interp(vertex, np.arange(len(knots)), knots) / knots[-1]
+    share: Array = np.interp(vertex, np.arange(len(knots)), knots) / knots[-1]
     turn = (share * TILE - first) % TILE
     place = (np.interp(turn, np.arange(TILE + 1), places) + start) % SILHOUETTE
     lengths = arc_lengths(rest)

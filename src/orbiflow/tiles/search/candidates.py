@@ -216,12 +216,15 @@ class Candidates(Protocol):
     @property
     def size(self) -> int:
         """The number of candidates."""
+        ...
 
     def finished(self, index: int, *, force: bool = False) -> tuple[Tile, TileMap]:
         """Return a candidate's polygon with its group, and its flow; it is simple unless forced."""
+        ...
 
     def as_model(self) -> TileModel:
         """Return the candidates as a torch module, to be trained further."""
+        ...
 
 
 class Fit(NamedTuple):

@@ -36,7 +36,7 @@ class Placements(NamedTuple):
 
     def take(self, index: Integers) -> Placements:
         """Those at `index`."""
-        return Placements(*(part[index] for part in self))
+        return self._make(part[index] for part in self)
 
 
 def best_placements(kind: IsohedralClass, outline: Complex, keep: int) -> Placements:

@@ -13,7 +13,7 @@ import numpy as np
 
 from orbiflow.arguments import described, instance, is_a
 from orbiflow.errors import CertificationError, OrbiflowError
-from orbiflow.runtime import Cancel, Cancelled, ignore, one_thread, process_context, work
+from orbiflow.runtime import Cancel, Cancelled, one_thread, process_context, work
 from orbiflow.tiles.likeness import diverse, mutual_iou
 from orbiflow.tiles.search.both_search import ALIKE
 from orbiflow.tiles.search.candidates import Fit, Progress
@@ -172,7 +172,7 @@ def search_classes(
             raise OrbiflowError(f"{what} must be at least 1, got {number}")
     task = _task(target, method, emphasis, pins, per_class, force)
     cancel = cancel or Cancel()
-    teller = _Teller(watch or ignore)
+    teller = _Teller(watch or (lambda _event: None))
     count = min(workers, len(names))
     # asked before torch is limited here: a limit makes no fork safe
     preload = ("orbiflow.tiles.search.searching", *task.method.modules)
@@ -224,7 +224,7 @@ def escherize_class(
         Cancelled: if it was told to stop.
     """
     task = _task(target, method, emphasis, pins, per_class, force)
-    return _work_on(task, name, watch or ignore, cancel or Cancel())
+    return _work_on(task, name, watch or (lambda _event: None), cancel or Cancel())
 
 
 class _Teller:

@@ -35,7 +35,7 @@ class NearestTiles(NamedTuple):
 
     def take(self, index: Integers) -> NearestTiles:
         """Those at `index`."""
-        return NearestTiles(*(part[index] for part in self))
+        return self._make(part[index] for part in self)
 
 
 class TileSpace:
