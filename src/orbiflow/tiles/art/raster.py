@@ -90,8 +90,7 @@ def runs(sides: Sides, top: int, rows: int, width: int) -> Runs:
     two regions share enters one of them, so every sample of a partition is in exactly one region.
 
     >>> square = np.array([[[1.0, 0.0], [3.0, 0.0], [3.0, 2.0], [1.0, 2.0]]])
-    >>> left = square - (2.0, 0.0)
-    >>> found = runs(ring_sides(np.concatenate([left, square])), 0, 2, 3)
+    >>> found = runs(ring_sides(np.concatenate([square - (2.0, 0.0), square])), 0, 2, 3)
     >>> found.label[found.length > 0].tolist(), found.length[found.length > 0].tolist()
     ([0, 1, 0, 1], [1, 2, 1, 2])
     """

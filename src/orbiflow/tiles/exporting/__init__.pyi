@@ -11,6 +11,7 @@ from .scene import Style as Style
 from .scene import Uses as Uses
 from .scene import rectangle as rectangle
 from .settings import ExportSettings as ExportSettings
+from .svg import Numbers as Numbers
 from .svg import tile_svg as tile_svg
 from .svg import tiling_svg as tiling_svg
 from .svg import write_svg as write_svg

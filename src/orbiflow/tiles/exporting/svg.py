@@ -33,7 +33,7 @@ def write_svg(scene: Scene, *, decimals: int = 3) -> str:
 
     Edges that two tiles share have the same numbers up to the last of them.
     """
-    number = _Numbers(decimals)
+    number = Numbers(decimals)
     parts = [_HEADER.format(width=number(scene.width), height=number(scene.height))]
     parts.append(f"  <title>{escape(scene.title)}</title>\n")
     if scene.notes:
@@ -51,7 +51,7 @@ def write_svg(scene: Scene, *, decimals: int = 3) -> str:
     return "".join(parts)
 
 
-class _Numbers:
+class Numbers:
     """A format for numbers: a fixed number of decimals, without zeros at the end."""
 
     def __init__(self, decimals: int) -> None:
@@ -63,13 +63,13 @@ class _Numbers:
         return "0" if text in ("-0", "") else text
 
 
-def path_data(curve: Curve, number: _Numbers | None = None) -> str:
+def path_data(curve: Curve, number: Numbers | None = None) -> str:
     """Return the d attribute of a path, in absolute coordinates.
 
     >>> path_data(Curve.polyline([[0, 0], [2, 0], [2, 1.5]], closed=True))
     'M0,0L2,0 2,1.5Z'
     """
-    number = number or _Numbers(3)
+    number = number or Numbers(3)
     (x, y), last = curve.start.tolist(), len(curve.pieces) - 1
     parts, before = [f"M{number(x)},{number(y)}"], ""
     for k, (piece, straight) in enumerate(
@@ -85,7 +85,7 @@ def path_data(curve: Curve, number: _Numbers | None = None) -> str:
     return "".join(parts) + ("Z" if curve.closed else "")
 
 
-def _definitions(scene: Scene, number: _Numbers) -> str:
+def _definitions(scene: Scene, number: Numbers) -> str:
     parts = []
     for name, curve in scene.symbols.items():
         parts.append(f'    <path id="{name}" d="{path_data(curve, number)}"/>\n')
@@ -99,7 +99,7 @@ def _definitions(scene: Scene, number: _Numbers) -> str:
     return "  <defs>\n" + "".join(parts) + "  </defs>\n" if parts else ""
 
 
-def _motif(name: str, motif: Motif, number: _Numbers) -> str:
+def _motif(name: str, motif: Motif, number: Numbers) -> str:
     """Return a group that is drawn once and used by every copy."""
     parts, clip = [], ""
     if motif.within is not None:
@@ -152,13 +152,13 @@ def _style_attributes(style: Style) -> str:
     text = f' fill="{style.fill or "none"}"'
     if style.stroke is None:
         return text + ' stroke="none"'
-    width = _Numbers(4)(style.width)
+    width = Numbers(4)(style.width)
     return text + f' stroke="{style.stroke}" stroke-width="{width}" stroke-linejoin="round"'
 
 
-def _uses(uses: Uses, reach: float, number: _Numbers) -> Iterator[str]:
+def _uses(uses: Uses, reach: float, number: Numbers) -> Iterator[str]:
     """Yield a line for each copy, its matrix as exact as keeps the symbol's far end in its place."""
-    fine = _Numbers(number.decimals + max(1, math.ceil(math.log10(max(reach, 1.0)))))
+    fine = Numbers(number.decimals + max(1, math.ceil(math.log10(max(reach, 1.0)))))
     # columns first, as SVG has them
     matrices = [",".join(fine(value) for value in linear.T.ravel()) for linear in uses.linear]
     still = [bool(np.abs(linear - np.eye(2)).max() < 1e-12) for linear in uses.linear]
@@ -215,17 +215,13 @@ def tiling_svg(
 ) -> str:
     """Return the SVG of the tiles that meet a window, clipped to it: one closed path per tile.
 
-    Each colour's paths are a group, with the ids "colour-1", "colour-2" ... Every tile has a
-    stroke, so that no paper shines through between neighbours.
+    Each colour's paths are a group, with the ids "colour-1", "colour-2" ... Every tile has a stroke,
+    so that no paper shines through between neighbours.
 
     Args:
-        tile: A tile or a tiling.
-        window: The window (xmin, ymin, xmax, ymax) in the tile's units. Default: `default_window`.
+        tile, window, palette_name, colours, y_down: As for `tiling_png`.
         width_mm: The page's width in mm.
-        palette_name: The palette of paper, fills and outlines.
-        colours: Which tile has which colour. Default: `colouring(tile)`.
         outline_mm: The outline's width in mm; 0 means a hairline in the tile's own colour.
-        y_down: Whether the tile's y axis points down, as in images.
         title: The file's title. Default: the class.
 
     Raises:

@@ -75,9 +75,7 @@ LOOKS = (0.0, 0.25, 0.5, 0.75, 1.0)
 class Page:
     """The tile's default window on a picture `width` pixels wide.
 
-    - `linear`: The map from the tile's coordinates to pixels.
-    - `center`: The tile's centre in its coordinates.
-    - `middle`: The tile's centre in pixels.
+    `linear` maps the tile's coordinates to pixels; `center` and `middle` are its centre in either.
     """
 
     def __init__(self, tile: Tile, width: int, y_down: bool) -> None:
@@ -318,21 +316,6 @@ def eased(share: float) -> float:
     [0.0, 0.156, 0.5, 1.0]
     """
     return share * share * (3 - 2 * share)
-
-
-def progress(time: float) -> float:
-    """Return the progress of a loop at a time, 0 to 1 of the loop.
-
-    >>> [round(progress(time), 3) for time in (0.0, 0.255, 0.5, 0.815)]
-    [0.0, 0.5, 1.0, 0.5]
-    """
-    if time < REST:
-        return 0.0
-    if time < REST + MOVE:
-        return eased((time - REST) / MOVE)
-    if time < REST + MOVE + SHOW:
-        return 1.0
-    return eased(max(0.0, 1 - (time - REST - MOVE - SHOW) / MOVE))
 
 
 def frames(seconds: float, fps: float) -> list[Frame]:

@@ -21,6 +21,7 @@ from orbiflow.arrays import Array
 from orbiflow.drawing import Palette, Raster, limited, palette
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import Cancel, Note, Progress, Sink, ignore, write_atomic
+from orbiflow.tiles.exporting import Numbers
 from orbiflow.tiles.motion.kinds import (
     MOVE,
     REST,
@@ -270,17 +271,15 @@ width="{width}" height="{height}" role="img" class="{key}">
 """
 
 
+_number = Numbers(1)
+
+
 def _path(ring: Array) -> str:
     return "M" + " ".join(f"{_number(x)},{_number(y)}" for x, y in ring.tolist()) + "Z"
 
 
-def _number(value: float, decimals: int = 1) -> str:
-    text = f"{value:.{decimals}f}".rstrip("0").rstrip(".")
-    return "0" if text in ("-0", "") else text
-
-
 def _matrix(linear: Array) -> str:
-    return ",".join(_number(value, 5) for value in linear.T.ravel())
+    return ",".join(Numbers(5)(value) for value in linear.T.ravel())
 
 
 def _changing(motion: Motion, seconds: float) -> str:
@@ -301,7 +300,7 @@ def _copy(
     if end <= 0:
         return f'{use} transform="matrix({_matrix(linear)},{_number(x)},{_number(y)})"/>\n'
     keys = [0.0, start, *np.linspace(start, end, 5)[1:-1].tolist(), end, 1.0]
-    sizes = [_number(eased(float(np.clip((t - start) / (end - start), 0, 1))), 3) for t in keys]
+    sizes = [Numbers(3)(eased(float(np.clip((t - start) / (end - start), 0, 1)))) for t in keys]
     grows = _animate(
         "animateTransform", 'attributeName="transform" type="scale"', keys, sizes, seconds
     )
@@ -326,7 +325,7 @@ def _animate(
     mode = f'calcMode="spline" keySplines="{";".join(splines)}"' if direct else 'calcMode="linear"'
     return (
         f'<{element} {what} dur="{seconds:g}s" repeatCount="indefinite" {mode} '
-        f'keyTimes="{";".join(_number(t, 4) for t in times)}" values="{";".join(shown)}"/>'
+        f'keyTimes="{";".join(Numbers(4)(t) for t in times)}" values="{";".join(shown)}"/>'
     )
 
 

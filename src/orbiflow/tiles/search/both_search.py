@@ -119,8 +119,7 @@ def front_list(results: Sequence[EscherTile]) -> list[EscherTile]:
 def behind(cost: Array, overlap: Array) -> Array:
     """(n,) how far each point is behind the nearest on the front that beats it; 0 on the front.
 
-    The larger of two shares: that of its cost which the other saves, and that of `WORTH` by which
-    the other's overlap is larger.
+    The larger of the share of its cost which the other saves, and that of `WORTH` in overlap.
 
     >>> behind(np.array([1.0, 1.25, 2.0, 1.3]), np.array([0.7, 0.68, 0.9, 0.68])).round(3)
     array([0.   , 0.2  , 0.   , 0.231])

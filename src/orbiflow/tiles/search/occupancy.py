@@ -32,8 +32,8 @@ SHAPE_PENALTY = 0.02
 class OccupancySamples:
     """Points around a target and whether it contains them: the paper's Q and o(q).
 
-    A third is uniform in the target's bounding box with a margin of 0.2, the rest normally
-    scattered about the outline (standard deviations 0.02, 0.06, 0.15): far points teach little.
+    A third is uniform in the target's bounding box with a margin of 0.2, the rest normally scattered
+    about the outline (standard deviations 0.02, 0.06, 0.15): far points teach little.
     """
 
     def __init__(
