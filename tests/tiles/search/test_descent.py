@@ -74,7 +74,7 @@ def test_steps_are_injective(name: str, soft: SoftTarget) -> None:
         state.step(soft)
         last = state.record[-1]
         state.field.parameters_.data.copy_(last)
-        points = torch.rand(state.size, 60, 2) * 3
+        points = torch.rand(state.model.size, 60, 2) * 3
         columns = []
         for direction in torch.eye(2):
             h = 1e-3
@@ -110,8 +110,8 @@ def test_keep_selects_everything_alike(soft: SoftTarget) -> None:
     for _ in range(3):
         state.step(soft)
     boundaries = state.placed()
-    state.keep([4, 1], np.full(state.size, 0.8))
-    assert state.size == 2
+    state.keep([4, 1], np.full(state.model.size, 0.8))
+    assert state.model.size == 2
     assert np.allclose(state.placed(), boundaries[[4, 1]], atol=1e-6)
     assert torch.allclose(state.threshold, torch.tensor(0.8 / 1.8))
     state.step(soft)
