@@ -217,11 +217,7 @@ def _labels(
 
 
 def _require_movable(groups: Groups, first: np.ndarray) -> None:
-    """Check that enough groups can change sides to tell a difference from chance.
-
-    Raises:
-        OrbiflowError: If there are too few.
-    """
+    """Check that enough groups can change sides to tell a difference from chance."""
     own = np.bincount(groups.index, first, groups.count) > 0
     other = np.bincount(groups.index, ~first, groups.count) > 0
     both, one, two = (own & other).sum(), (own & ~other).sum(), (other & ~own).sum()

@@ -70,16 +70,7 @@ def cross_fitted(
     others, Generative adversarial nets, 2014, section 4). The log odds of either half are multiplied by
     what suits the other half best. Whole groups are held out, and resampled.
 
-    Args:
-        space: The space.
-        points: Chart points (N, d) of both data sets.
-        first: Whether each row (N,) is of the first one.
-        groups: The groups of the rows.
-        settings: Resamples, level and seed of the intervals.
-        progress: A function that is called with the share of the work done, and what is being done.
-
-    Raises:
-        OrbiflowError: If half of a data set has fewer than ten different points.
+    `points` are chart points (N, d) of both data sets; `first` says which (N,) are of the first one.
     """
     seed, level = settings.seed, settings.level
     half = np.random.default_rng(seed).permutation(groups.count)[groups.index] % 2

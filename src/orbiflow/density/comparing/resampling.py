@@ -40,11 +40,7 @@ class Groups:
 
     @classmethod
     def of(cls, labels: ArrayLike | None, rows: int) -> Groups:
-        """Return groups from a label for each row, of any kind; None means independent rows.
-
-        Raises:
-            OrbiflowError: If there is another number of labels.
-        """
+        """Return groups from a label for each row, of any kind; None means independent rows."""
         if labels is None:
             return cls(np.arange(rows), rows, False)
         index = group_numbers(labels, rows)
@@ -56,11 +52,7 @@ class Groups:
         return "groups" if self.given else "rows"
 
     def require(self) -> None:
-        """Check that there are enough for an uncertainty.
-
-        Raises:
-            OrbiflowError: If there are too few.
-        """
+        """Check that there are enough for an uncertainty."""
         if self.count < MIN_GROUPS:
             raise OrbiflowError(
                 f"{self.count} {self.what} are too few for an uncertainty: there must be at least "

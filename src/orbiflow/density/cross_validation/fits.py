@@ -41,16 +41,7 @@ FITS = Kind(
 
 
 def run(asked: CrossValidation, work: WorkSettings, tell: Sink, cancel: Cancel) -> Outcome:
-    """Do the fits that have not been done, then compare what they say of rows that they had not seen.
-
-    Returns:
-        An outcome whose summary has `folder`; `table`, `rows`, `report` and `page`, the files; the
-        number of `fits`, and how many of them are `done`, gave `nothing`, `failed` or are `left`; how
-        many were `kept` from before; `comparison`, as in report.json; and `seconds`.
-
-    Raises:
-        OrbiflowError: For a mistake of the user; what has finished is kept.
-    """
+    """Do the fits that have not been done, then compare what they say of unseen rows."""
     begin = time.perf_counter()
     out = asked.out
     check_outside_runs(out, asked.data)

@@ -55,14 +55,6 @@ def fit_and_score(
     """Fit, score the fold, and write the folder.
 
     Rows of the fold take no part in the fit, nor in where the space is turned for it.
-
-    Returns:
-        An outcome whose summary has `folder`; the number of `rows` held out and `fitted`; the mean
-        `log_likelihood` of those held out, in nats, natural measure and weighted; and `seconds`.
-
-    Raises:
-        OrbiflowError: For a mistake of the user.
-        Cancelled: If it was told to stop; nothing is written.
     """
     begin = time.perf_counter()
     rows = read_rows(data, settings, tell, width=len(settings.columns or ()) or None, group=group)
@@ -115,11 +107,7 @@ def written_files(folder: Path) -> set[str]:
 
 
 def _held(data: Path, table: Table, fold: int, name: str, header: bool | None) -> NDArray[np.bool_]:
-    """Which rows (N,) are of the fold.
-
-    Raises:
-        OrbiflowError: If the column numbers no folds, or there is no such fold.
-    """
+    """Which rows (N,) are of the fold."""
     column = read_table(data, columns=[name], width=1, has_header=header, drop_missing=True)
     if not np.isin(table.lines, column.lines).all():
         raise OrbiflowError(f"{data}: some rows lack their fold in {column.columns[0]!r}")

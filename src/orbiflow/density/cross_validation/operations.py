@@ -174,9 +174,6 @@ def fold(
 def setting_of(components: Sequence[str] | None, field: str) -> tuple[str, tuple[str, ...] | None]:
     """Return the name of a setting, and its components in one order.
 
-    Raises:
-        SettingError: For components that there are not, by the field's name.
-
     >>> setting_of(["mixture", "kernels"], "components")
     ('kernels+mixture', ('kernels', 'mixture'))
     """

@@ -69,11 +69,7 @@ class CvOverview:
         return files
 
     def _rows(self, found: HeldOut) -> bytes | None:
-        """The table with the fold of each row and its log density by each setting.
-
-        Raises:
-            InputFileError: If the table has changed in the meantime.
-        """
+        """The table with the fold of each row and its log density by each setting."""
         means, data = found.means(), self.asked.data
         if np.isnan(means).all():
             return None

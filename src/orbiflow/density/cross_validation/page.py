@@ -51,16 +51,7 @@ def cv_page(
     done: Sequence[tuple[Fit, Entry]],
     waiting: int,
 ) -> bytes:
-    """Return the page as UTF-8, to be written beside the folders.
-
-    Args:
-        asked: What was asked for.
-        splits: All splits.
-        found: The scores so far.
-        comparison: The comparison, or why there is none.
-        done: The fits that have finished.
-        waiting: The number of fits that are still to be done.
-    """
+    """Return the page as UTF-8, to be written beside the folders."""
     rows = splits[0].rows
     folds = [
         (number + 1, fold, mean)

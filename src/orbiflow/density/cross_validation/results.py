@@ -51,13 +51,7 @@ class HeldOut:
         return np.where(counts > 0, sums / np.maximum(counts, 1), np.nan)
 
     def fold_means(self, split: Split, number: int, rows: NDArray[np.bool_]) -> dict[int, Array]:
-        """Return the weighted means (S,) of each fold of a split over the `rows` (N,) that count.
-
-        Args:
-            split: The split.
-            number: Its number, from 0.
-            rows: Which rows count.
-        """
+        """Return the weighted means (S,) of each fold of a split over the `rows` (N,) that count."""
         weights = np.ones(len(rows)) if split.rows.weights is None else split.rows.weights
         found: dict[int, Array] = {}
         for fold in range(1, int(split.fold.max()) + 1):
@@ -76,18 +70,7 @@ def held_out(
     splits: Sequence[Split],
     settings: Sequence[str],
 ) -> HeldOut:
-    """Return what is in the folders of the fits that are done.
-
-    Args:
-        folder: The folder of results.
-        entries: What the journal says, by key.
-        fits: All fits.
-        splits: All splits.
-        settings: The names of what is compared; the uniform density needs no fit.
-
-    Raises:
-        OrbiflowError: If a folder is not as it was written.
-    """
+    """Return what is in the folders of the fits that are done."""
     rows = splits[0].rows
     scores = np.full((len(settings), len(splits), len(rows.table.values)), np.nan)
     for fit in fits:

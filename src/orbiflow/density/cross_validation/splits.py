@@ -120,11 +120,7 @@ class Fit:
 
 
 def cv_rows(asked: CrossValidation, tell: Sink) -> CvRows:
-    """Return the rows of the table that count.
-
-    Raises:
-        OrbiflowError: If the table, its columns, weights or groups cannot be used.
-    """
+    """Return the rows of the table that count."""
     width = COLUMNS.get(asked.where.space)
     rows = _counting(read_rows(asked.data, asked.rows, tell, width=width, group=asked.group))
     table = rows.table
@@ -166,11 +162,7 @@ def _counting(rows: TableRows) -> TableRows:
 
 
 def splits_of(asked: CrossValidation, rows: CvRows) -> list[Split]:
-    """Return the splits.
-
-    Raises:
-        OrbiflowError: If there are fewer rows or groups than folds.
-    """
+    """Return the splits."""
     count, seed = len(rows.table.values), asked.density.seed
     return [
         Split(

@@ -33,13 +33,7 @@ class Strip:
 
 
 def strips(lines: Sequence[Strip], label: str, *, zero: bool = False) -> str:
-    """Return the picture, "" if there is nothing to draw.
-
-    Args:
-        lines: The strips, from above.
-        label: What the axis shows.
-        zero: Whether a line is drawn at 0.
-    """
+    """Return the picture, "" if there is nothing to draw."""
     values = [v for one in lines for v in (*one.dots, one.mean, one.low, one.high) if v is not None]
     values = [v for v in values if math.isfinite(v)] + ([0.0] if zero else [])
     if not values:

@@ -88,11 +88,7 @@ def compare(
 def _check_what_is_compared(
     data: Sequence[Path], models: Sequence[Path], space: str | None, unit: str | None
 ) -> None:
-    """Check that there are models and a table, or two tables and a space.
-
-    Raises:
-        SettingError: If there is something else.
-    """
+    """Check that there are models and a table, or two tables and a space."""
     if not models and len(data) != 2:
         raise SettingError(
             "give two {models} or more and one {data} to compare models, or two {data} and their "

@@ -52,9 +52,6 @@ DRAWN = 20_000
 def axes_of(wanted: Sequence[str], names: Sequence[str]) -> list[int]:
     """Return the numbers, from 0, of angles given by name, or else by number from 1, as in tables.
 
-    Raises:
-        OrbiflowError: If there is no such column, or several.
-
     >>> axes_of(["psi", "1"], ["phi", "psi"])
     [1, 0]
     """
@@ -110,12 +107,7 @@ def condition_of(
     pairs: Sequence[tuple[str, float]],
     columns: Sequence[str] | None,
 ) -> Condition:
-    """Return which angles are known, and which of the others are kept: all, or those of `columns`.
-
-    Raises:
-        OrbiflowError: If the space is no torus, or an angle is unknown, known twice, or both known and
-            kept.
-    """
+    """Return which angles are known, and which of the others are kept: all, or those of `columns`."""
     axes = axes_of([name for name, _ in pairs], names)
     values = [(axis, value) for axis, (_, value) in zip(axes, pairs, strict=True)]
     given = given_named(space, values, names)
@@ -141,20 +133,7 @@ def write_derived(
     tell: Sink,
     cancel: Cancel,
 ) -> Outcome:
-    """Write the folder of a density of fewer angles.
-
-    Args:
-        density: The density.
-        names: The names of its columns.
-        origin: What the report says of where it comes from.
-        folder: Where to write.
-        tell: Gets the progress, the files and what they are.
-        cancel: Ends it before anything is written.
-
-    Raises:
-        OutputError: If the folder cannot be written.
-        Cancelled: If it is cancelled.
-    """
+    """Write the folder of a density of fewer angles."""
     cancel.check()
     space = density.space
     document = {

@@ -25,11 +25,7 @@ PATCH_WIDTHS = (8, 9)
 
 
 def require_ending(out: Path | None, endings: tuple[str, ...]) -> None:
-    """Check that a file's name ends in one of these.
-
-    Raises:
-        SettingError: If it does not.
-    """
+    """Check that a file's name ends in one of these."""
     if out is not None and out.suffix.lower() not in endings:
         raise SettingError(f"{{out}} must end in {', '.join(endings)}, got {out.name!r}")
 
@@ -184,11 +180,7 @@ def region(
 
 
 def _require_format(out: Path, kind: str, space: Space) -> None:
-    """Check that regions of a space can be written in a format.
-
-    Raises:
-        OrbiflowError: If they cannot.
-    """
+    """Check that regions of a space can be written in a format."""
     if kind == ".geojson" and not space.is_round:
         raise OrbiflowError(
             f"{out}: GeoJSON is for places on a globe, not for the angles of a {space.name}: write "

@@ -32,14 +32,7 @@ def is_whole(rows: TableRows) -> NDArray[np.bool_]:
 def fit_document(
     estimator: DensityEstimator, rows: TableRows, asked: Mapping[str, Any], seed: int
 ) -> dict[str, Any]:
-    """Return what report.json says of a fit.
-
-    Args:
-        estimator: The fit.
-        rows: What it was fitted to.
-        asked: The settings, as JSON has them.
-        seed: Seed of the choice of rows that are scored.
-    """
+    """Return what report.json says of a fit."""
     report, space = estimator.report_, estimator.space_
     scored = _scored(rows, seed)
     weights = None if rows.weights is None else rows.weights[scored]

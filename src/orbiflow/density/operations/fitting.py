@@ -107,11 +107,7 @@ def fit(
 
 
 def check_group(settings: DensitySettings, group: str | None) -> None:
-    """Refuse groups where no components are chosen.
-
-    Raises:
-        SettingError: If there is a column of groups, and a flow alone.
-    """
+    """Refuse groups where no components are chosen."""
     if group is not None and settings.flow_alone:
         raise SettingError(
             "{group} serves to choose among {components}, and a flow alone has no choice; leave it out"
@@ -119,11 +115,7 @@ def check_group(settings: DensitySettings, group: str | None) -> None:
 
 
 def check_marginalised(where: SpaceSettings, settings: DensitySettings) -> None:
-    """Refuse what cannot be fitted to rows that lack angles.
-
-    Raises:
-        SettingError: If the space is no torus, or only a flow is allowed.
-    """
+    """Refuse what cannot be fitted to rows that lack angles."""
     if where.space != "torus":
         raise SettingError(
             f"{{missing}} marginalise is for angles on a torus: on the {where.space} no coordinate is "

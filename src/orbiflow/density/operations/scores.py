@@ -57,20 +57,7 @@ def score_rows(
     *,
     may_lack: bool = False,
 ) -> Scores:
-    """Return log densities of rows, and what else the settings ask for.
-
-    Args:
-        density: The density.
-        rows: Data in its own columns.
-        settings: What to find.
-        tell: Gets the progress.
-        cancel: Ends it between two blocks of rows.
-        may_lack: Whether rows may lack angles of a torus, and are scored by those that they have.
-
-    Raises:
-        OrbiflowError: If the data are not of the space.
-        Cancelled: If it is cancelled.
-    """
+    """Return log densities of rows, and what else the settings ask for."""
     space, values = density.space, rows.table.values
     points = chart_of_observed(space, values) if may_lack else space.to_chart(values)
     known = ~points.isnan()

@@ -38,22 +38,14 @@ class View(NamedTuple):
         return points + tensor(self.low, dtype=points.dtype)
 
     def places(self, points: Tensor) -> Array:
-        """Return where chart points (N, d) lie in the window, in [0, 1]^d.
-
-        Raises:
-            OrbiflowError: If the points have another shape.
-        """
+        """Return where chart points (N, d) lie in the window, in [0, 1]^d."""
         moved = chart_points(self.space, points) - tensor(self.low)
         # a translation commutes with the torus' group, and is 0 elsewhere
         return self.space.project(moved).numpy()
 
 
 def chart_points(space: Space, points: Tensor) -> Tensor:
-    """Return chart points (N, d) as float64.
-
-    Raises:
-        OrbiflowError: If they have another shape.
-    """
+    """Return chart points (N, d) as float64."""
     if points.ndim != 2 or points.shape[1] != space.dim:
         raise OrbiflowError(f"expected chart points (N, {space.dim}), got {tuple(points.shape)}")
     return points.detach().double().cpu()
@@ -62,18 +54,7 @@ def chart_points(space: Space, points: Tensor) -> Tensor:
 def view_of(
     space: Space, names: Sequence[str] | None = None, center: Sequence[float] | None = None
 ) -> View:
-    """Return the window of a space's flat pictures.
-
-    Args:
-        space: The space.
-        names: Names of the data's columns. Default: `space.columns`.
-        center: Middle of the torus' window, an angle for each column in the space's unit. Default:
-            0, so that angles run from minus half a turn to half a turn.
-
-    Raises:
-        OrbiflowError: If there is another number of names or angles, an angle is not finite, or a
-            centre is given on another space, whose window is the canonical square.
-    """
+    """Return the window of a space's flat pictures."""
     names = tuple(space.columns if names is None else names)
     if len(names) != len(space.columns):
         raise OrbiflowError(f"expected {len(space.columns)} names of columns, got {list(names)}")
@@ -97,11 +78,7 @@ def view_of(
 
 
 def require_plane(space: Space) -> None:
-    """Check that a space has two dimensions.
-
-    Raises:
-        OrbiflowError: If it has not.
-    """
+    """Check that a space has two dimensions."""
     if space.dim != 2:
         raise OrbiflowError(f"a picture needs two dimensions, this {space.name} has {space.dim}")
 

@@ -131,11 +131,7 @@ class _Grid(NamedTuple):
 
 
 def _grid(sheet: Sheet, dim: int) -> _Grid:
-    """Make a figure with room for the panels.
-
-    Raises:
-        OrbiflowError: If the panels would be too small for their labels.
-    """
+    """Make a figure with room for the panels."""
     left, below, right, above = (5.2, 4.0, 1.2, 2.2) if sheet.printed else _SCREEN
     side = (sheet.width - sheet.em * (left + right)) / dim
     if sheet.printed and side < _MIN_SIDE:

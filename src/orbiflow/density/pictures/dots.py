@@ -67,13 +67,6 @@ def draw_dots_over(
     """Draw points (N, 2) as dots over a density, smaller where they crowd.
 
     Where they crowd the density is high, and its peaks are what a picture should show.
-
-    Args:
-        axes: The axes.
-        points: The points.
-        inches: Size in inches of a unit of the axes.
-        limit: Maximum number of dots.
-        scale: Factor of the dots' area.
     """
     chosen = thinned(points, limit)
     most, scale = _largest(len(chosen), scale)
@@ -100,17 +93,7 @@ def draw_dots(
     scale: float = 1.0,
     rasterized: bool = False,
 ) -> None:
-    """Draw points (N, 2) as dots of one size on a ground of one colour.
-
-    Args:
-        axes: The axes.
-        points: The points.
-        alpha: Opacity of the dots.
-        fill: Their colour.
-        limit: Maximum number of dots.
-        scale: Factor of the dots' area.
-        rasterized: Whether they are pixels in a PDF or SVG, too. More than `MAX_DOTS` always are.
-    """
+    """Draw points (N, 2) as dots of one size on a ground of one colour."""
     points = thinned(points, limit)
     width, _ = _largest(len(points), scale)
     axes.scatter(

@@ -90,11 +90,7 @@ def _title(density: Density) -> str:
 
 
 def flow_of(density: Density) -> tuple[float, FlowDensity]:
-    """Return the weight and the density of the flow to draw.
-
-    Raises:
-        OrbiflowError: If the density has none.
-    """
+    """Return the weight and the density of the flow to draw."""
     part = density.flow_part
     if part is None:
         raise OrbiflowError("the density has no flow: draw another picture of it")

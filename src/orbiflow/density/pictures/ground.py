@@ -147,12 +147,7 @@ class Ground(ABC):
 
     @abstractmethod
     def caption(self, notes: Sequence[str], dots: tuple[int, int] | None) -> str:
-        """Return what is seen, and `notes`, as sentences.
-
-        Args:
-            notes: What else to say.
-            dots: How many dots are drawn, and of how many points.
-        """
+        """Return what is seen, and `notes`, as sentences."""
 
     @abstractmethod
     def samples_caption(self, notes: Sequence[str]) -> str:
@@ -176,16 +171,7 @@ def draw_density(
     regions: Sequence[RegionLine] = (),
     sheet: Sheet | None = None,
 ) -> Picture:
-    """Draw a density on a ground, with a colour bar.
-
-    Args:
-        ground: The ground.
-        density: The density.
-        settings: How it is drawn.
-        dots: Chart points (N, 2) to draw over it, smaller where they crowd.
-        regions: Lines to draw around regions of highest density.
-        sheet: The sheet. Default: that of the settings.
-    """
+    """Draw a density on a ground, chart points (N, 2) as dots over it, and a colour bar."""
     sheet = sheet or settings.sheet
     colouring = ground.colouring(density, settings)
     shade = colouring.shade
@@ -224,16 +210,7 @@ def draw_samples(
     *,
     sheet: Sheet | None = None,
 ) -> Picture:
-    """Draw data beside samples, as many of each if there are enough, or else the density.
-
-    Args:
-        ground: The ground.
-        density: The density.
-        settings: How it is drawn.
-        data: Chart points (N, 2).
-        samples: Chart points (M, 2).
-        sheet: The sheet. Default: that of the settings.
-    """
+    """Draw data (N, 2), or else the density, beside samples (M, 2): chart points, as many of each."""
     sheet = sheet or settings.sheet
     panels = {"data": data, "samples": samples}
     places = {n: ground.places(points) for n, points in panels.items() if points is not None}

@@ -29,16 +29,7 @@ def draw_map_lines(
     coastlines: Sequence[Array] = (),
     light: bool = False,
 ) -> None:
-    """Draw a map's outline, graticule, labels and coastlines on axes without a frame.
-
-    Args:
-        axes: The axes, which will show the whole map undistorted.
-        projection: The map.
-        sheet: The sheet of the figure.
-        side: Width of the axes in inches.
-        coastlines: Lines (M, 2) of latitude and longitude.
-        light: Whether the ground is light.
-    """
+    """Draw a map's outline, graticule, labels and coastlines (M, 2) on axes without a frame."""
     ring = projection.outline()
     axes.set_axis_off()
     axes.set_xticks([])

@@ -47,15 +47,7 @@ def chosen_map(
 ) -> Projection:
     """Return the map of a sphere or projective plane that settings ask for, or that suits points.
 
-    Args:
-        space: The sphere or projective plane.
-        points: Chart points (N, 2), such as the data.
-        settings: Settings, with the map's projection, centre and radius.
-        names: Names of the data's columns, which may ask for a net.
-
-    Raises:
-        OrbiflowError: If the space has no directions, or the projection cannot have such a centre or
-            radius.
+    `points` are chart points (N, 2); `names` of the data's columns may ask for a net.
 
     >>> from orbiflow.density import Sphere
     >>> here = Sphere().to_chart([[40.0, 140.0], [44.0, 142.0]])
@@ -166,13 +158,6 @@ def caption(
     coastlines: bool = False,
 ) -> str:
     """Return a map's caption: projection, centre, which points are one, lines and dots, and notes.
-
-    Args:
-        space: The space.
-        projection: The map.
-        notes: What else to say.
-        dots: How many dots are drawn, and of how many points.
-        coastlines: Whether there are any.
 
     >>> from orbiflow.density import Sphere
     >>> from orbiflow.density.pictures.projections import Mollweide

@@ -274,9 +274,6 @@ def places_on(space: Space, projection: Projection, points: Tensor) -> Array:
     """Return the places (M, 2) of those of chart points (N, 2) that are on a map.
 
     Axes are placed at the end that the map shows.
-
-    Raises:
-        OrbiflowError: If the points have another shape.
     """
     vectors = cast(RoundSpace, space).vectors(chart_points(space, points))
     if space.name == "projective-plane" and isinstance(projection, Azimuthal):

@@ -115,11 +115,7 @@ def plot_density(
 
 
 def refuse_foreign_files(out: Path) -> None:
-    """Refuse a folder with pictures beside files of others: the pictures may be somebody's own.
-
-    Raises:
-        OutputError: If it is such a folder.
-    """
+    """Refuse a folder with pictures beside files of others: the pictures may be somebody's own."""
     if not out.is_dir():
         return
     inside = {path.name for path in out.iterdir()} - LITTER
@@ -187,11 +183,7 @@ class _Plots:
         data: ArrayLike | None,
         coastlines: Sequence[ArrayLike],
     ) -> _Plots:
-        """Check all that can be wrong, before the work.
-
-        Raises:
-            OrbiflowError: As `plot_density`.
-        """
+        """Check all that can be wrong, before the work."""
         density, columns = _density_of(given)
         space = density.space
         if settings.names is None:
@@ -288,11 +280,7 @@ class _Plots:
 
 
 def _check_space(space: Space, settings: PlotSettings) -> None:
-    """Check that a space can be drawn, and that settings fit it.
-
-    Raises:
-        OrbiflowError: If it has too many angles, or a setting applies to another space.
-    """
+    """Check that a space can be drawn, and that settings fit it."""
     if space.dim > MAX_COLUMNS:
         raise OrbiflowError(
             f"this {space.name} has {space.dim} angles, pictures have {MAX_COLUMNS} at most: draw "

@@ -33,11 +33,7 @@ class RegionLine(NamedTuple):
 
 
 def region_lines(density: Density, settings: PlotSettings) -> tuple[RegionLine, ...]:
-    """Return the lines for the settings' `regions`, the smallest mass first.
-
-    Raises:
-        SettingError: If there are regions and the density is not of two dimensions.
-    """
+    """Return the lines for the settings' `regions`, the smallest mass first."""
     if not settings.regions:
         return ()
     space = density.space
@@ -76,16 +72,10 @@ def draw_regions(
     sheet: Sheet,
     clip: Patch | None = None,
 ) -> None:
-    """Draw lines where the density is that of each region's edge.
+    """Draw lines where the density is that of each region's edge, cut along the patch `clip`.
 
-    Args:
-        axes: The axes to draw on.
-        lines: The regions, the smallest mass first.
-        log_natural: Logarithms (R, C) of the density in natural measure, the lowest row first; NaN
-            where there is none.
-        extent: Left, right, bottom and top of these pixels on the axes.
-        sheet: The sheet of the figure.
-        clip: Patch beyond which nothing is drawn.
+    `log_natural` has its logarithms (R, C) in natural measure, the lowest row first, NaN where there
+    is none; `extent` is left, right, bottom and top of these pixels on the axes.
     """
     from matplotlib.patheffects import Stroke
 

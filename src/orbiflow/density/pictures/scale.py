@@ -53,11 +53,6 @@ def shading(values: Array, weights: Array | None = None, *, log: bool = False) -
     A linear scale goes from 0 to the largest value or, if a few are far above the others, to what
     99.8 % are below. A logarithmic one goes from `MAX_DECADES` below the largest value, or from the
     smallest, up to the largest.
-
-    Args:
-        values: Values of any shape.
-        weights: Areas of the same shape. Default: all equal.
-        log: Whether the scale is logarithmic.
     """
     peak = max(float(values.max()), 1e-300)
     if log:
@@ -108,12 +103,7 @@ def bar_label(shade: Shade, space: Space, measure: str) -> str:
 
 
 def bar_ticks(shade: Shade, *, ends: bool = False) -> list[Tick]:
-    """Return ticks with texts, on a linear scale in units of the power of ten in `bar_label`.
-
-    Args:
-        shade: The scale.
-        ends: Whether an end of the bar that stands for all beyond it says so.
-    """
+    """Return ticks with texts, on a linear scale in units of the power of ten in `bar_label`."""
     from matplotlib.ticker import MaxNLocator
 
     unit = 10.0 ** _power(shade)

@@ -127,13 +127,6 @@ def mesh(space: Space, resolution: int) -> Mesh:
     """Return an even grid on the canonical square, cut into 2 resolution^2 triangles.
 
     The groups take the grid's points on the edges to each other, so the surface closes.
-
-    Args:
-        space: The space.
-        resolution: Cells along an edge, 2 to `MAX_RESOLUTION`.
-
-    Raises:
-        OrbiflowError: If the resolution is not allowed, or the space is not two-dimensional.
     """
     immersion(space)
     if isinstance(resolution, bool) or not 2 <= resolution <= MAX_RESOLUTION:

@@ -27,11 +27,7 @@ _COARSE = 120
 
 @torch.no_grad()
 def density_at(density: Density, points: Tensor, measure: str) -> Array:
-    """Return the density (N,) at chart points (N, 2), and next to them at cone points.
-
-    Raises:
-        OrbiflowError: If the measure is unknown.
-    """
+    """Return the density (N,) at chart points (N, 2), and next to them at cone points."""
     if density.space.is_round:
         points = off_cones(points)
     own = points.to(device=density.device, dtype=density.dtype)
@@ -73,17 +69,7 @@ def density_on_grid(
 
 @torch.no_grad()
 def density_on_map(density: Density, points: Tensor, measure: str, angle: float) -> Array:
-    """Return the density (N,) at chart points (N, 2) of a round space, averaged over pixels.
-
-    Args:
-        density: The density.
-        points: Chart points of the pixels.
-        measure: What the density is per.
-        angle: Side of a pixel on the sphere, in radians.
-
-    Raises:
-        OrbiflowError: If the measure is unknown.
-    """
+    """Return the density (N,) at chart points (N, 2) of a round space, averaged over pixels."""
     part = density.kernel_part
     if part is None:
         return density_at(density, points, measure)
@@ -99,16 +85,7 @@ class ChosenScale(NamedTuple):
 
 
 def chosen_scale(density: Density, measure: str, scale: str) -> ChosenScale:
-    """Return the scale of colours, which is the same for all pictures of a density.
-
-    Args:
-        density: The density.
-        measure: What the density is per.
-        scale: "auto", "linear" or "log".
-
-    Raises:
-        OrbiflowError: If the measure is unknown.
-    """
+    """Return the scale of colours, which is the same for all pictures of a density."""
     if scale != "auto":
         return ChosenScale(scale == "log", f"{_COLOURS_ARE[scale == 'log']}, as asked for")
     t = (torch.arange(_COARSE, dtype=torch.float64) + 0.5) / _COARSE
@@ -126,13 +103,7 @@ _COLOURS_ARE = {False: "colours are linear", True: "colours are logarithmic"}
 
 
 def is_sharp(density: Density, *, pixel: float | None = None, angle: float | None = None) -> bool:
-    """Return whether peaks of a density may be narrower than the pixels of a picture.
-
-    Args:
-        density: The density.
-        pixel: Side of a pixel of the square.
-        angle: Instead of `pixel`, the side of a pixel on the sphere, in radians.
-    """
+    """Return whether peaks of a density may be narrower than the pixels of a picture."""
     part = density.kernel_part
     if part is None:
         return False

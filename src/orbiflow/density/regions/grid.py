@@ -58,18 +58,7 @@ class LevelGrid:
         doublings: int,
         budget: int,
     ) -> LevelGrid:
-        """Evaluate everywhere on `cells`, then halve them where a level is crossed.
-
-        Args:
-            function: The function.
-            low: Lower corner of the grid.
-            high: Upper corner of the grid.
-            cells: Numbers of cells along both sides, at first.
-            levels: The levels (T,).
-            seeds: Points at which the function is known.
-            doublings: How often cells are halved at most.
-            budget: Number of evaluations after which they are not halved again.
-        """
+        """Evaluate everywhere on `cells`, then halve them where a level is crossed."""
         maker = _Maker(function, low, high, cells, levels, seeds)
         for _ in range(doublings):
             if maker.evaluations >= budget:

@@ -46,11 +46,7 @@ class Window:
 
 
 def window_of(space: Space) -> Window:
-    """Return the window in which regions of a space are drawn.
-
-    Raises:
-        OrbiflowError: If the space does not have two dimensions.
-    """
+    """Return the window in which regions of a space are drawn."""
     if space.dim != 2:
         raise OrbiflowError(
             f"outlines are drawn in two dimensions, this {space.name} has {space.dim}; thresholds, "

@@ -88,14 +88,7 @@ def outlines_csv(outlines: Sequence[Outline]) -> str:
 def regions_document(
     regions: Sequence[DensityRegion], outlines: Sequence[Outline], *, samples: int, seed: int
 ) -> dict[str, Any]:
-    """Return one density's regions, with their outlines if there are any, for `json.dumps`.
-
-    Args:
-        regions: The regions.
-        outlines: Their outlines, or none.
-        samples: Number of samples from which the masses were told.
-        seed: Seed of the samples.
-    """
+    """Return one density's regions, with their outlines if there are any, for `json.dumps`."""
     space = regions[0].density.space
     document: dict[str, Any] = {
         "kind": "regions",

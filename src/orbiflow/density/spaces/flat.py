@@ -23,11 +23,7 @@ MAX_DIM = 64
 
 
 def whole_turn(unit: str) -> float:
-    """Return a whole turn in a unit.
-
-    Raises:
-        OrbiflowError: If the unit is unknown.
-    """
+    """Return a whole turn in a unit."""
     return TURN[as_choice(unit, tuple(TURN), "unit")]
 
 

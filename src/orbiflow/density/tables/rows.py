@@ -42,11 +42,7 @@ class TableRows:
     header: bool | None = None
 
     def labels(self) -> NDArray[np.str_] | None:
-        """Return what each row belongs to, (N,), or None if no column says so.
-
-        Raises:
-            InputFileError: If the column is unknown, or a row has no label.
-        """
+        """Return what each row belongs to, (N,), or None if no column says so."""
         if self.group is None:
             return None
         return read_labels(self.path, self.group, self.table, has_header=self.header)
@@ -175,19 +171,7 @@ def _name(path: Path, column: str, header: bool | None) -> str:
 
 
 def angle_unit(space: str, unit: Unit | None, table: Table, tell: Sink) -> Unit:
-    """Return the unit of angles: the given one, or else radians if all values are within 2 pi.
-
-    Args:
-        space: The name of the space.
-        unit: The unit that was asked for, if any.
-        table: The data.
-        tell: Gets a note if radians were assumed.
-
-    Raises:
-        SettingError: If no unit was given and the values cannot be radians; and on the sphere or the
-            projective plane, if another unit than degrees was given, or the columns are a longitude
-            before its latitude.
-    """
+    """Return the unit of angles: the given one, or else radians if all values are within 2 pi."""
     if space not in ("torus", "klein-bottle"):
         check_order(table.columns, space)
         check_unit(space, unit)

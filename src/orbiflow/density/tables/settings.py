@@ -40,11 +40,7 @@ class SpaceSettings(Settings, group="Density"):
 
 
 def check_unit(space: str, unit: Unit | None) -> None:
-    """Refuse a unit of data that are not angles.
-
-    Raises:
-        SettingError: If it is another than degrees, by the name of the setting `unit`.
-    """
+    """Refuse a unit of data that are not angles."""
     if space in ("sphere", "projective-plane") and unit in ("radians", "turns"):
         raise SettingError(
             f"{{unit}} {unit} applies only to angles on the torus and the Klein bottle: latitude and "
@@ -84,11 +80,7 @@ class RowSettings(TableSettings, group="Reading the table"):
 
 
 def check_table_name(out: Path) -> None:
-    """Refuse a name for a table whose ending is that of another format.
-
-    Raises:
-        SettingError: If it is, by the name of the setting `out`.
-    """
+    """Refuse a name for a table whose ending is that of another format."""
     if out.suffix.lower() in OTHER_FORMATS:
         raise SettingError(
             f"{{out}} must end in {', '.join(TABLES)}, got {literal(repr(out.name))}"

@@ -142,19 +142,7 @@ def checked_rows(
     unit: str,
     reading: Reading,
 ) -> tuple[NDArray[np.float64], NDArray[np.int64], frozenset[int], list[str]]:
-    """Return rows and lines without those to leave out, the lines of these, and a note of them.
-
-    Args:
-        path: The file.
-        values: Numbers (N, k), NaN for missing ones.
-        lines: Number (N,) of each row's line.
-        columns: Names of the columns.
-        unit: What a row is in: "line" or "row".
-        reading: Which rows may lack values.
-
-    Raises:
-        InputFileError: If there are no rows, or a cell is infinite or, unless it may be, missing.
-    """
+    """Return rows (N, k) and lines (N,) without those to leave out, the lines of these, and notes."""
     dropped, notes = frozenset[int](), list[str]()
     if reading.drop_missing and len(values):
         whole = ~np.isnan(values).any(axis=1)
