@@ -6,15 +6,15 @@ import json
 import math
 import time
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 
 from orbiflow.arrays import Array
 from orbiflow.density.estimator import DensityEstimator
-from orbiflow.density.fitting import ComponentSettings, DensitySettings, mean_of, weighed
+from orbiflow.density.fitting import ComponentSettings, DensitySettings
+from orbiflow.density.operations import mean_of_whole
+from orbiflow.density.run_folder import write_files
 from orbiflow.density.tables import (
     RowSettings,
     SpaceSettings,
@@ -24,17 +24,7 @@ from orbiflow.density.tables import (
     read_table,
 )
 from orbiflow.errors import OrbiflowError, SettingError, literal
-from orbiflow.runtime import (
-    Cancel,
-    Note,
-    Outcome,
-    ResultFolder,
-    Sink,
-    Written,
-    one_thread,
-    progress_events,
-    write_atomic,
-)
+from orbiflow.runtime import Cancel, Note, Outcome, ResultFolder, Sink, one_thread, progress_events
 
 SCORES, REPORT = "scores.csv", "report.json"
 
@@ -79,13 +69,20 @@ def fit_and_score(
             f"{(~np.isfinite(scores)).sum()} rows held out have no density: allow other {{components}}"
         )
     cancel.check()
-    mean = _mean(scores, table.values[held], None if weights is None else weights[held])
-    document = _document(density, fold, estimator, held, mean, begin)
-    with folder.replaced() as staged:
-        write_atomic(staged / SCORES, scores_csv(table.lines[held], scores))
-        write_atomic(staged / REPORT, json.dumps(document, allow_nan=False, indent=1))
-    for name in (SCORES, REPORT):
-        tell(Written(out / name))
+    mean = mean_of_whole(scores, None if weights is None else weights[held], rows.whole[held])
+    document = {
+        "space": {"name": estimator.space_.name, **estimator.space_.settings()},
+        "fold": fold,
+        "components": density.components,
+        "rows": int(held.sum()),
+        "fitted": int((~held).sum()),
+        "log_likelihood": mean,
+        "uniform": -math.log(estimator.space_.volume),
+        "report": estimator.report_.to_json(),
+        "seconds": time.perf_counter() - begin,
+    }
+    report = json.dumps(document, allow_nan=False, indent=1)
+    write_files(folder, {SCORES: scores_csv(table.lines[held], scores), REPORT: report}, tell)
     tell(Note(f"mean log density {mean:.4f} nats at {held.sum()} rows held out"))
     names = ("rows", "fitted", "log_likelihood", "seconds")
     return Outcome({"folder": str(out), **{name: document[name] for name in names}})
@@ -121,33 +118,3 @@ def _held(data: Path, table: Table, fold: int, name: str, header: bool | None) -
             + literal(f"{column.columns[0]!r}; give one of {some}")
         )
     return held
-
-
-def _mean(scores: Array, values: Array, weights: Array | None) -> float:
-    """The mean of the rows that lack nothing: densities of fewer angles are in another unit."""
-    whole = ~np.isnan(values).any(axis=1)
-    chosen = whole if whole.any() else np.ones_like(whole)
-    rows = weighed(torch.tensor(scores[chosen, None]), None if weights is None else weights[chosen])
-    return mean_of(rows.points[:, 0], rows.weights)
-
-
-def _document(
-    density: ComponentSettings,
-    fold: int,
-    estimator: DensityEstimator,
-    held: NDArray[np.bool_],
-    mean: float,
-    begin: float,
-) -> dict[str, Any]:
-    """What report.json says."""
-    return {
-        "space": {"name": estimator.space_.name, **estimator.space_.settings()},
-        "fold": fold,
-        "components": density.components,
-        "rows": int(held.sum()),
-        "fitted": int((~held).sum()),
-        "log_likelihood": mean,
-        "uniform": -math.log(estimator.space_.volume),
-        "report": estimator.report_.to_json(),
-        "seconds": time.perf_counter() - begin,
-    }

@@ -96,14 +96,12 @@ class CrossValidation:
         return found
 
     @property
-    def beside_uniform(self) -> bool:
-        """Whether the uniform density is compared, too: if asked for, or if there is no other."""
-        return UNIFORM in (self.cv.against or ()) or len(self.settings) == 1
-
-    @property
     def names(self) -> list[str]:
-        """The names of what is compared, the setting in question first."""
-        return [*self.settings, *([UNIFORM] if self.beside_uniform else [])]
+        """The names of what is compared: the uniform density, too, if asked for or beside one alone."""
+        fitted = list(self.settings)
+        return (
+            [*fitted, UNIFORM] if UNIFORM in (self.cv.against or ()) or len(fitted) == 1 else fitted
+        )
 
 
 @operation("density cv", keeps_partial=True, starts_processes=True)
@@ -136,7 +134,7 @@ def cross_validate(
     """
     asked = CrossValidation(data, out, where, density, rows, group, cv)
 
-    from orbiflow.density.cross_validation.fits import run
+    from orbiflow.density.cross_validation.overview import run
 
     return run(asked, work, on_event, cancel)
 

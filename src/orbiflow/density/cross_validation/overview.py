@@ -1,12 +1,12 @@
-"""The files of a cross-validation: a line for each fold and row, the comparison, the page."""
+"""The work of a cross-validation, and its files: folds, rows, the comparison, the page."""
 
 from __future__ import annotations
 
 import json
 import math
+import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -14,14 +14,43 @@ import numpy as np
 
 from orbiflow import __version__
 from orbiflow.arrays import Array
-from orbiflow.batch import Entry, csv_bytes
+from orbiflow.batch import (
+    BatchFolder,
+    Column,
+    Entry,
+    Item,
+    Kind,
+    Summary,
+    WorkSettings,
+    csv_bytes,
+    run_items,
+)
 from orbiflow.density.comparing import ModelComparison
+from orbiflow.density.cross_validation.fold import written_files
 from orbiflow.density.cross_validation.operations import CrossValidation
 from orbiflow.density.cross_validation.page import cv_page
-from orbiflow.density.cross_validation.results import HeldOut, Spread, compared, held_out
-from orbiflow.density.cross_validation.splits import Fit, Split
+from orbiflow.density.cross_validation.splits import (
+    Fit,
+    HeldOut,
+    Split,
+    compared,
+    cv_rows,
+    fits_of,
+    held_out,
+    splits_of,
+)
 from orbiflow.density.tables import append_columns
 from orbiflow.errors import InputFileError
+from orbiflow.runtime import (
+    Cancel,
+    Note,
+    Outcome,
+    Sink,
+    check_inputs_kept,
+    check_outside_runs,
+    find,
+    one_thread,
+)
 
 TABLE, ROWS, REPORT, PAGE = "cv.csv", "rows.csv", "report.json", "index.html"
 FIGURES = ("rows", "fitted", "log_likelihood")
@@ -86,7 +115,7 @@ class CvOverview:
         return append_columns(self.splits[0].rows.table, data, added)
 
     def _report(self, found: HeldOut, done: Sequence[tuple[Fit, Entry]], waiting: int) -> bytes:
-        rows = self.splits[0].rows
+        rows, cv, density = self.splits[0].rows, self.asked.cv, self.asked.density
         states = [entry.state for _, entry in done]
         comparison = self.comparison
         document: dict[str, Any] = {
@@ -95,7 +124,17 @@ class CvOverview:
             "data": str(self.asked.data),
             "space": {"name": rows.space.name, "unit": rows.space.unit},
             "columns": list(rows.table.columns),
-            "settings": self._settings,
+            "settings": {
+                "folds": cv.folds,
+                "times": cv.times,
+                "group": self.asked.group,
+                "missing": self.asked.rows.missing,
+                "weights": self.asked.rows.weights,
+                "repeats": density.repeats,
+                "level": cv.level,
+                "bootstrap": cv.bootstrap,
+                "seed": density.seed,
+            },
             "components": self.asked.settings,
             "rows": len(rows.table.values),
             "groups": None if rows.labels is None else len(np.unique(rows.labels)),
@@ -112,22 +151,6 @@ class CvOverview:
         }
         return json.dumps(document, allow_nan=False, indent=1).encode()
 
-    @cached_property
-    def _settings(self) -> dict[str, Any]:
-        """What was asked for, as the report tells it."""
-        cv, rows, density = self.asked.cv, self.asked.rows, self.asked.density
-        return {
-            "folds": cv.folds,
-            "times": cv.times,
-            "group": self.asked.group,
-            "missing": rows.missing,
-            "weights": rows.weights,
-            "repeats": density.repeats,
-            "level": cv.level,
-            "bootstrap": cv.bootstrap,
-            "seed": density.seed,
-        }
-
     def _spreads(self, found: HeldOut) -> dict[str, Any]:
         """How much folds differ, by setting."""
         whole = self.splits[0].rows.whole
@@ -136,11 +159,13 @@ class CvOverview:
             for number, split in enumerate(self.splits)
             for mean in found.fold_means(split, number, whole).values()
         ]
-        spreads = {
-            name: Spread.of([float(mean[k]) for mean in means])
-            for k, name in enumerate(found.settings)
+        columns = {name: [mean[k] for mean in means] for k, name in enumerate(found.settings)}
+        return {
+            name: {"deviation": float(np.std(column, ddof=1)), "folds": len(column)}
+            if len(column) > 1
+            else None
+            for name, column in columns.items()
         }
-        return {name: None if one is None else one.to_json() for name, one in spreads.items()}
 
 
 def _table(done: Sequence[tuple[Fit, Entry]]) -> bytes:
@@ -163,3 +188,77 @@ def _stamp(path: Path) -> tuple[int, int] | None:
     except OSError:
         return None
     return found.st_size, found.st_mtime_ns
+
+
+def _figures(summary: Summary) -> dict[str, Any]:
+    return {name: summary[name] for name in ("rows", "fitted", "log_likelihood")}
+
+
+FITS = Kind(
+    things="fits",
+    items="fits",
+    reads="data",
+    writes="out",
+    modules=("orbiflow.density.cross_validation.fold",),
+    columns=(Column("log_likelihood", "held out", ".4f"), Column("rows", "rows", "d")),
+    best=_figures,
+    picture=lambda _summary: None,
+    written=written_files,
+)
+
+
+def run(asked: CrossValidation, work: WorkSettings, tell: Sink, cancel: Cancel) -> Outcome:
+    """Do the fits that have not been done, then compare what they say of unseen rows."""
+    begin = time.perf_counter()
+    out = asked.out
+    check_outside_runs(out, asked.data)
+    for name in (TABLE, ROWS, REPORT, PAGE):
+        check_inputs_kept(out / name, asked.data)
+    with one_thread():
+        rows = cv_rows(asked, tell)
+    splits = splits_of(asked, rows)
+    fits = list(fits_of(asked))
+    items = [_item(fit, asked, splits[fit.split - 1]) for fit in fits]
+    overview = CvOverview(asked, fits, splits)
+    with BatchFolder(out, FITS, overview) as folder:
+        counts = run_items(items, work, folder, tell, cancel, gone="of other folds or settings")
+    found = overview.comparison
+    words = [f"no comparison: {found}"] if isinstance(found, str) else found.words()
+    notes = () if isinstance(found, str) else found.notes
+    for text in (*words, *notes):
+        tell(Note(text))
+    summary = {
+        "folder": str(out),
+        "table": str(out / TABLE),
+        "rows": str(out / ROWS),
+        "report": str(out / REPORT),
+        "page": str(out / PAGE),
+        "fits": len(fits),
+        "comparison": None if isinstance(found, str) else found.to_json(),
+        "seconds": time.perf_counter() - begin,
+    }
+    return counts.outcome(len(fits), out / TABLE, out / PAGE, summary, tell)
+
+
+def _item(fit: Fit, asked: CrossValidation, split: Split) -> Item:
+    """A fit as batches take it; all that decides it is said, so that the rows do not."""
+    angles = len(split.rows.table.columns)
+    weighted, grouped = split.rows.weights is not None, split.rows.labels is not None
+    density, space = asked.density, asked.where.space
+    given: dict[str, Any] = {
+        "data": Path(split.name),
+        "space": space,
+        "fold": fit.fold,
+        "columns": tuple(str(k + 1) for k in range(angles)),
+        "held": str(angles + weighted + grouped + 1),
+        "weights": str(angles + 1) if weighted else None,
+        # a flow alone has no components to choose
+        "group": str(angles + weighted + 1) if grouped and fit.components != ("flow",) else None,
+        "missing": "marginalise" if asked.rows.missing == "marginalise" else "refuse",
+        "unit": split.rows.unit if space in ("torus", "klein-bottle") else None,
+        "components": fit.components,
+        "repeats": density.repeats,
+        "seed": density.seed,
+    }
+    call = find("density fold").call({k: v for k, v in given.items() if v is not None})
+    return Item(fit.key, fit.name, call, split)

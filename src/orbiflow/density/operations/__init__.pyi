@@ -1,6 +1,3 @@
-from .fitting import COLUMNS as COLUMNS
-from .saved import check_fits as check_fits
-from .saved import model_at as model_at
-from .saved import with_columns_of as with_columns_of
+from .scores import mean_of_whole as mean_of_whole
 from .using import SampleSettings as SampleSettings
 from .using import ScoreSettings as ScoreSettings

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -26,19 +25,11 @@ from orbiflow.density.pictures import (
     corner_picture,
     density_picture,
 )
+from orbiflow.density.run_folder import write_files
 from orbiflow.density.spaces import Space, Torus
 from orbiflow.density.tables import to_csv
 from orbiflow.errors import OrbiflowError, SettingError, literal
-from orbiflow.runtime import (
-    Cancel,
-    Note,
-    Outcome,
-    Progress,
-    ResultFolder,
-    Sink,
-    Written,
-    write_atomic,
-)
+from orbiflow.runtime import Cancel, Note, Outcome, Progress, ResultFolder, Sink
 
 PICTURE = "density.png"
 
@@ -67,52 +58,22 @@ def axes_of(wanted: Sequence[str], names: Sequence[str]) -> list[int]:
     )
 
 
-@dataclass(frozen=True)
-class Condition:
-    """Some angles of a torus that are known, and those of the others that are kept.
-
-    - `names`: The names of all angles.
-    - `values`: What is known by name, in the torus' unit.
-    - `given`: The same in turns, by the angles' numbers.
-    - `kept`: The numbers of the angles to keep.
-    - `notes`: What the user should know.
-    """
-
-    names: list[str]
-    values: dict[str, float]
-    given: dict[int, float]
-    kept: list[int]
-    notes: tuple[str, ...]
-
-    @property
-    def columns(self) -> list[str]:
-        """The names of the angles to keep."""
-        return [self.names[axis] for axis in self.kept]
-
-    @property
-    def words(self) -> str:
-        """What is known, such as "psi = -45"."""
-        return ", ".join(f"{name} = {value:g}" for name, value in self.values.items())
-
-    def evidence(self, density: Density) -> float:
-        """Return the log density of what is known, relative to the uniform one."""
-        at = torch.full((1, len(self.names)), torch.nan, dtype=torch.float64)
-        at[0, list(self.given)] = torch.tensor(list(self.given.values()), dtype=torch.float64)
-        return float(log_prob_observed(density, at, measure="uniform"))
-
-
 def condition_of(
     space: Space,
     names: list[str],
     pairs: Sequence[tuple[str, float]],
     columns: Sequence[str] | None,
-) -> Condition:
-    """Return which angles are known, and which of the others are kept: all, or those of `columns`."""
+    tell: Sink,
+) -> tuple[dict[str, float], dict[int, float], list[int]]:
+    """Return the known angles by name in the torus' unit and by number in turns, and which to keep.
+
+    All others are kept, or those of `columns`. A warning is told of angles that seem to be in another
+    unit.
+    """
     axes = axes_of([name for name, _ in pairs], names)
     values = [(axis, value) for axis, (_, value) in zip(axes, pairs, strict=True)]
     given = given_named(space, values, names)
     known = {names[axis]: value for axis, value in values}
-    warning = unit_warning(space, np.array([list(known.values())]), list(known))
     kept = [axis for axis in range(len(names)) if axis not in given]
     if columns is not None:
         kept = axes_of(columns, names)
@@ -122,7 +83,17 @@ def condition_of(
                 literal(repr(both[0]))
                 + " is both among {columns} and {given}; name it in one of them"
             )
-    return Condition(names, known, given, kept, (f"WARNING: {warning}",) if warning else ())
+    warning = unit_warning(space, np.array([list(known.values())]), list(known))
+    if warning:
+        tell(Note(f"WARNING: {warning}"))
+    return known, given, kept
+
+
+def evidence_of(density: Density, given: dict[int, float]) -> float:
+    """Return the log density of known angles, in turns, relative to the uniform one."""
+    at = torch.full((1, density.space.dim), torch.nan, dtype=torch.float64)
+    at[0, list(given)] = torch.tensor(list(given.values()), dtype=torch.float64)
+    return float(log_prob_observed(density, at, measure="uniform"))
 
 
 def write_derived(
@@ -133,7 +104,7 @@ def write_derived(
     tell: Sink,
     cancel: Cancel,
 ) -> Outcome:
-    """Write the folder of a density of fewer angles."""
+    """Write the folder of a density of fewer angles; `origin` says in the report where it is from."""
     cancel.check()
     space = density.space
     document = {
@@ -151,11 +122,7 @@ def write_derived(
         files[TABLE] = to_csv((*names, "density"), _table(density))
         files[PICTURE] = _picture(density, names)
     cancel.check()
-    with folder.replaced() as staged:
-        for name, content in files.items():
-            write_atomic(staged / name, content)
-    for name in files:
-        tell(Written(folder.path / name))
+    write_files(folder, files, tell)
     tell(Note(_words(density, names, folder.path)))
     summary = {"folder": str(folder.path), "files": list(files), "columns": names}
     return Outcome({**summary, "error": density.error})

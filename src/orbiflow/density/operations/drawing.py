@@ -2,15 +2,30 @@
 
 from __future__ import annotations
 
+import json
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
+from orbiflow.density import pictures, regions, spaces, tables
 from orbiflow.density.pictures import PlotSettings
 from orbiflow.density.regions import RegionSettings
-from orbiflow.density.tables import TableSettings, check_table_name
+from orbiflow.density.tables import TableSettings, Unit, check_table_name
 from orbiflow.errors import OrbiflowError, SettingError
-from orbiflow.runtime import Cancel, Note, Outcome, Progress, Sink, Written, ignore, operation
+from orbiflow.runtime import (
+    Cancel,
+    Note,
+    Outcome,
+    Progress,
+    Sink,
+    Written,
+    check_output_file,
+    check_outside_runs,
+    ignore,
+    one_thread,
+    operation,
+    write_atomic,
+)
 from orbiflow.settings import DefaultText, Option, Range
 
 if TYPE_CHECKING:
@@ -57,11 +72,8 @@ def plot(
         raise SettingError(f"{{{name}}} applies only to {{data}}; give both or neither")
 
     from orbiflow.density.operations.saved import check_fits, model_at, with_columns_of
-    from orbiflow.density.pictures import is_one_file, known_names, plot_density
-    from orbiflow.density.tables import read_rows
-    from orbiflow.runtime import check_output_file, check_outside_runs
 
-    single = is_one_file(out)
+    single = pictures.is_one_file(out)
     if single and settings.format not in (None, "pdf"):
         raise SettingError(f"{{out}} ends in .pdf but {{format}} is {settings.format}")
     reads = (model, data, settings.coastlines)
@@ -71,13 +83,13 @@ def plot(
         check_outside_runs(out, *reads)
     density, extra = model_at(model)
     space = density.space
-    names = known_names(space, extra.get("columns"))
+    names = pictures.known_names(space, extra.get("columns"))
     if settings.names is None and names is not None:
         settings = settings.replace(names=names)
     points = None
     if data is not None:
         reading = with_columns_of(table, data, extra, on_event)
-        found = read_rows(data, reading, on_event).table
+        found = tables.read_rows(data, reading, on_event).table
         check_fits(data, found, space, extra, on_event)
         points = found.values
 
@@ -85,7 +97,7 @@ def plot(
         cancel.check()
         on_event(Progress(share, what))
 
-    plotted = plot_density(density, out, settings, data=points, told=told)
+    plotted = pictures.plot_density(density, out, settings, data=points, told=told)
     captions = plotted.captions if single or settings.sheet.printed else ()
     for path in plotted.files:
         on_event(Written(path))
@@ -127,30 +139,19 @@ def region(
     """
     require_ending(out, (".geojson", ".json", ".csv"))
 
-    import json
-
     from orbiflow.density.operations.saved import model_at
-    from orbiflow.density.regions import (
-        DensityLevels,
-        outlines,
-        outlines_csv,
-        regions_document,
-        samples_for,
-        to_geojson,
-    )
-    from orbiflow.runtime import check_output_file, one_thread, write_atomic
 
     check_output_file(out, model)
     density, _ = model_at(model)
     kind, space = out.suffix.lower(), density.space
     _require_format(out, kind, space)
-    samples = samples_for(settings.masses, settings.samples)
+    samples = regions.samples_for(settings.masses, settings.samples)
     on_event(Progress(0.0, f"drawing {samples} samples"))
     cancel.check()
     with one_thread():
-        levels = DensityLevels(density, samples=samples, seed=settings.seed)
-        regions = [levels.highest(mass) for mass in settings.masses]
-        regions += [levels.above(level) for level in settings.level or ()]
+        levels = regions.DensityLevels(density, samples=samples, seed=settings.seed)
+        found = [levels.highest(mass) for mass in settings.masses]
+        found += [levels.above(level) for level in settings.level or ()]
         reached = 0.1
 
         def told(share: float, what: str) -> None:
@@ -162,21 +163,21 @@ def region(
         drawn: list[Outline] = []
         if space.dim == 2:
             budget, seed = settings.budget, settings.seed
-            drawn = outlines(levels, regions, budget=budget, seed=seed, told=told)
+            drawn = regions.outlines(levels, found, budget=budget, seed=seed, told=told)
     if kind == ".geojson":
-        text = json.dumps(to_geojson(drawn), allow_nan=False)
+        text = json.dumps(regions.to_geojson(drawn), allow_nan=False)
     elif kind == ".csv":
-        text = outlines_csv(drawn)
+        text = regions.outlines_csv(drawn)
     else:
-        document = regions_document(regions, drawn, samples=samples, seed=settings.seed)
+        document = regions.regions_document(found, drawn, samples=samples, seed=settings.seed)
         text = json.dumps(document, allow_nan=False)
     cancel.check()
     write_atomic(out, text)
     on_event(Written(out))
-    for note in _region_notes(regions, drawn):
+    for note in _region_notes(found, drawn):
         on_event(Note(note))
     on_event(Note(f"written to {out}"))
-    return Outcome({"file": str(out), "regions": [one.to_json() for one in regions]})
+    return Outcome({"file": str(out), "regions": [one.to_json() for one in found]})
 
 
 def _require_format(out: Path, kind: str, space: Space) -> None:
@@ -193,9 +194,9 @@ def _require_format(out: Path, kind: str, space: Space) -> None:
         )
 
 
-def _region_notes(regions: list[DensityRegion], drawn: list[Outline]) -> list[str]:
+def _region_notes(found: list[DensityRegion], drawn: list[Outline]) -> list[str]:
     """Return what the user should know of regions, whose outlines may not have been drawn."""
-    space = regions[0].density.space
+    space = found[0].density.space
     notes: list[str] = []
     if not drawn:
         notes.append(
@@ -203,15 +204,13 @@ def _region_notes(regions: list[DensityRegion], drawn: list[Outline]) -> list[st
             "thresholds and sizes alone; `orbiflow density score --region` says of each row how far "
             "inside it is"
         )
-    for k, one in enumerate(regions):
+    for k, one in enumerate(found):
         notes.append(_described(one, drawn[k] if drawn else None))
         notes += drawn[k].notes if drawn else ()
     return notes
 
 
 def _described(found: DensityRegion, outline: Outline | None) -> str:
-    from orbiflow.density.regions import size_unit
-
     size, fraction, polygons = found.size, found.fraction, ""
     if outline is not None:
         size, fraction = outline.size, outline.fraction
@@ -222,7 +221,8 @@ def _described(found: DensityRegion, outline: Outline | None) -> str:
     return (
         f"mass {_with_error(found.held, found.error)}: log density of at least "
         f"{found.log_prob:.4f} ({found.log_prob_low:.4f} to {found.log_prob_high:.4f}), "
-        f"{size:.6g} {size_unit(found.density.space)}, {_percentage(fraction)} of the space{polygons}"
+        f"{size:.6g} {regions.size_unit(found.density.space)}, {_percentage(fraction)} of the space"
+        f"{polygons}"
     )
 
 
@@ -258,7 +258,7 @@ def patches(
     table: TableSettings = TableSettings(),
     *,
     out: Annotated[Path, Option("-o")] = Path("angles.csv"),
-    unit: Literal["radians", "degrees", "turns"] = "radians",
+    unit: Unit = "radians",
     farthest: Annotated[float | None, Range(0), DefaultText("all are kept")] = None,
     on_event: Sink = ignore,
     cancel: Cancel = Cancel(),
@@ -275,22 +275,18 @@ def patches(
     """
     import numpy as np
 
-    from orbiflow.density.spaces import to_klein
-    from orbiflow.density.tables import listing, read_rows, to_csv
-    from orbiflow.runtime import check_output_file, one_thread, write_atomic
-
     check_table_name(out)
     check_output_file(out, data)
-    found = read_rows(data, table, on_event).table
+    found = tables.read_rows(data, table, on_event).table
     width = len(found.columns)
     if width not in PATCH_WIDTHS:
         raise OrbiflowError(
             f"{data}: a patch has 9 pixel values or 8 DCT coordinates, and there "
             f"{'is' if width == 1 else 'are'} {_counted(width, 'column')} "
-            f"({listing(found.columns)}): choose with --columns"
+            f"({tables.listing(found.columns)}): choose with --columns"
         )
     with one_thread():
-        angles, distances = to_klein(found.values, unit=unit)
+        angles, distances = spaces.to_klein(found.values, unit=unit)
     near = distances <= (np.inf if farthest is None else farthest)
     if not near.any():
         raise OrbiflowError(
@@ -301,7 +297,7 @@ def patches(
         )
     kept = np.column_stack([angles, distances])[near]
     cancel.check()
-    write_atomic(out, to_csv(("theta", "phi", "distance"), kept))
+    write_atomic(out, tables.to_csv(("theta", "phi", "distance"), kept))
     on_event(Written(out))
     left_out = int((~near).sum())
     left = f", {left_out} farther ones left out" if left_out else ""

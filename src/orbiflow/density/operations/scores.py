@@ -77,7 +77,7 @@ def score_rows(
     if not whole.all():
         notes.append(_missing_note(known, name))
     over = f"{len(whole)} rows" if whole.all() else f"the {whole.sum()} whole rows"
-    return Scores(columns, _mean(columns[name], rows.weights, whole), over, tuple(notes))
+    return Scores(columns, mean_of_whole(columns[name], rows.weights, whole), over, tuple(notes))
 
 
 def _log_densities(
@@ -124,8 +124,8 @@ def _gradients(density: Density, rows: TableRows, tell: Sink, cancel: Cancel) ->
     return dict(zip(names, np.concatenate(found).T, strict=True))
 
 
-def _mean(scores: Array, weights: Array | None, whole: NDArray[np.bool_]) -> float:
-    """Of the whole rows: densities of fewer angles are in another unit."""
+def mean_of_whole(scores: Array, weights: Array | None, whole: NDArray[np.bool_]) -> float:
+    """Return the mean of the rows that lack nothing: densities of fewer angles are in another unit."""
     chosen = whole if whole.any() else np.ones_like(whole)
     rows = weighed(torch.tensor(scores[chosen, None]), None if weights is None else weights[chosen])
     return mean_of(rows.points[:, 0], rows.weights)

@@ -6,9 +6,25 @@ import math
 from pathlib import Path
 from typing import Annotated, Literal
 
+from orbiflow.density import inference, tables
+from orbiflow.density.run_folder import written_files
 from orbiflow.density.tables import RowSettings, check_table_name
 from orbiflow.errors import literal
-from orbiflow.runtime import Cancel, Note, Outcome, Progress, Sink, Written, ignore, operation
+from orbiflow.runtime import (
+    Cancel,
+    Note,
+    Outcome,
+    Progress,
+    ResultFolder,
+    Sink,
+    Written,
+    check_output_file,
+    check_output_folder,
+    ignore,
+    one_thread,
+    operation,
+    write_atomic,
+)
 from orbiflow.settings import DefaultText, Needs, NotWith, Option, Range, SettingError, Settings
 
 Model = Annotated[Path, Option("--model", "-m")]
@@ -73,16 +89,14 @@ def score(
 
     from orbiflow.density.operations.saved import check_fits, model_at, with_columns_of
     from orbiflow.density.operations.scores import score_rows
-    from orbiflow.density.tables import append_columns, read_rows
-    from orbiflow.runtime import check_output_file, one_thread, write_atomic
 
     check_output_file(out, data, model)
     with one_thread():
         density, extra = model_at(model)
-        rows = read_rows(data, with_columns_of(reading, data, extra, on_event), on_event)
+        rows = tables.read_rows(data, with_columns_of(reading, data, extra, on_event), on_event)
         check_fits(data, rows.table, density.space, extra, on_event)
         found = score_rows(density, rows, settings, on_event, cancel, may_lack=may_lack)
-    write_atomic(out, append_columns(rows.table, data, found.columns))
+    write_atomic(out, tables.append_columns(rows.table, data, found.columns))
     on_event(Written(out))
     for note in found.notes:
         on_event(Note(note))
@@ -125,8 +139,6 @@ def sample(
     import torch
 
     from orbiflow.density.operations.saved import model_at, names_of
-    from orbiflow.density.tables import to_csv
-    from orbiflow.runtime import check_output_file, one_thread, write_atomic
 
     check_output_file(out, model)
     with one_thread():
@@ -135,7 +147,7 @@ def sample(
         data = density.space.from_chart(density.sample((settings.count,), generator))
     names = names_of(density, extra)
     cancel.check()
-    write_atomic(out, to_csv(names, data))
+    write_atomic(out, tables.to_csv(names, data))
     on_event(Written(out))
     on_event(Note(f"{settings.count} samples written to {out}"))
     return Outcome({"file": str(out), "rows": settings.count})
@@ -163,11 +175,8 @@ def marginal(
     if not columns:
         raise SettingError("{columns} names no column; give names or numbers, as in phi,psi")
 
-    from orbiflow.density.inference import marginal as marginal_of
     from orbiflow.density.operations.derived import axes_of, write_derived
     from orbiflow.density.operations.saved import model_at, names_of
-    from orbiflow.density.run_folder import written_files
-    from orbiflow.runtime import ResultFolder, check_output_folder, one_thread
 
     check_output_folder(out, model, what="model")
     with one_thread():
@@ -176,7 +185,7 @@ def marginal(
         axes = axes_of(columns, names)
         folder = ResultFolder(out, written_files)
         on_event(Progress(0.0, "integrating"))
-        found = marginal_of(density, axes)
+        found = inference.marginal(density, axes)
         kept = [names[axis] for axis in axes]
         origin = {"marginal": kept, "model": str(model)}
         return write_derived(found, kept, origin, folder, on_event, cancel)
@@ -207,36 +216,31 @@ def conditional(
         raise SettingError("{given} says nothing; give what is known, as in psi=-45")
     pairs = [_angle(text) for text in given]
 
-    from orbiflow.density.inference import conditional as conditional_of
-    from orbiflow.density.operations.derived import condition_of, write_derived
+    from orbiflow.density.operations.derived import condition_of, evidence_of, write_derived
     from orbiflow.density.operations.saved import model_at, names_of
-    from orbiflow.density.run_folder import written_files
-    from orbiflow.runtime import ResultFolder, check_output_folder, one_thread
 
     check_output_folder(out, model, what="model")
     with one_thread():
         density, extra = model_at(model)
         names = names_of(density, extra)
-        condition = condition_of(density.space, names, pairs, columns)
-        for note in condition.notes:
-            on_event(Note(note))
+        known, turns, kept = condition_of(density.space, names, pairs, columns, on_event)
         folder = ResultFolder(out, written_files)
         on_event(Progress(0.0, "integrating"))
-        found = conditional_of(density, condition.given, condition.kept)
-        evidence = condition.evidence(density)
+        found = inference.conditional(density, turns, kept)
+        evidence = evidence_of(density, turns)
         rare = "; few data lie there, or none" if evidence < -3 else ""
+        words = ", ".join(f"{name} = {value:g}" for name, value in known.items())
         on_event(
             Note(
-                f"the density at {condition.words} is {math.exp(evidence):.3g} times that of even "
-                f"angles{rare}"
+                f"the density at {words} is {math.exp(evidence):.3g} times that of even angles{rare}"
             )
         )
         origin = {
-            "given": condition.values,
+            "given": known,
             "log_density_of_given_over_uniform": evidence,
             "model": str(model),
         }
-        return write_derived(found, condition.columns, origin, folder, on_event, cancel)
+        return write_derived(found, [names[k] for k in kept], origin, folder, on_event, cancel)
 
 
 def _angle(text: str) -> tuple[str, float]:

@@ -41,6 +41,11 @@ class TableRows:
     group: str | None = None
     header: bool | None = None
 
+    @property
+    def whole(self) -> NDArray[np.bool_]:
+        """Which rows (N,) lack no value."""
+        return np.isfinite(self.table.values).all(axis=1)
+
     def labels(self) -> NDArray[np.str_] | None:
         """Return what each row belongs to, (N,), or None if no column says so."""
         if self.group is None:

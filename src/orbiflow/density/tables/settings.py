@@ -21,14 +21,14 @@ OTHER_FORMATS = frozenset((
 ))
 # fmt: on
 
-Space = Literal["torus", "sphere", "klein-bottle", "projective-plane"]
+SpaceName = Literal["torus", "sphere", "klein-bottle", "projective-plane"]
 Unit = Literal["radians", "degrees", "turns"]
 
 
 class SpaceSettings(Settings, group="Density"):
     """Where the data live."""
 
-    space: Space
+    space: SpaceName
     """Where the data live."""
 
     unit: Annotated[Unit | None, DefaultText("radians, if no value is beyond 2 pi")] = None
@@ -37,6 +37,11 @@ class SpaceSettings(Settings, group="Density"):
     def check(self) -> None:
         """Check that only angles have a unit."""
         check_unit(self.space, self.unit)
+
+    @property
+    def width(self) -> int | None:
+        """The number of columns that the space takes, None if there may be several."""
+        return 2 if self.space == "klein-bottle" else None
 
 
 def check_unit(space: str, unit: Unit | None) -> None:
