@@ -1,7 +1,7 @@
 from .comparing.data_sets import DataComparison as DataComparison
+from .comparing.data_sets import Divergence as Divergence
+from .comparing.data_sets import Estimate as Estimate
 from .comparing.data_sets import compare_samples as compare_samples
-from .comparing.divergence import Divergence as Divergence
-from .comparing.divergence import Estimate as Estimate
 from .comparing.known_rows import RowSketch as RowSketch
 from .comparing.paired import Difference as Difference
 from .comparing.paired import ModelComparison as ModelComparison

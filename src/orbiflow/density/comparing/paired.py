@@ -11,9 +11,8 @@ import numpy as np
 import torch
 from numpy.typing import ArrayLike
 
-from orbiflow.arguments import as_array, is_a
+from orbiflow.arguments import as_array, as_instance, is_a
 from orbiflow.arrays import Array
-from orbiflow.density.arguments import check_kind
 from orbiflow.density.comparing.resampling import Groups, resampled_sums
 from orbiflow.density.comparing.settings import ComparisonSettings
 from orbiflow.density.estimator import DensityEstimator
@@ -173,7 +172,9 @@ def compare_scores(
             )
         )
     beaten = {d.second for d in found if d.first == names[0] and d.better is not None}
-    same = [f"{d.first} and {d.second} are equal at every row" for d in found if _equal(d)]
+    same = [
+        f"{d.first} and {d.second} are equal at every row" for d in found if d.mean == d.error == 0
+    ]
     return ModelComparison(
         tuple(ModelScore(*s) for s in zip(names, means.tolist(), errors.tolist(), strict=True)),
         tuple(found),
@@ -244,10 +245,6 @@ def _ratio(size: Any, error: Any) -> Any:
     return np.where(np.asarray(size) <= 1e-14, 0.0, t)
 
 
-def _equal(difference: Difference) -> bool:
-    return difference.mean == 0 and difference.error == 0
-
-
 def _listed(names: list[str]) -> str:
     """Return names in words.
 
@@ -295,7 +292,7 @@ def density_of(model: Density | DensityEstimator, name: str = "the model") -> De
         if density is None:
             raise OrbiflowError(f"{name} is not fitted yet: call fit first")
         return density
-    return check_kind(model, Density, name, "or a fitted DensityEstimator")
+    return as_instance(model, Density, name, "or a fitted DensityEstimator")
 
 
 def require_one_space(spaces: Mapping[str, Space]) -> None:

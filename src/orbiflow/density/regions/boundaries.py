@@ -13,7 +13,6 @@ from shapely.geometry.polygon import orient
 from torch import Tensor
 
 from orbiflow.arrays import Array
-from orbiflow.density.arguments import silent
 from orbiflow.density.models import Density
 from orbiflow.density.regions.contours import filled
 from orbiflow.density.regions.grid import LevelGrid, Seeds
@@ -100,7 +99,7 @@ def outlines(
     *,
     budget: int = BUDGET,
     seed: int = 0,
-    told: Callable[[float, str], None] = silent,
+    told: Callable[[float, str], None] = lambda *_: None,
 ) -> list[Outline]:
     """Return the boundaries of regions of one density of two dimensions.
 
