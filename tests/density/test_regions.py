@@ -23,8 +23,8 @@ from orbiflow.density import (
     outlines,
     to_geojson,
 )
-from orbiflow.density.regions.contours import filled
 from orbiflow.density.regions.grid import LevelGrid, Seeds
+from orbiflow.density.regions.islands import filled
 from orbiflow.errors import OrbiflowError
 
 SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")

@@ -55,6 +55,7 @@ from .models.uniform import UniformDensity as UniformDensity
 from .models.uniform import VonMisesDensity as VonMisesDensity
 from .pictures.axes import space_title as space_title
 from .pictures.coastlines import read_coastlines as read_coastlines
+from .pictures.colours import density_on_grid as density_on_grid
 from .pictures.corner import corner_picture as corner_picture
 from .pictures.flow import draw_cells as draw_cells
 from .pictures.flow import flow_picture as flow_picture
@@ -79,7 +80,6 @@ from .pictures.surfaces import edge_pairs as edge_pairs
 from .pictures.surfaces import immersion as immersion
 from .pictures.surfaces import viewpoint as viewpoint
 from .pictures.thumbnail import density_thumbnail as density_thumbnail
-from .pictures.values import density_on_grid as density_on_grid
 from .regions.boundaries import Outline as Outline
 from .regions.boundaries import outlines as outlines
 from .regions.levels import DensityLevels as DensityLevels

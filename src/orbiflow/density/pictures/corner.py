@@ -20,9 +20,9 @@ from orbiflow.density.pictures.axes import (
     space_title,
     view_of,
 )
-from orbiflow.density.pictures.dots import MAX_DOTS, draw_dots
+from orbiflow.density.pictures.colours import density_at
+from orbiflow.density.pictures.overlays import MAX_DOTS, draw_dots
 from orbiflow.density.pictures.settings import PlotSettings
-from orbiflow.density.pictures.values import density_at
 from orbiflow.drawing import Picture, Sheet
 from orbiflow.errors import OrbiflowError
 

@@ -23,9 +23,16 @@ from orbiflow.density.pictures.axes import (
     space_title,
     view_of,
 )
-from orbiflow.density.pictures.dots import thinned, uncrowded
+from orbiflow.density.pictures.colours import (
+    bar_label,
+    bar_ticks,
+    chosen_scale,
+    density_on_grid,
+    is_sharp,
+    shading,
+)
 from orbiflow.density.pictures.ground import COLOURS, SMALLER
-from orbiflow.density.pictures.scale import bar_label, bar_ticks, shading
+from orbiflow.density.pictures.overlays import thinned, uncrowded
 from orbiflow.density.pictures.settings import PlotSettings
 from orbiflow.density.pictures.square import average_note
 from orbiflow.density.pictures.surfaces import (
@@ -39,7 +46,6 @@ from orbiflow.density.pictures.surfaces import (
     vector_immersion,
     viewpoint,
 )
-from orbiflow.density.pictures.values import chosen_scale, density_on_grid, is_sharp
 from orbiflow.density.spaces import RoundSpace, Space, checked_table, to_vectors
 from orbiflow.drawing import rendered
 from orbiflow.errors import OrbiflowError

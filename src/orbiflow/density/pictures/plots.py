@@ -20,11 +20,10 @@ from orbiflow.density.pictures.coastlines import read_coastlines, simplified
 from orbiflow.density.pictures.corner import MAX_COLUMNS, corner_picture
 from orbiflow.density.pictures.flow import few_colours, flow_picture
 from orbiflow.density.pictures.ground import Ground, draw_density, draw_samples
-from orbiflow.density.pictures.map_choice import chosen_map
-from orbiflow.density.pictures.maps import Map
+from orbiflow.density.pictures.maps import Map, chosen_map
+from orbiflow.density.pictures.overlays import RegionLine, region_lines
 from orbiflow.density.pictures.page import density_page
 from orbiflow.density.pictures.projections import PlateCarree, Projection
-from orbiflow.density.pictures.regions import RegionLine, region_lines
 from orbiflow.density.pictures.settings import PlotSettings
 from orbiflow.density.pictures.square import Square
 from orbiflow.density.spaces import Space
@@ -111,7 +110,7 @@ def plot_density(
         told(0.75, f"drawing {PAGE}")
         contents[PAGE] = plots.page()
     paths = write_set(out, PICTURES, contents)
-    return Plotted(tuple(paths), _captions(pictures.values()), plots.notes)
+    return Plotted(tuple(paths), _captions(pictures.colours()), plots.notes)
 
 
 def refuse_foreign_files(out: Path) -> None:

@@ -21,28 +21,25 @@ from orbiflow.density.pictures.axes import (
     shortened,
     view_of,
 )
-from orbiflow.density.pictures.frame import (
+from orbiflow.density.pictures.colours import chosen_scale, density_on_grid, is_sharp, shading
+from orbiflow.density.pictures.ground import (
+    LIGHT,
     NARROW,
+    Colouring,
     Frame,
+    Ground,
+    Panel,
     Room,
+    Words,
     caption_lines,
+    draw_density,
+    draw_samples,
     printed_room,
     write_caption,
 )
-from orbiflow.density.pictures.ground import (
-    LIGHT,
-    Colouring,
-    Ground,
-    Panel,
-    Words,
-    draw_density,
-    draw_samples,
-)
-from orbiflow.density.pictures.regions import log_natural, region_lines
-from orbiflow.density.pictures.scale import shading
+from orbiflow.density.pictures.overlays import log_natural, region_lines
 from orbiflow.density.pictures.settings import PlotSettings
 from orbiflow.density.pictures.surfaces import edge_pairs
-from orbiflow.density.pictures.values import chosen_scale, density_on_grid, is_sharp
 from orbiflow.density.spaces import Space
 from orbiflow.drawing import CENTER_COLOURS, Picture, Sheet, center_sign
 from orbiflow.symmetry import CrystallographicGroup, symmetry_elements

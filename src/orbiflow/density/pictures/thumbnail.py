@@ -19,10 +19,15 @@ from PIL import Image, ImageDraw
 from orbiflow.arrays import Array
 from orbiflow.density.models import Density, midpoints
 from orbiflow.density.pictures.axes import view_of
-from orbiflow.density.pictures.map_choice import chosen_map
-from orbiflow.density.pictures.maps import pixels_of
-from orbiflow.density.pictures.scale import DARK_SHARE, Shade, dark_share, shading
-from orbiflow.density.pictures.values import density_on_grid, density_on_map
+from orbiflow.density.pictures.colours import (
+    DARK_SHARE,
+    Shade,
+    dark_share,
+    density_on_grid,
+    density_on_map,
+    shading,
+)
+from orbiflow.density.pictures.maps import chosen_map, pixels_of
 from orbiflow.density.spaces import RoundSpace, to_vectors
 
 SIZE = (360, 240)
