@@ -122,7 +122,7 @@ def compare_samples(
     *,
     unit: str = "radians",
     groups: Mapping[str, ArrayLike] | None = None,
-    progress: Progress = lambda *_: None,
+    progress: Progress = lambda _share, _what: None,
 ) -> DataComparison:
     """Test whether two data sets come from one density, and measure how far apart they are.
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import torch
@@ -13,9 +14,10 @@ from numpy.typing import ArrayLike
 from torch import Tensor
 
 from orbiflow.arguments import as_path
+from orbiflow.density.comparing import density_of
 from orbiflow.density.estimator import DensityEstimator
 from orbiflow.density.models import Density, read_density
-from orbiflow.density.pictures.axes import space_title, view_of
+from orbiflow.density.pictures.axes import view_of
 from orbiflow.density.pictures.coastlines import read_coastlines, simplified
 from orbiflow.density.pictures.corner import MAX_COLUMNS, corner_picture
 from orbiflow.density.pictures.flow import few_colours, flow_picture
@@ -47,8 +49,6 @@ PICTURES = (*(f"{name}.{form}" for form in FORMATS for name in NAMES), PAGE)
 SAMPLES = 3000
 PAGE_POINTS = 40_000
 """Points of coastlines on the surface that turns, at most."""
-
-Maker = Callable[[], Picture]
 
 
 class Plotted(NamedTuple):
@@ -95,22 +95,27 @@ def plot_density(
     single = is_one_file(out)
     if not single:
         refuse_foreign_files(out)
-    plots = _Plots.of(density, settings, data, coastlines)
+    drawn, settings, columns = _checked(density, settings)
+    lines = _all_coastlines(drawn.space, settings, coastlines)
+    shown = _Shown.of(drawn, settings, data, columns, lines)
+    sheet = Sheet.column(settings.width or "single", "pdf") if single else settings.sheet
+    if not single:
+        make_folder(out)
+    makers, pictures = shown.makers(sheet), dict[str, Picture]()
+    for k, (name, make) in enumerate(makers.items()):
+        told(k / (len(makers) + 1), f"drawing {name}.{sheet.format}")
+        pictures[name] = make()
+    captions = tuple(f"{own.title}. {own.caption}".strip() for own in pictures.values())
     if single:
-        sheet = Sheet.column(settings.width or "single", "pdf")
-        made = list(plots.pictures(sheet, told).values())
-        return Plotted((write_atomic(out, pdf_pages(made)),), _captions(made), plots.notes)
-    make_folder(out)
-    sheet = settings.sheet
-    pictures = plots.pictures(sheet, told)
+        path = write_atomic(out, pdf_pages(list(pictures.values())))
+        return Plotted((path,), captions, shown.notes)
     contents: dict[str, str | bytes] = {
         f"{name}.{sheet.format}": _content(name, picture) for name, picture in pictures.items()
     }
-    if plots.space.dim == 2:
+    if drawn.space.dim == 2:
         told(0.75, f"drawing {PAGE}")
-        contents[PAGE] = plots.page()
-    paths = write_set(out, PICTURES, contents)
-    return Plotted(tuple(paths), _captions(pictures.colours()), plots.notes)
+        contents[PAGE] = shown.page()
+    return Plotted(tuple(write_set(out, PICTURES, contents)), captions, shown.notes)
 
 
 def refuse_foreign_files(out: Path) -> None:
@@ -158,12 +163,37 @@ def _content(name: str, picture: Picture) -> bytes:
     return few_colours(content) if few else content
 
 
-def _captions(pictures: Iterable[Picture]) -> tuple[str, ...]:
-    return tuple(f"{picture.title}. {picture.caption}".strip() for picture in pictures)
+def _checked(
+    given: Density | DensityEstimator | str | Path, settings: PlotSettings
+) -> tuple[Density, PlotSettings, Sequence[str] | None]:
+    """Return a density that can be drawn, settings that fit it, and its columns if they are known."""
+    columns = None
+    if isinstance(given, Density | DensityEstimator):
+        density = density_of(given, "this DensityEstimator")
+    else:
+        path = as_path(given, "the density")
+        density, extra = read_density(path / MODEL if path.is_dir() else path)
+        columns = extra.get("columns")
+    space = density.space
+    if settings.names is None:
+        settings = settings.replace(names=known_names(space, columns))
+    if space.dim > MAX_COLUMNS:
+        raise OrbiflowError(
+            f"this {space.name} has {space.dim} angles, pictures have {MAX_COLUMNS} at most: draw "
+            "columns of `orbiflow density sample` beside those of the data"
+        )
+    view_of(space, settings.names, None if space.is_round else settings.center)
+    if not space.is_round and (settings.projection != "auto" or settings.radius is not None):
+        name = "radius" if settings.projection == "auto" else "projection"
+        raise SettingError(
+            f"{{{name}}} applies to maps of the sphere and the projective plane, not to the "
+            f"{space.name}"
+        )
+    return density, settings, columns
 
 
 @dataclass(frozen=True, eq=False)
-class _Plots:
+class _Shown:
     """A density and what is drawn with it: chart points, lines around regions, coastlines."""
 
     density: Density
@@ -177,97 +207,66 @@ class _Plots:
     @classmethod
     def of(
         cls,
-        given: Density | DensityEstimator | str | Path,
+        density: Density,
         settings: PlotSettings,
         data: ArrayLike | None,
+        columns: Sequence[str] | None,
         coastlines: Sequence[ArrayLike],
-    ) -> _Plots:
-        """Check all that can be wrong, before the work."""
-        density, columns = _density_of(given)
+    ) -> _Shown:
+        """Draw the samples, and choose the map."""
         space = density.space
-        if settings.names is None:
-            names = known_names(space, columns)
-            settings = settings if names is None else settings.replace(names=names)
-        coastlines = _all_coastlines(space, settings, coastlines)
-        _check_space(space, settings)
         points = None if data is None else space.to_chart(data)
         generator = torch.Generator().manual_seed(settings.seed)
         samples = density.sample((settings.samples or SAMPLES,), generator)
         chosen = None
         if space.is_round:
-            about = samples if points is None else points
-            chosen = chosen_map(space, about, settings, columns)
+            chosen = chosen_map(space, samples if points is None else points, settings, columns)
         lines = region_lines(density, settings)
         return cls(density, settings, samples, points, chosen, lines, coastlines)
 
     @property
-    def space(self) -> Space:
-        """The density's space."""
-        return self.density.space
-
-    @property
     def notes(self) -> tuple[str, ...]:
         """What is not drawn, and why."""
-        if self.space.dim != 2 or self._has_flow:
+        if self.density.space.dim != 2 or self.density.flow_part is not None:
             return ()
         return ("the flow has no part in this density, so that there is no picture of it",)
 
-    def pictures(
-        self, sheet: Sheet, told: Callable[[float, str], None] = lambda *_: None
-    ) -> dict[str, Picture]:
-        """Draw all figures, by the names of their files without the ending."""
-        makers = self._makers(sheet)
-        made: dict[str, Picture] = {}
-        for k, (name, make) in enumerate(makers.items()):
-            told(k / (len(makers) + 1), f"drawing {name}.{sheet.format}")
-            made[name] = make()
-        return made
+    @property
+    def points(self) -> Tensor:
+        """The data, or else the samples."""
+        return self.samples if self.data is None else self.data
 
     def page(self) -> str:
         """Return the page of the surface to turn in a browser."""
-        return density_page(
-            self.density,
-            self.settings,
-            samples=self._shown,
-            coastlines=simplified(list(map(np.asarray, self.coastlines)), PAGE_POINTS),
-            title=f"Density on the {space_title(self.space)}",
-        )
+        lines = simplified(list(map(np.asarray, self.coastlines)), PAGE_POINTS)
+        return density_page(self.density, self.settings, samples=self.points, coastlines=lines)
 
-    @property
-    def _shown(self) -> Tensor:
-        return self.samples if self.data is None else self.data
-
-    @property
-    def _has_flow(self) -> bool:
-        """Whether a flow has a part in the density."""
-        return self.density.flow_part is not None
-
-    def _makers(self, sheet: Sheet) -> dict[str, Maker]:
-        """Return functions that draw the figures, by name."""
-        density, settings, data = self.density, self.settings, self.data
-        if self.space.dim != 2:
-            draw = lambda: corner_picture(density, data, self.samples, settings, sheet=sheet)  # noqa: E731
-            return {"samples": draw}
+    def makers(self, sheet: Sheet) -> dict[str, Callable[[], Picture]]:
+        """Return functions that draw the figures, by the names of their files without the ending."""
+        density, settings, data, samples = self.density, self.settings, self.data, self.samples
+        if density.space.dim != 2:
+            return {
+                "samples": partial(corner_picture, density, data, samples, settings, sheet=sheet)
+            }
         grounds = self._grounds()
-        makers = {name: self._maker(ground, sheet) for name, ground in grounds.items()}
-        if self._has_flow:
-            makers["flow"] = lambda: flow_picture(density, settings, sheet=sheet)
+        dots = self.points if settings.dots else None
+        kept: dict[str, Any] = {"dots": dots, "regions": self.regions, "sheet": sheet}
+        makers = {
+            name: partial(draw_density, ground, density, settings, **kept)
+            for name, ground in grounds.items()
+        }
+        if density.flow_part is not None:
+            makers["flow"] = partial(flow_picture, density, settings, sheet=sheet)
         if data is not None or settings.samples is not None:
             ground = grounds["density"]
-            makers["samples"] = lambda: draw_samples(
-                ground, density, settings, data, self.samples, sheet=sheet
+            makers["samples"] = partial(
+                draw_samples, ground, density, settings, data, samples, sheet=sheet
             )
         return makers
 
-    def _maker(self, ground: Ground, sheet: Sheet) -> Maker:
-        dots = self._shown if self.settings.dots else None
-        return lambda: draw_density(
-            ground, self.density, self.settings, dots=dots, regions=self.regions, sheet=sheet
-        )
-
     def _grounds(self) -> dict[str, Ground]:
         """Return what the density is drawn on, by the names of the figures."""
-        space, chosen = self.space, self.projection
+        space, chosen = self.density.space, self.projection
         square = Square(space, self.settings)
         if chosen is None:
             return {"density": square}
@@ -276,22 +275,6 @@ class _Plots:
             plain = PlateCarree((0.0, chosen.center[1]))
             grounds["latlon"] = Map(space, plain, self.coastlines)
         return {**grounds, "square": square}
-
-
-def _check_space(space: Space, settings: PlotSettings) -> None:
-    """Check that a space can be drawn, and that settings fit it."""
-    if space.dim > MAX_COLUMNS:
-        raise OrbiflowError(
-            f"this {space.name} has {space.dim} angles, pictures have {MAX_COLUMNS} at most: draw "
-            "columns of `orbiflow density sample` beside those of the data"
-        )
-    view_of(space, settings.names, None if space.is_round else settings.center)
-    if not space.is_round and (settings.projection != "auto" or settings.radius is not None):
-        name = "radius" if settings.projection == "auto" else "projection"
-        raise SettingError(
-            f"{{{name}}} applies to maps of the sphere and the projective plane, not to the "
-            f"{space.name}"
-        )
 
 
 def _all_coastlines(
@@ -304,19 +287,3 @@ def _all_coastlines(
     if settings.coastlines is None:
         return lines
     return [*lines, *read_coastlines(settings.coastlines)]
-
-
-def _density_of(
-    given: Density | DensityEstimator | str | Path,
-) -> tuple[Density, Sequence[str] | None]:
-    """Return the density, and the columns that it was fitted to, if they are known."""
-    if isinstance(given, Density):
-        return given, None
-    if isinstance(given, DensityEstimator):
-        density = getattr(given, "density_", None)
-        if density is None:
-            raise OrbiflowError("this DensityEstimator is not fitted; call fit(data) first")
-        return density, None
-    path = as_path(given, "the density")
-    density, extra = read_density(path / MODEL if path.is_dir() else path)
-    return density, extra.get("columns")

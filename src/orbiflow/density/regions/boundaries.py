@@ -100,7 +100,7 @@ def outlines(
     *,
     budget: int = BUDGET,
     seed: int = 0,
-    told: Callable[[float, str], None] = lambda *_: None,
+    told: Callable[[float, str], None] = lambda _share, _what: None,
 ) -> list[Outline]:
     """Return the boundaries of regions of one density of two dimensions.
 
