@@ -74,7 +74,12 @@ def fit(
         picture: Also draw a small picture, thumbnail.png.
     """
     begin = time.perf_counter()
-    _check_fit(where, settings, reading, group)
+    if group is not None and settings.flow_alone:
+        raise SettingError(
+            "{group} serves to choose among {components}, and a flow alone has no choice; leave it out"
+        )
+    if reading.missing == "marginalise":
+        check_marginalised(where, settings)
 
     from orbiflow.density.estimator import DensityEstimator
 
@@ -114,16 +119,8 @@ def fit(
     return Outcome({**summary, "picture": pictures.THUMBNAIL if picture else None})
 
 
-def _check_fit(
-    where: SpaceSettings, settings: DensitySettings, reading: RowSettings, group: str | None
-) -> None:
-    """Refuse groups without components to choose, and rows without angles that cannot be used."""
-    if group is not None and settings.flow_alone:
-        raise SettingError(
-            "{group} serves to choose among {components}, and a flow alone has no choice; leave it out"
-        )
-    if reading.missing != "marginalise":
-        return
+def check_marginalised(where: SpaceSettings, settings: DensitySettings) -> None:
+    """Refuse what cannot be fitted to rows that lack angles."""
     if where.space != "torus":
         raise SettingError(
             f"{{missing}} marginalise is for angles on a torus: on the {where.space} no coordinate is "

@@ -20,7 +20,6 @@ from orbiflow.density.regions.levels import DensityLevels, DensityRegion
 from orbiflow.density.spaces import RoundSpace, Space, to_latlon, to_vectors, whole_turn
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import one_thread
-from orbiflow.typed_shapely import ufuncs
 from orbiflow.typed_torch import unique
 
 DOUBLINGS = 3
@@ -233,7 +232,7 @@ class Window:
         On the globe it is in steradians, and sides are straight in longitude and latitude.
         """
         if not self.on_globe:
-            return float(ufuncs.area(shape))
+            return float(shapely.area(shape))
         return sum(_steradians(part) for part in shapely.get_parts(shape))
 
 

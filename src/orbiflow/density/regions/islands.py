@@ -9,7 +9,6 @@ from skimage.measure import find_contours
 
 from orbiflow.arrays import Array
 from orbiflow.density.regions.grid import Function, LevelGrid, Seeds
-from orbiflow.typed_shapely import ufuncs
 
 PARTS = 12
 """Parts into which each side of a cell is cut."""
@@ -74,7 +73,7 @@ def _wrong(
 ) -> NDArray[np.int64]:
     """Return cells (C, 2) with seeds on the wrong side, those with most first."""
     shapely.prepare(shape)
-    wrong = ufuncs.intersects_xy(shape, *seeds.points.T) != (seeds.values >= level)
+    wrong = shapely.intersects_xy(shape, *seeds.points.T) != (seeds.values >= level)
     most = np.array(grid.values.shape) - 2
     at = np.clip(np.floor((seeds.points[wrong] - grid.low) / grid.step).astype(int), 0, most)
     cells, counts = np.unique(at, axis=0, return_counts=True)
