@@ -290,7 +290,7 @@ def density_of(model: Density | DensityEstimator, name: str = "the model") -> De
     if isinstance(model, DensityEstimator):
         density = getattr(model, "density_", None)
         if density is None:
-            raise OrbiflowError(f"{name} is not fitted yet: call fit first")
+            raise OrbiflowError(f"{name} is not fitted yet: call fit(data) first")
         return density
     return as_instance(model, Density, name, "or a fitted DensityEstimator")
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from fractions import Fraction
 from typing import NamedTuple
 
@@ -128,33 +128,17 @@ def legible(at: list[float], texts: list[str], side: float, sheet: Sheet) -> lis
 
 
 def angle_axis(view: View, axis: int) -> tuple[str, list[float], list[str]]:
-    """Return the label of an axis, and the places and texts of its ticks.
-
-    The view is of a space whose name is in `ANGLE_AXES`.
-    """
-    return ANGLE_AXES[view.space.name](view, axis)
-
-
-def _torus_axis(view: View, axis: int) -> tuple[str, list[float], list[str]]:
-    low = float(view.low[axis])
-    quarters = range(math.ceil(4 * low - 1e-9), math.floor(4 * low + 4 + 1e-9) + 1)
-    places = [k / 4 - low for k in quarters]
-    texts = [angle_text(k / 4, view.space.unit) for k in quarters]
-    return axis_label(view, axis), places, texts
-
-
-def _klein_axis(view: View, axis: int) -> tuple[str, list[float], list[str]]:
-    # the first column, theta, goes up: half a turn; phi starts a quarter before 0
-    turns = [k / 4 - 0.25 for k in range(5)] if axis == 0 else [k / 8 for k in range(5)]
-    texts = [angle_text(t, view.space.unit) for t in turns]
-    return axis_label(view, 1 - axis), [k / 4 for k in range(5)], texts
-
-
-ANGLE_AXES: dict[str, Callable[[View, int], tuple[str, list[float], list[str]]]] = {
-    "torus": _torus_axis,
-    "klein-bottle": _klein_axis,
-}
-"""The spaces whose chart is a plain rescaling of angles, by name."""
+    """Return the label of an axis of a torus or Klein bottle, and the places and texts of its ticks."""
+    if view.space.is_torus:
+        low = float(view.low[axis])
+        quarters = range(math.ceil(4 * low - 1e-9), math.floor(4 * low + 4 + 1e-9) + 1)
+        places, turns = [k / 4 - low for k in quarters], [k / 4 for k in quarters]
+        label = axis_label(view, axis)
+    else:  # the first column, theta, goes up: half a turn; phi starts a quarter before 0
+        places = [k / 4 for k in range(5)]
+        turns = [k / 4 - 0.25 for k in range(5)] if axis == 0 else [k / 8 for k in range(5)]
+        label = axis_label(view, 1 - axis)
+    return label, places, [angle_text(t, view.space.unit) for t in turns]
 
 
 def angle_text(turns: float, unit: str | None) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -60,10 +60,11 @@ def density_on_grid(
     if part is None:
         return density_at(density, points, measure).reshape(shape)
     half = _half_pixels(part[1], pixel or float(x[1] - x[0]))
+    sums = _round_sums
     if density.space.is_round:
         points = off_cones(points)
-        return _averaged(density, part, points, measure, half, _round_sums).reshape(shape)
-    sums = lambda wide, _: _flat_sums(wide, x, y).reshape(-1)  # noqa: E731
+    else:
+        sums = lambda wide, _: _flat_sums(wide, x, y).reshape(-1)  # noqa: E731
     return _averaged(density, part, points, measure, half, sums).reshape(shape)
 
 
@@ -283,12 +284,7 @@ def minor_places(shade: Shade) -> list[float]:
     """Return places of ticks without texts: 2 to 9 times the powers of ten of a logarithmic scale."""
     if not shade.log:
         return []
-    values = [m * 10.0**k for k in _decades(shade) for m in range(2, 10)]
-    return [
-        float(shade.places(np.array(v)))
-        for v in values
-        if shade.low <= v <= shade.high * (1 + 1e-9)
-    ]
+    return [float(shade.places(np.array(v))) for v in _within(shade, range(2, 10))]
 
 
 def short_number(value: float, digits: int = 3) -> str:
@@ -306,18 +302,16 @@ def short_number(value: float, digits: int = 3) -> str:
 
 
 def _log_ticks(shade: Shade) -> list[Tick]:
-    within = [10.0**k for k in _decades(shade) if shade.low <= 10.0**k <= shade.high * (1 + 1e-9)]
-    factors = (1,) if len(within) > 2 else (1, 2, 5)
-    values = [m * 10.0**k for k in _decades(shade) for m in factors]
-    return [
-        Tick(float(shade.places(np.array(v))), short_number(v))
-        for v in values
-        if shade.low <= v <= shade.high * (1 + 1e-9)
-    ]
+    factors = (1,) if len(_within(shade, (1,))) > 2 else (1, 2, 5)
+    values = _within(shade, factors)
+    return [Tick(float(shade.places(np.array(v))), short_number(v)) for v in values]
 
 
-def _decades(shade: Shade) -> range:
-    return range(math.floor(math.log10(shade.low)), math.floor(math.log10(shade.high)) + 1)
+def _within(shade: Shade, factors: Iterable[int]) -> list[float]:
+    """Return these multiples of the powers of ten that are on a scale."""
+    low, high = (math.floor(math.log10(v)) for v in (shade.low, shade.high))
+    values = [m * 10.0**k for k in range(low, high + 1) for m in factors]
+    return [v for v in values if shade.low <= v <= shade.high * (1 + 1e-9)]
 
 
 def _power(shade: Shade) -> int:

@@ -88,24 +88,11 @@ class Colouring:
 
 
 class Panel(NamedTuple):
-    """How the axes of a panel are drawn.
-
-    - `alone`: Whether they are the only ones of the picture, with room around them.
-    - `labelled`: Whether the left side has texts.
-    - `light`: Whether the ground is light, without a density.
-    """
+    """Whether a panel's axes are alone in the picture, have texts at the left, are without density."""
 
     alone: bool = True
     labelled: bool = True
     light: bool = False
-
-
-class Words(NamedTuple):
-    """What is said of a picture: its caption, the notes in it, and whether there are dots."""
-
-    caption: str
-    notes: Sequence[str]
-    dots: bool
 
 
 class Ground(ABC):
@@ -155,8 +142,10 @@ class Ground(ABC):
         """Return the caption of points on two grounds."""
 
     @abstractmethod
-    def write_on_screen(self, frame: Frame, sheet: Sheet, title: str, words: Words) -> None:
-        """Write the title and what the signs mean on a picture for a screen."""
+    def write_on_screen(
+        self, frame: Frame, sheet: Sheet, title: str, caption: str, notes: Sequence[str], dots: bool
+    ) -> None:
+        """Write the title, and the caption or a legend with notes, on a picture for a screen."""
 
     def dot_scale(self, sheet: Sheet, side: float) -> float:
         """Return what to multiply the area of dots by, on axes `side` inches wide."""
@@ -197,8 +186,7 @@ def draw_density(
     shade_bar(image, frame, sheet, shade, label)
     title = f"Density on the {space_title(ground.space)}"
     if not sheet.printed:
-        words = Words(caption, notes, places is not None)
-        ground.write_on_screen(frame, sheet, title, words)
+        ground.write_on_screen(frame, sheet, title, caption, notes, places is not None)
     return Picture(frame.figure, sheet, title, caption)
 
 
@@ -217,7 +205,8 @@ def draw_samples(
     places = {n: ground.places(points) for n, points in panels.items() if points is not None}
     count = min([settings.samples or MAX_DOTS, *(len(own) for own in places.values() if len(own))])
     colouring = ground.colouring(density, settings) if data is None else None
-    words = ground.samples_caption([] if colouring is None else [_without_bar(colouring.reason)])
+    bar = "from the least (dark) to the largest (light) density"
+    words = ground.samples_caption([] if colouring is None else [f"{colouring.reason}, {bar}"])
     room, stacked = ground.panels_room(sheet)
     room = room.with_words(words, sheet)
     figure, both, side = two_panels(sheet, room, ground.aspect, stacked=stacked)
@@ -230,20 +219,15 @@ def draw_samples(
             draw_dots(axes, places[name], 0.5, limit=count, fill=DOT, scale=scale)
         panel = Panel(False, stacked or axes is both[0], points is not None)
         ground.draw_axes(axes, sheet, side, panel)
-        head = "density" if points is None else _head(name, min(count, len(places[name])), points)
+        head = "density"
+        if points is not None:
+            shown = min(count, len(places[name]))
+            head = f"{f'{shown} of ' if shown < len(points) else ''}{len(points)} {name}"
         axes.set_title(head, fontsize=sheet.text, pad=ground.title_gap * sheet.text)
     if not sheet.printed:
         write_caption(figure, words, sheet)
     first = "Density" if data is None else "Data"
     return Picture(figure, sheet, f"{first} and samples on the {space_title(ground.space)}", words)
-
-
-def _without_bar(reason: str) -> str:
-    return f"{reason}, from the least (dark) to the largest (light) density"
-
-
-def _head(name: str, shown: int, points: Tensor) -> str:
-    return f"{shown} of {len(points)} {name}" if shown < len(points) else f"{len(points)} {name}"
 
 
 NARROW = 70 / 25.4

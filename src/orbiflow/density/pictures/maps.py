@@ -23,7 +23,6 @@ from orbiflow.density.pictures.ground import (
     Ground,
     Panel,
     Room,
-    Words,
     draw_density,
     draw_samples,
     room_for_bar_below,
@@ -89,7 +88,7 @@ def map_picture(
     settings = settings or PlotSettings()
     if about is None:
         about = torch.empty(0, 2) if samples is None else samples
-    ground = Map(density.space, _projection(density.space, about, settings), coastlines)
+    ground = _map_about(density.space, about, settings, coastlines)
     lines = region_lines(density, settings)
     return draw_density(ground, density, settings, dots=samples, regions=lines, sheet=sheet)
 
@@ -103,27 +102,21 @@ def map_samples_picture(
     coastlines: Sequence[ArrayLike] = (),
     sheet: Sheet | None = None,
 ) -> Picture:
-    """Draw data and samples on two maps; without data, the density and samples.
+    """Draw data (N, 2) and samples (M, 2) on two maps; without data, the density and samples.
 
-    Args:
-        density: A density on the sphere or the projective plane.
-        data: Chart points (N, 2).
-        samples: Chart points (M, 2).
-        settings: How it is drawn.
-        coastlines: Lines (M, 2) of latitude and longitude.
-        sheet: The sheet. Default: that of the settings.
-
-    Raises:
-        OrbiflowError: As `map_picture`.
+    Points are of the chart; all else is as for `map_picture`.
     """
     settings = settings or PlotSettings()
-    projection = _projection(density.space, samples if data is None else data, settings)
-    ground = Map(density.space, projection, coastlines)
+    about = samples if data is None else data
+    ground = _map_about(density.space, about, settings, coastlines)
     return draw_samples(ground, density, settings, data, samples, sheet=sheet)
 
 
-def _projection(space: Space, about: Tensor, settings: PlotSettings) -> Projection:
-    return chosen_map(space, chart_points(space, about), settings, settings.names)
+def _map_about(
+    space: Space, about: Tensor, settings: PlotSettings, coastlines: Sequence[ArrayLike]
+) -> Map:
+    chosen = chosen_map(space, chart_points(space, about), settings, settings.names)
+    return Map(space, chosen, coastlines)
 
 
 class Map(Ground):
@@ -194,20 +187,23 @@ class Map(Ground):
         )
 
     def caption(self, notes: Sequence[str], dots: tuple[int, int] | None) -> str:
-        return caption(
+        return map_caption(
             self.space, self.projection, notes, dots=dots, coastlines=bool(self.coastlines)
         )
 
     def samples_caption(self, notes: Sequence[str]) -> str:
         return self.caption(notes or ["dots are points"], None)
 
-    def write_on_screen(self, frame: Frame, sheet: Sheet, title: str, words: Words) -> None:
+    def write_on_screen(
+        self, frame: Frame, sheet: Sheet, title: str, caption: str, notes: Sequence[str], dots: bool
+    ) -> None:
+        del notes, dots  # the caption has them
         top = 1 - 1.6 * sheet.em / frame.figure.get_size_inches()[1]
         frame.figure.text(
             0.5, top, f"{title}: {subtitle(self.projection)}", ha="center", va="center",
             fontsize=1.15 * sheet.text,
         )  # fmt: skip
-        write_caption(frame.figure, words.caption, sheet)
+        write_caption(frame.figure, caption, sheet)
 
 
 class Pixels(NamedTuple):
@@ -238,6 +234,7 @@ class Pixels(NamedTuple):
 def pixels_of(projection: Projection, count: int | None = None) -> Pixels:
     """Return about `count` pixels of a map, by default `_PIXELS`."""
     from matplotlib.path import Path
+    from scipy.ndimage import binary_dilation
 
     ring = projection.outline()
     low, high = ring.min(axis=0), ring.max(axis=0)
@@ -248,22 +245,12 @@ def pixels_of(projection: Projection, count: int | None = None) -> Pixels:
     places = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
     within = Path(ring).contains_points(places)
     shown = within.reshape(counts[::-1])
-    for _ in range(_MARGIN):
-        shown = _grown(shown)
+    shown = binary_dilation(shown, iterations=_MARGIN)
     kept = shown.ravel()
     latlon = projection.inverse(places[kept])
     last = first + step * counts
     extent = (float(first[0]), float(last[0]), float(first[1]), float(last[1]))
     return Pixels(shown, latlon, within[kept], _areas(projection, latlon), step, extent)
-
-
-def _grown(shown: Array) -> Array:
-    wider = shown.copy()
-    wider[1:] |= shown[:-1]
-    wider[:-1] |= shown[1:]
-    wider[:, 1:] |= shown[:, :-1]
-    wider[:, :-1] |= shown[:, 1:]
-    return wider
 
 
 def _areas(projection: Projection, latlon: Array) -> Array:
@@ -320,12 +307,18 @@ def chosen_map(
         raise OrbiflowError(f"maps are of the sphere and the projective plane, not of {space!r}")
     settings = settings or PlotSettings()
     projection, radius = settings.projection, settings.radius
-    middle = None if settings.center is None else _checked_center(settings.center)
+    middle = settings.center
+    if middle is not None and not (len(middle) in (1, 2) and all(map(math.isfinite, middle))):
+        raise SettingError(
+            "{center} must be a latitude and a longitude, or a longitude, in degrees, such as 40,140, "
+            f"got {list(middle)}"
+        )
     axial = space.name == "projective-plane"
     cap = None if axial else smallest_cap(cast(RoundSpace, space).vectors(points))
     if projection == "auto":
         if axial:
-            projection = "schmidt" if _name_a_net(names) and middle is None else "lambert"
+            a_net = bool(names and names[0].strip().lower().startswith(_NET_WORDS))
+            projection = "schmidt" if a_net and middle is None else "lambert"
         elif middle is not None:
             projection = "lambert" if len(middle) == 2 and middle[0] else "equal-earth"
         else:
@@ -339,7 +332,13 @@ def chosen_map(
                 "middle: give no centre"
             )
         return NETS[projection]((90.0, 0.0), float(radius or 90.0), flipped=True)
-    return _centred(CENTRED[projection], middle, radius, axial, cap)
+    if middle is None:
+        middle, reach = cap or ((90.0, 0.0), 90.0)
+    else:
+        reach = 90.0
+        if len(middle) == 1:
+            middle = (90.0 if axial else 0.0, middle[0])
+    return CENTRED[projection]((middle[0], middle[1]), float(radius or reach))
 
 
 def smallest_cap(vectors: Array) -> tuple[tuple[float, float], float] | None:
@@ -370,38 +369,8 @@ def _world(
         raise SettingError(
             f"a map of the whole sphere ({kind.name}) has no radius: leave {{radius}} out"
         )
-    middle = middle or (0.0,)
-    return kind(middle if len(middle) == 2 else (0.0, middle[0]))  # pyright: ignore[reportArgumentType]
-
-
-def _centred(
-    kind: type[Azimuthal],
-    middle: tuple[float, ...] | None,
-    radius: float | None,
-    axial: bool,
-    cap: tuple[tuple[float, float], float] | None,
-) -> Projection:
-    if middle is None:
-        middle, reach = cap or ((90.0, 0.0), 90.0)
-    else:
-        reach = 90.0
-        if len(middle) == 1:
-            middle = (90.0 if axial else 0.0, middle[0])
-    return kind((middle[0], middle[1]), float(radius or reach))
-
-
-def _checked_center(center: Sequence[float]) -> tuple[float, ...]:
-    values = tuple(float(value) for value in center)
-    if len(values) not in (1, 2) or not all(map(math.isfinite, values)):
-        raise SettingError(
-            "{center} must be a latitude and a longitude, or a longitude, in degrees, such as 40,140, "
-            f"got {list(center)}"
-        )
-    return values
-
-
-def _name_a_net(names: Sequence[str] | None) -> bool:
-    return bool(names) and names is not None and names[0].strip().lower().startswith(_NET_WORDS)
+    lat, lon = middle if middle and len(middle) == 2 else (0.0, *(middle or (0.0,)))
+    return kind((lat, lon))
 
 
 def subtitle(projection: Projection) -> str:
@@ -411,7 +380,7 @@ def subtitle(projection: Projection) -> str:
     return projection.title
 
 
-def caption(
+def map_caption(
     space: Space,
     projection: Projection,
     notes: Sequence[str] = (),
@@ -423,7 +392,7 @@ def caption(
 
     >>> from orbiflow.density import Sphere
     >>> from orbiflow.density.pictures.projections import Mollweide
-    >>> caption(Sphere(), Mollweide((0.0, 150.0)))
+    >>> map_caption(Sphere(), Mollweide((0.0, 150.0)))
     'The sphere in the Mollweide projection (equal-area), about 150° E. Lines every 30°.'
     """
     parts = [_description(space, projection)]

@@ -12,7 +12,6 @@ from torch import Tensor
 from orbiflow.arrays import Array
 from orbiflow.density.models import Density, midpoints
 from orbiflow.density.pictures.axes import (
-    ANGLE_AXES,
     INK,
     angle_axis,
     degrees_text,
@@ -30,7 +29,6 @@ from orbiflow.density.pictures.ground import (
     Ground,
     Panel,
     Room,
-    Words,
     caption_lines,
     draw_density,
     draw_samples,
@@ -103,18 +101,10 @@ def samples_picture(
     *,
     sheet: Sheet | None = None,
 ) -> Picture:
-    """Draw data and samples on two squares; without data, the density and samples.
+    """Draw data (N, 2) and samples (M, 2) on two squares; without data, the density and samples.
 
-    Args:
-        density: A density on a two-dimensional space.
-        data: Chart points (N, 2), such as `space.to_chart(table)`.
-        samples: Chart points (M, 2), such as `density.sample((M,))`.
-        settings: How it is drawn.
-        sheet: The sheet. Default: that of the settings.
-
-    Raises:
-        OrbiflowError: If the space has another dimension, points have another shape, or names or a
-            centre do not fit.
+    Points are of the chart, such as `space.to_chart(table)` and `density.sample((M,))`; all else is as
+    for `density_picture`.
     """
     settings = settings or PlotSettings()
     ground = Square(density.space, settings)
@@ -207,13 +197,16 @@ class Square(Ground):
     def samples_caption(self, notes: Sequence[str]) -> str:
         return self.caption(notes, (0, 0))
 
-    def write_on_screen(self, frame: Frame, sheet: Sheet, title: str, words: Words) -> None:
+    def write_on_screen(
+        self, frame: Frame, sheet: Sheet, title: str, caption: str, notes: Sequence[str], dots: bool
+    ) -> None:
+        del caption  # the legend says it
         frame.axes.set_title(title, fontsize=1.15 * sheet.text, pad=14)
-        self._draw_legend(frame.figure, sheet, words)
+        self._draw_legend(frame.figure, sheet, _sentences(self._notes(notes, dots)), dots)
 
     @property
     def _has_ticks(self) -> bool:
-        return self.space.name in ANGLE_AXES
+        return self.space.unit is not None
 
     @property
     def _orders(self) -> list[int]:
@@ -258,7 +251,7 @@ class Square(Ground):
             fontsize=sheet.small, color=INK,
         )  # fmt: skip
 
-    def _draw_legend(self, figure: Figure, sheet: Sheet, words: Words) -> None:
+    def _draw_legend(self, figure: Figure, sheet: Sheet, notes: str, dots: bool) -> None:
         """Draw a legend of edges, cone points and dots above the notes, in the lower left corner."""
         from matplotlib.lines import Line2D
 
@@ -274,10 +267,9 @@ class Square(Ground):
             style |= {"marker": np.concatenate([sign, sign[:1]]), "markersize": size}
             text = f"cone point of a {TURNS[order]} turn: no flow moves it"
             entries.append(Line2D([], [], color=CENTER_COLOURS[order], label=text, **style))
-        if words.dots:
+        if dots:
             style = {"markerfacecolor": "#ffffff", "markeredgecolor": INK, "linestyle": "none"}
             entries.append(Line2D([], [], marker="o", label="points", **style))
-        notes = _sentences(self._notes(words.notes, words.dots))
         write_caption(figure, notes, sheet)
         lines = len(caption_lines(notes, sheet))
         up = (0.6 + 1.25 * lines) * sheet.em / figure.get_size_inches()[1]

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import NamedTuple, cast
+from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -31,11 +31,7 @@ MAX_RESOLUTION = 250
 
 
 class Mesh(NamedTuple):
-    """Triangles of the canonical square.
-
-    - `points`: Chart points (N, 2), float64, the square's edges included.
-    - `triangles`: Indices (M, 3) into them, int64.
-    """
+    """Chart points (N, 2) of the square, edges included, and triangles (M, 3), numbers of points."""
 
     points: Tensor
     triangles: Array
@@ -100,27 +96,17 @@ def immersion(space: Space) -> Callable[[Tensor], Array]:
     Raises:
         OrbiflowError: If the space has no surface.
     """
-    if space.name not in _IMMERSIONS or space.dim != 2:
+    if space.dim != 2:
         raise OrbiflowError(f"only spaces of two dimensions have a surface, not {space!r}")
-    return _IMMERSIONS[space.name](space)
+    if isinstance(space, RoundSpace):
+        surface = vector_immersion(space)
+        return lambda points: surface(space.vectors(points))
+    return torus_ring if space.is_torus else klein_figure_eight
 
 
 def vector_immersion(space: Space) -> Callable[[Array], Array]:
     """Return the surface of a round space as a function of unit vectors (N, 3) in the data's frame."""
     return boy_surface if space.name == "projective-plane" else np.asarray
-
-
-def _round_immersion(space: Space) -> Callable[[Tensor], Array]:
-    vectors, surface = cast(RoundSpace, space).vectors, vector_immersion(space)
-    return lambda points: surface(vectors(points))
-
-
-_IMMERSIONS: dict[str, Callable[[Space], Callable[[Tensor], Array]]] = {
-    "torus": lambda _: torus_ring,
-    "klein-bottle": lambda _: klein_figure_eight,
-    "sphere": _round_immersion,
-    "projective-plane": _round_immersion,
-}
 
 
 def mesh(space: Space, resolution: int) -> Mesh:
@@ -237,7 +223,14 @@ def viewpoint(space: Space, place: Tensor) -> Viewpoint:
     radius = float(np.linalg.norm(cloud - center, axis=1).max())
     spot = (surface(place[None])[0] - center) / radius
     normal = normals(space, place[None])[0]
-    angles = _candidates(space, spot)
+    if space.name == "sphere":
+        pitch = np.clip([np.arctan2(spot[2], np.hypot(spot[0], spot[1]))], -0.9, 0.9)
+    elif space.is_round:
+        pitch = np.linspace(-1.2, 1.2, 17)
+    else:  # rings are recognised from above or below
+        pitch = np.concatenate([s * np.linspace(0.4, 1.2, 9) for s in (1, -1)])
+    yaw = np.arctan2(spot[1], spot[0]) + np.linspace(0, 2 * np.pi, 36, endpoint=False)
+    angles = np.stack(np.meshgrid(yaw, pitch, indexing="ij"), axis=-1).reshape(-1, 2)
     toward = _directions(angles)
     sight = EYE * toward - spot
     sight /= np.linalg.norm(sight, axis=1, keepdims=True)
@@ -254,30 +247,7 @@ def viewpoint(space: Space, place: Tensor) -> Viewpoint:
     return Viewpoint(*angles[best].tolist(), cut=50 * (1 - depth) if hidden[best] else 0.0)
 
 
-def _candidates(space: Space, spot: Array) -> Array:
-    """Return angles (M, 2) all round, at heights from which the surface is recognised."""
-    yaw = np.arctan2(spot[1], spot[0]) + np.linspace(0, 2 * np.pi, 36, endpoint=False)
-    pitch = _PITCHES[space.name](spot)
-    return np.stack(np.meshgrid(yaw, pitch, indexing="ij"), axis=-1).reshape(-1, 2)
-
-
-_FROM_ABOVE = np.concatenate([s * np.linspace(0.4, 1.2, 9) for s in (1, -1)])
-
-
-def _own_pitch(spot: Array) -> Array:
-    own = float(np.arctan2(spot[2], np.hypot(spot[0], spot[1])))
-    return np.clip([own], -0.9, 0.9)
-
-
-_PITCHES: dict[str, Callable[[Array], Array]] = {
-    "torus": lambda _: _FROM_ABOVE,
-    "klein-bottle": lambda _: _FROM_ABOVE,
-    "sphere": _own_pitch,
-    "projective-plane": lambda _: np.linspace(-1.2, 1.2, 17),
-}
-"""Pitches that are tried for a place on the surface, by the name of the space."""
-
-
 def _directions(angles: Array) -> Array:
+    """Return unit vectors (M, 3) of yaws and pitches (M, 2)."""
     yaw, pitch = angles.T
     return np.stack([np.cos(pitch) * np.cos(yaw), np.cos(pitch) * np.sin(yaw), np.sin(pitch)], -1)

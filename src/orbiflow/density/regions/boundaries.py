@@ -134,7 +134,7 @@ def outlines(
         np.concatenate([window.from_chart(levels.points), peaks]),
         np.concatenate([levels.log_probs, function(peaks)]),
     )
-    grid = LevelGrid.refined(
+    grid = LevelGrid(
         function, window.low, window.high, window.cells, thresholds, seeds, DOUBLINGS, budget
     )
     spent = grid.evaluations + len(peaks)
@@ -145,10 +145,11 @@ def outlines(
         told(min(0.9, spent / budget), "drawing outlines")
         shape, off = filled(grid.values, grid.low, grid.step, region.log_prob, function)
         left = (budget - spent) // (len(regions) - number)
-        shape, more, missed = with_islands(shape, grid, region.log_prob, seeds, function, left)
+        shape, more, missed = with_islands(shape, grid, region.log_prob, left)
         spent += more
         shape = _polygons(shape, float(grid.step.min()), MAX_SIDE if window.on_globe else np.inf)
-        inside = _share_inside(shape, fresh)
+        shapely.prepare(shape)
+        inside = float(np.mean(shapely.intersects_xy(shape, fresh[:, 0], fresh[:, 1])))
         error = float(np.sqrt(max(inside * (1 - inside), 1 / CHECKED) / CHECKED))
         found.append(
             Outline(
@@ -182,15 +183,6 @@ def _polygons(shape: shapely.Geometry, step: float, longest: float) -> shapely.M
     if longest < np.inf:
         kept = [shapely.segmentize(p, longest) for p in kept]
     return shapely.MultiPolygon(kept)
-
-
-def _share_inside(shape: shapely.MultiPolygon, points: Array) -> float:
-    """Return the share of points (N, 2) in the polygons."""
-    if shape.is_empty:
-        return 0.0
-    tree = shapely.STRtree(list(shape.geoms))
-    rows, _ = tree.query(shapely.points(points), predicate="intersects")
-    return len(np.unique(rows)) / len(points)
 
 
 def _notes(region: DensityRegion, inside: float, error: float, missed: int) -> tuple[str, ...]:

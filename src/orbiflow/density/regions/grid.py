@@ -27,48 +27,16 @@ class Seeds:
     values: Array
 
 
-@dataclass(frozen=True, eq=False)
 class LevelGrid:
     """Values (n + 1, m + 1) at the nodes of n x m even cells between `low` and `high`.
 
-    Values are exact at both ends of every side of a cell whose ends are on different sides of a level;
-    elsewhere they are interpolated from coarser cells.
+    They are evaluated everywhere on `cells`, which are then halved, `doublings` times or until `budget`
+    evaluations, where a level is crossed. Values are exact at both ends of every side of a cell whose
+    ends are on different sides of one of the levels (T,); elsewhere they are interpolated from coarser
+    cells.
 
-    - `low`, `step`: The lower corner, and the sides of a cell.
-    - `missed`: For each cell and level (n, m, T) how many seeds are on the other side of the level than
-      all nodes of the cell.
     - `evaluations`: Number of evaluations of the function.
     """
-
-    low: Array
-    step: Array
-    values: Array
-    missed: NDArray[np.int64]
-    evaluations: int
-
-    @classmethod
-    def refined(
-        cls,
-        function: Function,
-        low: Array,
-        high: Array,
-        cells: tuple[int, int],
-        levels: Array,
-        seeds: Seeds,
-        doublings: int,
-        budget: int,
-    ) -> LevelGrid:
-        """Evaluate everywhere on `cells`, then halve them where a level is crossed."""
-        maker = _Maker(function, low, high, cells, levels, seeds)
-        for _ in range(doublings):
-            if maker.evaluations >= budget:
-                break
-            maker.double()
-        return cls(low, maker.step, maker.values, maker.missed(), maker.evaluations)
-
-
-class _Maker:
-    """A grid that is being refined."""
 
     def __init__(
         self,
@@ -78,6 +46,8 @@ class _Maker:
         cells: tuple[int, int],
         levels: Array,
         seeds: Seeds,
+        doublings: int,
+        budget: int,
     ) -> None:
         self.function, self.low, self.high = function, low, high
         self.levels, self.seeds = levels, seeds
@@ -85,33 +55,40 @@ class _Maker:
         self.known = np.zeros(self.values.shape, dtype=bool)
         self.evaluations = 0
         self._evaluate(~self.known)
+        for _ in range(doublings):
+            if self.evaluations >= budget:
+                break
+            self._double()
 
     @property
     def step(self) -> Array:
+        """The sides of a cell."""
         return (self.high - self.low) / (np.array(self.values.shape) - 1)
 
-    def double(self) -> None:
+    def _double(self) -> None:
         """Halve the cells, and evaluate around crossings and where seeds were missed."""
-        wanted = (self.missed() > 0).any(axis=2)
-        self.values, self.known = _doubled(self.values), _spread(self.known)
+        wanted = self._missed()
+        known = np.zeros(2 * np.array(self.known.shape) - 1, dtype=bool)
+        known[::2, ::2] = self.known
+        self.values, self.known = _doubled(self.values), known
         self._evaluate(_corners(np.repeat(np.repeat(wanted, 2, axis=0), 2, axis=1)))
         for _ in range(MAX_ROUNDS):
             if not self._evaluate(_corners(self._mixed())):
                 return
 
-    def missed(self) -> NDArray[np.int64]:
-        """Return for each cell and level (n, m, T) how many seeds are on the other side."""
-        shape = np.array(self.values.shape) - 1
-        cell = np.clip(
-            np.floor((self.seeds.points - self.low) / self.step).astype(int), 0, shape - 1
-        )
-        found = np.zeros((*shape, len(self.levels)), dtype=np.int64)
-        for k, level in enumerate(self.levels):
+    def cells_of(self, points: Array) -> NDArray[np.int64]:
+        """Return the cells (N, 2) that hold points (N, 2)."""
+        most = np.array(self.values.shape) - 2
+        return np.clip(np.floor((points - self.low) / self.step).astype(np.int64), 0, most)
+
+    def _missed(self) -> Flags:
+        """Return the cells (n, m) with a seed on the other side of a level than all their nodes."""
+        i, j = self.cells_of(self.seeds.points).T
+        found = np.zeros(np.array(self.values.shape) - 1, dtype=bool)
+        for level in self.levels:
             least, most = _extremes(self.values >= level)
-            above = self.seeds.values >= level
-            i, j = cell.T
-            lost = np.where(above, ~most[i, j], least[i, j])
-            np.add.at(found[:, :, k], (i[lost], j[lost]), 1)
+            lost = np.where(self.seeds.values >= level, ~most[i, j], least[i, j])
+            found[i[lost], j[lost]] = True
         return found
 
     def _mixed(self) -> Flags:
@@ -154,10 +131,4 @@ def _doubled(values: Array) -> Array:
     found[::2, ::2] = values
     found[1::2, ::2] = (values[1:] + values[:-1]) / 2
     found[:, 1::2] = (found[:, 2::2] + found[:, :-2:2]) / 2
-    return found
-
-
-def _spread(known: Flags) -> Flags:
-    found = np.zeros(2 * np.array(known.shape) - 1, dtype=bool)
-    found[::2, ::2] = known
     return found

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from skimage.measure import find_contours
 
 from orbiflow.arrays import Array
-from orbiflow.density.regions.grid import Function, LevelGrid, Seeds
+from orbiflow.density.regions.grid import Function, LevelGrid
 
 PARTS = 12
 """Parts into which each side of a cell is cut."""
@@ -24,29 +24,17 @@ BLOCK = 500
 
 
 def with_islands(
-    shape: shapely.Geometry,
-    grid: LevelGrid,
-    level: float,
-    seeds: Seeds,
-    function: Function,
-    budget: int,
+    shape: shapely.Geometry, grid: LevelGrid, level: float, budget: int
 ) -> tuple[shapely.Geometry, int, int]:
     """Draw a shape again in those of a grid's cells that have seeds on its wrong side.
 
-    Args:
-        shape: The shape that was drawn on the grid.
-        grid: The grid.
-        level: The level of the shape's boundary.
-        seeds: Points at which the function is known.
-        function: The function.
-        budget: Number of evaluations. Cells with the most seeds are first, and those beyond it are left
-            as they are.
+    Cells with the most seeds are first; those beyond the budget of evaluations are left as they are.
 
     Returns:
         The shape, the number of evaluations, and the number of cells left.
     """
     most = max(1, budget // (PARTS + 1) ** 2)
-    cells = _wrong(shape, grid, level, seeds)
+    cells = _wrong(shape, grid, level)
     left = max(0, len(cells) - most)
     done = np.zeros(np.array(grid.values.shape) - 1, dtype=bool)
     drawn: list[shapely.Geometry] = []
@@ -55,48 +43,41 @@ def with_islands(
         if not len(cells):
             break
         done[tuple(cells.T)] = True
-        blocks = _evaluated(grid, cells, function)
+        blocks, fine = _evaluated(grid, cells), grid.step / PARTS
         drawn += [
-            _drawn(grid, cell, block, level, function)
+            filled(block, grid.low + cell * grid.step, fine, level, grid.function)[0]
             for cell, block in zip(cells, blocks, strict=True)
         ]
         cells = _beside(cells, blocks, level, done)
     if not drawn:
         return shape, 0, left
-    boxes = shapely.union_all([_box(grid, cell) for cell in np.argwhere(done)])
+    lows = grid.low + np.argwhere(done) * grid.step
+    corners = np.concatenate([lows, lows + grid.step], axis=1).tolist()
+    boxes = shapely.union_all([shapely.box(*corner) for corner in corners])
     merged = shapely.union_all([shapely.difference(shape, boxes), *drawn])
     return merged, len(drawn) * (PARTS + 1) ** 2, left
 
 
-def _wrong(
-    shape: shapely.Geometry, grid: LevelGrid, level: float, seeds: Seeds
-) -> NDArray[np.int64]:
+def _wrong(shape: shapely.Geometry, grid: LevelGrid, level: float) -> NDArray[np.int64]:
     """Return cells (C, 2) with seeds on the wrong side, those with most first."""
     shapely.prepare(shape)
-    wrong = shapely.intersects_xy(shape, *seeds.points.T) != (seeds.values >= level)
-    most = np.array(grid.values.shape) - 2
-    at = np.clip(np.floor((seeds.points[wrong] - grid.low) / grid.step).astype(int), 0, most)
-    cells, counts = np.unique(at, axis=0, return_counts=True)
+    points, values = grid.seeds.points, grid.seeds.values
+    inside = np.asarray(shapely.intersects_xy(shape, points[:, 0], points[:, 1]))
+    wrong = inside != (values >= level)
+    cells, counts = np.unique(grid.cells_of(points[wrong]), axis=0, return_counts=True)
     return cells[np.argsort(-counts, kind="stable")]
 
 
-def _evaluated(grid: LevelGrid, cells: NDArray[np.int64], function: Function) -> Array:
+def _evaluated(grid: LevelGrid, cells: NDArray[np.int64]) -> Array:
     """Return values (C, P + 1, P + 1) in cells (C, 2)."""
     t = np.arange(PARTS + 1) / PARTS
     inside = np.stack(np.meshgrid(t, t, indexing="ij"), axis=-1)
     found: list[Array] = []
     for start in range(0, len(cells), BLOCK):
         at = cells[start : start + BLOCK, None, None] + inside
-        values = function((grid.low + at * grid.step).reshape(-1, 2))
+        values = grid.function((grid.low + at * grid.step).reshape(-1, 2))
         found.append(values.reshape(at.shape[:-1]))
     return np.concatenate(found)
-
-
-def _drawn(
-    grid: LevelGrid, cell: Array, block: Array, level: float, function: Function
-) -> shapely.Geometry:
-    low = grid.low + cell * grid.step
-    return filled(block, low, grid.step / PARTS, level, function)[0]
 
 
 def _beside(
@@ -118,12 +99,6 @@ def _beside(
         fits = (to >= 0).all(axis=1) & (to < done.shape).all(axis=1) & off
         found.append(to[fits][~done[tuple(to[fits].T)]])
     return np.unique(np.concatenate(found), axis=0)
-
-
-def _box(grid: LevelGrid, cell: Array) -> shapely.Geometry:
-    low: Array = grid.low + cell * grid.step
-    xmin, ymin, xmax, ymax = (float(c) for c in (*low, *(low + grid.step)))
-    return shapely.box(xmin, ymin, xmax, ymax)
 
 
 TOLERANCE = 1e-3
