@@ -304,9 +304,13 @@ def require_one_space(spaces: Mapping[str, Space]) -> None:
     (first, one), *others = spaces.items()
     for name, other in others:
         if (one.name, one.dim) != (other.name, other.dim):
+            titles = [
+                f"torus of {space.dim} angles" if space.is_torus else space.name
+                for space in (one, other)
+            ]
             raise OrbiflowError(
-                f"{first} is on the {_title(one)}, {name} on the {_title(other)}: their densities "
-                "have no common measure; compare models of one space"
+                f"{first} is on the {titles[0]}, {name} on the {titles[1]}: their densities have no "
+                "common measure; compare models of one space"
             )
         if one.unit != other.unit:
             raise OrbiflowError(
@@ -318,10 +322,7 @@ def require_one_space(spaces: Mapping[str, Space]) -> None:
 def scores_of(
     density: Density, data: ArrayLike, told: Callable[[float], None] = lambda _: None
 ) -> Array:
-    """Return log densities (N,) at data (N, k), in natural measure.
-
-    `told` is called with the share of the rows that are done.
-    """
+    """Return log densities (N,) at data (N, k) in natural measure; `told` gets the share done."""
     points = density.space.to_chart(data)
     found: list[Sequence[float] | np.ndarray] = []
     with torch.no_grad():
@@ -329,7 +330,3 @@ def scores_of(
             told(start / len(points))
             found.append(density.log_prob(points[start : start + BLOCK], measure="natural").numpy())
     return np.concatenate(found) if found else np.zeros(0)
-
-
-def _title(space: Space) -> str:
-    return f"torus of {space.dim} angles" if space.is_torus else space.name

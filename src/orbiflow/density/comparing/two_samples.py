@@ -77,7 +77,8 @@ def mmd_test(
     labels = _permuted(first, groups, permutations, rng)
     index = torch.as_tensor(groups.index)
     apart = index[:, None] != index[None, :]
-    dots = _dots(space, points)
+    images = space.features(points)
+    dots = [images[0] @ image.mT for image in images]  # their exponentials are kernels
     top = float(dots[0].diagonal().mean())
     scales = _scales(top - dots[0], apart, rng)
     counts = _difference(apart.double(), labels, None)
@@ -109,12 +110,6 @@ def chosen_rows(first: Array, groups: Groups, most: int, seed: int = 0) -> Array
     return np.sort(by_group[: total[whole - 1] if whole else most])
 
 
-def _dots(space: Space, points: Tensor) -> list[Tensor]:
-    """Return for each image the table (N, N) whose exponentials are kernels."""
-    images = space.features(points)
-    return [images[0] @ image.mT for image in images]
-
-
 def _scales(distances: Tensor, apart: Tensor, rng: np.random.Generator) -> list[float]:
     """Return quantiles of half the squared distances of pairs that are not of one group."""
     pairs = torch.as_tensor(rng.integers(len(distances), size=(2, PAIRS)))
@@ -134,9 +129,8 @@ def _permuted(first: Array, groups: Groups, permutations: int, rng: np.random.Ge
         side = own.copy()
         side[single] = own[rng.permutation(single)]
         turned = both & (rng.random(groups.count) < 0.5)
-        row = side[groups.index]
-        shared = both[groups.index]
-        found[:, k] = np.where(shared, first ^ turned[groups.index], row)
+        of_row = groups.index
+        found[:, k] = np.where(both[of_row], first ^ turned[of_row], side[of_row])
     return torch.as_tensor(found)
 
 

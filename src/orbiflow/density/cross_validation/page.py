@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import html
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -79,7 +79,9 @@ def _signed(value: float, sign: str = "-") -> str:
     return f"{value:{sign}.4f}".replace("-", "\N{MINUS SIGN}")
 
 
-def _scores(found: HeldOut, made: ModelComparison | None, folds: FoldMeans) -> str:
+def _scores(
+    found: HeldOut, made: ModelComparison | None, folds: FoldMeans
+) -> dict[str, Any] | None:
     """A picture of the mean log densities."""
     names = list(found.settings)
     known = {score.name: score for score in made.scores} if made else {}
@@ -92,10 +94,12 @@ def _scores(found: HeldOut, made: ModelComparison | None, folds: FoldMeans) -> s
         for k, name in enumerate(names)
         if len(names) == 2 or name != UNIFORM
     ]
-    return strips(lines, "mean log density of a fold, nats") if folds else ""
+    return strips(lines, "mean log density of a fold, nats") if folds else None
 
 
-def _differences(found: HeldOut, made: ModelComparison | None, folds: FoldMeans) -> str:
+def _differences(
+    found: HeldOut, made: ModelComparison | None, folds: FoldMeans
+) -> dict[str, Any] | None:
     """A picture of the differences between settings."""
     names = list(found.settings)
     lines = [
@@ -110,7 +114,7 @@ def _differences(found: HeldOut, made: ModelComparison | None, folds: FoldMeans)
         if len(names) == 2 or UNIFORM not in (d.first, d.second)  # far off, and in the table
     ]
     label = "difference of a fold, nats a row"
-    return strips(lines, label, zero=True) if folds and lines else ""
+    return strips(lines, label, zero=True) if folds and lines else None
 
 
 WIDTH, NAMES, MARGIN, STEP = 720, 300, 24, 34
@@ -119,17 +123,10 @@ WIDTH, NAMES, MARGIN, STEP = 720, 300, 24, 34
 LETTER = 7.6
 """Largest width of a letter of a name, in pixels."""
 
-Placed = Callable[[float], float]
-"""Returns the place of a figure, in pixels from the left."""
-
 
 @dataclass(frozen=True)
 class Strip:
-    """A strip of the picture.
-
-    - `dots`: The figures of the folds.
-    - `mean`, `low`, `high`: The mean of all rows, with an interval.
-    """
+    """A strip of the picture: dots for the folds, the mean of all rows and its interval."""
 
     name: str
     dots: Sequence[float]
@@ -138,61 +135,44 @@ class Strip:
     high: float | None = None
 
 
-def strips(lines: Sequence[Strip], label: str, *, zero: bool = False) -> str:
-    """Return the picture, "" if there is nothing to draw."""
+def strips(lines: Sequence[Strip], label: str, *, zero: bool = False) -> dict[str, Any] | None:
+    """Return what the template draws and where, in pixels; None if there is nothing to draw."""
     values = [v for one in lines for v in (*one.dots, one.mean, one.low, one.high) if v is not None]
     values = [v for v in values if math.isfinite(v)] + ([0.0] if zero else [])
     if not values:
-        return ""
+        return None
     ticks = _ticks(min(values), max(values))
     low, high = min(ticks[0], *values), max(ticks[-1], *values)
-
     names = min(NAMES, 30 + LETTER * max(len(one.name) for one in lines))
+    room = int((names - 20) / LETTER)
+    decimals = max(0, -math.floor(math.log10(ticks[1] - ticks[0]) + 1e-9))
 
-    def place(value: float) -> float:
+    def place(value: float | None) -> float | None:
+        if value is None:
+            return None
         return names + (WIDTH - names - MARGIN) * (value - low) / (high - low)
 
-    foot = STEP * len(lines) + 8
-    parts = [
-        f'<line class="grid" x1="{place(t):.1f}" x2="{place(t):.1f}" y1="4" y2="{foot}"/>'
-        f'<text class="tick" x="{place(t):.1f}" y="{foot + 17}">{_number(t, ticks)}</text>'
-        for t in ticks
-    ]
-    if zero:
-        parts.append(
-            f'<line class="zero" x1="{place(0):.1f}" x2="{place(0):.1f}" y1="4" y2="{foot}"/>'
-        )
-    parts += [_strip(one, names, 4 + STEP * (k + 0.5), place) for k, one in enumerate(lines)]
-    middle = (names + WIDTH - MARGIN) / 2
-    parts.append(f'<text class="tick" x="{middle:.0f}" y="{foot + 38}">{html.escape(label)}</text>')
-    said = html.escape(f"{label}: {', '.join(one.name for one in lines)}")
-    return (
-        f'<svg viewBox="0 0 {WIDTH} {foot + 46}" role="img" aria-label="{said}">\n'
-        + "\n".join(parts)
-        + "\n</svg>\n"
-    )
-
-
-def _strip(one: Strip, names: float, y: float, place: Placed) -> str:
-    room = int((names - 20) / LETTER)
-    name = one.name if len(one.name) <= room else one.name[: room - 1] + "…"
-    parts = [f'<text class="name" x="{names - 14:.1f}" y="{y + 5:.1f}">{html.escape(name)}</text>']
-    if one.low is not None and one.high is not None:
-        parts.append(
-            f'<line class="interval" x1="{place(one.low):.1f}" x2="{place(one.high):.1f}" '
-            f'y1="{y:.1f}" y2="{y:.1f}"/>'
-        )
-    parts += [
-        f'<circle class="dot" cx="{place(dot):.1f}" cy="{y:.1f}" r="4"/>'
-        for dot in one.dots
-        if math.isfinite(dot)
-    ]
-    if one.mean is not None:
-        parts.append(
-            f'<line class="mean" x1="{place(one.mean):.1f}" x2="{place(one.mean):.1f}" '
-            f'y1="{y - 11:.1f}" y2="{y + 11:.1f}"/>'
-        )
-    return "".join(parts)
+    return {
+        "width": WIDTH,
+        "names": names,
+        "middle": (names + WIDTH - MARGIN) / 2,
+        "foot": STEP * len(lines) + 8,
+        "label": label,
+        "said": f"{label}: {', '.join(one.name for one in lines)}",
+        "ticks": [(place(t), f"{t:.{decimals}f}".replace("-", "\N{MINUS SIGN}")) for t in ticks],
+        "zero": place(0.0) if zero else None,
+        "strips": [
+            {
+                "name": one.name if len(one.name) <= room else one.name[: room - 1] + "…",
+                "y": 4 + STEP * (k + 0.5),
+                "dots": [place(dot) for dot in one.dots if math.isfinite(dot)],
+                "mean": place(one.mean),
+                "low": place(one.low),
+                "high": place(one.high),
+            }
+            for k, one in enumerate(lines)
+        ],
+    }
 
 
 def _ticks(low: float, high: float) -> list[float]:
@@ -206,9 +186,3 @@ def _ticks(low: float, high: float) -> list[float]:
     step = next(m * power for m in (1, 2, 5, 10) if span / (m * power) <= 6)
     first, last = math.floor(low / step + 1e-9), math.ceil(high / step - 1e-9)
     return [round(k * step, 12) for k in range(first, max(last, first + 1) + 1)]
-
-
-def _number(value: float, ticks: Sequence[float]) -> str:
-    """A tick in as many decimals as tell the ticks apart."""
-    digits = max(0, -math.floor(math.log10(ticks[1] - ticks[0]) + 1e-9))
-    return f"{value:.{digits}f}".replace("-", "\N{MINUS SIGN}")

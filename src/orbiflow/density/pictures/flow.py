@@ -74,18 +74,13 @@ def flow_picture(
     draw_cells(axes, space.group, window, pen=sheet.pen)
     colour_bar(axes.images[0], frame, sheet, SPEED)
     axes.set_axis_off()
-    title, signs = _title(density), "canonical square outlined, its images thin"
+    weight, flow = flow_of(density)
+    part = "" if flow is density else f", {100 * weight:.0f} % of the density"
+    title = f"Flow{part} on the {space_title(space)}"
+    signs = "canonical square outlined, its images thin"
     if not sheet.printed:
         frame.figure.text(0.03, 0.025, f"{title}: {signs}", fontsize=sheet.text, color=INK)
     return Picture(frame.figure, sheet, title, f"The {signs}.")
-
-
-def _title(density: Density) -> str:
-    name = f"the {space_title(density.space)}"
-    weight, flow = flow_of(density)
-    if flow is density:
-        return f"Flow on {name}"
-    return f"Flow, {100 * weight:.0f} % of the density on {name}"
 
 
 def flow_of(density: Density) -> tuple[float, FlowDensity]:

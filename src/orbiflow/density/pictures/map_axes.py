@@ -177,7 +177,6 @@ class _Labels:
             self._on_map(self.longitude(lon), level, lon)
 
     def _on_map(self, text: str, lat: float, lon: float) -> None:
-        """Write a text at a direction, if the map shows it."""
         direction = np.array([[lat, lon]])
         if self.projection.contains(direction)[0]:
             self._inside(text, self.projection.forward(direction)[0])

@@ -218,14 +218,14 @@ class Window:
     to_chart: Callable[[Array], Tensor]
     from_chart: Callable[[Tensor], Array]
 
-    def area(self, shape: shapely.Geometry) -> float:
+    def area(self, shape: shapely.MultiPolygon) -> float:
         """Return the natural area of a polygon or several.
 
         On the globe it is in steradians, and sides are straight in longitude and latitude.
         """
         if not self.on_globe:
-            return float(shapely.area(shape))
-        return sum(_steradians(part) for part in shapely.get_parts(shape))
+            return shape.area
+        return sum(map(_steradians, shape.geoms))
 
 
 def window_of(space: Space) -> Window:
@@ -285,17 +285,12 @@ def _flat(space: Space) -> Window:
     )
 
 
-def _steradians(polygon: shapely.Geometry) -> float:
-    assert isinstance(polygon, shapely.Polygon)
-    outside, *holes = [
-        abs(_ring_area(np.asarray(r.coords))) for r in (polygon.exterior, *polygon.interiors)
-    ]
-    return outside - sum(holes)
-
-
-def _ring_area(ring: Array) -> float:
-    """Return the integral of sin(lat) dlon around a ring (n, 2), exact for straight sides."""
-    lon, lat = np.radians(ring.T)
-    half = np.diff(lat) / 2
-    mean = np.sin(lat[:-1] + half) * np.sinc(half / np.pi)
-    return float((mean * np.diff(lon)).sum())
+def _steradians(polygon: shapely.Polygon) -> float:
+    """Return the area of a polygon: integrals of sin(lat) dlon, exact for straight sides."""
+    areas: list[float] = []
+    for ring in (polygon.exterior, *polygon.interiors):
+        lon, lat = np.radians(np.asarray(ring.coords).T)
+        half = np.diff(lat) / 2
+        mean = np.sin(lat[:-1] + half) * np.sinc(half / np.pi)
+        areas.append(abs(float((mean * np.diff(lon)).sum())))
+    return areas[0] - sum(areas[1:])

@@ -53,8 +53,8 @@ def with_islands(
         return shape, 0, left
     lows = grid.low + np.argwhere(done) * grid.step
     corners = np.concatenate([lows, lows + grid.step], axis=1).tolist()
-    boxes = shapely.union_all([shapely.box(*corner) for corner in corners])
-    merged = shapely.union_all([shapely.difference(shape, boxes), *drawn])
+    boxes: list[shapely.Geometry] = [shapely.box(*corner) for corner in corners]
+    merged = shapely.union_all([shapely.difference(shape, shapely.union_all(boxes)), *drawn])
     return merged, len(drawn) * (PARTS + 1) ** 2, left
 
 

@@ -34,39 +34,28 @@ def to_geojson(outlines: Sequence[Outline]) -> dict[str, Any]:
     Raises:
         OrbiflowError: If the space is not round.
     """
+    features: list[dict[str, Any]] = []
     for outline in outlines:
+        region = outline.region
         if not outline.window.on_globe:
-            space = outline.region.density.space
             raise OrbiflowError(
-                f"GeoJSON is for places on a globe, not for the angles of a {space.name}: write "
-                ".json or .csv"
+                "GeoJSON is for places on a globe, not for the angles of a "
+                f"{region.density.space.name}: write .json or .csv"
             )
-    return {"type": "FeatureCollection", "features": [_feature(outline) for outline in outlines]}
-
-
-def _feature(outline: Outline) -> dict[str, Any]:
-    region = outline.region
-    return {
-        "type": "Feature",
-        "properties": {
-            "mass": region.mass,
-            "held": region.held,
+        found = region.to_json()
+        names = ("mass", "held", "log_prob", "log_prob_low", "log_prob_high")
+        properties = {
+            **{name: found[name] for name in names},
             "held_error": region.error,
-            "log_prob": region.log_prob,
-            "log_prob_low": region.log_prob_low,
-            "log_prob_high": region.log_prob_high,
             "area": outline.size,
             "fraction": outline.fraction,
             "polygons_mass": outline.mass,
             "polygons_mass_error": outline.error,
-        },
-        "geometry": {
-            "type": "MultiPolygon",
-            "coordinates": [
-                [np.round(ring, DIGITS).tolist() for ring in rings] for rings in outline.rings()
-            ],
-        },
-    }
+        }
+        rings = [[np.round(ring, DIGITS).tolist() for ring in rings] for rings in outline.rings()]
+        geometry = {"type": "MultiPolygon", "coordinates": rings}
+        features.append({"type": "Feature", "properties": properties, "geometry": geometry})
+    return {"type": "FeatureCollection", "features": features}
 
 
 def outlines_csv(outlines: Sequence[Outline]) -> str:

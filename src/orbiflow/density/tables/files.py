@@ -104,7 +104,7 @@ def append_columns(
             cells = [_name_cell(name, end) for name in _free_names(columns, header)]
             header = None
         elif number in table.dropped:
-            cells = [_missing_cell(end)] * len(values)
+            cells = ["nan" if end == " " else ""] * len(values)
         elif lines[done] == number:
             cells = [_number_cell(column[done], table) for column in values]
             done += 1
@@ -136,24 +136,16 @@ def _number_cell(value: float, table: Table) -> str:
     return f'"{cell}"' if table.decimal == table.delimiter else cell
 
 
-def _missing_cell(delimiter: str) -> str:
-    return "nan" if delimiter == " " else ""
-
-
 def _free_names(wanted: Iterable[str], taken: Sequence[str]) -> list[str]:
-    found: list[str] = []
+    found, used = list[str](), {name.casefold() for name in taken}
     for name in wanted:
-        found.append(_free_name(name, (*taken, *found)))
+        free, i = name, 1
+        while free.casefold() in used:
+            i += 1
+            free = f"{name}_{i}"
+        found.append(free)
+        used.add(free.casefold())
     return found
-
-
-def _free_name(name: str, taken: Sequence[str]) -> str:
-    used = {other.casefold() for other in taken}
-    free, i = name, 1
-    while free.casefold() in used:
-        i += 1
-        free = f"{name}_{i}"
-    return free
 
 
 def _name_cell(name: str, delimiter: str) -> str:
@@ -232,30 +224,20 @@ def read_labels(
     """
     path = Path(path)
     kind = kind_of_file(path)
+    found: dict[int, str] = {}
     if kind == "npy":
         numbers = read_table(path, columns=[column], width=1, drop_missing=True)
         cells = numbers.values[:, 0].astype(str).tolist()
         found = dict(zip(numbers.lines.tolist(), cells, strict=True))
-        return _picked(path, column, found, table)
-    if kind == "parquet":
-        cells = parquet_labels(path, column)
-        return _picked(path, column, {k: c for k, c in enumerate(cells, start=1) if c}, table)
-    layout = layout_of(path, [column], has_header)
-    index = find(path, layout.names, column)
-    found: dict[int, str] = {}
-    for number, line, is_comment in text_lines(path):
-        if is_comment:
-            continue
-        cells = split_line(path, number, line, layout.delimiter)
-        cell = cells[index].strip() if index < len(cells) else ""
-        if cell:
-            found[number] = cell
-    return _picked(path, column, found, table)
-
-
-def _picked(path: Path, column: str, found: dict[int, str], table: Table) -> NDArray[np.str_]:
-    """Return cells, given by the numbers of their lines, for the rows of the table."""
-    missing = [line for line in table.lines.tolist() if line not in found]
+    elif kind == "parquet":
+        found = dict(enumerate(parquet_labels(path, column), start=1))
+    else:
+        layout = layout_of(path, [column], has_header)
+        index = find(path, layout.names, column)
+        for number, line, is_comment in text_lines(path):
+            cells = [] if is_comment else split_line(path, number, line, layout.delimiter)
+            found[number] = cells[index].strip() if index < len(cells) else ""
+    missing = [line for line in table.lines.tolist() if not found.get(line)]
     if missing:
         raise InputFileError(
             f"{path}: {len(missing)} rows have no {column!r}, the first in line {missing[0]}; fill "

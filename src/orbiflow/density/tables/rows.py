@@ -44,7 +44,7 @@ class TableRows:
     @property
     def whole(self) -> NDArray[np.bool_]:
         """Which rows (N,) lack no value."""
-        return np.isfinite(self.table.values).all(axis=1)
+        return np.logical_and.reduce(np.isfinite(self.table.values), axis=1)
 
     def labels(self) -> NDArray[np.str_] | None:
         """Return what each row belongs to, (N,), or None if no column says so."""
