@@ -153,12 +153,7 @@ class CvOverview:
 
     def _spreads(self, found: HeldOut) -> dict[str, Any]:
         """How much folds differ, by setting."""
-        whole = self.splits[0].rows.whole
-        means = [
-            mean
-            for number, split in enumerate(self.splits)
-            for mean in found.fold_means(split, number, whole).values()
-        ]
+        means = [mean for *_, mean in found.fold_means(self.splits)]
         columns = {name: [mean[k] for mean in means] for k, name in enumerate(found.settings)}
         return {
             name: {"deviation": float(np.std(column, ddof=1)), "folds": len(column)}

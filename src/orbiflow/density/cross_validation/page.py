@@ -34,11 +34,7 @@ def cv_page(
 ) -> bytes:
     """Return the page as UTF-8, to be written beside the folders."""
     rows = splits[0].rows
-    folds = [
-        (number + 1, fold, mean)
-        for number, split in enumerate(splits)
-        for fold, mean in found.fold_means(split, number, rows.whole).items()
-    ]
+    folds = found.fold_means(splits)
     seconds = {(fit.split, fit.fold, fit.setting): entry.seconds for fit, entry in done}
     first = next(iter(asked.settings))
     made = None if isinstance(comparison, str) else comparison

@@ -154,33 +154,21 @@ def cv_rows(asked: CrossValidation, tell: Sink) -> CvRows:
 
 def _counting(rows: TableRows) -> TableRows:
     """The same without the rows of weight 0, which count for nothing."""
-    table, weights = rows.table, rows.weights
+    weights = rows.weights
     if weights is None:
         return rows
     weighed(torch.zeros(len(weights), 1), weights)  # refuses what is no weight
-    kept = weights > 0
-    kept_table = replace(
-        table,
-        values=table.values[kept],
-        lines=table.lines[kept],
-        dropped=table.dropped | frozenset(table.lines[~kept].tolist()),
-    )
-    return replace(rows, table=kept_table, weights=weights[kept])
+    return replace(rows, table=rows.table.only(weights > 0), weights=weights[weights > 0])
 
 
 def splits_of(asked: CrossValidation, rows: CvRows) -> list[Split]:
     """Return the splits."""
-    count, seed = len(rows.table.values), asked.density.seed
-    return [
-        Split(
-            rows,
-            1
-            + cross_validation_folds(
-                count, asked.cv.folds, together=rows.together, seed=seed, split=number
-            ),
-        )
-        for number in range(asked.cv.times)
+    count, folds, seed = len(rows.table.values), asked.cv.folds, asked.density.seed
+    numbers = [
+        cross_validation_folds(count, folds, together=rows.together, seed=seed, split=k)
+        for k in range(asked.cv.times)
     ]
+    return [Split(rows, 1 + fold) for fold in numbers]
 
 
 def fits_of(asked: CrossValidation) -> Iterator[Fit]:
@@ -220,16 +208,17 @@ class HeldOut:
         sums = np.where(self.common, self.scores, 0.0).sum(axis=1)
         return np.where(counts > 0, sums / np.maximum(counts, 1), np.nan)
 
-    def fold_means(self, split: Split, number: int, rows: NDArray[np.bool_]) -> dict[int, Array]:
-        """Return the weighted means (S,) of each fold of a split over the `rows` (N,) that count."""
-        weights = np.ones(len(rows)) if split.rows.weights is None else split.rows.weights
-        found: dict[int, Array] = {}
-        for fold in range(1, int(split.fold.max()) + 1):
-            chosen = (split.fold == fold) & self.common[number] & rows
-            if chosen.any():
-                found[fold] = (
-                    self.scores[:, number, chosen] @ weights[chosen] / weights[chosen].sum()
-                )
+    def fold_means(self, splits: Sequence[Split]) -> list[tuple[int, int, Array]]:
+        """Return split and fold, from 1, and the weighted means (S,) of its whole, common rows."""
+        rows, common = splits[0].rows, self.common
+        weights = np.ones(len(rows.whole)) if rows.weights is None else rows.weights
+        found: list[tuple[int, int, Array]] = []
+        for number, split in enumerate(splits):
+            for fold in range(1, int(split.fold.max()) + 1):
+                chosen = (split.fold == fold) & common[number] & rows.whole
+                if chosen.any():
+                    mean = self.scores[:, number, chosen] @ weights[chosen] / weights[chosen].sum()
+                    found.append((number + 1, fold, mean))
         return found
 
 

@@ -77,10 +77,11 @@ def corner_picture(
         if row == column:
             _draw_histograms(axes, sheet, above[:, row], None if below is None else below[:, row])
         else:
-            shows_data = row > column and below is not None
+            points = above if below is None or row < column else below
             draw_dots(
-                axes, (below if shows_data else above)[:, [column, row]], 0.4, limit=most,
-                fill=_DATA if shows_data else _SAMPLES, scale=panels.dot_scale, rasterized=dim > 3,
+                axes, points[:, [column, row]], 0.4, limit=most,
+                fill=_SAMPLES if points is above else _DATA, scale=panels.dot_scale,
+                rasterized=dim > 3,
             )  # fmt: skip
         panels.draw_ticks(axes, row, column)
         if dim == 1:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -156,13 +156,7 @@ def _weighed(path: Path, table: Table, weighing: Table) -> tuple[Table, Array]:
             literal(f"{path}: {name!r} holds the rows' weights and cannot be a column of the data")
             + " as well; leave it out of {columns}"
         )
-    kept = np.isin(table.lines, weighing.lines)
-    table = replace(
-        table,
-        values=table.values[kept],
-        lines=table.lines[kept],
-        dropped=table.dropped | weighing.dropped,
-    )
+    table = table.only(np.isin(table.lines, weighing.lines))
     return table, weighing.values[np.isin(weighing.lines, table.lines), 0]
 
 

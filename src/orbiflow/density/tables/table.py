@@ -51,6 +51,11 @@ class Table:
     decimal: str = "."
     dropped: frozenset[int] = frozenset()
 
+    def only(self, kept: NDArray[np.bool_]) -> Table:
+        """Return the rows that are kept, (N,) of bool; the others are dropped."""
+        dropped = self.dropped | frozenset(self.lines[~kept].tolist())
+        return replace(self, values=self.values[kept], lines=self.lines[kept], dropped=dropped)
+
     def without(self, column: int) -> Table:
         """Return the table without a column, by its number from 0."""
         names = self.columns[:column] + self.columns[column + 1 :]
