@@ -141,10 +141,7 @@ def _half_pixels(kernels: AdaptiveKernels, pixel: float) -> Tensor:
 
 
 def _flat_sums(kernels: AdaptiveKernels, x: Tensor, y: Tensor) -> Tensor:
-    """Return the mixture of kernels on a grid.
-
-    It is a matrix product, since kernels are products of functions of one coordinate.
-    """
+    """Return the mixture on a grid: a matrix product, as kernels are products of one coordinate's."""
     space = kernels.space
     # cosets are rotations by half a turn and glides along the axes: each image of a grid is one
     ends = [torch.stack([t, torch.zeros_like(t)], dim=-1) for t in (x, y)]

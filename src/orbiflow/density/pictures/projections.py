@@ -24,14 +24,10 @@ FINEST = 1.0
 
 @dataclass(frozen=True)
 class Projection(ABC):
-    """A map of directions.
+    """A map of directions about `center`, a latitude and a longitude.
 
     - `name`: Its name in settings. `title`: Its name in a sentence.
     - `is_equal_area`: Whether equal areas of the sphere are equal on the map.
-    - `center`: Latitude and longitude of the map's middle.
-
-    Raises:
-        OrbiflowError: If the centre is no direction.
     """
 
     name: ClassVar[str]

@@ -126,4 +126,4 @@ def _count(expected: int, share: float) -> int:
 
     1 - 0.9995 is not 0.0005 to the last digit.
     """
-    return math.ceil(expected / share * (1 - 1e-9))
+    return math.ceil(expected / share * (1 - 1e-9))  # 1 - 0.9995 is not 0.0005 to the last digit
