@@ -105,11 +105,7 @@ def row_hashes(space: Space, data: ArrayLike) -> NDArray[np.uint64]:
 
 
 def _mixed(x: NDArray[np.uint64]) -> NDArray[np.uint64]:
-    """Mix 64 bits so that no pattern is left.
-
-    This is the bijection of Steele, Lea and Flood, Fast splittable pseudorandom number generators,
-    2014.
-    """
+    """Mix 64 bits by a bijection (Steele, Lea and Flood, Fast splittable generators, 2014)."""
     x = (x ^ (x >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
     x = (x ^ (x >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
     return x ^ (x >> np.uint64(31))

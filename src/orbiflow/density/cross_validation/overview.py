@@ -58,10 +58,7 @@ FIGURES = ("rows", "fitted", "log_likelihood")
 
 @dataclass(eq=False)
 class CvOverview:
-    """Files that are written anew as fits come; the comparison once nothing more comes.
-
-    - `comparison`: The last comparison, or why there is none.
-    """
+    """Files that are written anew as fits come; the comparison, or why there is none, at the end."""
 
     journal: ClassVar[str] = "cv.jsonl"
     what: ClassVar[str] = "cross-validation"

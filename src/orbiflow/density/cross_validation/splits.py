@@ -104,11 +104,7 @@ class Split:
 
 @dataclass(frozen=True)
 class Fit:
-    """One of many fits.
-
-    - `split`, `fold`: Their numbers, from 1.
-    - `setting`, `components`: The name of the setting, and its components.
-    """
+    """One of many fits: its split and fold, from 1, and the components of its setting."""
 
     split: int
     fold: int

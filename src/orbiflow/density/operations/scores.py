@@ -34,12 +34,10 @@ SCORED = 0.3
 
 @dataclass(frozen=True, eq=False)
 class Scores:
-    """What is known of the rows.
+    """Columns (N,) to add to a table, log densities first, and what is known of them.
 
-    - `columns`: Values (N,) by the name of the column to add; the first are log densities.
     - `mean`: The mean log density in nats, weighted, of the rows that lack nothing.
     - `over`: Which rows these are, in words.
-    - `notes`: What the user should know.
     """
 
     columns: dict[str, Array]

@@ -120,11 +120,7 @@ def _map_about(
 
 
 class Map(Ground):
-    """A map of the sphere or the projective plane.
-
-    Raises:
-        OrbiflowError: If coastlines are not lines (N, 2) of latitude and longitude.
-    """
+    """A map of the sphere or the projective plane, with coastlines (N, 2) in degrees."""
 
     caption_below = True
 
@@ -264,10 +260,7 @@ def _areas(projection: Projection, latlon: Array) -> Array:
 
 
 def places_on(space: Space, projection: Projection, points: Tensor) -> Array:
-    """Return the places (M, 2) of those of chart points (N, 2) that are on a map.
-
-    Axes are placed at the end that the map shows.
-    """
+    """Return places (M, 2) of chart points (N, 2) on a map; of axes, those of the end that it shows."""
     vectors = cast(RoundSpace, space).vectors(chart_points(space, points))
     if space.name == "projective-plane" and isinstance(projection, Azimuthal):
         vectors = np.where(vectors @ projection.frame[2] < 0, -1.0, 1.0)[:, None] * vectors

@@ -71,10 +71,7 @@ def uncrowded(points: Array) -> Dots:
 def draw_dots_over(
     axes: Axes, points: Array, inches: float, *, limit: int = MAX_DOTS, scale: float = 1.0
 ) -> None:
-    """Draw points (N, 2) as dots over a density, smaller where they crowd.
-
-    Where they crowd the density is high, and its peaks are what a picture should show.
-    """
+    """Draw points (N, 2) as dots over a density, smaller where they crowd, as there its peaks are."""
     chosen = thinned(points, limit)
     most, scale = _largest(len(chosen), scale)
     dots = uncrowded(chosen)

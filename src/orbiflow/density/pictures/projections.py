@@ -46,10 +46,7 @@ class Projection(ABC):
 
     @abstractmethod
     def inverse(self, places: Array) -> Array:
-        """Return the directions of places, continued a little beyond the outline.
-
-        Longitudes are in [-180, 180).
-        """
+        """Return directions of places, even a little off the map; longitudes are in [-180, 180)."""
 
     @abstractmethod
     def outline(self) -> Array:
@@ -97,9 +94,6 @@ class Azimuthal(Projection):
 
     - `flipped`: Whether it is upside down, so that about the north pole longitudes run clockwise from
       the top: a net of structural geology and palaeomagnetism.
-
-    Raises:
-        OrbiflowError: If the centre is no direction, or the radius is not above 0 and at most 90.
     """
 
     radius: float = 90.0
@@ -206,11 +200,7 @@ _NEWTON = 12
 
 
 class WorldMap(Projection):
-    """A map of the whole sphere, cut along the meridian opposite the map's own.
-
-    Raises:
-        OrbiflowError: If the centre is no direction, or off the equator.
-    """
+    """A map of the whole sphere, cut along the meridian opposite the map's own."""
 
     def __post_init__(self) -> None:
         super().__post_init__()

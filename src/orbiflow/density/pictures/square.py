@@ -112,11 +112,7 @@ def samples_picture(
 
 
 class Square(Ground):
-    """The canonical square of a two-dimensional space.
-
-    Raises:
-        OrbiflowError: If the space has another dimension, or names or a centre do not fit.
-    """
+    """The canonical square of a two-dimensional space."""
 
     width = aspect = 1.0
     title_gap = 0.7

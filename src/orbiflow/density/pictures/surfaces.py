@@ -38,10 +38,7 @@ class Mesh(NamedTuple):
 
 
 def torus_ring(points: Tensor) -> Array:
-    """Return points of a ring.
-
-    They are ((R + r cos 2 pi y) cos 2 pi x, (R + r cos 2 pi y) sin 2 pi x, r sin 2 pi y).
-    """
+    """Return ((R + r cos 2 pi y) cos 2 pi x, (R + r cos 2 pi y) sin 2 pi x, r sin 2 pi y)."""
     u, v = _turns(points)
     radius = RING_RADIUS + TUBE_RADIUS * np.cos(v)
     return np.stack([radius * np.cos(u), radius * np.sin(u), TUBE_RADIUS * np.sin(v)], axis=-1)
@@ -110,10 +107,7 @@ def vector_immersion(space: Space) -> Callable[[Array], Array]:
 
 
 def mesh(space: Space, resolution: int) -> Mesh:
-    """Return an even grid on the canonical square, cut into 2 resolution^2 triangles.
-
-    The groups take the grid's points on the edges to each other, so the surface closes.
-    """
+    """Return an even grid on the canonical square, whose edges a group identifies, in triangles."""
     immersion(space)
     if isinstance(resolution, bool) or not 2 <= resolution <= MAX_RESOLUTION:
         raise OrbiflowError(f"resolution must be 2 to {MAX_RESOLUTION}, got {resolution!r}")
@@ -152,20 +146,14 @@ def edge_pairs(group: CrystallographicGroup) -> list[EdgePair]:
 
 
 def off_cones(points: Tensor, margin: float = 1e-3) -> Tensor:
-    """Move chart points (N, 2) of the square that are within `margin` of a corner inwards by it.
-
-    At the cone points of sphere and projective plane the area factor is 0, and a density 0/0.
-    """
+    """Move chart points (N, 2) within `margin` of a corner inwards: cone points have densities 0/0."""
     inward = 0.5 - points
     near = inward.abs().amin(dim=-1, keepdim=True) > 0.5 - margin
     return torch.where(near, points + margin * inward.sign(), points)
 
 
 def normals(space: Space, points: Tensor) -> Array:
-    """Return unit normals (N, 3) of the immersed surface at points (N, 2) of the square.
-
-    They are continuous over the square, and up to the sign over its edges.
-    """
+    """Return unit normals (N, 3) at points (N, 2) of the square, over its edges up to the sign."""
     surface, step = immersion(space), 1e-4
     if space.is_round:
         points = off_cones(points, 4e-3)

@@ -219,10 +219,7 @@ class Window:
     from_chart: Callable[[Tensor], Array]
 
     def area(self, shape: shapely.MultiPolygon) -> float:
-        """Return the natural area of a polygon or several.
-
-        On the globe it is in steradians, and sides are straight in longitude and latitude.
-        """
+        """Return the natural area; on the globe, of sides straight in longitude and latitude."""
         if not self.on_globe:
             return shape.area
         return sum(map(_steradians, shape.geoms))

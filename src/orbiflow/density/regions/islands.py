@@ -113,20 +113,10 @@ FAR_BELOW = 1e12
 def filled(
     values: Array, low: Array, step: Array, level: float, function: Function
 ) -> tuple[shapely.Geometry, float]:
-    """Return the area in which values on a grid are at least `level`, cut at the grid's border.
+    """Return the area in which values (n + 1, m + 1) at the nodes of a grid are at least `level`.
 
-    Vertices lie on sides of cells, moved along them to where `function` is at the level.
-
-    Args:
-        values: Values (n + 1, m + 1) at the nodes.
-        low: Lower corner of the grid.
-        step: Sides of a cell.
-        level: The level.
-        function: The function.
-
-    Returns:
-        A polygon, several, or an empty one; and the root mean square of the difference between the
-        function and the level at the vertices inside.
+    It is cut at the grid's border. Vertices lie on sides of cells, moved along them to where `function`
+    is at the level; second comes the root mean square of the difference that is left inside.
     """
     padded = np.pad(values, 1, constant_values=level - FAR_BELOW)
     rings = [ring - 1 for ring in find_contours(padded, level)]

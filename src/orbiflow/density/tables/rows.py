@@ -26,13 +26,10 @@ EAST = frozenset({"lon", "long", "lng", "longitude", "trend", "azimuth"})
 
 @dataclass(frozen=True, eq=False)
 class TableRows:
-    """The rows of a table, what each weighs and what it belongs to.
+    """The rows of a table, what each weighs, and the column that names what rows belong to.
 
-    - `path`: The file.
-    - `table`: The columns of data, N rows.
     - `weights`: How much each row counts, (N,). None: all the same.
-    - `group`: The column that names what rows belong to, or None.
-    - `header`: Whether the first line names the columns, None to look.
+    - `header`: Whether the first line of the file names the columns, None to look.
     """
 
     path: Path
@@ -61,21 +58,10 @@ def read_rows(
     width: int | None = None,
     group: str | None = None,
 ) -> TableRows:
-    """Return the rows of a table, and tell what was decided for the user.
+    """Return the rows of a table of `width` columns, and tell what was decided for the user.
 
-    Without `columns`, all columns of numbers are taken but those that count the rows, and those of
-    weights and groups.
-
-    Args:
-        path: The file.
-        settings: Which columns and rows.
-        tell: Gets a note of each decision.
-        width: How many columns there must be. Default: any number.
-        group: The column that names what rows belong to.
-
-    Raises:
-        InputFileError: If the table cannot be read, lacks values that it must have, or its columns
-            are not those that are needed.
+    Without `columns` in the settings, all columns of numbers are taken but those that count the rows, and
+    those of weights and groups.
     """
     rows = settings if isinstance(settings, RowSettings) else RowSettings(**settings.to_json())
     how: dict[str, Any] = {
