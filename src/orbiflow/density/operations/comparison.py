@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+from orbiflow.batch import csv_bytes
 from orbiflow.density import comparing, tables
 from orbiflow.density.comparing import ComparisonSettings
 from orbiflow.density.operations.drawing import require_ending
@@ -299,19 +298,11 @@ def _names(paths: Sequence[Path]) -> list[str]:
     return [f"{k}: {path}" for k, path in enumerate(full, 1)]
 
 
-def _csv(found: ModelComparison | DataComparison) -> str:
+def _csv(found: ModelComparison | DataComparison) -> bytes:
     """Return the differences of models, or the figures of data sets, a row each."""
     document = found.to_json()
-    rows: list[Mapping[str, Any]]
-    if document["kind"] == "models":
-        rows = document["differences"]
-    else:
-        p = {"figure": "p", "value": document["test"]["p"]}
-        p |= dict.fromkeys(("error", "low", "high"))
-        divergence: dict[str, Any] = document["divergence"] or {}
-        rows = [p, *({"figure": name, **estimate} for name, estimate in divergence.items())]
-    text = io.StringIO()
-    writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)
-    return text.getvalue()
+    rows: list[dict[str, Any]] = document.get("differences") or [
+        {"figure": "p", "value": document["test"]["p"], "error": None, "low": None, "high": None},
+        *({"figure": name, **own} for name, own in (document["divergence"] or {}).items()),
+    ]
+    return csv_bytes(list(rows[0]), [list(row.values()) for row in rows])

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import csv
-import io
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
 
+from orbiflow.batch import csv_bytes
 from orbiflow.density.regions.boundaries import Outline
 from orbiflow.density.regions.levels import DensityRegion
 from orbiflow.density.spaces import Space
@@ -58,20 +57,20 @@ def to_geojson(outlines: Sequence[Outline]) -> dict[str, Any]:
     return {"type": "FeatureCollection", "features": features}
 
 
-def outlines_csv(outlines: Sequence[Outline]) -> str:
+def outlines_csv(outlines: Sequence[Outline]) -> bytes:
     """Return CSV text with a row for each vertex of the outlines of one density's regions."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    names = outlines[0].window.names
-    writer.writerow(["region", "mass", "log_prob", "polygon", "ring", *names])
+    heads = ["region", "mass", "log_prob", "polygon", "ring", *outlines[0].window.names]
+    return csv_bytes(heads, _vertices(outlines))
+
+
+def _vertices(outlines: Sequence[Outline]) -> Iterator[list[Any]]:
     for number, outline in enumerate(outlines, 1):
         mass = "" if outline.region.mass is None else f"{outline.region.mass:g}"
         level = f"{outline.region.log_prob:.10g}"
         for polygon, rings in enumerate(outline.rings(), 1):
             for ring, points in enumerate(rings):
                 for x, y in points:
-                    writer.writerow([number, mass, level, polygon, ring, f"{x:.10g}", f"{y:.10g}"])
-    return text.getvalue()
+                    yield [number, mass, level, polygon, ring, f"{x:.10g}", f"{y:.10g}"]
 
 
 def regions_document(

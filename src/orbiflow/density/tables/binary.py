@@ -7,26 +7,25 @@ from __future__ import annotations
 
 import importlib
 import math
-from collections.abc import Sequence
+from collections.abc import Generator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from orbiflow.density.tables.table import (
     BLOCK,
     MAX_COLUMNS,
     Reading,
     Table,
-    TableError,
     check_count,
-    checked_rows,
     choose,
     find,
+    finished,
     quote,
 )
-from orbiflow.errors import InputFileError, OrbiflowError, literal
+from orbiflow.errors import InputFileError, OrbiflowError
 
 MAX_NPY_HEADER = 10_000
 """Characters of a header, which numpy parses with `ast.literal_eval`."""
@@ -42,8 +41,7 @@ def read_npy(path: Path, reading: Reading) -> Table:
     names = fields or tuple(f"column{i}" for i in range(1, n_columns + 1))
     types = [dtype[name] for name in fields] if fields is not None else [dtype] * n_columns
     numeric = [kind.kind in "fiu" for kind in types]
-    picked, notes = choose(path, names, numeric, reading)
-    _check_numeric(path, names, types, numeric, picked)
+    picked, notes = choose(path, names, numeric, reading, types)
     try:
         data = np.load(path, mmap_mode="r", allow_pickle=False, max_header_size=MAX_NPY_HEADER)
         with np.errstate(over="ignore"):
@@ -51,7 +49,7 @@ def read_npy(path: Path, reading: Reading) -> Table:
             values = np.stack([part.astype(np.float64) for part in parts], axis=1)
     except (OSError, ValueError, TypeError, IndexError, OverflowError) as exc:
         raise _damaged(path, exc) from exc
-    return _table(path, values, tuple(names[i] for i in picked), notes, reading)
+    return finished(path, values, None, tuple(names[i] for i in picked), reading, notes)
 
 
 def _npy_header(path: Path) -> tuple[tuple[int, ...], np.dtype]:
@@ -87,87 +85,56 @@ def npy_names(path: Path) -> tuple[str, ...] | None:
     return _npy_header(path)[1].names
 
 
-def parquet_names(path: Path) -> tuple[str, ...]:
-    """Return the names of all columns."""
-    arrow, parquet = _arrow(path)
+@contextmanager
+def _parquet(path: Path) -> Generator[Any]:
+    """Open a Parquet file; whatever goes wrong inside is its damage."""
     try:
-        with parquet.ParquetFile(path) as file:
-            return tuple(file.schema_arrow.names)
-    except (arrow.ArrowException, OSError, ValueError) as exc:
-        raise _damaged(path, exc) from exc
-
-
-def parquet_labels(path: Path, column: str) -> list[str]:
-    """Return a column's cells as text, "" for empty ones."""
-    arrow, parquet = _arrow(path)
-    name = parquet_names(path)[find(path, parquet_names(path), column)]
-    try:
-        with parquet.ParquetFile(path) as file:
-            batches = file.iter_batches(BLOCK, columns=[name])
-            cells = [cell for batch in batches for cell in batch.column(0).to_pylist()]
-    except (arrow.ArrowException, OSError, ValueError, KeyError, MemoryError) as exc:
-        raise _damaged(path, exc) from exc
-    return ["" if cell is None else str(cell).strip() for cell in cells]
-
-
-def _arrow(path: Path) -> tuple[Any, Any]:
-    try:
-        return importlib.import_module("pyarrow"), importlib.import_module("pyarrow.parquet")
+        arrow, parquet = map(importlib.import_module, ("pyarrow", "pyarrow.parquet"))
     except ImportError as exc:
         raise OrbiflowError(f"{path}: reading Parquet needs pyarrow: pip install pyarrow") from exc
-
-
-def read_parquet(path: Path, reading: Reading) -> Table:
-    """Read a table from a Parquet file."""
-    arrow, parquet = _arrow(path)
     try:
         with parquet.ParquetFile(path) as file:
-            check_count(path, file.metadata.num_rows, reading.max_rows, "rows")
-            schema = file.schema_arrow
-            check_count(path, len(schema.names), MAX_COLUMNS, "columns")
-            tests = arrow.types.is_integer, arrow.types.is_floating, arrow.types.is_decimal
-            numeric = [any(test(kind) for test in tests) for kind in schema.types]
-            picked, notes = choose(path, schema.names, numeric, reading)
-            names = tuple(schema.names[i] for i in picked)
-            _check_numeric(path, schema.names, schema.types, numeric, picked)
-            for name in names:  # Parquet columns are read by name alone
-                find(path, schema.names, name)
-            blocks = [np.empty((0, len(names)))]
-            for batch in file.iter_batches(BLOCK, columns=list(names)):
-                cast = [batch.column(name).cast("float64", safe=False) for name in names]
-                blocks.append(np.stack([c.to_numpy(zero_copy_only=False) for c in cast], axis=1))
+            yield file
     except InputFileError:
         raise
     except (arrow.ArrowException, OSError, ValueError, KeyError, MemoryError) as exc:
         raise _damaged(path, exc) from exc
-    return _table(path, np.concatenate(blocks), names, notes, reading)
 
 
-def _table(
-    path: Path,
-    values: NDArray[np.float64],
-    names: tuple[str, ...],
-    notes: list[str],
-    reading: Reading,
-) -> Table:
-    rows = np.arange(1, len(values) + 1, dtype=np.int64)
-    values, rows, dropped, more = checked_rows(path, values, rows, names, "row", reading)
-    return Table(values, names, rows, (*notes, *more), None, None, dropped=dropped)
+def parquet_names(path: Path) -> tuple[str, ...]:
+    """Return the names of all columns."""
+    with _parquet(path) as file:
+        return tuple(file.schema_arrow.names)
 
 
-def _check_numeric(
-    path: Path,
-    names: Sequence[str],
-    types: Sequence[object],
-    numeric: Sequence[bool],
-    picked: list[int],
-) -> None:
-    for i in picked:
-        if not numeric[i]:
-            raise TableError(
-                literal(f"{path}: column {quote(names[i])} holds {quote(str(types[i]))}")
-                + ", not numbers; choose another with {columns}"
-            )
+def parquet_labels(path: Path, column: str) -> list[str]:
+    """Return a column's cells as text, "" for empty ones."""
+    names = parquet_names(path)
+    name = names[find(path, names, column)]
+    with _parquet(path) as file:
+        batches = file.iter_batches(BLOCK, columns=[name])
+        cells = [cell for batch in batches for cell in batch.column(0).to_pylist()]
+    return ["" if cell is None else str(cell).strip() for cell in cells]
+
+
+def read_parquet(path: Path, reading: Reading) -> Table:
+    """Read a table from a Parquet file."""
+    with _parquet(path) as file:
+        check_count(path, file.metadata.num_rows, reading.max_rows, "rows")
+        schema = file.schema_arrow
+        check_count(path, len(schema.names), MAX_COLUMNS, "columns")
+        kinds = importlib.import_module("pyarrow").types
+        tests = kinds.is_integer, kinds.is_floating, kinds.is_decimal
+        numeric = [any(test(kind) for test in tests) for kind in schema.types]
+        picked, notes = choose(path, schema.names, numeric, reading, schema.types)
+        names = tuple(schema.names[i] for i in picked)
+        for name in names:  # Parquet columns are read by name alone
+            find(path, schema.names, name)
+        blocks = [np.empty((0, len(names)))]
+        for batch in file.iter_batches(BLOCK, columns=list(names)):
+            cast = [batch.column(name).cast("float64", safe=False) for name in names]
+            blocks.append(np.stack([c.to_numpy(zero_copy_only=False) for c in cast], axis=1))
+    return finished(path, np.concatenate(blocks), None, names, reading, notes)
 
 
 def _damaged(path: Path, exc: Exception) -> InputFileError:

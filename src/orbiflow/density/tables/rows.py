@@ -60,8 +60,8 @@ def read_rows(
 ) -> TableRows:
     """Return the rows of a table of `width` columns, and tell what was decided for the user.
 
-    Without `columns` in the settings, all columns of numbers are taken but those that count the rows, and
-    those of weights and groups.
+    Without `columns` in the settings, all columns of numbers are taken but those that count the rows,
+    and those of weights and groups.
     """
     rows = settings if isinstance(settings, RowSettings) else RowSettings(**settings.to_json())
     how: dict[str, Any] = {

@@ -12,7 +12,7 @@ import math
 import re
 from array import array
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import islice
 from pathlib import Path
@@ -26,9 +26,9 @@ from orbiflow.density.tables.table import (
     Table,
     TableError,
     check_count,
-    checked_rows,
     choose,
     column_number,
+    finished,
     listing,
     quote,
 )
@@ -87,17 +87,16 @@ def read_text(path: Path, reading: Reading) -> Table:
     values.extend(_numbers(path, cells, lines, names, layout.decimal))
     check_count(path, len(lines), reading.max_rows, "rows")
     rows, at = np.frombuffer(values).reshape(-1, len(picked)), np.frombuffer(lines, dtype=np.int64)
-    rows, at, dropped, more = checked_rows(path, rows, at, names, "line", reading)
-    notes += more
+    named = {name: getattr(layout, name) for name in ("header", "delimiter", "decimal")}
+    table = finished(path, rows, at, names, reading, notes, named)
+    notes = list(table.notes)
     if layout.decimal == ",":
         notes.append("read decimal commas")
     if layout.header is not None:
         notes.append(f"took line {layout.first} as the header: {listing(layout.header)}")
     if comments:
         notes.append(f"skipped {comments} comment line{'s' * (comments > 1)}")
-    return Table(
-        rows, names, at, tuple(notes), layout.header, layout.delimiter, layout.decimal, dropped
-    )
+    return replace(table, notes=tuple(notes))
 
 
 def text_lines(path: Path) -> Iterator[tuple[int, str, bool]]:
