@@ -73,11 +73,8 @@ class RowSketch:
             assert is_a(document, Mapping)
             given = cast(Mapping[str, Any], document)
             hashes = np.array(given["hashes"], dtype=np.uint64)
-            if (
-                hashes.ndim != 1
-                or not 0 < len(hashes) <= MAX_HASHES
-                or (hashes[1:] <= hashes[:-1]).any()
-            ):
+            ordered = hashes.ndim == 1 and bool((hashes[1:] > hashes[:-1]).all())
+            if not ordered or not 0 < len(hashes) <= MAX_HASHES:
                 raise ValueError("hashes out of order")
             return cls(int(given["rows"]), hashes, bool(given["whole"]))
         except (AssertionError, KeyError, TypeError, ValueError, OverflowError) as error:

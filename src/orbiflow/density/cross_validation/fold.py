@@ -10,58 +10,53 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from orbiflow import runtime
 from orbiflow.arrays import Array
+from orbiflow.density import tables
 from orbiflow.density.estimator import DensityEstimator
 from orbiflow.density.fitting import ComponentSettings, DensitySettings
 from orbiflow.density.operations import mean_of_whole
 from orbiflow.density.run_folder import write_files
-from orbiflow.density.tables import (
-    RowSettings,
-    SpaceSettings,
-    Table,
-    angle_unit,
-    read_rows,
-    read_table,
-)
 from orbiflow.errors import OrbiflowError, SettingError, literal
-from orbiflow.runtime import Cancel, Note, Outcome, ResultFolder, Sink, one_thread, progress_events
 
 SCORES, REPORT = "scores.csv", "report.json"
 
 
-@one_thread()
+@runtime.one_thread()
 def fit_and_score(
     data: Path,
-    where: SpaceSettings,
+    where: tables.SpaceSettings,
     density: ComponentSettings,
-    settings: RowSettings,
+    settings: tables.RowSettings,
     out: Path,
     fold: int,
     held_column: str,
     group: str | None,
-    tell: Sink,
-    cancel: Cancel,
-) -> Outcome:
+    tell: runtime.Sink,
+    cancel: runtime.Cancel,
+) -> runtime.Outcome:
     """Fit, score the fold, and write the folder.
 
     Rows of the fold take no part in the fit, nor in where the space is turned for it.
     """
     begin = time.perf_counter()
-    rows = read_rows(data, settings, tell, width=len(settings.columns or ()) or None, group=group)
+    rows = tables.read_rows(
+        data, settings, tell, width=len(settings.columns or ()) or None, group=group
+    )
     table, weights, labels = rows.table, rows.weights, rows.labels()
     held = _held(data, table, fold, held_column, settings.header)
     estimator = DensityEstimator.with_settings(
         where.space,
         DensitySettings(**density.to_json()),
-        unit=angle_unit(where.space, where.unit, table, tell),
+        unit=tables.angle_unit(where.space, where.unit, table, tell),
         missing="marginalise" if settings.missing == "marginalise" else "refuse",
     )
-    folder = ResultFolder(out, written_files)
+    folder = runtime.ResultFolder(out, written_files)
     estimator.fit(
         table.values[~held],
         sample_weight=None if weights is None else weights[~held],
         groups=None if labels is None else labels[~held],
-        progress=progress_events(tell, cancel),
+        progress=runtime.progress_events(tell, cancel),
     )
     scores = estimator.score_samples(table.values[held])
     if not np.isfinite(scores).all():
@@ -83,9 +78,9 @@ def fit_and_score(
     }
     report = json.dumps(document, allow_nan=False, indent=1)
     write_files(folder, {SCORES: scores_csv(table.lines[held], scores), REPORT: report}, tell)
-    tell(Note(f"mean log density {mean:.4f} nats at {held.sum()} rows held out"))
+    tell(runtime.Note(f"mean log density {mean:.4f} nats at {held.sum()} rows held out"))
     names = ("rows", "fitted", "log_likelihood", "seconds")
-    return Outcome({"folder": str(out), **{name: document[name] for name in names}})
+    return runtime.Outcome({"folder": str(out), **{name: document[name] for name in names}})
 
 
 def scores_csv(rows: NDArray[np.int64], scores: Array) -> str:
@@ -103,9 +98,11 @@ def written_files(folder: Path) -> set[str]:
     return {SCORES, REPORT} if (folder / SCORES).is_file() else set()
 
 
-def _held(data: Path, table: Table, fold: int, name: str, header: bool | None) -> NDArray[np.bool_]:
+def _held(
+    data: Path, table: tables.Table, fold: int, name: str, header: bool | None
+) -> NDArray[np.bool_]:
     """Which rows (N,) are of the fold."""
-    column = read_table(data, columns=[name], width=1, has_header=header, drop_missing=True)
+    column = tables.read_table(data, columns=[name], width=1, has_header=header, drop_missing=True)
     if not np.isin(table.lines, column.lines).all():
         raise OrbiflowError(f"{data}: some rows lack their fold in {column.columns[0]!r}")
     folds = column.values[np.isin(column.lines, table.lines), 0]

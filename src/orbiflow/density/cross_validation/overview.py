@@ -12,19 +12,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from orbiflow import __version__
+from orbiflow import __version__, batch, runtime
 from orbiflow.arrays import Array
-from orbiflow.batch import (
-    BatchFolder,
-    Column,
-    Entry,
-    Item,
-    Kind,
-    Summary,
-    WorkSettings,
-    csv_bytes,
-    run_items,
-)
 from orbiflow.density.comparing import ModelComparison
 from orbiflow.density.cross_validation.fold import written_files
 from orbiflow.density.cross_validation.operations import CrossValidation
@@ -41,16 +30,6 @@ from orbiflow.density.cross_validation.splits import (
 )
 from orbiflow.density.tables import append_columns
 from orbiflow.errors import InputFileError
-from orbiflow.runtime import (
-    Cancel,
-    Note,
-    Outcome,
-    Sink,
-    check_inputs_kept,
-    check_outside_runs,
-    find,
-    one_thread,
-)
 
 TABLE, ROWS, REPORT, PAGE = "cv.csv", "rows.csv", "report.json", "index.html"
 FIGURES = ("rows", "fitted", "log_likelihood")
@@ -73,7 +52,7 @@ class CvOverview:
 
     def files(
         self,
-        entries: Sequence[Entry],
+        entries: Sequence[batch.Entry],
         waiting: int,
         pictures: frozenset[str],  # noqa: ARG002
         *,
@@ -111,7 +90,9 @@ class CvOverview:
             added[f"log_prob_{name}"] = column
         return append_columns(self.splits[0].rows.table, data, added)
 
-    def _report(self, found: HeldOut, done: Sequence[tuple[Fit, Entry]], waiting: int) -> bytes:
+    def _report(
+        self, found: HeldOut, done: Sequence[tuple[Fit, batch.Entry]], waiting: int
+    ) -> bytes:
         rows, cv, density = self.splits[0].rows, self.asked.cv, self.asked.density
         states = [entry.state for _, entry in done]
         comparison = self.comparison
@@ -160,13 +141,13 @@ class CvOverview:
         }
 
 
-def _table(done: Sequence[tuple[Fit, Entry]]) -> bytes:
+def _table(done: Sequence[tuple[Fit, batch.Entry]]) -> bytes:
     """A line for each fit that has finished."""
     heads = ["split", "fold", "setting", "state", *FIGURES, "seconds", "error", "folder"]
-    return csv_bytes(heads, (list(_cells(fit, entry)) for fit, entry in done))
+    return batch.csv_bytes(heads, (list(_cells(fit, entry)) for fit, entry in done))
 
 
-def _cells(fit: Fit, entry: Entry) -> Iterator[Any]:
+def _cells(fit: Fit, entry: batch.Entry) -> Iterator[Any]:
     yield from (fit.split, fit.fold, fit.setting, entry.state)
     yield from ("" if (v := entry.best.get(name)) is None else repr(v) for name in FIGURES)
     yield "" if entry.seconds is None else f"{entry.seconds:.3f}"
@@ -182,43 +163,47 @@ def _stamp(path: Path) -> tuple[int, int] | None:
     return found.st_size, found.st_mtime_ns
 
 
-def _figures(summary: Summary) -> dict[str, Any]:
+def _figures(summary: batch.Summary) -> dict[str, Any]:
     return {name: summary[name] for name in ("rows", "fitted", "log_likelihood")}
 
 
-FITS = Kind(
+FITS = batch.Kind(
     things="fits",
     items="fits",
     reads="data",
     writes="out",
     modules=("orbiflow.density.cross_validation.fold",),
-    columns=(Column("log_likelihood", "held out", ".4f"), Column("rows", "rows", "d")),
+    columns=(batch.Column("log_likelihood", "held out", ".4f"), batch.Column("rows", "rows", "d")),
     best=_figures,
     picture=lambda _summary: None,
     written=written_files,
 )
 
 
-def run(asked: CrossValidation, work: WorkSettings, tell: Sink, cancel: Cancel) -> Outcome:
+def run(
+    asked: CrossValidation, work: batch.WorkSettings, tell: runtime.Sink, cancel: runtime.Cancel
+) -> runtime.Outcome:
     """Do the fits that have not been done, then compare what they say of unseen rows."""
     begin = time.perf_counter()
     out = asked.out
-    check_outside_runs(out, asked.data)
+    runtime.check_outside_runs(out, asked.data)
     for name in (TABLE, ROWS, REPORT, PAGE):
-        check_inputs_kept(out / name, asked.data)
-    with one_thread():
+        runtime.check_inputs_kept(out / name, asked.data)
+    with runtime.one_thread():
         rows = cv_rows(asked, tell)
     splits = splits_of(asked, rows)
     fits = list(fits_of(asked))
     items = [_item(fit, asked, splits[fit.split - 1]) for fit in fits]
     overview = CvOverview(asked, fits, splits)
-    with BatchFolder(out, FITS, overview) as folder:
-        counts = run_items(items, work, folder, tell, cancel, gone="of other folds or settings")
+    with batch.BatchFolder(out, FITS, overview) as folder:
+        counts = batch.run_items(
+            items, work, folder, tell, cancel, gone="of other folds or settings"
+        )
     found = overview.comparison
     words = [f"no comparison: {found}"] if isinstance(found, str) else found.words()
     notes = () if isinstance(found, str) else found.notes
     for text in (*words, *notes):
-        tell(Note(text))
+        tell(runtime.Note(text))
     summary = {
         "folder": str(out),
         "table": str(out / TABLE),
@@ -232,7 +217,7 @@ def run(asked: CrossValidation, work: WorkSettings, tell: Sink, cancel: Cancel) 
     return counts.outcome(len(fits), out / TABLE, out / PAGE, summary, tell)
 
 
-def _item(fit: Fit, asked: CrossValidation, split: Split) -> Item:
+def _item(fit: Fit, asked: CrossValidation, split: Split) -> batch.Item:
     """A fit as batches take it; all that decides it is said, so that the rows do not."""
     angles = len(split.rows.table.columns)
     weighted, grouped = split.rows.weights is not None, split.rows.labels is not None
@@ -252,5 +237,5 @@ def _item(fit: Fit, asked: CrossValidation, split: Split) -> Item:
         "repeats": density.repeats,
         "seed": density.seed,
     }
-    call = find("density fold").call({k: v for k, v in given.items() if v is not None})
-    return Item(fit.key, fit.name, call, split)
+    call = runtime.find("density fold").call({k: v for k, v in given.items() if v is not None})
+    return batch.Item(fit.key, fit.name, call, split)

@@ -16,12 +16,7 @@ from numpy.typing import NDArray
 
 from orbiflow.arrays import Array
 from orbiflow.batch import Entry, code_of
-from orbiflow.density.comparing import (
-    ComparisonSettings,
-    ModelComparison,
-    compare_scores,
-    cross_validation_folds,
-)
+from orbiflow.density import comparing
 from orbiflow.density.cross_validation.fold import SCORES
 from orbiflow.density.cross_validation.operations import UNIFORM, CrossValidation
 from orbiflow.density.fitting import LEAST_PLACES, places, weighed
@@ -161,7 +156,7 @@ def splits_of(asked: CrossValidation, rows: CvRows) -> list[Split]:
     """Return the splits."""
     count, folds, seed = len(rows.table.values), asked.cv.folds, asked.density.seed
     numbers = [
-        cross_validation_folds(count, folds, together=rows.together, seed=seed, split=k)
+        comparing.cross_validation_folds(count, folds, together=rows.together, seed=seed, split=k)
         for k in range(asked.cv.times)
     ]
     return [Split(rows, 1 + fold) for fold in numbers]
@@ -252,15 +247,17 @@ def _read(path: Path, held: NDArray[np.int64]) -> Array:
 
 
 @one_blas_thread()  # sums of several threads differ in their last digits
-def compared(asked: CrossValidation, found: HeldOut, split: Split) -> ModelComparison | str:
+def compared(
+    asked: CrossValidation, found: HeldOut, split: Split
+) -> comparing.ModelComparison | str:
     """Compare settings at all rows that every one of them has scored, or return why this cannot be."""
     means = found.means()
     chosen = ~np.isnan(means).any(axis=0) & split.rows.whole
     labels, weights = split.rows.labels, split.rows.weights
     try:
-        made = compare_scores(
+        made = comparing.compare_scores(
             {name: means[k, chosen] for k, name in enumerate(found.settings)},
-            ComparisonSettings(
+            comparing.ComparisonSettings(
                 bootstrap=asked.cv.bootstrap, level=asked.cv.level, seed=asked.density.seed
             ),
             groups=None if labels is None else labels[chosen],

@@ -14,17 +14,9 @@ import numpy as np
 import torch
 
 from orbiflow.arrays import Array
-from orbiflow.density.inference import axes_named, given_named, log_prob_observed
+from orbiflow.density import inference, pictures
 from orbiflow.density.models import Density, density_to_bytes
 from orbiflow.density.operations.saved import unit_warning
-from orbiflow.density.pictures import (
-    MODEL,
-    REPORT,
-    TABLE,
-    PlotSettings,
-    corner_picture,
-    density_picture,
-)
 from orbiflow.density.run_folder import write_files
 from orbiflow.density.spaces import Space, Torus
 from orbiflow.density.tables import to_csv
@@ -47,7 +39,7 @@ def axes_of(wanted: Sequence[str], names: Sequence[str]) -> list[int]:
     [1, 0]
     """
     lower = {name.casefold() for name in names}
-    return axes_named(
+    return inference.axes_named(
         [
             int(one) - 1
             if one.casefold() not in lower and one.isdecimal() and 1 <= int(one) <= len(names)
@@ -72,7 +64,7 @@ def condition_of(
     """
     axes = axes_of([name for name, _ in pairs], names)
     values = [(axis, value) for axis, (_, value) in zip(axes, pairs, strict=True)]
-    given = given_named(space, values, names)
+    given = inference.given_named(space, values, names)
     known = {names[axis]: value for axis, value in values}
     kept = [axis for axis in range(len(names)) if axis not in given]
     if columns is not None:
@@ -93,7 +85,7 @@ def evidence_of(density: Density, given: dict[int, float]) -> float:
     """Return the log density of known angles, in turns, relative to the uniform one."""
     at = torch.full((1, density.space.dim), torch.nan, dtype=torch.float64)
     at[0, list(given)] = torch.tensor(list(given.values()), dtype=torch.float64)
-    return float(log_prob_observed(density, at, measure="uniform"))
+    return float(inference.log_prob_observed(density, at, measure="uniform"))
 
 
 def write_derived(
@@ -114,12 +106,12 @@ def write_derived(
         **origin,
     }
     files: dict[str, str | bytes] = {
-        MODEL: density_to_bytes(density, columns=names),
-        REPORT: json.dumps(document, allow_nan=False, indent=1),
+        pictures.MODEL: density_to_bytes(density, columns=names),
+        pictures.REPORT: json.dumps(document, allow_nan=False, indent=1),
     }
     if space.dim in ROWS:
         tell(Progress(0.5, "drawing"))
-        files[TABLE] = to_csv((*names, "density"), _table(density))
+        files[pictures.TABLE] = to_csv((*names, "density"), _table(density))
         files[PICTURE] = _picture(density, names)
     cancel.check()
     write_files(folder, files, tell)
@@ -150,8 +142,8 @@ def _table(density: Density) -> Array:
 
 
 def _picture(density: Density, names: list[str]) -> bytes:
-    settings = PlotSettings(names=tuple(names))
+    settings = pictures.PlotSettings(names=tuple(names))
     if density.space.dim == 2:
-        return density_picture(density, settings=settings).file()
+        return pictures.density_picture(density, settings=settings).file()
     drawn = density.sample((DRAWN,), torch.Generator().manual_seed(0))
-    return corner_picture(density, None, drawn, settings).file()
+    return pictures.corner_picture(density, None, drawn, settings).file()

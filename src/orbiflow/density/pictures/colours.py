@@ -203,20 +203,24 @@ class Tick(NamedTuple):
     text: str
 
 
-def shading(values: Array, weights: Array | None = None, *, log: bool = False) -> Shade:
+def shading(values: Array, weights: Array | None = None, *, log: bool | None = False) -> Shade:
     """Return a scale that shows where a density is large, and where it is small.
 
     A linear scale goes from 0 to the largest value or, if a few are far above the others, to what
     99.8 % are below. A logarithmic one goes from `MAX_DECADES` below the largest value, or from the
-    smallest, up to the largest.
+    smallest, up to the largest. `log` None chooses the logarithmic one if much would be dark.
     """
+    if log is None:
+        log = dark_share(values, weights) > DARK_SHARE
     peak = max(float(values.max()), 1e-300)
     if log:
         smallest = float(values.min())
         # nearly even values: a decade at least, so that noise is not drawn as structure
         low = min(max(smallest, 10.0**-MAX_DECADES * peak), peak / 10)
         return Shade(low, peak, peak, log=True, faint=smallest < low)
-    high = _quantile(values, weights, 0.998)
+    flat, order = values.ravel(), values.argsort(axis=None)
+    sums = np.cumsum(np.ones_like(flat) if weights is None else weights.ravel()[order])
+    high = float(flat[order[np.searchsorted(sums, 0.998 * sums[-1])]])
     cut = peak > 1.3 * high > 0
     return Shade(0.0, high if cut else peak, peak, cut=cut)
 
@@ -225,13 +229,6 @@ def dark_share(values: Array, weights: Array | None = None) -> float:
     """Return the share of the area that a linear scale leaves dark: below a tenth of the peak."""
     dark = values.ravel() < 0.1 * float(values.max())
     return float(np.average(dark, weights=None if weights is None else weights.ravel()))
-
-
-def _quantile(values: Array, weights: Array | None, share: float) -> float:
-    """Return the value that this share of the area is at or below."""
-    flat, order = values.ravel(), values.argsort(axis=None)
-    sums = np.cumsum(np.ones_like(flat) if weights is None else weights.ravel()[order])
-    return float(flat[order[np.searchsorted(sums, share * sums[-1])]])
 
 
 def measure_label(space: Space, measure: str, power: int = 0) -> str:

@@ -13,6 +13,7 @@ from torch import Tensor
 
 from orbiflow.arrays import Array
 from orbiflow.density.models import Density
+from orbiflow.density.pictures import projections
 from orbiflow.density.pictures.axes import chart_points, degrees_text
 from orbiflow.density.pictures.colours import chosen_scale, density_on_map, is_sharp, shading
 from orbiflow.density.pictures.ground import (
@@ -31,16 +32,6 @@ from orbiflow.density.pictures.ground import (
 )
 from orbiflow.density.pictures.map_axes import draw_map_lines, graticule
 from orbiflow.density.pictures.overlays import log_natural, region_lines
-from orbiflow.density.pictures.projections import (
-    Azimuthal,
-    EqualEarth,
-    Lambert,
-    Mollweide,
-    PlateCarree,
-    Projection,
-    Stereographic,
-    WorldMap,
-)
 from orbiflow.density.pictures.settings import PlotSettings
 from orbiflow.density.spaces import RoundSpace, Space, checked_table, to_latlon, to_vectors
 from orbiflow.drawing import Picture, Sheet
@@ -125,7 +116,7 @@ class Map(Ground):
     caption_below = True
 
     def __init__(
-        self, space: Space, projection: Projection, coastlines: Sequence[ArrayLike] = ()
+        self, space: Space, projection: projections.Projection, coastlines: Sequence[ArrayLike] = ()
     ) -> None:
         self.space, self.projection = space, projection
         self.coastlines = [checked_table(line, (2,), "a coastline") for line in coastlines]
@@ -134,7 +125,7 @@ class Map(Ground):
         self.outline = projection.outline()
         width, height = np.ptp(self.outline, axis=0)
         self.width, self.aspect = float(width), float(width / height)
-        self.is_disc = isinstance(projection, Azimuthal)
+        self.is_disc = isinstance(projection, projections.Azimuthal)
         self.title_gap = 2.2 if self.is_disc else 0.6
 
     def places(self, points: Tensor) -> Array:
@@ -227,7 +218,7 @@ class Pixels(NamedTuple):
         return table
 
 
-def pixels_of(projection: Projection, count: int | None = None) -> Pixels:
+def pixels_of(projection: projections.Projection, count: int | None = None) -> Pixels:
     """Return about `count` pixels of a map, by default `_PIXELS`."""
     from matplotlib.path import Path
     from scipy.ndimage import binary_dilation
@@ -249,28 +240,35 @@ def pixels_of(projection: Projection, count: int | None = None) -> Pixels:
     return Pixels(shown, latlon, within[kept], _areas(projection, latlon), step, extent)
 
 
-def _areas(projection: Projection, latlon: Array) -> Array:
+def _areas(projection: projections.Projection, latlon: Array) -> Array:
     """Return the areas on the sphere of equal pixels of the map."""
     if projection.is_equal_area:
         return np.ones(len(latlon))
-    if isinstance(projection, Azimuthal):
+    if isinstance(projection, projections.Azimuthal):
         cosines = to_vectors(latlon) @ projection.frame[2]
         return ((1 + cosines) / 2) ** 2  # conformal: scale 2 / (1 + cos), squared
     return np.cos(np.radians(latlon[:, 0]))
 
 
-def places_on(space: Space, projection: Projection, points: Tensor) -> Array:
+def places_on(space: Space, projection: projections.Projection, points: Tensor) -> Array:
     """Return places (M, 2) of chart points (N, 2) on a map; of axes, those of the end that it shows."""
     vectors = cast(RoundSpace, space).vectors(chart_points(space, points))
-    if space.name == "projective-plane" and isinstance(projection, Azimuthal):
+    if space.name == "projective-plane" and isinstance(projection, projections.Azimuthal):
         vectors = np.where(vectors @ projection.frame[2] < 0, -1.0, 1.0)[:, None] * vectors
     latlon = to_latlon(vectors)
     return projection.forward(latlon[projection.contains(latlon)])
 
 
-WORLD: dict[str, type[WorldMap]] = {c.name: c for c in (EqualEarth, Mollweide, PlateCarree)}
-CENTRED: dict[str, type[Azimuthal]] = {c.name: c for c in (Lambert, Stereographic)}
-NETS: dict[str, type[Azimuthal]] = {"schmidt": Lambert, "wulff": Stereographic}
+WORLD: dict[str, type[projections.WorldMap]] = {
+    c.name: c for c in (projections.EqualEarth, projections.Mollweide, projections.PlateCarree)
+}
+CENTRED: dict[str, type[projections.Azimuthal]] = {
+    c.name: c for c in (projections.Lambert, projections.Stereographic)
+}
+NETS: dict[str, type[projections.Azimuthal]] = {
+    "schmidt": projections.Lambert,
+    "wulff": projections.Stereographic,
+}
 """Nets of structural geology: latitude is plunge or inclination, longitude trend or declination."""
 
 _NET_WORDS = ("inc", "plunge", "dip")
@@ -286,7 +284,7 @@ def chosen_map(
     points: Tensor,
     settings: PlotSettings | None = None,
     names: Sequence[str] | None = None,
-) -> Projection:
+) -> projections.Projection:
     """Return the map of a sphere or projective plane that settings ask for, or that suits points.
 
     `points` are chart points (N, 2); `names` of the data's columns may ask for a net.
@@ -351,8 +349,11 @@ def smallest_cap(vectors: Array) -> tuple[tuple[float, float], float] | None:
 
 
 def _world(
-    kind: type[WorldMap], space: Space, middle: tuple[float, ...] | None, radius: float | None
-) -> Projection:
+    kind: type[projections.WorldMap],
+    space: Space,
+    middle: tuple[float, ...] | None,
+    radius: float | None,
+) -> projections.Projection:
     if space.name == "projective-plane":
         raise SettingError(
             "a direction and its opposite are one point of the projective plane, which needs a map "
@@ -366,7 +367,7 @@ def _world(
     return kind((lat, lon))
 
 
-def subtitle(projection: Projection) -> str:
+def subtitle(projection: projections.Projection) -> str:
     """Return the projection as a title has it."""
     if _is_net(projection):
         return "Schmidt net (equal-area)" if projection.is_equal_area else "Wulff net (equal-angle)"
@@ -375,7 +376,7 @@ def subtitle(projection: Projection) -> str:
 
 def map_caption(
     space: Space,
-    projection: Projection,
+    projection: projections.Projection,
     notes: Sequence[str] = (),
     *,
     dots: tuple[int, int] | None = None,
@@ -407,14 +408,14 @@ def map_caption(
     return " ".join(f"{part}." for part in parts)
 
 
-def _description(space: Space, projection: Projection) -> str:
+def _description(space: Space, projection: projections.Projection) -> str:
     lat, lon = projection.center
     frame = (
         ""
         if space.columns[0] == "lat"
         else "; latitudes are from the x, y plane towards z, longitudes from x towards y"
     )
-    if not isinstance(projection, Azimuthal):
+    if not isinstance(projection, projections.Azimuthal):
         middle = degrees_text((lon + 180) % 360 - 180, "EW")
         return f"The sphere in {projection.title}, about {middle}{frame}"
     within = (
@@ -433,5 +434,5 @@ def _description(space: Space, projection: Projection) -> str:
     return f"{within[0].upper()}{within[1:]} {seen}"
 
 
-def _is_net(projection: Projection) -> bool:
-    return isinstance(projection, Azimuthal) and projection.flipped
+def _is_net(projection: projections.Projection) -> bool:
+    return isinstance(projection, projections.Azimuthal) and projection.flipped

@@ -13,6 +13,7 @@ from torch import Tensor
 
 from orbiflow.arrays import Array
 from orbiflow.density.models import Density
+from orbiflow.density.pictures import surfaces
 from orbiflow.density.pictures.axes import (
     View,
     angle_text,
@@ -34,17 +35,6 @@ from orbiflow.density.pictures.ground import COLOURS, SMALLER
 from orbiflow.density.pictures.overlays import thinned, uncrowded
 from orbiflow.density.pictures.settings import PlotSettings
 from orbiflow.density.pictures.square import average_note
-from orbiflow.density.pictures.surfaces import (
-    EYE,
-    KLEIN_RADIUS,
-    RING_RADIUS,
-    TUBE_RADIUS,
-    immersion,
-    mesh,
-    normals,
-    vector_immersion,
-    viewpoint,
-)
 from orbiflow.density.spaces import Space, checked_table, to_vectors
 from orbiflow.drawing import rendered
 from orbiflow.errors import OrbiflowError
@@ -93,7 +83,7 @@ def density_page(
 
     settings, space = settings or PlotSettings(), density.space
     cells = resolution or (_FINE_CELLS if density.has_fine_detail else _CELLS)
-    grid, view = mesh(space, cells), view_of(space, settings.names)
+    grid, view = surfaces.mesh(space, cells), view_of(space, settings.names)
     t = torch.linspace(0.0, 1.0, cells + 1, dtype=torch.float64)
     values = density_on_grid(density, t, t, settings.measure, pixel=_SOFT / cells).ravel()
     # by area on the surface: vertices crowd at the cone points
@@ -118,7 +108,7 @@ def density_page(
     }
     if samples is not None:
         points = torch.tensor(thinned(chart_points(space, samples).numpy()))
-        places, widths = uncrowded(immersion(space)(space.project(points)))
+        places, widths = uncrowded(surfaces.immersion(space)(space.project(points)))
         data |= {"samples": _packed(places, "<f4"), "widths": _packed(widths, "<f4")}
         notes.append(SMALLER)
     if is_sharp(density, pixel=_SOFT / cells):
@@ -139,15 +129,15 @@ def density_page(
 
 def _surface(space: Space, points: Tensor, peak: int) -> dict[str, Any]:
     """Return the mesh in space, its size, and from where it is seen first."""
-    places = immersion(space)(points)
+    places = surfaces.immersion(space)(points)
     center = (places.min(axis=0) + places.max(axis=0)) / 2
     return {
         "center": center.tolist(),
         "radius": float(np.linalg.norm(places - center, axis=1).max()),
-        "start": viewpoint(space, points[peak])._asdict(),
-        "eye": EYE,
+        "start": surfaces.viewpoint(space, points[peak])._asdict(),
+        "eye": surfaces.EYE,
         "points": _packed(places, "<f4"),
-        "normals": _packed(127 * normals(space, points), "i1"),
+        "normals": _packed(127 * surfaces.normals(space, points), "i1"),
     }
 
 
@@ -171,7 +161,9 @@ def _coast(space: Space, coastlines: Sequence[ArrayLike]) -> list[Array]:
     if not space.is_round:
         raise OrbiflowError(f"coastlines need latitudes and longitudes, the {space.name} has none")
     tables = [checked_table(line, (2,), "a coastline") for line in coastlines]
-    return [vector_immersion(space)(to_vectors(table)) for table in tables if len(table) > 1]
+    return [
+        surfaces.vector_immersion(space)(to_vectors(table)) for table in tables if len(table) > 1
+    ]
 
 
 Lines = tuple[tuple[float, list[Array]], tuple[float, list[Array]]]
@@ -188,7 +180,7 @@ def _coordinate_lines(space: Space) -> Lines:
     across = [np.stack([np.full(181, lat), t], axis=-1) for lat in range(0, 90, step)]
     across += [line * (-1, 1) for line in across[1:]]
     along = [np.stack([t / 2, np.full(181, lon)], axis=-1) for lon in range(0, 360, step)]
-    surface = vector_immersion(space)
+    surface = surfaces.vector_immersion(space)
     parallels, meridians = (
         [surface(to_vectors(line)) for line in lines] for lines in (across, along)
     )
@@ -197,7 +189,7 @@ def _coordinate_lines(space: Space) -> Lines:
 
 def _eighths(space: Space, steps: int, zero: int) -> Lines:
     """Return lines every eighth of a turn, `steps` of them up the square; x = zero / 8 is angle 0."""
-    surface, t = immersion(space), torch.linspace(0, 1, 161, dtype=torch.float64)
+    surface, t = surfaces.immersion(space), torch.linspace(0, 1, 161, dtype=torch.float64)
     across = [torch.stack([torch.full_like(t, k / 8), t], dim=-1) for k in range(8)]
     along = [torch.stack([t, torch.full_like(t, k / steps)], dim=-1) for k in range(steps)]
     zeros = [across[zero], along[0]]
@@ -217,7 +209,11 @@ def _labels(view: View) -> list[dict[str, Any]]:
     else:
         turns = (0, 0.25, 0.5, -0.25) if space.is_torus else (0, 0.125, 0.25, 0.375)
         texts = [f"{column_name(view, 0)} {angle_text(t, space.unit)}" for t in turns]
-        radius = RING_RADIUS + TUBE_RADIUS if space.is_torus else KLEIN_RADIUS + 1
+        radius = (
+            surfaces.RING_RADIUS + surfaces.TUBE_RADIUS
+            if space.is_torus
+            else surfaces.KLEIN_RADIUS + 1
+        )
         places = 1.1 * radius * np.array([[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0]])
     return [{"text": t, "at": place.tolist()} for t, place in zip(texts, places, strict=True)]
 

@@ -144,8 +144,10 @@ def layout_of(path: Path, columns: Sequence[str] | None, has_header: bool | None
         if len(row) != len(rows[0]):
             raise _ragged(path, number, len(row), first, len(rows[0]), delimiter)
     decimal = _decimal(rows)
-    pointed = [[_pointed(cell, decimal) for cell in row] for row in rows]
-    classes = list(zip(*([_class(cell) for cell in row] for row in pointed), strict=True))
+    classes = [
+        tuple(_class(cell.replace(decimal, ".")) for cell in column)
+        for column in zip(*rows, strict=True)
+    ]
     header = None
     if has_header is None:
         has_header = _has_header(path, first, rows[0], classes, columns)
@@ -165,10 +167,6 @@ def _decimal(rows: list[list[str]]) -> str:
     commas = any(DECIMAL_COMMA.fullmatch(cell) for cell in cells)
     points = any("." in cell and _class(cell) == "number" for cell in cells)
     return "," if commas and not points else "."
-
-
-def _pointed(cell: str, decimal: str) -> str:
-    return cell if decimal == "." else cell.replace(decimal, ".")
 
 
 def _delimiter(lines: list[str]) -> str:
@@ -264,7 +262,7 @@ def _numbers(
 ) -> list[float]:
     """Return the cells of the last of `lines`, row after row, as floats; NaN for missing ones."""
     if decimal != ".":
-        cells = [_pointed(cell, decimal) for cell in cells]
+        cells = [cell.replace(decimal, ".") for cell in cells]
     try:
         if "_" not in "".join(cells):  # float takes 1_000
             return list(map(float, cells))
