@@ -1,4 +1,4 @@
-"""The folder of a density, as a fit and the operations on its model leave it."""
+"""The folder of a density, as a fit and the operations on its model leave it, and other results."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import json
 from collections.abc import Mapping
 from pathlib import Path
 
-from orbiflow.runtime import ResultFolder, Sink, Written, write_atomic
+from orbiflow.runtime import Note, ResultFolder, Sink, Written, write_atomic
 
 
 def written_files(folder: Path) -> set[str]:
@@ -31,3 +31,11 @@ def write_files(folder: ResultFolder, files: Mapping[str, str | bytes], tell: Si
             write_atomic(staged / name, content)
     for name in files:
         tell(Written(folder.path / name))
+
+
+def write_file(path: Path, content: str | bytes, tell: Sink, *notes: str) -> None:
+    """Write a file, and tell so before other notes."""
+    write_atomic(path, content)
+    tell(Written(path))
+    for note in notes:
+        tell(Note(note))

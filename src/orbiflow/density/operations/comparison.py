@@ -12,6 +12,7 @@ from orbiflow.batch import csv_bytes
 from orbiflow.density import comparing, tables
 from orbiflow.density.comparing import ComparisonSettings
 from orbiflow.density.operations.drawing import require_ending
+from orbiflow.density.run_folder import write_file
 from orbiflow.density.tables import SpaceName, TableSettings, Unit
 from orbiflow.errors import OrbiflowError, SettingError
 from orbiflow.runtime import (
@@ -20,12 +21,10 @@ from orbiflow.runtime import (
     Outcome,
     Progress,
     Sink,
-    Written,
     check_output_file,
     ignore,
     one_thread,
     operation,
-    write_atomic,
 )
 from orbiflow.settings import DefaultText, Option, Repeated
 
@@ -86,11 +85,8 @@ def compare(
         on_event(Note(line))
     if out is not None:
         as_csv = out.suffix.lower() == ".csv"
-        write_atomic(
-            out, _csv(found) if as_csv else json.dumps(document, allow_nan=False, indent=1)
-        )
-        on_event(Written(out))
-        on_event(Note(f"written to {out}"))
+        text = _csv(found) if as_csv else json.dumps(document, allow_nan=False, indent=1)
+        write_file(out, text, on_event, f"written to {out}")
     return Outcome({"file": None if out is None else str(out), "comparison": document})
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 from orbiflow.density import pictures, regions, spaces, tables
 from orbiflow.density.pictures import PlotSettings
 from orbiflow.density.regions import RegionSettings
+from orbiflow.density.run_folder import write_file
 from orbiflow.density.tables import TableSettings, Unit, check_table_name
 from orbiflow.errors import OrbiflowError, SettingError
 from orbiflow.runtime import (
@@ -24,7 +25,6 @@ from orbiflow.runtime import (
     ignore,
     one_thread,
     operation,
-    write_atomic,
 )
 from orbiflow.settings import DefaultText, Option, Range
 
@@ -172,11 +172,7 @@ def region(
         document = regions.regions_document(found, drawn, samples=samples, seed=settings.seed)
         text = json.dumps(document, allow_nan=False)
     cancel.check()
-    write_atomic(out, text)
-    on_event(Written(out))
-    for note in _region_notes(found, drawn):
-        on_event(Note(note))
-    on_event(Note(f"written to {out}"))
+    write_file(out, text, on_event, *_region_notes(found, drawn), f"written to {out}")
     return Outcome({"file": str(out), "regions": [one.to_json() for one in found]})
 
 
@@ -297,14 +293,9 @@ def patches(
         )
     kept = np.column_stack([angles, distances])[near]
     cancel.check()
-    write_atomic(out, tables.to_csv(("theta", "phi", "distance"), kept))
-    on_event(Written(out))
     left_out = int((~near).sum())
     left = f", {left_out} farther ones left out" if left_out else ""
-    on_event(
-        Note(
-            f"{len(kept)} patches, half of them within {np.median(kept[:, 2]):.3f} of the Klein "
-            f"bottle{left}; written to {out}"
-        )
-    )
+    half = f"half of them within {np.median(kept[:, 2]):.3f} of the Klein bottle{left}"
+    content = tables.to_csv(("theta", "phi", "distance"), kept)
+    write_file(out, content, on_event, f"{len(kept)} patches, {half}; written to {out}")
     return Outcome({"file": str(out), "rows": len(kept), "left_out": left_out})

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 from orbiflow.density import inference, tables
-from orbiflow.density.run_folder import written_files
+from orbiflow.density.run_folder import write_file, written_files
 from orbiflow.density.tables import RowSettings, check_table_name
 from orbiflow.errors import literal
 from orbiflow.runtime import (
@@ -17,13 +17,11 @@ from orbiflow.runtime import (
     Progress,
     ResultFolder,
     Sink,
-    Written,
     check_output_file,
     check_output_folder,
     ignore,
     one_thread,
     operation,
-    write_atomic,
 )
 from orbiflow.settings import DefaultText, Needs, NotWith, Option, Range, SettingError, Settings
 
@@ -96,16 +94,10 @@ def score(
         rows = tables.read_rows(data, with_columns_of(reading, data, extra, on_event), on_event)
         check_fits(data, rows.table, density.space, extra, on_event)
         found = score_rows(density, rows, settings, on_event, cancel, may_lack=may_lack)
-    write_atomic(out, tables.append_columns(rows.table, data, found.columns))
-    on_event(Written(out))
-    for note in found.notes:
-        on_event(Note(note))
     weighted = "" if reading.weights is None else f", weighted by {reading.weights}"
-    on_event(
-        Note(
-            f"mean log density {found.mean:.4f} nats over {found.over}{weighted}; written to {out}"
-        )
-    )
+    words = f"mean log density {found.mean:.4f} nats over {found.over}{weighted}; written to {out}"
+    table = tables.append_columns(rows.table, data, found.columns)
+    write_file(out, table, on_event, *found.notes, words)
     return Outcome({"file": str(out), "rows": len(rows.table.values), "mean": found.mean})
 
 
@@ -147,9 +139,8 @@ def sample(
         data = density.space.from_chart(density.sample((settings.count,), generator))
     names = names_of(density, extra)
     cancel.check()
-    write_atomic(out, tables.to_csv(names, data))
-    on_event(Written(out))
-    on_event(Note(f"{settings.count} samples written to {out}"))
+    words = f"{settings.count} samples written to {out}"
+    write_file(out, tables.to_csv(names, data), on_event, words)
     return Outcome({"file": str(out), "rows": settings.count})
 
 
@@ -230,11 +221,8 @@ def conditional(
         evidence = evidence_of(density, turns)
         rare = "; few data lie there, or none" if evidence < -3 else ""
         words = ", ".join(f"{name} = {value:g}" for name, value in known.items())
-        on_event(
-            Note(
-                f"the density at {words} is {math.exp(evidence):.3g} times that of even angles{rare}"
-            )
-        )
+        ratio = f"{math.exp(evidence):.3g} times that of even angles{rare}"
+        on_event(Note(f"the density at {words} is {ratio}"))
         origin = {
             "given": known,
             "log_density_of_given_over_uniform": evidence,
