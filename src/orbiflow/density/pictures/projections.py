@@ -56,9 +56,9 @@ class Projection(ABC):
     def pieces(self, latlon: Array) -> list[Array]:
         """Return a line (M, 2) of directions on the map, cut where the map is: places (K, 2), K > 1."""
 
-    @abstractmethod
     def contains(self, latlon: Array) -> Array:
-        """Return which directions the map shows, (N,) of bool."""
+        """Return which directions the map shows, (N,) of bool: all, unless it is of a part."""
+        return np.ones(len(latlon), dtype=bool)
 
 
 def refined(latlon: Array) -> Array:
@@ -81,7 +81,6 @@ def wrapped(lon: Array) -> Array:
 
 
 def _without_points(lines: list[Array]) -> list[Array]:
-    """Return the lines (M, 2) that are more than a point."""
     return [line for line in lines if len(line) > 1 and bool((line != line[0]).any())]
 
 
@@ -143,8 +142,7 @@ class Azimuthal(Projection):
 
     def pieces(self, latlon: Array) -> list[Array]:
         vectors = to_vectors(refined(latlon))
-        limit = math.cos(math.radians(self.radius))
-        above = vectors @ self.frame[2] - limit
+        above = vectors @ self.frame[2] - math.cos(math.radians(self.radius))
         inside = above >= 0
         found: list[Array] = []
         ends = np.flatnonzero(np.diff(np.concatenate([[False], inside, [False]])))
@@ -223,7 +221,7 @@ class WorldMap(Projection):
         """Return x per radian of longitude."""
 
     def forward(self, latlon: Array) -> Array:
-        return self._placed(latlon[:, 0], self._relative(latlon[:, 1]))
+        return self._placed(latlon[:, 0], wrapped(latlon[:, 1] - self.center[1]))
 
     def inverse(self, places: Array) -> Array:
         x, y = places.T
@@ -239,7 +237,7 @@ class WorldMap(Projection):
 
     def pieces(self, latlon: Array) -> list[Array]:
         latlon = refined(latlon)
-        lat, lon = latlon[:, 0], self._relative(latlon[:, 1])
+        lat, lon = latlon[:, 0], wrapped(latlon[:, 1] - self.center[1])
         found: list[Array] = []
         start, head = 0, np.empty((0, 2))
         for k in np.flatnonzero(abs(np.diff(lon)) > 180):
@@ -252,12 +250,6 @@ class WorldMap(Projection):
             start, head = k + 1, np.array([[cut, -sign * 180]])
         found.append(np.concatenate([head, np.stack([lat[start:], lon[start:]], axis=-1)]))
         return _without_points([self._placed(*line.T) for line in found])
-
-    def contains(self, latlon: Array) -> Array:
-        return np.ones(len(latlon), dtype=bool)
-
-    def _relative(self, lon: Array) -> Array:
-        return wrapped(lon - self.center[1])
 
     def _placed(self, lat: Array, lon: Array) -> Array:
         """Return places of longitudes from the map's own meridian, -180 and 180 at its two sides."""
