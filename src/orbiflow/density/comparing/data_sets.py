@@ -162,37 +162,20 @@ def compare_samples(
     if len(kept) < len(points):
         notes.append(f"the test looks at {len(kept)} of {len(points)} rows, drawn at random")
     progress(0.0, "permuting")
-    test = mmd_test(
-        own,
-        points[torch.as_tensor(kept)],
-        first[kept],
-        Groups.of(members.index[kept] if members.given else None, len(kept)),
-        permutations=settings.permutations,
-        seed=seed,
-    )
+    looked_at, among = points[torch.as_tensor(kept)], members.index[kept]
+    chosen = Groups.of(among if members.given else None, len(kept))
+    most = settings.permutations
+    test = mmd_test(own, looked_at, first[kept], chosen, permutations=most, seed=seed)
     divergence = None
     try:
-        divergence = cross_fitted(
-            own,
-            points,
-            first,
-            members,
-            settings,
-            progress=lambda share, what: progress(0.3 + 0.7 * share, what),
-        )
+        told: Progress = lambda share, what: progress(0.3 + 0.7 * share, what)  # noqa: E731
+        divergence = cross_fitted(own, points, first, members, settings, told)
     except OrbiflowError as error:
         notes.append(f"how far apart they are was not estimated: {error}")
-    return DataComparison(
-        (names[0], names[1]),
-        (len(tables[0]), len(tables[1])),
-        members.count if members.given else None,
-        test,
-        divergence,
-        settings.level,
-        settings.bootstrap,
-        seed,
-        tuple(notes),
-    )
+    rows = (len(tables[0]), len(tables[1]))
+    groups_in_all = members.count if members.given else None
+    found = (rows, groups_in_all, test, divergence, settings.level, settings.bootstrap, seed)
+    return DataComparison((names[0], names[1]), *found, tuple(notes))
 
 
 def _two(samples: Mapping[str, ArrayLike]) -> tuple[list[str], list[np.ndarray]]:
@@ -270,7 +253,6 @@ def cross_fitted(
     first: Array,
     groups: Groups,
     settings: ComparisonSettings,
-    *,
     progress: Progress,
 ) -> Divergence:
     """Fit a density to half of each data set, score the other halves, and swap the halves.

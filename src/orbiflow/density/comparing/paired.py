@@ -158,32 +158,24 @@ def compare_scores(
     for k, (i, j) in enumerate(pairs):
         low, high = mean[k] - reach * error[k], mean[k] + reach * error[k]
         t = _ratio(abs(mean[k]), error[k])
-        found.append(
-            Difference(
-                names[i],
-                names[j],
-                float(mean[k]),
-                float(error[k]),
-                float(low),
-                float(high),
-                float((1 + (largest >= t).sum()) / (1 + settings.bootstrap)) if t else 1.0,
-                float(np.average((rows[:, k] > 0) + (rows[:, k] == 0) / 2, weights=counts)),
-                names[i] if low > 0 else None,
-            )
-        )
+        p = float((1 + (largest >= t).sum()) / (1 + settings.bootstrap)) if t else 1.0
+        share = float(np.average((rows[:, k] > 0) + (rows[:, k] == 0) / 2, weights=counts))
+        figures = map(float, (mean[k], error[k], low, high, p, share))
+        better = names[i] if low > 0 else None
+        found.append(Difference(names[i], names[j], *figures, better=better))
     beaten = {d.second for d in found if d.first == names[0] and d.better is not None}
     same = [
         f"{d.first} and {d.second} are equal at every row" for d in found if d.mean == d.error == 0
     ]
+    best = names[0] if len(beaten) == len(names) - 1 else None
+    scored = zip(names, means.tolist(), errors.tolist(), strict=True)
     return ModelComparison(
-        tuple(ModelScore(*s) for s in zip(names, means.tolist(), errors.tolist(), strict=True)),
+        tuple(ModelScore(*score) for score in scored),
         tuple(found),
         len(table),
         members.count if members.given else None,
-        settings.level,
-        settings.bootstrap,
-        settings.seed,
-        names[0] if len(beaten) == len(names) - 1 else None,
+        *(settings.level, settings.bootstrap, settings.seed),
+        best,
         (*members.notes(), *same),
     )
 

@@ -151,18 +151,8 @@ def outlines(
         shapely.prepare(shape)
         inside = float(np.mean(shapely.intersects_xy(shape, fresh[:, 0], fresh[:, 1])))
         error = float(np.sqrt(max(inside * (1 - inside), 1 / CHECKED) / CHECKED))
-        found.append(
-            Outline(
-                region,
-                window,
-                shape,
-                window.area(shape),
-                inside,
-                error,
-                off,
-                _notes(region, inside, error, missed),
-            )
-        )
+        size, notes = window.area(shape), _notes(region, inside, error, missed)
+        found.append(Outline(region, window, shape, size, inside, error, off, notes))
     return found
 
 
@@ -249,16 +239,9 @@ def _round(space: RoundSpace) -> Window:
     edges = "longitude -180 is longitude 180"
     if half:
         edges += "; on the equator, a point is that opposite; polygons are of northern ends"
-    return Window(
-        ("lon", "lat"),
-        np.array([-180.0, 0.0 if half else -90.0]),
-        np.array([180.0, 90.0]),
-        (180, 45 if half else 90),
-        edges,
-        True,
-        to_chart,
-        from_chart,
-    )
+    low, high = np.array([-180.0, 0.0 if half else -90.0]), np.array([180.0, 90.0])
+    cells = (180, 45 if half else 90)
+    return Window(("lon", "lat"), low, high, cells, edges, True, to_chart, from_chart)
 
 
 def _flat(space: Space) -> Window:
@@ -270,16 +253,8 @@ def _flat(space: Space) -> Window:
         low, high = np.array([0.0, -period / 4]), np.array([period / 2, 3 * period / 4])
         theta, phi = space.columns
         edges = f"{theta} 0 is {theta} {period / 2:g} with {phi} turned over; the others are one"
-    return Window(
-        (space.columns[0], space.columns[1]),
-        low,
-        high,
-        (128, 128),
-        edges,
-        False,
-        space.to_chart,
-        space.from_chart,
-    )
+    names, cells = (space.columns[0], space.columns[1]), (128, 128)
+    return Window(names, low, high, cells, edges, False, space.to_chart, space.from_chart)
 
 
 def _steradians(polygon: shapely.Polygon) -> float:
