@@ -6,6 +6,7 @@ import json
 import math
 import time
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,67 +19,82 @@ from orbiflow.density.fitting import ComponentSettings, DensitySettings
 from orbiflow.density.operations import mean_of_whole
 from orbiflow.density.run_folder import write_files
 from orbiflow.errors import OrbiflowError, SettingError, literal
+from orbiflow.settings import Option
 
 SCORES, REPORT = "scores.csv", "report.json"
 
 
+@runtime.operation("density fold")
 @runtime.one_thread()
-def fit_and_score(
+def fold(
     data: Path,
     where: tables.SpaceSettings,
-    density: ComponentSettings,
-    settings: tables.RowSettings,
-    out: Path,
+    density: ComponentSettings = ComponentSettings(),
+    out: Annotated[Path, Option("-o")] = Path("fold"),
+    rows: tables.RowSettings = tables.RowSettings(),
+    *,
     fold: int,
-    held_column: str,
-    group: str | None,
-    tell: runtime.Sink,
-    cancel: runtime.Cancel,
+    held: str = "fold",
+    group: str | None = None,
+    on_event: runtime.Sink = runtime.ignore,
+    cancel: runtime.Cancel = runtime.Cancel(),
 ) -> runtime.Outcome:
-    """Fit, score the fold, and write the folder.
+    """Fit a density to all rows of a table but those of one fold, and score that fold.
 
-    Rows of the fold take no part in the fit, nor in where the space is turned for it.
+    Writes scores.csv, a line for each row held out, and report.json. Rows of the fold take no part in
+    the fit, nor in where the space is turned for it.
+
+    Args:
+        data: The table.
+        out: Folder for the results, made if need be.
+        fold: The fold that is held out.
+        held: Column that numbers the fold of each row.
+        group: Column that names what rows belong to.
     """
     begin = time.perf_counter()
-    rows = tables.read_rows(
-        data, settings, tell, width=len(settings.columns or ()) or None, group=group
-    )
-    table, weights, labels = rows.table, rows.weights, rows.labels()
-    held = _held(data, table, fold, held_column, settings.header)
+    width = len(rows.columns or ()) or None
+    read = tables.read_rows(data, rows, on_event, width=width, group=group)
+    table, weights, labels = read.table, read.weights, read.labels()
+    out_of_fit = _held(data, table, fold, held, rows.header)
     estimator = DensityEstimator.with_settings(
         where.space,
         DensitySettings(**density.to_json()),
-        unit=tables.angle_unit(where.space, where.unit, table, tell),
-        missing="marginalise" if settings.missing == "marginalise" else "refuse",
+        unit=tables.angle_unit(where.space, where.unit, table, on_event),
+        missing="marginalise" if rows.missing == "marginalise" else "refuse",
     )
     folder = runtime.ResultFolder(out, written_files)
     estimator.fit(
-        table.values[~held],
-        sample_weight=None if weights is None else weights[~held],
-        groups=None if labels is None else labels[~held],
-        progress=runtime.progress_events(tell, cancel),
+        table.values[~out_of_fit],
+        sample_weight=None if weights is None else weights[~out_of_fit],
+        groups=None if labels is None else labels[~out_of_fit],
+        progress=runtime.progress_events(on_event, cancel),
     )
-    scores = estimator.score_samples(table.values[held])
+    scores = estimator.score_samples(table.values[out_of_fit])
     if not np.isfinite(scores).all():
         raise SettingError(
-            f"{(~np.isfinite(scores)).sum()} rows held out have no density: allow other {{components}}"
+            f"{(~np.isfinite(scores)).sum()} rows held out have no density: allow other "
+            "{components}"
         )
     cancel.check()
-    mean = mean_of_whole(scores, None if weights is None else weights[held], rows.whole[held])
+    mean = mean_of_whole(
+        scores, None if weights is None else weights[out_of_fit], read.whole[out_of_fit]
+    )
     document = {
         "space": {"name": estimator.space_.name, **estimator.space_.settings()},
         "fold": fold,
         "components": density.components,
-        "rows": int(held.sum()),
-        "fitted": int((~held).sum()),
+        "rows": int(out_of_fit.sum()),
+        "fitted": int((~out_of_fit).sum()),
         "log_likelihood": mean,
         "uniform": -math.log(estimator.space_.volume),
         "report": estimator.report_.to_json(),
         "seconds": time.perf_counter() - begin,
     }
     report = json.dumps(document, allow_nan=False, indent=1)
-    write_files(folder, {SCORES: scores_csv(table.lines[held], scores), REPORT: report}, tell)
-    tell(runtime.Note(f"mean log density {mean:.4f} nats at {held.sum()} rows held out"))
+    write_files(
+        folder, {SCORES: scores_csv(table.lines[out_of_fit], scores), REPORT: report}, on_event
+    )
+    on_event(runtime.Note(f"mean log density {mean:.4f} nats at {out_of_fit.sum()} rows held out"))
     names = ("rows", "fitted", "log_likelihood", "seconds")
     return runtime.Outcome({"folder": str(out), **{name: document[name] for name in names}})
 

@@ -130,36 +130,6 @@ def cross_validate(
     return run(asked, work, on_event, cancel)
 
 
-@operation("density fold")
-def fold(
-    data: Path,
-    where: SpaceSettings,
-    density: ComponentSettings = ComponentSettings(),
-    out: Annotated[Path, Option("-o")] = Path("fold"),
-    rows: RowSettings = RowSettings(),
-    *,
-    fold: int,
-    held: str = "fold",
-    group: str | None = None,
-    on_event: Sink = ignore,
-    cancel: Cancel = Cancel(),
-) -> Outcome:
-    """Fit a density to all rows of a table but those of one fold, and score that fold.
-
-    Writes scores.csv, a line for each row held out, and report.json.
-
-    Args:
-        data: The table.
-        out: Folder for the results, made if need be.
-        fold: The fold that is held out.
-        held: Column that numbers the fold of each row.
-        group: Column that names what rows belong to.
-    """
-    from orbiflow.density.cross_validation.fold import fit_and_score
-
-    return fit_and_score(data, where, density, rows, out, fold, held, group, on_event, cancel)
-
-
 def setting_of(components: Sequence[str] | None, field: str) -> tuple[str, Components]:
     """Return the name of a setting, and its components in one order.
 

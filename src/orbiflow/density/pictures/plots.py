@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import torch
 from numpy.typing import ArrayLike
-from torch import Tensor
 
 from orbiflow.arguments import as_path
 from orbiflow.density.comparing import density_of
@@ -23,13 +21,13 @@ from orbiflow.density.pictures.corner import MAX_COLUMNS, corner_picture
 from orbiflow.density.pictures.flow import few_colours, flow_picture
 from orbiflow.density.pictures.ground import Ground, draw_density, draw_samples
 from orbiflow.density.pictures.maps import Map, chosen_map
-from orbiflow.density.pictures.overlays import RegionLine, region_lines
+from orbiflow.density.pictures.overlays import region_lines
 from orbiflow.density.pictures.page import density_page
-from orbiflow.density.pictures.projections import PlateCarree, Projection
+from orbiflow.density.pictures.projections import PlateCarree
 from orbiflow.density.pictures.settings import PlotSettings
 from orbiflow.density.pictures.square import Square
 from orbiflow.density.spaces import Space
-from orbiflow.drawing import FORMATS, Picture, Sheet, pdf_pages
+from orbiflow.drawing import FORMATS, Picture, pdf_pages
 from orbiflow.errors import OrbiflowError, OutputError, SettingError
 from orbiflow.runtime import LITTER, make_folder, one_thread, write_atomic, write_set
 
@@ -93,26 +91,25 @@ def plot_density(
     """
     settings, out = settings or PlotSettings(), as_path(out, "the folder to draw into")
     single = is_one_file(out)
-    if not single:
+    if single:
+        settings = settings.replace(format="pdf")
+    else:
         refuse_foreign_files(out)
-    drawn, settings, columns = _checked(density, settings)
-    lines = _all_coastlines(drawn.space, settings, coastlines)
-    shown = _Shown.of(drawn, settings, data, columns, lines)
-    sheet = Sheet.column(settings.width or "single", "pdf") if single else settings.sheet
+    shown = _Shown(density, settings, data, coastlines)
     if not single:
         make_folder(out)
-    makers, pictures = shown.makers(sheet), dict[str, Picture]()
+    form, makers, pictures = settings.sheet.format, shown.makers(), dict[str, Picture]()
     for k, (name, make) in enumerate(makers.items()):
-        told(k / (len(makers) + 1), f"drawing {name}.{sheet.format}")
+        told(k / (len(makers) + 1), f"drawing {name}.{form}")
         pictures[name] = make()
     captions = tuple(f"{own.title}. {own.caption}".strip() for own in pictures.values())
     if single:
         path = write_atomic(out, pdf_pages(list(pictures.values())))
         return Plotted((path,), captions, shown.notes)
     contents: dict[str, str | bytes] = {
-        f"{name}.{sheet.format}": _content(name, picture) for name, picture in pictures.items()
+        f"{name}.{form}": _content(name, picture) for name, picture in pictures.items()
     }
-    if drawn.space.dim == 2:
+    if shown.space.dim == 2:
         told(0.75, f"drawing {PAGE}")
         contents[PAGE] = shown.page()
     return Plotted(tuple(write_set(out, PICTURES, contents)), captions, shown.notes)
@@ -163,20 +160,88 @@ def _content(name: str, picture: Picture) -> bytes:
     return few_colours(content) if few else content
 
 
-def _checked(
-    given: Density | DensityEstimator | str | Path, settings: PlotSettings
-) -> tuple[Density, PlotSettings, Sequence[str] | None]:
-    """Return a density that can be drawn, settings that fit it, and its columns if they are known."""
-    columns = None
+class _Shown:
+    """A density and what is drawn with it: settings, chart points, lines around regions, a map.
+
+    All that can be wrong is checked before the work.
+    """
+
+    def __init__(
+        self,
+        given: Density | DensityEstimator | str | Path,
+        settings: PlotSettings,
+        data: ArrayLike | None,
+        coastlines: Sequence[ArrayLike],
+    ) -> None:
+        self.density, columns = _density_of(given)
+        self.space = space = self.density.space
+        if settings.names is None:
+            settings = settings.replace(names=known_names(space, columns))
+        self.settings = settings
+        self.coastlines = _all_coastlines(space, settings, coastlines)
+        _check_space(space, settings)
+        self.data = None if data is None else space.to_chart(data)
+        generator = torch.Generator().manual_seed(settings.seed)
+        self.samples = self.density.sample((settings.samples or SAMPLES,), generator)
+        self.points = self.samples if self.data is None else self.data
+        self.map = chosen_map(space, self.points, settings, columns) if space.is_round else None
+        self.regions = region_lines(self.density, settings)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What is not drawn, and why."""
+        if self.space.dim != 2 or self.density.flow_part is not None:
+            return ()
+        return ("the flow has no part in this density, so that there is no picture of it",)
+
+    def page(self) -> str:
+        """Return the page of the surface to turn in a browser."""
+        lines = simplified(list(map(np.asarray, self.coastlines)), PAGE_POINTS)
+        return density_page(self.density, self.settings, samples=self.points, coastlines=lines)
+
+    def makers(self) -> dict[str, Callable[[], Picture]]:
+        """Return functions that draw the figures, by the names of their files without the ending."""
+        density, settings, data, samples = self.density, self.settings, self.data, self.samples
+        if self.space.dim != 2:
+            return {"samples": partial(corner_picture, density, data, samples, settings)}
+        grounds = self._grounds()
+        dots = self.points if settings.dots else None
+        draw = partial(draw_density, dots=dots, regions=self.regions)
+        makers: dict[str, Callable[[], Picture]] = {
+            name: partial(draw, own, density, settings) for name, own in grounds.items()
+        }
+        if density.flow_part is not None:
+            makers["flow"] = partial(flow_picture, density, settings)
+        if data is not None or settings.samples is not None:
+            ground = grounds["density"]
+            makers["samples"] = partial(draw_samples, ground, density, settings, data, samples)
+        return makers
+
+    def _grounds(self) -> dict[str, Ground]:
+        """Return what the density is drawn on, by the names of the figures."""
+        space, square = self.space, Square(self.space, self.settings)
+        if self.map is None:
+            return {"density": square}
+        grounds: dict[str, Ground] = {"density": Map(space, self.map, self.coastlines)}
+        if space.name == "sphere" and not isinstance(self.map, PlateCarree):
+            plain = PlateCarree((0.0, self.map.center[1]))
+            grounds["latlon"] = Map(space, plain, self.coastlines)
+        return {**grounds, "square": square}
+
+
+def _density_of(
+    given: Density | DensityEstimator | str | Path,
+) -> tuple[Density, Sequence[str] | None]:
+    """Return the density, and the columns that it was fitted to, if they are known."""
     if isinstance(given, Density | DensityEstimator):
-        density = density_of(given, "this DensityEstimator")
-    else:
-        path = as_path(given, "the density")
-        density, extra = read_density(path / MODEL if path.is_dir() else path)
-        columns = extra.get("columns")
-    space = density.space
-    if settings.names is None:
-        settings = settings.replace(names=known_names(space, columns))
+        return density_of(given, "this DensityEstimator"), None
+    path = as_path(given, "the density")
+    density, extra = read_density(path / MODEL if path.is_dir() else path)
+    return density, extra.get("columns")
+
+
+def _check_space(space: Space, settings: PlotSettings) -> None:
+    """Check that a space can be drawn, and that settings fit it."""
     if space.dim > MAX_COLUMNS:
         raise OrbiflowError(
             f"this {space.name} has {space.dim} angles, pictures have {MAX_COLUMNS} at most: draw "
@@ -189,92 +254,6 @@ def _checked(
             f"{{{name}}} applies to maps of the sphere and the projective plane, not to the "
             f"{space.name}"
         )
-    return density, settings, columns
-
-
-@dataclass(frozen=True, eq=False)
-class _Shown:
-    """A density and what is drawn with it: chart points, lines around regions, coastlines."""
-
-    density: Density
-    settings: PlotSettings
-    samples: Tensor
-    data: Tensor | None
-    projection: Projection | None
-    regions: tuple[RegionLine, ...]
-    coastlines: Sequence[ArrayLike]
-
-    @classmethod
-    def of(
-        cls,
-        density: Density,
-        settings: PlotSettings,
-        data: ArrayLike | None,
-        columns: Sequence[str] | None,
-        coastlines: Sequence[ArrayLike],
-    ) -> _Shown:
-        """Draw the samples, and choose the map."""
-        space = density.space
-        points = None if data is None else space.to_chart(data)
-        generator = torch.Generator().manual_seed(settings.seed)
-        samples = density.sample((settings.samples or SAMPLES,), generator)
-        chosen = None
-        if space.is_round:
-            chosen = chosen_map(space, samples if points is None else points, settings, columns)
-        lines = region_lines(density, settings)
-        return cls(density, settings, samples, points, chosen, lines, coastlines)
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """What is not drawn, and why."""
-        if self.density.space.dim != 2 or self.density.flow_part is not None:
-            return ()
-        return ("the flow has no part in this density, so that there is no picture of it",)
-
-    @property
-    def points(self) -> Tensor:
-        """The data, or else the samples."""
-        return self.samples if self.data is None else self.data
-
-    def page(self) -> str:
-        """Return the page of the surface to turn in a browser."""
-        lines = simplified(list(map(np.asarray, self.coastlines)), PAGE_POINTS)
-        return density_page(self.density, self.settings, samples=self.points, coastlines=lines)
-
-    def makers(self, sheet: Sheet) -> dict[str, Callable[[], Picture]]:
-        """Return functions that draw the figures, by the names of their files without the ending."""
-        density, settings, data, samples = self.density, self.settings, self.data, self.samples
-        if density.space.dim != 2:
-            return {
-                "samples": partial(corner_picture, density, data, samples, settings, sheet=sheet)
-            }
-        grounds = self._grounds()
-        dots = self.points if settings.dots else None
-        kept: dict[str, Any] = {"dots": dots, "regions": self.regions, "sheet": sheet}
-        makers = {
-            name: partial(draw_density, ground, density, settings, **kept)
-            for name, ground in grounds.items()
-        }
-        if density.flow_part is not None:
-            makers["flow"] = partial(flow_picture, density, settings, sheet=sheet)
-        if data is not None or settings.samples is not None:
-            ground = grounds["density"]
-            makers["samples"] = partial(
-                draw_samples, ground, density, settings, data, samples, sheet=sheet
-            )
-        return makers
-
-    def _grounds(self) -> dict[str, Ground]:
-        """Return what the density is drawn on, by the names of the figures."""
-        space, chosen = self.density.space, self.projection
-        square = Square(space, self.settings)
-        if chosen is None:
-            return {"density": square}
-        grounds: dict[str, Ground] = {"density": Map(space, chosen, self.coastlines)}
-        if space.name == "sphere" and not isinstance(chosen, PlateCarree):
-            plain = PlateCarree((0.0, chosen.center[1]))
-            grounds["latlon"] = Map(space, plain, self.coastlines)
-        return {**grounds, "square": square}
 
 
 def _all_coastlines(
