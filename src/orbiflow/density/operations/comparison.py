@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+from orbiflow import runtime
 from orbiflow.batch import csv_bytes
 from orbiflow.density import comparing, tables
 from orbiflow.density.comparing import ComparisonSettings
@@ -15,17 +16,6 @@ from orbiflow.density.operations.drawing import require_ending
 from orbiflow.density.run_folder import write_file
 from orbiflow.density.tables import SpaceName, TableSettings, Unit
 from orbiflow.errors import OrbiflowError, SettingError
-from orbiflow.runtime import (
-    Cancel,
-    Note,
-    Outcome,
-    Progress,
-    Sink,
-    check_output_file,
-    ignore,
-    one_thread,
-    operation,
-)
 from orbiflow.settings import DefaultText, Option, Repeated
 
 if TYPE_CHECKING:
@@ -40,7 +30,7 @@ FITTED_SHARE, MIN_LOOKED_UP = 0.5, 5
 """Share of the rows that a model knows, and rows that must have been looked up, for a warning."""
 
 
-@operation("density compare")
+@runtime.operation("density compare")
 def compare(
     settings: ComparisonSettings = ComparisonSettings(),
     table: TableSettings = TableSettings(),
@@ -51,9 +41,9 @@ def compare(
     unit: Annotated[Unit | None, DefaultText("radians, if no value is beyond 2 pi")] = None,
     group: str | None = None,
     out: Annotated[Path | None, Option("-o"), DefaultText("nothing is written")] = None,
-    on_event: Sink = ignore,
-    cancel: Cancel = Cancel(),
-) -> Outcome:
+    on_event: runtime.Sink = runtime.ignore,
+    cancel: runtime.Cancel = runtime.Cancel(),
+) -> runtime.Outcome:
     """Which model suits held-out rows better, or do two data sets differ? With its uncertainty.
 
     Models: -m A -m B -d held-out.csv. Data sets: -d a.csv -d b.csv --space sphere.
@@ -71,9 +61,9 @@ def compare(
     require_ending(out, (".json", ".csv"))
     _check_what_is_compared(data, models, space, unit)
     if out is not None:
-        check_output_file(out, *models, *data)
+        runtime.check_output_file(out, *models, *data)
     read = _Reader(table, group, on_event, cancel)
-    with one_thread():
+    with runtime.one_thread():
         if models:
             found = _compare_models(data[0], models, read, settings)
         else:
@@ -82,12 +72,12 @@ def compare(
     document = found.to_json()
     cancel.check()
     for line in [*found.words(), *found.notes]:
-        on_event(Note(line))
+        on_event(runtime.Note(line))
     if out is not None:
         as_csv = out.suffix.lower() == ".csv"
         text = _csv(found) if as_csv else json.dumps(document, allow_nan=False, indent=1)
         write_file(out, text, on_event, f"written to {out}")
-    return Outcome({"file": None if out is None else str(out), "comparison": document})
+    return runtime.Outcome({"file": None if out is None else str(out), "comparison": document})
 
 
 def _check_what_is_compared(
@@ -124,15 +114,15 @@ class _Reader:
 
     settings: TableSettings
     group: str | None
-    tell: Sink
-    cancel: Cancel
+    tell: runtime.Sink
+    cancel: runtime.Cancel
 
     def progress(self, share: float, what: str) -> None:
         """Tell the progress, unless the work was cancelled."""
         self.cancel.check()
-        self.tell(Progress(min(1.0, share), what))
+        self.tell(runtime.Progress(min(1.0, share), what))
 
-    def rows(self, data: Path, columns: Columns, tell: Sink) -> TableRows:
+    def rows(self, data: Path, columns: Columns, tell: runtime.Sink) -> TableRows:
         """Return rows, without the column of groups if columns are not named."""
         return tables.read_rows(
             data, self.settings.replace(columns=columns), tell, group=self.group
@@ -154,7 +144,7 @@ def _compare_models(
     for k, (name, (density, extra)) in enumerate(models.items()):
         own = columns[name]
         if own not in found:
-            tell_once = ignore if found else read.tell
+            tell_once = runtime.ignore if found else read.tell
             found[own] = read.rows(data, own, tell_once)
             check_fits(data, found[own].table, density.space, extra, tell_once)
         values = found[own].table.values

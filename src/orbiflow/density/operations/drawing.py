@@ -7,25 +7,13 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+from orbiflow import runtime
 from orbiflow.density import pictures, regions, spaces, tables
 from orbiflow.density.pictures import PlotSettings
 from orbiflow.density.regions import RegionSettings
 from orbiflow.density.run_folder import write_file
 from orbiflow.density.tables import TableSettings, Unit, check_table_name
 from orbiflow.errors import OrbiflowError, SettingError
-from orbiflow.runtime import (
-    Cancel,
-    Note,
-    Outcome,
-    Progress,
-    Sink,
-    Written,
-    check_output_file,
-    check_outside_runs,
-    ignore,
-    one_thread,
-    operation,
-)
 from orbiflow.settings import DefaultText, Option, Range
 
 if TYPE_CHECKING:
@@ -45,7 +33,7 @@ def require_ending(out: Path | None, endings: tuple[str, ...]) -> None:
         raise SettingError(f"{{out}} must end in {', '.join(endings)}, got {out.name!r}")
 
 
-@operation("density plot")
+@runtime.operation("density plot")
 def plot(
     settings: PlotSettings = PlotSettings(),
     table: TableSettings = TableSettings(),
@@ -53,9 +41,9 @@ def plot(
     model: Model,
     out: Annotated[Path, Option("-o")] = Path("plots"),
     data: Path | None = None,
-    on_event: Sink = ignore,
-    cancel: Cancel = Cancel(),
-) -> Outcome:
+    on_event: runtime.Sink = runtime.ignore,
+    cancel: runtime.Cancel = runtime.Cancel(),
+) -> runtime.Outcome:
     """Draw a density: density, flow, samples as PNG, PDF or SVG, and surface.html, to turn in 3-D.
 
     Directions and axes are drawn on maps (density, latlon) and on the square.
@@ -78,9 +66,9 @@ def plot(
         raise SettingError(f"{{out}} ends in .pdf but {{format}} is {settings.format}")
     reads = (model, data, settings.coastlines)
     if single:
-        check_output_file(out, *reads)
+        runtime.check_output_file(out, *reads)
     else:  # pictures may stand beside their model
-        check_outside_runs(out, *reads)
+        runtime.check_outside_runs(out, *reads)
     density, extra = model_at(model)
     space = density.space
     names = pictures.known_names(space, extra.get("columns"))
@@ -95,17 +83,17 @@ def plot(
 
     def told(share: float, what: str) -> None:
         cancel.check()
-        on_event(Progress(share, what))
+        on_event(runtime.Progress(share, what))
 
     plotted = pictures.plot_density(density, out, settings, data=points, told=told)
     captions = plotted.captions if single or settings.sheet.printed else ()
     for path in plotted.files:
-        on_event(Written(path))
+        on_event(runtime.Written(path))
     for note in (*(f"caption: {caption}" for caption in captions), *plotted.notes):
-        on_event(Note(note))
-    on_event(Note(_where_pictures_are(out, single, space)))
+        on_event(runtime.Note(note))
+    on_event(runtime.Note(_where_pictures_are(out, single, space)))
     folder = out.parent if single else out
-    return Outcome({"folder": str(folder), "files": [path.name for path in plotted.files]})
+    return runtime.Outcome({"folder": str(folder), "files": [path.name for path in plotted.files]})
 
 
 def _where_pictures_are(out: Path, single: bool, space: Space) -> str:
@@ -120,15 +108,15 @@ def _where_pictures_are(out: Path, single: bool, space: Space) -> str:
     return f"written to {out}; open {out / 'surface.html'} in a browser"
 
 
-@operation("density region")
+@runtime.operation("density region")
 def region(
     settings: RegionSettings = RegionSettings(),
     *,
     model: Model,
     out: Annotated[Path, Option("-o")] = Path("regions.json"),
-    on_event: Sink = ignore,
-    cancel: Cancel = Cancel(),
-) -> Outcome:
+    on_event: runtime.Sink = runtime.ignore,
+    cancel: runtime.Cancel = runtime.Cancel(),
+) -> runtime.Outcome:
     """Find the smallest regions that hold a mass: threshold, size, and boundary as closed polygons.
 
     On a torus of more or fewer than two angles there are threshold and size alone.
@@ -141,14 +129,14 @@ def region(
 
     from orbiflow.density.operations.saved import model_at
 
-    check_output_file(out, model)
+    runtime.check_output_file(out, model)
     density, _ = model_at(model)
     kind, space = out.suffix.lower(), density.space
     _require_format(out, kind, space)
     samples = regions.samples_for(settings.masses, settings.samples)
-    on_event(Progress(0.0, f"drawing {samples} samples"))
+    on_event(runtime.Progress(0.0, f"drawing {samples} samples"))
     cancel.check()
-    with one_thread():
+    with runtime.one_thread():
         levels = regions.DensityLevels(density, samples=samples, seed=settings.seed)
         found = [levels.highest(mass) for mass in settings.masses]
         found += [levels.above(level) for level in settings.level or ()]
@@ -158,7 +146,7 @@ def region(
             nonlocal reached
             cancel.check()
             reached = max(reached, 0.1 + 0.9 * share)
-            on_event(Progress(reached, what))
+            on_event(runtime.Progress(reached, what))
 
         drawn: list[Outline] = []
         if space.dim == 2:
@@ -173,7 +161,7 @@ def region(
         text = json.dumps(document, allow_nan=False)
     cancel.check()
     write_file(out, text, on_event, *_region_notes(found, drawn), f"written to {out}")
-    return Outcome({"file": str(out), "regions": [one.to_json() for one in found]})
+    return runtime.Outcome({"file": str(out), "regions": [one.to_json() for one in found]})
 
 
 def _require_format(out: Path, kind: str, space: Space) -> None:
@@ -248,7 +236,7 @@ def _counted(count: int, noun: str) -> str:
     return f"{count} {noun}{'s' * (count != 1)}"
 
 
-@operation("density patches")
+@runtime.operation("density patches")
 def patches(
     data: Path,
     table: TableSettings = TableSettings(),
@@ -256,9 +244,9 @@ def patches(
     out: Annotated[Path, Option("-o")] = Path("angles.csv"),
     unit: Unit = "radians",
     farthest: Annotated[float | None, Range(0), DefaultText("all are kept")] = None,
-    on_event: Sink = ignore,
-    cancel: Cancel = Cancel(),
-) -> Outcome:
+    on_event: runtime.Sink = runtime.ignore,
+    cancel: runtime.Cancel = runtime.Cancel(),
+) -> runtime.Outcome:
     """Turn image patches into theta,phi on the Klein bottle, for `fit --space klein-bottle`.
 
     Distances are between patches of mean 0 and contrast 1.
@@ -272,7 +260,7 @@ def patches(
     import numpy as np
 
     check_table_name(out)
-    check_output_file(out, data)
+    runtime.check_output_file(out, data)
     found = tables.read_rows(data, table, on_event).table
     width = len(found.columns)
     if width not in PATCH_WIDTHS:
@@ -281,7 +269,7 @@ def patches(
             f"{'is' if width == 1 else 'are'} {_counted(width, 'column')} "
             f"({tables.listing(found.columns)}): choose with --columns"
         )
-    with one_thread():
+    with runtime.one_thread():
         angles, distances = spaces.to_klein(found.values, unit=unit)
     near = distances <= (np.inf if farthest is None else farthest)
     if not near.any():
@@ -298,4 +286,4 @@ def patches(
     half = f"half of them within {np.median(kept[:, 2]):.3f} of the Klein bottle{left}"
     content = tables.to_csv(("theta", "phi", "distance"), kept)
     write_file(out, content, on_event, f"{len(kept)} patches, {half}; written to {out}")
-    return Outcome({"file": str(out), "rows": len(kept), "left_out": left_out})
+    return runtime.Outcome({"file": str(out), "rows": len(kept), "left_out": left_out})

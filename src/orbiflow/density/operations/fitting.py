@@ -9,25 +9,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+from orbiflow import runtime
 from orbiflow.batch import Column, FolderKind, Summary, WorkSettings, run_files
 from orbiflow.density import comparing, models, pictures, tables
 from orbiflow.density.fitting import ComponentSettings, DensitySettings
 from orbiflow.density.run_folder import write_files, written_files
 from orbiflow.density.tables import RowSettings, SpaceSettings, TableSettings
-from orbiflow.runtime import (
-    Call,
-    Cancel,
-    Note,
-    Outcome,
-    ResultFolder,
-    Sink,
-    check_output_folder,
-    find,
-    ignore,
-    one_thread,
-    operation,
-    progress_events,
-)
 from orbiflow.settings import Group, Hidden, NotWith, Option, SettingError
 
 if TYPE_CHECKING:
@@ -45,7 +32,7 @@ REPORTED = (
 """Settings that the report repeats."""
 
 
-@operation("density fit")
+@runtime.operation("density fit")
 def fit(
     data: Path,
     where: SpaceSettings,
@@ -59,9 +46,9 @@ def fit(
         NotWith("kernels", because="a flow has no components to choose"),
     ] = None,
     picture: Annotated[bool, Hidden()] = False,
-    on_event: Sink = ignore,
-    cancel: Cancel = Cancel(),
-) -> Outcome:
+    on_event: runtime.Sink = runtime.ignore,
+    cancel: runtime.Cancel = runtime.Cancel(),
+) -> runtime.Outcome:
     """Fit a density: angles (torus), lat,lon or x,y,z (sphere), axes (projective plane) or theta,phi.
 
     Writes density.safetensors and report.json into the folder.
@@ -83,17 +70,17 @@ def fit(
 
     from orbiflow.density.estimator import DensityEstimator
 
-    with one_thread():
+    with runtime.one_thread():
         rows = tables.read_rows(data, reading, on_event, width=where.width, group=group)
         labels, values = rows.labels(), rows.table.values
         unit = tables.angle_unit(where.space, where.unit, rows.table, on_event)
-        folder = ResultFolder(out, written_files)
-        check_output_folder(out, data)
+        folder = runtime.ResultFolder(out, written_files)
+        runtime.check_output_folder(out, data)
         missing = "marginalise" if reading.missing == "marginalise" else "refuse"
         estimator = DensityEstimator.with_settings(
             where.space, settings, unit=unit, missing=missing
         )
-        progress = progress_events(on_event, cancel)
+        progress = runtime.progress_events(on_event, cancel)
         estimator.fit(values, sample_weight=rows.weights, groups=labels, progress=progress)
         asked = {**settings.values(), **reading.values(), "group": group}
         document = _document(estimator, rows, asked, settings.seed)
@@ -113,10 +100,10 @@ def fit(
             files[pictures.THUMBNAIL] = pictures.density_thumbnail(estimator.density_, values)
     write_files(folder, files, on_event)
     for note in (*estimator.report_.notes, *_words(document, len(values), out)):
-        on_event(Note(note))
+        on_event(runtime.Note(note))
     summary = {name: document[name] for name in ("log_likelihood", "seconds")}
     summary |= {"folder": str(out), "rows": len(values)}
-    return Outcome({**summary, "picture": pictures.THUMBNAIL if picture else None})
+    return runtime.Outcome({**summary, "picture": pictures.THUMBNAIL if picture else None})
 
 
 def check_marginalised(where: SpaceSettings, settings: DensitySettings) -> None:
@@ -172,7 +159,7 @@ def _words(document: Mapping[str, Any], rows: int, out: Path) -> tuple[str, str]
     )
 
 
-@operation("density batch", keeps_partial=True, starts_processes=True)
+@runtime.operation("density batch", keeps_partial=True, starts_processes=True)
 def batch(
     folder: Path,
     where: SpaceSettings,
@@ -182,9 +169,9 @@ def batch(
     work: WorkSettings = WorkSettings(),
     *,
     match: str | None = None,
-    on_event: Sink = ignore,
-    cancel: Cancel = Cancel(),
-) -> Outcome:
+    on_event: runtime.Sink = runtime.ignore,
+    cancel: runtime.Cancel = runtime.Cancel(),
+) -> runtime.Outcome:
     """Fit a density to every table of a folder, here or on a Dask cluster.
 
     Writes a folder for each table, as fit does, with a small picture; batch.csv, a table of all; and
@@ -198,8 +185,8 @@ def batch(
     """
     given = {**where.to_json(), **density.to_json(), **table.to_json(), "picture": True}
 
-    def call_of(name: str) -> Call:
-        return find("density fit").call({**given, "data": name, "out": "out"})
+    def call_of(name: str) -> runtime.Call:
+        return runtime.find("density fit").call({**given, "data": name, "out": "out"})
 
     title = f"Densities of {folder.name or 'a folder'}"
     return run_files(folder, out, DENSITIES, title, call_of, match, work, on_event, cancel)

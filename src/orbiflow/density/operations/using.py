@@ -6,23 +6,11 @@ import math
 from pathlib import Path
 from typing import Annotated, Literal
 
+from orbiflow import runtime
 from orbiflow.density import inference, tables
 from orbiflow.density.run_folder import write_file, written_files
 from orbiflow.density.tables import RowSettings, check_table_name
 from orbiflow.errors import literal
-from orbiflow.runtime import (
-    Cancel,
-    Note,
-    Outcome,
-    Progress,
-    ResultFolder,
-    Sink,
-    check_output_file,
-    check_output_folder,
-    ignore,
-    one_thread,
-    operation,
-)
 from orbiflow.settings import DefaultText, Needs, NotWith, Option, Range, SettingError, Settings
 
 Model = Annotated[Path, Option("--model", "-m")]
@@ -62,7 +50,7 @@ class ScoreSettings(Settings, group="Scores"):
                 )
 
 
-@operation("density score")
+@runtime.operation("density score")
 def score(
     data: Path,
     settings: ScoreSettings = ScoreSettings(),
@@ -70,9 +58,9 @@ def score(
     *,
     model: Model,
     out: Out = Path("scores.csv"),
-    on_event: Sink = ignore,
-    cancel: Cancel = Cancel(),
-) -> Outcome:
+    on_event: runtime.Sink = runtime.ignore,
+    cancel: runtime.Cancel = runtime.Cancel(),
+) -> runtime.Outcome:
     """Add a column log_prob, in nats, to a table.
 
     Args:
@@ -88,8 +76,8 @@ def score(
     from orbiflow.density.operations.saved import check_fits, model_at, with_columns_of
     from orbiflow.density.operations.scores import score_rows
 
-    check_output_file(out, data, model)
-    with one_thread():
+    runtime.check_output_file(out, data, model)
+    with runtime.one_thread():
         density, extra = model_at(model)
         rows = tables.read_rows(data, with_columns_of(reading, data, extra, on_event), on_event)
         check_fits(data, rows.table, density.space, extra, on_event)
@@ -98,7 +86,7 @@ def score(
     words = f"mean log density {found.mean:.4f} nats over {found.over}{weighted}; written to {out}"
     table = tables.append_columns(rows.table, data, found.columns)
     write_file(out, table, on_event, *found.notes, words)
-    return Outcome({"file": str(out), "rows": len(rows.table.values), "mean": found.mean})
+    return runtime.Outcome({"file": str(out), "rows": len(rows.table.values), "mean": found.mean})
 
 
 class SampleSettings(Settings, group="Samples"):
@@ -111,15 +99,15 @@ class SampleSettings(Settings, group="Samples"):
     """Seed of the random numbers: the same seed on the same machine gives the same samples."""
 
 
-@operation("density sample")
+@runtime.operation("density sample")
 def sample(
     settings: SampleSettings = SampleSettings(),
     *,
     model: Model,
     out: Out = Path("samples.csv"),
-    on_event: Sink = ignore,
-    cancel: Cancel = Cancel(),
-) -> Outcome:
+    on_event: runtime.Sink = runtime.ignore,
+    cancel: runtime.Cancel = runtime.Cancel(),
+) -> runtime.Outcome:
     """Draw samples in the units of the data.
 
     Args:
@@ -132,8 +120,8 @@ def sample(
 
     from orbiflow.density.operations.saved import model_at, names_of
 
-    check_output_file(out, model)
-    with one_thread():
+    runtime.check_output_file(out, model)
+    with runtime.one_thread():
         density, extra = model_at(model)
         generator = torch.Generator().manual_seed(settings.seed)
         data = density.space.from_chart(density.sample((settings.count,), generator))
@@ -141,18 +129,18 @@ def sample(
     cancel.check()
     words = f"{settings.count} samples written to {out}"
     write_file(out, tables.to_csv(names, data), on_event, words)
-    return Outcome({"file": str(out), "rows": settings.count})
+    return runtime.Outcome({"file": str(out), "rows": settings.count})
 
 
-@operation("density marginal")
+@runtime.operation("density marginal")
 def marginal(
     *,
     model: Model,
     columns: tuple[str, ...],
     out: Out = Path("marginal"),
-    on_event: Sink = ignore,
-    cancel: Cancel = Cancel(),
-) -> Outcome:
+    on_event: runtime.Sink = runtime.ignore,
+    cancel: runtime.Cancel = runtime.Cancel(),
+) -> runtime.Outcome:
     """Find the density of some of a torus' angles, whatever the others are.
 
     Writes a model that score, sample and plot read; of one or two angles density.csv and density.png,
@@ -169,29 +157,29 @@ def marginal(
     from orbiflow.density.operations.derived import axes_of, write_derived
     from orbiflow.density.operations.saved import model_at, names_of
 
-    check_output_folder(out, model, what="model")
-    with one_thread():
+    runtime.check_output_folder(out, model, what="model")
+    with runtime.one_thread():
         density, extra = model_at(model)
         names = names_of(density, extra)
         axes = axes_of(columns, names)
-        folder = ResultFolder(out, written_files)
-        on_event(Progress(0.0, "integrating"))
+        folder = runtime.ResultFolder(out, written_files)
+        on_event(runtime.Progress(0.0, "integrating"))
         found = inference.marginal(density, axes)
         kept = [names[axis] for axis in axes]
         origin = {"marginal": kept, "model": str(model)}
         return write_derived(found, kept, origin, folder, on_event, cancel)
 
 
-@operation("density conditional")
+@runtime.operation("density conditional")
 def conditional(
     *,
     model: Model,
     given: tuple[str, ...],
     columns: Annotated[tuple[str, ...] | None, DefaultText("all")] = None,
     out: Out = Path("conditional"),
-    on_event: Sink = ignore,
-    cancel: Cancel = Cancel(),
-) -> Outcome:
+    on_event: runtime.Sink = runtime.ignore,
+    cancel: runtime.Cancel = runtime.Cancel(),
+) -> runtime.Outcome:
     """Find the density of a torus' other angles where some are known.
 
     Writes a model that score, sample and plot read; of one or two angles density.csv and density.png,
@@ -210,19 +198,19 @@ def conditional(
     from orbiflow.density.operations.derived import condition_of, evidence_of, write_derived
     from orbiflow.density.operations.saved import model_at, names_of
 
-    check_output_folder(out, model, what="model")
-    with one_thread():
+    runtime.check_output_folder(out, model, what="model")
+    with runtime.one_thread():
         density, extra = model_at(model)
         names = names_of(density, extra)
         known, turns, kept = condition_of(density.space, names, pairs, columns, on_event)
-        folder = ResultFolder(out, written_files)
-        on_event(Progress(0.0, "integrating"))
+        folder = runtime.ResultFolder(out, written_files)
+        on_event(runtime.Progress(0.0, "integrating"))
         found = inference.conditional(density, turns, kept)
         evidence = evidence_of(density, turns)
         rare = "; few data lie there, or none" if evidence < -3 else ""
         words = ", ".join(f"{name} = {value:g}" for name, value in known.items())
         ratio = f"{math.exp(evidence):.3g} times that of even angles{rare}"
-        on_event(Note(f"the density at {words} is {ratio}"))
+        on_event(runtime.Note(f"the density at {words} is {ratio}"))
         origin = {
             "given": known,
             "log_density_of_given_over_uniform": evidence,

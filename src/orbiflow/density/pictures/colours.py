@@ -1,4 +1,4 @@
-"""Values of a density for a picture: at points, and on pixels over which narrow peaks are averaged."""
+"""Values of a density on the pixels of a picture, the scales that colour them, and their ticks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Grounds on which densities and points are drawn, and the two pictures that all grounds have.
+"""Grounds on which densities and points are drawn, the two pictures that all have, and their frame.
 
 A ground is the canonical square (`square`) or a map of directions (`maps`).
 """

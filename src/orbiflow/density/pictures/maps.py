@@ -1,4 +1,4 @@
-"""Pictures of densities of directions or axes on maps."""
+"""Pictures of densities of directions or axes on maps, and the map that suits them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Dots for points, over a density that stays readable or on a light ground."""
+"""What is drawn over a density that stays readable: dots for points, lines around regions."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The boundaries of regions in two dimensions, as closed polygons."""
+"""The boundaries of regions in two dimensions, as closed polygons in a window of the space."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Islands and holes as small as a grid's cells, drawn with finer cells around seeds in them."""
+"""Polygons where a function is at least a level, with islands and holes as small as a grid's cells."""
 
 from __future__ import annotations
 
