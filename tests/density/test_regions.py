@@ -23,8 +23,7 @@ from orbiflow.density import (
     outlines,
     to_geojson,
 )
-from orbiflow.density.regions.grid import LevelGrid, Seeds
-from orbiflow.density.regions.islands import filled
+from orbiflow.density.regions.grid import LevelGrid, Seeds, filled
 from orbiflow.errors import OrbiflowError
 
 SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")

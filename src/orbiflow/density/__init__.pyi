@@ -82,13 +82,13 @@ from .pictures.surfaces import viewpoint as viewpoint
 from .pictures.thumbnail import density_thumbnail as density_thumbnail
 from .regions.boundaries import Outline as Outline
 from .regions.boundaries import outlines as outlines
+from .regions.boundaries import to_geojson as to_geojson
 from .regions.levels import DensityLevels as DensityLevels
 from .regions.levels import DensityRegion as DensityRegion
 from .regions.levels import highest_density_region as highest_density_region
 from .regions.settings import RegionSettings as RegionSettings
 from .regions.settings import resolvable_masses as resolvable_masses
 from .regions.settings import samples_for as samples_for
-from .regions.writing import to_geojson as to_geojson
 from .run_folder import written_files as written_files
 from .spaces.catalogue import SPACES as SPACES
 from .spaces.catalogue import make_space as make_space
