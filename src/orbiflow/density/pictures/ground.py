@@ -15,17 +15,9 @@ from torch import Tensor
 
 from orbiflow.arrays import Array
 from orbiflow.density.models import Density
+from orbiflow.density.pictures import overlays
 from orbiflow.density.pictures.axes import INK, LETTER, space_title
 from orbiflow.density.pictures.colours import Shade, bar_label, bar_ticks, minor_places
-from orbiflow.density.pictures.overlays import (
-    MAX_DOTS,
-    RegionLine,
-    dot_scale,
-    draw_dots,
-    draw_dots_over,
-    draw_regions,
-    region_note,
-)
 from orbiflow.density.pictures.settings import PlotSettings
 from orbiflow.density.spaces import Space
 from orbiflow.drawing import Picture, Sheet
@@ -74,10 +66,12 @@ class Colouring:
             image.set_clip_path(self._clip(axes))
         return image
 
-    def draw_regions(self, axes: Axes, lines: Sequence[RegionLine], sheet: Sheet) -> None:
+    def draw_regions(self, axes: Axes, lines: Sequence[overlays.RegionLine], sheet: Sheet) -> None:
         """Draw lines around regions, cut along the outline."""
         if lines:
-            draw_regions(axes, lines, self.log_natural(), self.extent, sheet, self._clip(axes))
+            overlays.draw_regions(
+                axes, lines, self.log_natural(), self.extent, sheet, self._clip(axes)
+            )
 
     def _clip(self, axes: Axes) -> Polygon | None:
         from matplotlib.patches import Polygon
@@ -149,7 +143,7 @@ class Ground(ABC):
 
     def dot_scale(self, sheet: Sheet, side: float) -> float:
         """Return what to multiply the area of dots by, on axes `side` inches wide."""
-        return dot_scale(sheet, max(1.0, side / self.aspect))
+        return overlays.dot_scale(sheet, max(1.0, side / self.aspect))
 
 
 def draw_density(
@@ -158,7 +152,7 @@ def draw_density(
     settings: PlotSettings,
     *,
     dots: Tensor | None = None,
-    regions: Sequence[RegionLine] = (),
+    regions: Sequence[overlays.RegionLine] = (),
     sheet: Sheet | None = None,
 ) -> Picture:
     """Draw a density on a ground, chart points (N, 2) as dots over it, and a colour bar."""
@@ -167,9 +161,9 @@ def draw_density(
     shade = colouring.shade
     label = bar_label(shade, ground.space, settings.measure)
     places = None if dots is None else ground.places(dots)
-    most = settings.samples or MAX_DOTS
+    most = settings.samples or overlays.MAX_DOTS
     notes = [*([] if places is None else [SMALLER]), colouring.reason]
-    notes += [region_note(regions)] if regions else []
+    notes += [overlays.region_note(regions)] if regions else []
     notes += [colouring.averaging] if colouring.averaging else []
     count = None if places is None else (min(most, len(places)), len(places))
     caption = ground.caption(notes, count)
@@ -181,7 +175,9 @@ def draw_density(
     colouring.draw_regions(frame.axes, regions, sheet)
     if places is not None:
         scale = ground.dot_scale(sheet, frame.side)
-        draw_dots_over(frame.axes, places, frame.side / ground.width, limit=most, scale=scale)
+        overlays.draw_dots_over(
+            frame.axes, places, frame.side / ground.width, limit=most, scale=scale
+        )
     ground.draw_axes(frame.axes, sheet, frame.side, Panel())
     shade_bar(image, frame, sheet, shade, label)
     title = f"Density on the {space_title(ground.space)}"
@@ -203,7 +199,9 @@ def draw_samples(
     sheet = sheet or settings.sheet
     panels = {"data": data, "samples": samples}
     places = {n: ground.places(points) for n, points in panels.items() if points is not None}
-    count = min([settings.samples or MAX_DOTS, *(len(own) for own in places.values() if len(own))])
+    count = min(
+        [settings.samples or overlays.MAX_DOTS, *(len(own) for own in places.values() if len(own))]
+    )
     colouring = ground.colouring(density, settings) if data is None else None
     bar = "from the least (dark) to the largest (light) density"
     words = ground.samples_caption([] if colouring is None else [f"{colouring.reason}, {bar}"])
@@ -216,7 +214,7 @@ def draw_samples(
         else:
             ground.fill(axes)
             scale = ground.dot_scale(sheet, side)
-            draw_dots(axes, places[name], 0.5, limit=count, fill=DOT, scale=scale)
+            overlays.draw_dots(axes, places[name], 0.5, limit=count, fill=DOT, scale=scale)
         panel = Panel(False, stacked or axes is both[0], points is not None)
         ground.draw_axes(axes, sheet, side, panel)
         head = "density"

@@ -13,23 +13,9 @@ from torch import Tensor
 
 from orbiflow.arrays import Array
 from orbiflow.density.models import Density
-from orbiflow.density.pictures import projections
+from orbiflow.density.pictures import ground, projections
 from orbiflow.density.pictures.axes import chart_points, degrees_text
 from orbiflow.density.pictures.colours import chosen_scale, density_on_map, is_sharp, shading
-from orbiflow.density.pictures.ground import (
-    LIGHT,
-    NARROW,
-    Colouring,
-    Frame,
-    Ground,
-    Panel,
-    Room,
-    draw_density,
-    draw_samples,
-    room_for_bar_below,
-    room_for_bar_beside,
-    write_caption,
-)
 from orbiflow.density.pictures.map_axes import draw_map_lines, graticule
 from orbiflow.density.pictures.overlays import log_natural, region_lines
 from orbiflow.density.pictures.settings import PlotSettings
@@ -79,9 +65,9 @@ def map_picture(
     settings = settings or PlotSettings()
     if about is None:
         about = torch.empty(0, 2) if samples is None else samples
-    ground = _map_about(density.space, about, settings, coastlines)
+    drawn = _map_about(density.space, about, settings, coastlines)
     lines = region_lines(density, settings)
-    return draw_density(ground, density, settings, dots=samples, regions=lines, sheet=sheet)
+    return ground.draw_density(drawn, density, settings, dots=samples, regions=lines, sheet=sheet)
 
 
 def map_samples_picture(
@@ -99,8 +85,8 @@ def map_samples_picture(
     """
     settings = settings or PlotSettings()
     about = samples if data is None else data
-    ground = _map_about(density.space, about, settings, coastlines)
-    return draw_samples(ground, density, settings, data, samples, sheet=sheet)
+    drawn = _map_about(density.space, about, settings, coastlines)
+    return ground.draw_samples(drawn, density, settings, data, samples, sheet=sheet)
 
 
 def _map_about(
@@ -110,7 +96,7 @@ def _map_about(
     return Map(space, chosen, coastlines)
 
 
-class Map(Ground):
+class Map(ground.Ground):
     """A map of the sphere or the projective plane, with coastlines (N, 2) in degrees."""
 
     caption_below = True
@@ -131,7 +117,7 @@ class Map(Ground):
     def places(self, points: Tensor) -> Array:
         return places_on(self.space, self.projection, points)
 
-    def colouring(self, density: Density, settings: PlotSettings) -> Colouring:
+    def colouring(self, density: Density, settings: PlotSettings) -> ground.Colouring:
         pixels = pixels_of(self.projection)
         points = cast(RoundSpace, self.space).vectors_to_chart(to_vectors(pixels.latlon))
         values = density_on_map(density, points, settings.measure, pixels.angle)
@@ -147,27 +133,29 @@ class Map(Ground):
             size = f"{math.degrees(pixels.angle):.2g}°"
             note = f"peaks narrower than {size} are averaged over it"
         places = pixels.table(shade.places(values), 0.0)
-        return Colouring(places, pixels.extent, shade, chosen.reason, note, logs, self.outline)
+        return ground.Colouring(
+            places, pixels.extent, shade, chosen.reason, note, logs, self.outline
+        )
 
-    def room(self, sheet: Sheet, label: str, ticks: Sequence[str]) -> Room:
+    def room(self, sheet: Sheet, label: str, ticks: Sequence[str]) -> ground.Room:
         above = 0.8 if sheet.printed else 3.2
-        if self.is_disc and (not sheet.printed or sheet.width >= NARROW):
-            beside = Room(3.6, 1.8, 0.0, above + 1.2, 4.4, 1.2)
-            return room_for_bar_beside(sheet, beside, label, ticks)
+        if self.is_disc and (not sheet.printed or sheet.width >= ground.NARROW):
+            beside = ground.Room(3.6, 1.8, 0.0, above + 1.2, 4.4, 1.2)
+            return ground.room_for_bar_beside(sheet, beside, label, ticks)
         left, right, top = (3.4, 3.4, 1.2) if self.is_disc else (3.6, 1.8, 0.0)
-        under = Room(left, 0.0, right, above + top, 2.2, 1.0)
-        return room_for_bar_below(sheet, under, label)
+        under = ground.Room(left, 0.0, right, above + top, 2.2, 1.0)
+        return ground.room_for_bar_below(sheet, under, label)
 
-    def panels_room(self, sheet: Sheet) -> tuple[Room, bool]:
+    def panels_room(self, sheet: Sheet) -> tuple[ground.Room, bool]:
         if not self.is_disc:
-            return Room(3.6, 2.4, 1.8, 2.2, 4.4, 0.0), True
+            return ground.Room(3.6, 2.4, 1.8, 2.2, 4.4, 0.0), True
         stacked = sheet.printed and sheet.width < _BESIDE
-        return Room(3.6, 1.8, 3.6, 3.8, 5.6 if stacked else 7.4, 0.0), stacked
+        return ground.Room(3.6, 1.8, 3.6, 3.8, 5.6 if stacked else 7.4, 0.0), stacked
 
     def fill(self, axes: Axes) -> None:
-        axes.fill(*self.outline.T, color=LIGHT, linewidth=0, zorder=0)
+        axes.fill(*self.outline.T, color=ground.LIGHT, linewidth=0, zorder=0)
 
-    def draw_axes(self, axes: Axes, sheet: Sheet, side: float, panel: Panel) -> None:
+    def draw_axes(self, axes: Axes, sheet: Sheet, side: float, panel: ground.Panel) -> None:
         """Draw the outline, the graticule with its degrees, and coastlines."""
         draw_map_lines(
             axes, self.projection, sheet, side, coastlines=self.coastlines, light=panel.light
@@ -182,7 +170,13 @@ class Map(Ground):
         return self.caption(notes or ["dots are points"], None)
 
     def write_on_screen(
-        self, frame: Frame, sheet: Sheet, title: str, caption: str, notes: Sequence[str], dots: bool
+        self,
+        frame: ground.Frame,
+        sheet: Sheet,
+        title: str,
+        caption: str,
+        notes: Sequence[str],
+        dots: bool,
     ) -> None:
         del notes, dots  # the caption has them
         top = 1 - 1.6 * sheet.em / frame.figure.get_size_inches()[1]
@@ -190,7 +184,7 @@ class Map(Ground):
             0.5, top, f"{title}: {subtitle(self.projection)}", ha="center", va="center",
             fontsize=1.15 * sheet.text,
         )  # fmt: skip
-        write_caption(frame.figure, caption, sheet)
+        ground.write_caption(frame.figure, caption, sheet)
 
 
 class Pixels(NamedTuple):

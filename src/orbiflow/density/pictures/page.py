@@ -13,24 +13,7 @@ from torch import Tensor
 
 from orbiflow.arrays import Array
 from orbiflow.density.models import Density
-from orbiflow.density.pictures import surfaces
-from orbiflow.density.pictures.axes import (
-    View,
-    angle_text,
-    axis_label,
-    chart_points,
-    column_name,
-    space_title,
-    view_of,
-)
-from orbiflow.density.pictures.colours import (
-    bar_label,
-    bar_ticks,
-    chosen_scale,
-    density_on_grid,
-    is_sharp,
-    shading,
-)
+from orbiflow.density.pictures import axes, colours, surfaces
 from orbiflow.density.pictures.ground import COLOURS, SMALLER
 from orbiflow.density.pictures.overlays import thinned, uncrowded
 from orbiflow.density.pictures.settings import PlotSettings
@@ -83,13 +66,13 @@ def density_page(
 
     settings, space = settings or PlotSettings(), density.space
     cells = resolution or (_FINE_CELLS if density.has_fine_detail else _CELLS)
-    grid, view = surfaces.mesh(space, cells), view_of(space, settings.names)
+    grid, view = surfaces.mesh(space, cells), axes.view_of(space, settings.names)
     t = torch.linspace(0.0, 1.0, cells + 1, dtype=torch.float64)
-    values = density_on_grid(density, t, t, settings.measure, pixel=_SOFT / cells).ravel()
+    values = colours.density_on_grid(density, t, t, settings.measure, pixel=_SOFT / cells).ravel()
     # by area on the surface: vertices crowd at the cone points
     areas = space.log_area(grid.points).exp().numpy()
-    chosen = chosen_scale(density, settings.measure, settings.scale)
-    shade = shading(values, areas, log=chosen.log)
+    chosen = colours.chosen_scale(density, settings.measure, settings.scale)
+    shade = colours.shading(values, areas, log=chosen.log)
     lines = (*_coordinate_lines(space), (1.6, _coast(space, coastlines)))
     notes = []
     data = {
@@ -103,18 +86,18 @@ def density_page(
         "dots": settings.dots,
         "labels": _labels(view),
         "colours": _packed(255 * colormaps[COLOURS](np.linspace(0, 1, 256)), "u1"),
-        "ticks": [tick._asdict() for tick in bar_ticks(shade, ends=True)],
-        "measure": bar_label(shade, space, settings.measure),
+        "ticks": [tick._asdict() for tick in colours.bar_ticks(shade, ends=True)],
+        "measure": colours.bar_label(shade, space, settings.measure),
     }
     if samples is not None:
-        points = torch.tensor(thinned(chart_points(space, samples).numpy()))
+        points = torch.tensor(thinned(axes.chart_points(space, samples).numpy()))
         places, widths = uncrowded(surfaces.immersion(space)(space.project(points)))
         data |= {"samples": _packed(places, "<f4"), "widths": _packed(widths, "<f4")}
         notes.append(SMALLER)
-    if is_sharp(density, pixel=_SOFT / cells):
+    if colours.is_sharp(density, pixel=_SOFT / cells):
         notes.append(average_note(round(cells / _SOFT)))
     caption = " ".join([_caption(view), *(f"{n[0].upper()}{n[1:]}." for n in notes)])
-    title = title or f"Density on the {space_title(space)}"
+    title = title or f"Density on the {axes.space_title(space)}"
     page = rendered(
         "orbiflow.density.pictures", "surface.html", title=title, caption=caption, data=data
     )
@@ -196,7 +179,7 @@ def _eighths(space: Space, steps: int, zero: int) -> Lines:
     return (1.0, [surface(line) for line in across + along]), (2.0, [surface(z) for z in zeros])
 
 
-def _labels(view: View) -> list[dict[str, Any]]:
+def _labels(view: axes.View) -> list[dict[str, Any]]:
     """Return texts of directions, or of the first angle at four places of a ring, and their places."""
     space = view.space
     if space.name == "projective-plane":
@@ -208,7 +191,7 @@ def _labels(view: View) -> list[dict[str, Any]]:
         places = 1.07 * np.concatenate([np.eye(3), -np.eye(3)])
     else:
         turns = (0, 0.25, 0.5, -0.25) if space.is_torus else (0, 0.125, 0.25, 0.375)
-        texts = [f"{column_name(view, 0)} {angle_text(t, space.unit)}" for t in turns]
+        texts = [f"{axes.column_name(view, 0)} {axes.angle_text(t, space.unit)}" for t in turns]
         radius = (
             surfaces.RING_RADIUS + surfaces.TUBE_RADIUS
             if space.is_torus
@@ -218,11 +201,11 @@ def _labels(view: View) -> list[dict[str, Any]]:
     return [{"text": t, "at": place.tolist()} for t, place in zip(texts, places, strict=True)]
 
 
-def _caption(view: View) -> str:
+def _caption(view: axes.View) -> str:
     """Return what is seen, and which way the coordinates run."""
     if view.space.is_round:
         return CAPTIONS[view.space.name]
-    names = {"first": axis_label(view, 0), "second": axis_label(view, 1)}
+    names = {"first": axes.axis_label(view, 0), "second": axes.axis_label(view, 1)}
     return CAPTIONS[view.space.name].format(**names)
 
 

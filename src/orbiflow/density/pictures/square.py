@@ -11,6 +11,7 @@ from torch import Tensor
 
 from orbiflow.arrays import Array
 from orbiflow.density.models import Density, midpoints
+from orbiflow.density.pictures import ground
 from orbiflow.density.pictures.axes import (
     INK,
     angle_axis,
@@ -21,20 +22,6 @@ from orbiflow.density.pictures.axes import (
     view_of,
 )
 from orbiflow.density.pictures.colours import chosen_scale, density_on_grid, is_sharp, shading
-from orbiflow.density.pictures.ground import (
-    LIGHT,
-    NARROW,
-    Colouring,
-    Frame,
-    Ground,
-    Panel,
-    Room,
-    caption_lines,
-    draw_density,
-    draw_samples,
-    printed_room,
-    write_caption,
-)
 from orbiflow.density.pictures.overlays import log_natural, region_lines
 from orbiflow.density.pictures.settings import PlotSettings
 from orbiflow.density.pictures.surfaces import edge_pairs
@@ -55,7 +42,7 @@ EDGE_COLOURS = ("#d95f02", "#1f78b4")
 HEAD = 0.035
 """Length of an arrow's head on a screen, in sides of the square."""
 
-SCREEN = Room(6.67, 10.4, 11.52, 5.26, 3.33, 1.52)
+SCREEN = ground.Room(6.67, 10.4, 11.52, 5.26, 3.33, 1.52)
 """Room on a screen, with a title above and a legend of five lines below."""
 
 TURNS, SIGNS = {2: "half", 4: "quarter"}, {2: "Lenses", 4: "Squares"}
@@ -89,8 +76,8 @@ def density_picture(
             centre do not fit.
     """
     settings = settings or PlotSettings()
-    ground, lines = Square(density.space, settings), region_lines(density, settings)
-    return draw_density(ground, density, settings, dots=samples, regions=lines, sheet=sheet)
+    square, lines = Square(density.space, settings), region_lines(density, settings)
+    return ground.draw_density(square, density, settings, dots=samples, regions=lines, sheet=sheet)
 
 
 def samples_picture(
@@ -107,11 +94,11 @@ def samples_picture(
     for `density_picture`.
     """
     settings = settings or PlotSettings()
-    ground = Square(density.space, settings)
-    return draw_samples(ground, density, settings, data, samples, sheet=sheet)
+    square = Square(density.space, settings)
+    return ground.draw_samples(square, density, settings, data, samples, sheet=sheet)
 
 
-class Square(Ground):
+class Square(ground.Ground):
     """The canonical square of a two-dimensional space."""
 
     width = aspect = 1.0
@@ -127,7 +114,7 @@ class Square(Ground):
     def places(self, points: Tensor) -> Array:
         return self.view.places(points)
 
-    def colouring(self, density: Density, settings: PlotSettings) -> Colouring:
+    def colouring(self, density: Density, settings: PlotSettings) -> ground.Colouring:
         count = _FINE_GRID if density.has_fine_detail else _GRID
         middles = (torch.arange(count, dtype=torch.float64) + 0.5) / count
         x, y = (middles + low for low in self.view.low)
@@ -143,23 +130,23 @@ class Square(Ground):
 
         note = average_note(count) if is_sharp(density, pixel=1 / count) else ""
         places = shade.places(values).T
-        return Colouring(places, (0, 1, 0, 1), shade, chosen.reason, note, logs)
+        return ground.Colouring(places, (0, 1, 0, 1), shade, chosen.reason, note, logs)
 
-    def room(self, sheet: Sheet, label: str, ticks: Sequence[str]) -> Room:
+    def room(self, sheet: Sheet, label: str, ticks: Sequence[str]) -> ground.Room:
         if not sheet.printed:
             return SCREEN
         edges = (5.4, 3.8, 0.8) if self._has_ticks else (1.0, 2.8, 2.8)
-        return printed_room(sheet, *edges, label, ticks)
+        return ground.printed_room(sheet, *edges, label, ticks)
 
-    def panels_room(self, sheet: Sheet) -> tuple[Room, bool]:
+    def panels_room(self, sheet: Sheet) -> tuple[ground.Room, bool]:
         edges = (5.4, 4.2, 1.6, 2.4, 4.2) if self._has_ticks else (1.0, 1.0, 1.0, 2.4, 1.6)
-        room, stacked = Room(*edges, 0.0), sheet.printed and sheet.width < NARROW
+        room, stacked = ground.Room(*edges, 0.0), sheet.printed and sheet.width < ground.NARROW
         return (room._replace(gap=room.below + 2.0) if stacked else room), stacked
 
     def fill(self, axes: Axes) -> None:
-        axes.set_facecolor(LIGHT)
+        axes.set_facecolor(ground.LIGHT)
 
-    def draw_axes(self, axes: Axes, sheet: Sheet, side: float, panel: Panel) -> None:
+    def draw_axes(self, axes: Axes, sheet: Sheet, side: float, panel: ground.Panel) -> None:
         """Draw ticks, edges with their arrows, and cone points with their places in the data."""
         axes.set_xlim(0, 1)
         axes.set_ylim(0, 1)
@@ -194,7 +181,13 @@ class Square(Ground):
         return self.caption(notes, (0, 0))
 
     def write_on_screen(
-        self, frame: Frame, sheet: Sheet, title: str, caption: str, notes: Sequence[str], dots: bool
+        self,
+        frame: ground.Frame,
+        sheet: Sheet,
+        title: str,
+        caption: str,
+        notes: Sequence[str],
+        dots: bool,
     ) -> None:
         del caption  # the legend says it
         frame.axes.set_title(title, fontsize=1.15 * sheet.text, pad=14)
@@ -266,8 +259,8 @@ class Square(Ground):
         if dots:
             style = {"markerfacecolor": "#ffffff", "markeredgecolor": INK, "linestyle": "none"}
             entries.append(Line2D([], [], marker="o", label="points", **style))
-        write_caption(figure, notes, sheet)
-        lines = len(caption_lines(notes, sheet))
+        ground.write_caption(figure, notes, sheet)
+        lines = len(ground.caption_lines(notes, sheet))
         up = (0.6 + 1.25 * lines) * sheet.em / figure.get_size_inches()[1]
         figure.legend(
             handles=entries, loc="lower left", bbox_to_anchor=(0.02, up), ncols=2, frameon=False,

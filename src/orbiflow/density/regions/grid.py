@@ -1,4 +1,4 @@
-"""Where a function is at least a level: a grid that is fine at the levels, and polygons with islands."""
+"""Where a function is at least a level: a grid that is fine there, and polygons with their islands."""
 
 from __future__ import annotations
 

@@ -9,13 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from orbiflow.density.tables.binary import (
-    npy_names,
-    parquet_labels,
-    parquet_names,
-    read_npy,
-    read_parquet,
-)
+from orbiflow.density.tables import binary
 from orbiflow.density.tables.table import Reading, Table, find
 from orbiflow.density.tables.text import layout_of, read_text, split_line, text_lines
 from orbiflow.errors import InputFileError
@@ -58,7 +52,9 @@ def read_table(
         OrbiflowError: If pyarrow is missing for a Parquet file.
     """
     path = Path(path)
-    read = {"text": read_text, "npy": read_npy, "parquet": read_parquet}[kind_of_file(path)]
+    read = {"text": read_text, "npy": binary.read_npy, "parquet": binary.read_parquet}[
+        kind_of_file(path)
+    ]
     return read(path, Reading(columns, width, max_rows, has_header, drop_missing, keep_missing))
 
 
@@ -205,7 +201,7 @@ def column_names(
     kind = kind_of_file(path)
     if kind == "text":
         return layout_of(path, wanted, has_header).header
-    return npy_names(path) if kind == "npy" else parquet_names(path)
+    return binary.npy_names(path) if kind == "npy" else binary.parquet_names(path)
 
 
 def read_labels(
@@ -230,7 +226,7 @@ def read_labels(
         cells = numbers.values[:, 0].astype(str).tolist()
         found = dict(zip(numbers.lines.tolist(), cells, strict=True))
     elif kind == "parquet":
-        found = dict(enumerate(parquet_labels(path, column), start=1))
+        found = dict(enumerate(binary.parquet_labels(path, column), start=1))
     else:
         layout = layout_of(path, [column], has_header)
         index = find(path, layout.names, column)
