@@ -25,6 +25,10 @@ _COARSE = 120
 """Points along a side by which a scale is chosen."""
 
 
+Sums = Callable[[AdaptiveKernels, Tensor], Tensor]
+"""A function that returns a mixture of kernels at points."""
+
+
 @torch.no_grad()
 def density_at(density: Density, points: Tensor, measure: str) -> Array:
     """Return the density (N,) at chart points (N, 2), and next to them at cone points."""
@@ -65,7 +69,7 @@ def density_on_grid(
         points = off_cones(points)
     else:
         sums = lambda wide, _: _flat_sums(wide, x, y).reshape(-1)  # noqa: E731
-    return _averaged(density, part, points, measure, half, sums).reshape(shape)
+    return _averaged(density, points, measure, half, sums).reshape(shape)
 
 
 @torch.no_grad()
@@ -75,7 +79,7 @@ def density_on_map(density: Density, points: Tensor, measure: str, angle: float)
     if part is None:
         return density_at(density, points, measure)
     half = torch.tensor(angle / 2)
-    return _averaged(density, part, off_cones(points), measure, half, _round_sums)
+    return _averaged(density, off_cones(points), measure, half, _round_sums)
 
 
 class ChosenScale(NamedTuple):
@@ -88,7 +92,8 @@ class ChosenScale(NamedTuple):
 def chosen_scale(density: Density, measure: str, scale: str) -> ChosenScale:
     """Return the scale of colours, which is the same for all pictures of a density."""
     if scale != "auto":
-        return ChosenScale(scale == "log", f"{_COLOURS_ARE[scale == 'log']}, as asked for")
+        log = scale == "log"
+        return ChosenScale(log, f"colours are {'logarithmic' if log else 'linear'}, as asked for")
     t = (torch.arange(_COARSE, dtype=torch.float64) + 0.5) / _COARSE
     values = density_on_grid(density, t, t, measure, pixel=0.5 / _COARSE).ravel()
     areas = density.space.log_area(midpoints(density.space, _COARSE)).exp().numpy()
@@ -97,10 +102,7 @@ def chosen_scale(density: Density, measure: str, scale: str) -> ChosenScale:
     # never more than what is true: 99.6 % are not all
     share, side = (int(100 * dark), "below") if log else (math.ceil(100 * (1 - dark)), "above")
     reason = f"the density is {side} a tenth of its peak on {share} % of the area"
-    return ChosenScale(log, f"{_COLOURS_ARE[log]}, as {reason}")
-
-
-_COLOURS_ARE = {False: "colours are linear", True: "colours are logarithmic"}
+    return ChosenScale(log, f"colours are {'logarithmic' if log else 'linear'}, as {reason}")
 
 
 def is_sharp(density: Density, *, pixel: float | None = None, angle: float | None = None) -> bool:
@@ -112,15 +114,10 @@ def is_sharp(density: Density, *, pixel: float | None = None, angle: float | Non
     return bool((part[1].concentrations ** -0.5 < 2 * half).any())
 
 
-def _averaged(
-    density: Density,
-    part: tuple[float, AdaptiveKernels],
-    points: Tensor,
-    measure: str,
-    half: Tensor,
-    sums: Callable[[AdaptiveKernels, Tensor], Tensor],
-) -> Array:
+def _averaged(density: Density, points: Tensor, measure: str, half: Tensor, sums: Sums) -> Array:
     """Return the density (N,) with kernels whose deviations are at least `half` a pixel."""
+    part = density.kernel_part
+    assert part is not None
     weight, own = part
     kappa = 1 / (1 / own.concentrations + half**2)
     widened = AdaptiveKernels(own.space, own.centers, kappa, own.weights)
