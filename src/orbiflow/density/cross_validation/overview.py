@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
@@ -146,14 +146,14 @@ class CvOverview:
 def _table(done: Sequence[tuple[Fit, batch.Entry]]) -> bytes:
     """A line for each fit that has finished."""
     heads = ["split", "fold", "setting", "state", *FIGURES, "seconds", "error", "folder"]
-    return batch.csv_bytes(heads, (list(_cells(fit, entry)) for fit, entry in done))
-
-
-def _cells(fit: Fit, entry: batch.Entry) -> Iterator[Any]:
-    yield from (fit.split, fit.fold, fit.setting, entry.state)
-    yield from ("" if (v := entry.best.get(name)) is None else repr(v) for name in FIGURES)
-    yield "" if entry.seconds is None else f"{entry.seconds:.3f}"
-    yield from (entry.reason, "" if entry.state == "failed" else entry.name)
+    rows: list[list[Any]] = []
+    for fit, entry in done:
+        figures = ["" if (v := entry.best.get(name)) is None else repr(v) for name in FIGURES]
+        seconds = "" if entry.seconds is None else f"{entry.seconds:.3f}"
+        folder = "" if entry.state == "failed" else entry.name
+        rows.append([fit.split, fit.fold, fit.setting, entry.state, *figures, seconds])
+        rows[-1] += [entry.reason, folder]
+    return batch.csv_bytes(heads, rows)
 
 
 def _stamp(path: Path) -> tuple[int, int] | None:
