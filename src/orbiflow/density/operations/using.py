@@ -15,7 +15,6 @@ from orbiflow.settings import DefaultText, Needs, NotWith, Option, Range, Settin
 
 Model = Annotated[Path, Option("--model", "-m")]
 Out = Annotated[Path, Option("--out", "-o")]
-RegionSamples = Annotated[int | None, Range(1000, 10_000_000)]
 
 
 class ScoreSettings(Settings, group="Scores"):
@@ -28,7 +27,9 @@ class ScoreSettings(Settings, group="Scores"):
     region: bool = False
     """Add a column hdr: the mass of the smallest region of highest density that holds the row."""
 
-    samples: Annotated[RegionSamples, Needs("region"), DefaultText("20000")] = None
+    samples: Annotated[
+        int | None, Range(1000, 10_000_000), Needs("region"), DefaultText("20000")
+    ] = None
     """Samples of the density from which hdr is known; 20000 tell masses up to 0.9995."""
 
     gradient: bool = False

@@ -58,10 +58,8 @@ def flow_picture(
     view = view_of(space, center=None if space.is_round else settings.center)
     low, high = 0.5 - cells / 2, 0.5 + cells / 2
     window = (low, low, high, high)
-    room = SCREEN
-    if sheet.printed:
-        room = printed_room(sheet, 0.4, 0.6, 0.6, SPEED, ("0.00",))
-    frame = make_frame(sheet, room)
+    printed = printed_room(sheet, 0.4, 0.6, 0.6, SPEED, ("0.00",))
+    frame = make_frame(sheet, printed if sheet.printed else SCREEN)
     axes = frame.axes
     axes.set_xlim(low, high)
     axes.set_ylim(low, high)  # `draw_magnitude` keeps these

@@ -311,30 +311,21 @@ class EqualEarth(WorldMap):
 
     name, title, is_equal_area = "equal-earth", "the Equal Earth projection (equal-area)", True
 
-    _A = (1.340264, -0.081106, 0.000893, 0.003796)
-
-    def _polynomial(self, theta: Array) -> Array:
-        a1, a2, a3, a4 = self._A
-        square = theta**2
-        return theta * (a1 + square * (a2 + square**2 * (a3 + square * a4)))
-
-    def _slope(self, theta: Array) -> Array:
-        a1, a2, a3, a4 = self._A
-        square = theta**2
-        return a1 + square * (3 * a2 + square**2 * (7 * a3 + square * 9 * a4))
+    _Y = np.polynomial.Polynomial((0, 1.340264, 0, -0.081106, 0, 0, 0, 0.000893, 0, 0.003796))
+    _SLOPE = _Y.deriv()
 
     def _theta(self, y: Array) -> Array:
-        theta = y / self._A[0]
+        theta = y / self._Y.coef[1]
         for _ in range(_NEWTON):
-            theta = theta - (self._polynomial(theta) - y) / self._slope(theta)
+            theta = theta - (self._Y(theta) - y) / self._SLOPE(theta)
         return np.clip(theta, -math.pi / 3, math.pi / 3)
 
     def height(self, lat: Array) -> Array:
-        return self._polynomial(np.arcsin(math.sqrt(3) / 2 * np.sin(lat)))
+        return self._Y(np.arcsin(math.sqrt(3) / 2 * np.sin(lat)))
 
     def latitude(self, y: Array) -> Array:
         return np.arcsin(np.clip(2 / math.sqrt(3) * np.sin(self._theta(y)), -1, 1))
 
     def stretch(self, y: Array) -> Array:
         theta = self._theta(y)
-        return 2 / math.sqrt(3) * np.cos(theta) / self._slope(theta)
+        return 2 / math.sqrt(3) * np.cos(theta) / self._SLOPE(theta)

@@ -8,8 +8,6 @@ from typing import Annotated, Literal
 from orbiflow.errors import literal
 from orbiflow.settings import DefaultText, SettingError, Settings
 
-Missing = Literal["refuse", "drop", "marginalise"]
-
 TABLES = (".csv", ".tsv", ".txt", ".dat")
 """What names of tables end in. Others may end in anything that is not among these:"""
 
@@ -69,7 +67,7 @@ class TableSettings(Settings, group="Reading the table"):
 class RowSettings(TableSettings, group="Reading the table"):
     """Which columns and rows of a table are read, and how much each row counts."""
 
-    missing: Missing = "refuse"
+    missing: Literal["refuse", "drop", "marginalise"] = "refuse"
     """What is done with rows that lack a value. With marginalise, on tori, they count by the angles
     that they have."""
 
