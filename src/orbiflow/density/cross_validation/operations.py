@@ -150,7 +150,7 @@ def setting_of(components: Sequence[str] | None, field: str) -> tuple[str, Compo
 
 
 def _setting_in(text: str) -> tuple[str, Components]:
-    """The setting that a word of `against` names."""
+    """Return the setting that a word of `against` names."""
     if text == DEFAULT:
         return DEFAULT, None
     pieces = [piece.strip() for piece in text.replace("+", ",").split(",")]

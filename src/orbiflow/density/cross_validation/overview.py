@@ -76,7 +76,7 @@ class CvOverview:
         return files
 
     def _rows(self, found: HeldOut) -> bytes | None:
-        """The table with the fold of each row and its log density by each setting."""
+        """Return the table with the fold of each row and its log density by each setting."""
         means, data = found.means(), self.asked.data
         if np.isnan(means).all():
             return None
@@ -132,7 +132,7 @@ class CvOverview:
         return json.dumps(document, allow_nan=False, indent=1).encode()
 
     def _spreads(self, found: HeldOut) -> dict[str, Any]:
-        """How much folds differ, by setting."""
+        """Return how much folds differ, by setting."""
         means = [mean for *_, mean in found.fold_means(self.splits)]
         columns = {name: [mean[k] for mean in means] for k, name in enumerate(found.settings)}
         return {
@@ -144,7 +144,7 @@ class CvOverview:
 
 
 def _table(done: Sequence[tuple[Fit, batch.Entry]]) -> bytes:
-    """A line for each fit that has finished."""
+    """Return a CSV with a line for each fit that has finished."""
     heads = ["split", "fold", "setting", "state", *FIGURES, "seconds", "error", "folder"]
     rows: list[list[Any]] = []
     for fit, entry in done:
@@ -157,7 +157,7 @@ def _table(done: Sequence[tuple[Fit, batch.Entry]]) -> bytes:
 
 
 def _stamp(path: Path) -> tuple[int, int] | None:
-    """What a change of a file is noticed by."""
+    """Return what a change of a file is noticed by."""
     try:
         found = path.stat()
     except OSError:
@@ -220,7 +220,7 @@ def run(
 
 
 def _item(fit: Fit, asked: CrossValidation, split: Split) -> batch.Item:
-    """A fit as batches take it; all that decides it is said, so that the rows do not."""
+    """Return a fit as batches take it, with all that decides its result besides the rows."""
     angles = len(split.rows.table.columns)
     weighted, grouped = split.rows.weights is not None, split.rows.labels is not None
     density, space = asked.density, asked.where.space
@@ -304,7 +304,7 @@ def _signed(value: float, sign: str = "-") -> str:
 def _scores(
     found: HeldOut, made: ModelComparison | None, folds: FoldMeans
 ) -> dict[str, Any] | None:
-    """A picture of the mean log densities."""
+    """Return a picture of the mean log densities."""
     names = list(found.settings)
     known = {score.name: score for score in made.scores} if made else {}
     lines = [
@@ -322,7 +322,7 @@ def _scores(
 def _differences(
     found: HeldOut, made: ModelComparison | None, folds: FoldMeans
 ) -> dict[str, Any] | None:
-    """A picture of the differences between settings."""
+    """Return a picture of the differences between settings."""
     names = list(found.settings)
     lines = [
         Strip(

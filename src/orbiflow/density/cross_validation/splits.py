@@ -144,7 +144,7 @@ def cv_rows(asked: CrossValidation, tell: Sink) -> CvRows:
 
 
 def _counting(rows: TableRows) -> TableRows:
-    """The same without the rows of weight 0, which count for nothing."""
+    """Return rows without those of weight 0, which count for nothing."""
     weights = rows.weights
     if weights is None:
         return rows
@@ -236,7 +236,7 @@ def held_out(
 
 
 def _read(path: Path, held: NDArray[np.int64]) -> Array:
-    """The log densities of the rows of these numbers, from 0."""
+    """Return the log densities of the rows of these numbers, from 0."""
     table = read_table(path, columns=COLUMNS, width=2)
     if not np.array_equal(table.values[:, 0], held + 1):
         raise OrbiflowError(

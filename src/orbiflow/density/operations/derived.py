@@ -130,7 +130,7 @@ def _words(density: Density, names: list[str], out: Path) -> str:
 
 
 def _table(density: Density) -> Array:
-    """Angles from minus half a turn on, and the density (N, d + 1) in their unit."""
+    """Return angles from minus half a turn on, and the density in their unit: (N, d + 1)."""
     space = density.space
     if not isinstance(space, Torus):
         raise OrbiflowError(f"a table of angles needs a torus, not the {space.name}")

@@ -110,7 +110,7 @@ def _log_densities(
 
 
 def _gradients(density: Density, rows: TableRows, tell: Sink, cancel: Cancel) -> dict[str, Array]:
-    """The gradient of the log density in the data's own coordinates, a column (N,) for each."""
+    """Return the gradient of the log density, a column (N,) for each of the data's coordinates."""
     values = rows.table.values
     found: list[NDArray[np.float64]] = []
     for start in range(0, len(values), BLOCK_GRADIENT):
@@ -130,7 +130,7 @@ def mean_of_whole(scores: Array, weights: Array | None, whole: NDArray[np.bool_]
 
 
 def _region_note(samples: int) -> str:
-    """How far `hdr` can be trusted."""
+    """Return how far `hdr` can be trusted, in words."""
     low, high = resolvable_masses(samples)
     return (
         "hdr: the mass of the smallest highest-density region that holds the row, by "
@@ -140,7 +140,7 @@ def _region_note(samples: int) -> str:
 
 
 def _missing_note(known: Tensor, name: str) -> str:
-    """How many rows lack angles, and what their log density is."""
+    """Return in words how many rows lack angles, and what their log density is."""
     lacking, empty = int((~known.all(dim=1)).sum()), int((~known.any(dim=1)).sum())
     nothing = f"; {empty} of them have none, hence 0" if empty else ""
     return (

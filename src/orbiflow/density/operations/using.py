@@ -221,7 +221,7 @@ def conditional(
 
 
 def _angle(text: str) -> tuple[str, float]:
-    """The name and the value of an angle that is known."""
+    """Return the name and the value of an angle that is known."""
     name, sign, value = text.rpartition("=")
     try:
         if not sign or not name.strip():

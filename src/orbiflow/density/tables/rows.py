@@ -135,7 +135,7 @@ def _without_identifiers(table: Table, tell: Sink) -> Table:
 
 
 def _weighed(path: Path, table: Table, weighing: Table) -> tuple[Table, Array]:
-    """The rows that have a weight, and their weights."""
+    """Return the rows that have a weight, and their weights."""
     name = weighing.columns[0]
     if name in table.columns:
         raise TableError(
@@ -147,7 +147,7 @@ def _weighed(path: Path, table: Table, weighing: Table) -> tuple[Table, Array]:
 
 
 def _name(path: Path, column: str, header: bool | None) -> str:
-    """What a table calls a column that is given by its name or number."""
+    """Return what a table calls a column that is given by its name or number."""
     names = column_names(path, wanted=[column], has_header=header)
     if names is None:
         number = column.strip()
