@@ -1,7 +1,7 @@
 from .comparing.data_sets import DataComparison as DataComparison
+from .comparing.data_sets import Divergence as Divergence
+from .comparing.data_sets import Estimate as Estimate
 from .comparing.data_sets import compare_samples as compare_samples
-from .comparing.divergence import Divergence as Divergence
-from .comparing.divergence import Estimate as Estimate
 from .comparing.known_rows import RowSketch as RowSketch
 from .comparing.paired import Difference as Difference
 from .comparing.paired import ModelComparison as ModelComparison
@@ -55,6 +55,7 @@ from .models.uniform import UniformDensity as UniformDensity
 from .models.uniform import VonMisesDensity as VonMisesDensity
 from .pictures.axes import space_title as space_title
 from .pictures.coastlines import read_coastlines as read_coastlines
+from .pictures.colours import density_on_grid as density_on_grid
 from .pictures.corner import corner_picture as corner_picture
 from .pictures.flow import draw_cells as draw_cells
 from .pictures.flow import flow_picture as flow_picture
@@ -79,16 +80,15 @@ from .pictures.surfaces import edge_pairs as edge_pairs
 from .pictures.surfaces import immersion as immersion
 from .pictures.surfaces import viewpoint as viewpoint
 from .pictures.thumbnail import density_thumbnail as density_thumbnail
-from .pictures.values import density_on_grid as density_on_grid
 from .regions.boundaries import Outline as Outline
 from .regions.boundaries import outlines as outlines
+from .regions.boundaries import to_geojson as to_geojson
 from .regions.levels import DensityLevels as DensityLevels
 from .regions.levels import DensityRegion as DensityRegion
 from .regions.levels import highest_density_region as highest_density_region
 from .regions.settings import RegionSettings as RegionSettings
 from .regions.settings import resolvable_masses as resolvable_masses
 from .regions.settings import samples_for as samples_for
-from .regions.writing import to_geojson as to_geojson
 from .run_folder import written_files as written_files
 from .spaces.catalogue import SPACES as SPACES
 from .spaces.catalogue import make_space as make_space
