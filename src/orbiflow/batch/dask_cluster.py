@@ -12,17 +12,15 @@ import contextlib
 import ctypes
 import importlib
 import os
-import secrets
 import time
 import warnings
 from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
-from types import TracebackType
 from typing import Any, Self, TypeAlias
 
 from orbiflow import __version__
-from orbiflow.batch.parcels import Answer, Parcel, carry_out
+from orbiflow.batch.executors import Answer, Executor, Parcel, carry_out
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import Cancel, Note, Sink, one_thread
 
@@ -45,8 +43,8 @@ USUAL_MMAP_BYTES = 128 * 2**10
 TRIM_VARIABLE = "MALLOC_TRIM_THRESHOLD_"
 
 
-class DaskCluster:
-    """An `Executor` of the workers of the scheduler at an address.
+class DaskCluster(Executor):
+    """The workers of the scheduler at an address.
 
     Dask gives the work of a lost worker to another one, three times (the scheduler's setting
     `distributed.scheduler.allowed-failures`), and then gives up all that the last one worked on. These
@@ -84,19 +82,16 @@ class DaskCluster:
         try:
             self._check_workers(self._client)
         except BaseException:
-            self._close()
+            self.__exit__()
             raise
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-        /,
-    ) -> None:
+    def __exit__(self, *_error: object) -> None:
         """Disconnect; workers stop at their next step."""
-        self._close()
+        if self._client is not None:
+            with suppress(Exception):  # a scheduler that has gone
+                self._client.close(timeout=2)
+            self._client = None
 
     @property
     def place(self) -> str:
@@ -161,6 +156,7 @@ class DaskCluster:
         return Answer.from_worker(one.parcel.key, *result)
 
     def _check_workers(self, client: Client) -> None:
+        """Raise an `OrbiflowError` if there is no worker, or one with another orbiflow."""
         try:
             client.wait_for_workers(1, timeout=self.timeout)
         except TimeoutError as error:
@@ -187,12 +183,6 @@ class DaskCluster:
             raise OrbiflowError("connect first: `with DaskCluster(address) as cluster:`")
         return self._client
 
-    def _close(self) -> None:
-        if self._client is not None:
-            with suppress(Exception):  # a scheduler that has gone
-                self._client.close(timeout=2)
-            self._client = None
-
 
 @dataclass(frozen=True, eq=False)
 class _Sent:
@@ -212,8 +202,6 @@ class _Out:
 
     def __init__(self, client: Client) -> None:
         self.client = client
-        self.run = secrets.token_hex(4)
-        self.count = 0
         self.sent: list[_Sent] = []
 
     def __len__(self) -> int:
@@ -224,13 +212,9 @@ class _Out:
             self.send(parcel)
 
     def send(self, parcel: Parcel) -> None:
-        key = f"orbiflow-{self.run}-{self.count}"
-        self.count += 1
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # that a picture is large
-            future = self.client.submit(
-                _serve, parcel.header(), parcel.data, key=key, pure=False, retries=0
-            )
+            future = self.client.submit(_serve, parcel.header(), parcel.data, pure=False, retries=0)
         loop = self.client.loop.asyncio_loop
         fetched = asyncio.run_coroutine_threadsafe(_fetched(self.client, future), loop)
         self.sent.append(_Sent(parcel, future, fetched))

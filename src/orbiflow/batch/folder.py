@@ -5,16 +5,14 @@ from __future__ import annotations
 import io
 import time
 from collections.abc import Mapping, Sequence
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack, nullcontext, suppress
 from pathlib import Path, PurePosixPath
-from types import TracebackType
 from typing import Self
 
 from filelock import FileLock, Timeout
 
 from orbiflow.batch.journal import Entry, Journal
-from orbiflow.batch.kinds import Kind
-from orbiflow.batch.overview import PAGE, TABLE, ContactSheet, Overview
+from orbiflow.batch.overview import PAGE, TABLE, ContactSheet, Kind, Overview
 from orbiflow.errors import OrbiflowError, OutputError
 from orbiflow.runtime import LITTER, ResultFolder, make_folder, write_atomic, write_set
 
@@ -73,23 +71,11 @@ class BatchFolder:
         self._open.enter_context(self.journal)
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, _kind: object, error: BaseException | None, _traceback: object) -> None:
         """Write the overview, whatever has happened."""
-        with self._open:
-            if kind is None:
-                self.write_all(last=True)
-            else:
-                with suppress(OrbiflowError):  # the first error is the one to be told
-                    self.write_all(last=True)
-
-    def has(self, name: str) -> bool:
-        """Return whether the folder of a result exists."""
-        return (self.path / name).is_dir()
+        # the first error is the one to be told
+        with self._open, suppress(OrbiflowError) if error else nullcontext():
+            self.write_all(last=True)
 
     def keep(self, entry: Entry, files: Mapping[str, bytes], picture: str | None) -> None:
         """Put a result where it belongs, and then add it to the journal.
@@ -119,11 +105,7 @@ class BatchFolder:
             self.write_all()
 
     def write_all(self, *, last: bool = False) -> None:
-        """Write the overview of all `keys` that are `current`.
-
-        Raises:
-            OutputError: If it cannot be written.
-        """
+        """Write the overview of all `keys` that are `current`."""
         begin = time.monotonic()
         entries = [self.journal.entries[key] for key in self.keys if key in self.current]
         pictures = frozenset(path.stem for path in (self.path / THUMBNAILS).glob("*.png"))

@@ -11,7 +11,7 @@ from fnmatch import fnmatch
 from pathlib import Path, PurePosixPath
 from typing import Any, Protocol
 
-from orbiflow.batch.kinds import Kind
+from orbiflow.batch.overview import Kind
 from orbiflow.errors import InputFileError
 from orbiflow.runtime import Call
 
@@ -51,7 +51,18 @@ class FileSource:
         return self.path.name
 
     def read(self) -> bytes:
-        return content(self.path, self.most)
+        try:
+            with self.path.open("rb") as file:
+                data = file.read(self.most + 1)
+        except OSError as error:
+            why = error.strerror or error
+            raise InputFileError(f"{self.name}: cannot be read ({why}); check it") from error
+        if len(data) > self.most:
+            raise InputFileError(
+                f"{self.name}: larger than {self.most / 2**20:.0f} MB, the most that is read; simplify "
+                "it"
+            )
+        return data
 
     def code(self) -> str:
         return code_of(self.read())
@@ -174,25 +185,6 @@ def _plain(text: str) -> str:
     """A name of letters, digits, dots, dashes and underscores, neither empty nor hidden."""
     text = re.sub(r"[^\w.-]+", "-", text.replace("/", "-")).strip("-.")
     return text[:LONGEST_NAME].rstrip("-.") or "file"
-
-
-def content(path: Path, most: int) -> bytes:
-    """Return a file's bytes.
-
-    Raises:
-        InputFileError: If it cannot be read, is empty, or has more bytes than `most`.
-    """
-    try:
-        with path.open("rb") as file:
-            data = file.read(most + 1)
-    except OSError as error:
-        why = error.strerror or error
-        raise InputFileError(f"{path.name}: cannot be read ({why}); check it") from error
-    if len(data) > most:
-        raise InputFileError(
-            f"{path.name}: larger than {most / 2**20:.0f} MB, the most that is read; simplify it"
-        )
-    return data
 
 
 def code_of(data: bytes) -> str:

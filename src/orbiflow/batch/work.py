@@ -11,13 +11,11 @@ from pathlib import Path
 from typing import Any
 
 from orbiflow import __version__
-from orbiflow.batch.executors import WorkSettings, executor_for
+from orbiflow.batch.executors import Answer, Parcel, WorkSettings, executor_for
 from orbiflow.batch.folder import RESERVED, BatchFolder
 from orbiflow.batch.items import FileSource, Item, code_of, folder_names, listed
 from orbiflow.batch.journal import Entry
-from orbiflow.batch.kinds import FolderKind, Kind
-from orbiflow.batch.overview import PAGE, TABLE, ContactSheet
-from orbiflow.batch.parcels import Answer, Parcel
+from orbiflow.batch.overview import PAGE, TABLE, ContactSheet, Kind
 from orbiflow.errors import OrbiflowError, SettingError
 from orbiflow.runtime import (
     Call,
@@ -46,24 +44,12 @@ class Counts:
     left: int
     kept: int
 
-    @property
-    def state(self) -> State:
-        """How the batch ends."""
-        if self.left:
-            return "cancelled"
-        return "done" if self.done else "nothing found"
-
     def outcome(
         self, count: int, table: Path, page: Path, summary: dict[str, Any], tell: Sink
     ) -> Outcome:
-        """Say what was done and what to do next, and return the outcome.
+        """Tell what was done of `count` items and what to do next, and return the outcome.
 
-        Args:
-            count: The number of items.
-            table: The table of all results.
-            page: The page of all results.
-            summary: What the summary has besides the counts; with `seconds`.
-            tell: Is told.
+        Its summary has the counts and what `summary` has, with `seconds`.
         """
         done = "nothing was left to do" if self.kept == count else f"{self.done} of {count} done"
         tell(Note(f"{done}, in {summary['seconds']:.0f} s; look at {page}, or {table}"))
@@ -74,13 +60,14 @@ class Counts:
         elif without:
             text = f"{without} without a result, for the reasons in {table}"
             tell(Note(f"{text}; --retry-failed does them again", warning=True))
-        return Outcome({**summary, **asdict(self)}, self.state, without)
+        state: State = "cancelled" if self.left else "done" if self.done else "nothing found"
+        return Outcome({**summary, **asdict(self)}, state, without)
 
 
 def run_files(
     source: Path,
     out: Path,
-    kind: FolderKind,
+    kind: Kind,
     title: str,
     call_of: Callable[[str], Call],
     match: str | None,
@@ -179,7 +166,7 @@ def _todo(items: Sequence[Item], settings: WorkSettings, folder: BatchFolder) ->
                 code = item.source.code()
             except OrbiflowError:
                 code = ""
-            there = before.state == "failed" or folder.has(before.name)
+            there = before.state == "failed" or (folder.path / before.name).is_dir()
             if there and before.same_work(code, item.settings(folder.kind), __version__):
                 continue
         yield item

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any
 
-from orbiflow.batch import Column, FolderKind, Summary, WorkSettings, run_files
+from orbiflow.batch import Column, Kind, Summary, WorkSettings, run_files
 from orbiflow.density.fitting import ComponentSettings
 from orbiflow.density.run_folder import written_files
 from orbiflow.density.tables import SpaceSettings, TableSettings
@@ -58,7 +58,7 @@ def _figures(summary: Summary) -> dict[str, Any]:
     }
 
 
-DENSITIES = FolderKind(
+DENSITIES = Kind(
     things="tables",
     items="files",
     endings=(".csv", ".tsv", ".txt", ".npy", ".parquet"),
