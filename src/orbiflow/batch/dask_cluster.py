@@ -253,11 +253,7 @@ class _Crew:
         self.looked = self.seen = time.monotonic()
 
     def room(self) -> int:
-        """Return how many parcels may be on the cluster at a time.
-
-        Raises:
-            OrbiflowError: If nobody has worked for long.
-        """
+        """Return how many parcels may be on the cluster at a time."""
         now = time.monotonic()
         if now - self.looked >= LOOK:
             before, self.threads, self.looked = self.threads, _threads(self.client), now

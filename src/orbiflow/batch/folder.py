@@ -39,9 +39,6 @@ class BatchFolder:
         path: The folder, made if need be. An earlier batch there is resumed.
         kind: The kind of batch.
         overview: What shows all results.
-
-    Raises:
-        OutputError: If it holds something else, another batch works there, or it cannot be written.
     """
 
     def __init__(self, path: Path, kind: Kind, overview: Overview) -> None:
@@ -84,9 +81,6 @@ class BatchFolder:
             entry: What came of the item.
             files: The files of the result, by path; none leaves what was there.
             picture: The path of the one that the page shows small.
-
-        Raises:
-            OutputError: If it cannot be written; the journal then does not have it.
         """
         if files:
             folder = ResultFolder(self.path / entry.name, self.kind.written)

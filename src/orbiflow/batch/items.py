@@ -103,9 +103,6 @@ def listed(folder: Path, endings: Collection[str], match: str | None, out: Path)
         endings: Endings of names in small letters, such as ".svg".
         match: A pattern that the name or the path must fit.
         out: Where the results go.
-
-    Raises:
-        InputFileError: If it is no folder, cannot be read, holds `out`, or has no such file.
     """
     if not folder.is_dir():
         why = "it is a file" if folder.exists() else "there is no such folder"

@@ -59,9 +59,6 @@ class Journal:
 
     Args:
         path: The file, which need not exist.
-
-    Raises:
-        OutputError: If it exists and is no journal.
     """
 
     def __init__(self, path: Path) -> None:
@@ -84,11 +81,7 @@ class Journal:
         self._file.close()
 
     def add(self, entry: Entry) -> None:
-        """Add an entry, which is on the disk when this returns.
-
-        Raises:
-            OutputError: If it cannot be written.
-        """
+        """Add an entry, which is on the disk when this returns."""
         try:
             self._file.write(entry.line().encode())
             self._file.flush()

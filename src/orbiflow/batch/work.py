@@ -92,9 +92,6 @@ def run_files(
         An outcome whose summary has `folder`, `table` and `page`; the number of `files`, and how many
         of them are `done`, gave `nothing`, `failed` or are `left`; how many were `kept` from before;
         and `seconds`.
-
-    Raises:
-        OrbiflowError: For a mistake of the user; what has finished is kept.
     """
     begin = time.perf_counter()
     if match is not None and not match.strip():
@@ -139,9 +136,6 @@ def run_items(
         tell: Is told all that a user should see.
         cancel: Ends the batch; what has finished is kept.
         gone: What earlier results are of that belong to no item, in words.
-
-    Raises:
-        OrbiflowError: For a mistake of the user; what has finished is kept.
     """
     folder.keys = [item.key for item in items]
     todo = list(_todo(items, settings, folder))

@@ -22,11 +22,7 @@ MAX_PIXELS = 20_000
 
 
 def check_size(width_px: int, height_px: int) -> None:
-    """Check that a picture can have this size.
-
-    Raises:
-        OrbiflowError: If a side is below 16 or above `MAX_PIXELS` pixels.
-    """
+    """Check that a picture can have this size."""
     if not (16 <= width_px <= MAX_PIXELS and 16 <= height_px <= MAX_PIXELS):
         raise OrbiflowError(
             f"a picture of {width_px} by {height_px} pixels cannot be made: sides go from 16 to "
@@ -35,11 +31,7 @@ def check_size(width_px: int, height_px: int) -> None:
 
 
 def blank_figure(width_px: int, height_px: int, paper: str = "#ffffff") -> Figure:
-    """Return an empty figure of this size in pixels.
-
-    Raises:
-        OrbiflowError: If a side is below 16 or above `MAX_PIXELS` pixels.
-    """
+    """Return an empty figure of this size in pixels."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 

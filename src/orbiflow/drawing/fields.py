@@ -207,11 +207,7 @@ def _in_window(seeds: Array, group: CrystallographicGroup, window: Window, margi
 
 
 def evaluate(velocity: Callable[[Any], Any], points: Array) -> Array:
-    """Return a field that is written in torch at NumPy points (..., 2).
-
-    Raises:
-        OrbiflowError: If it does not return finite vectors of the points' shape.
-    """
+    """Return a field that is written in torch at NumPy points (..., 2)."""
     dtype = torch.float64
     if isinstance(velocity, torch.nn.Module):
         dtype = next((p.dtype for p in velocity.parameters()), dtype)

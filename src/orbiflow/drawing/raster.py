@@ -75,9 +75,6 @@ class Raster:
         paper: The background, as #rrggbb.
         strip_px: Height of the strip.
 
-    Raises:
-        OrbiflowError: If there cannot be a picture of this size.
-
     >>> raster = Raster((0.0, 0.0, 2.0, 1.0), 40)
     >>> raster.fill([np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])], "#ff0000")
     >>> picture = raster.image()

@@ -109,9 +109,6 @@ class CallProcess:
 
         Args:
             timeout: Maximum time to wait, in seconds. Default: no limit.
-
-        Raises:
-            TimeoutError: If it still runs then.
         """
         try:
             status = self._process.wait(timeout)

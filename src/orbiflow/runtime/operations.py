@@ -140,11 +140,7 @@ class Operation:
         return dict(entry.split(": ", 1) for entry in entries if ": " in entry)
 
     def call(self, given: Mapping[str, Any]) -> Call:
-        """Return a call with these parameters and settings, all in one mapping, checked.
-
-        Raises:
-            SettingError: If one is unknown, missing or not allowed.
-        """
+        """Return a call with these parameters and settings, all in one mapping, checked."""
         check_names(given, self.fields, self.name)
         arguments: dict[str, Any] = {}
         for name, part in self._parts.items():

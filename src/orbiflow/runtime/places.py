@@ -17,10 +17,6 @@ def check_output_file(out: Path, *reads: Path | None) -> None:
     Args:
         out: The file.
         reads: What the operation reads: files, and folders of runs. None is passed over.
-
-    Raises:
-        OutputError: If it is a folder or a device, its folder is not there, it would replace what is
-            read, or it would lie in the folder of a run that is read.
     """
     if out.is_dir():
         raise OutputError(f"cannot write {out}: it is a folder; give a file's name in it")
@@ -39,10 +35,6 @@ def check_output_folder(out: Path, *reads: Path | None, what: str = "file") -> N
         out: The folder.
         reads: As in `check_output_file`.
         what: What they are, for the message.
-
-    Raises:
-        OutputError: If one of `reads` is the folder or in it, or the folder would lie in that of a run
-            that is read.
     """
     for read in reads:
         if read is not None and _real(read).is_relative_to(_real(out)):
@@ -54,11 +46,7 @@ def check_output_folder(out: Path, *reads: Path | None, what: str = "file") -> N
 
 
 def check_inputs_kept(out: Path, *reads: Path | None) -> None:
-    """Check that a file that will be written is none that is read, by whatever name or link.
-
-    Raises:
-        OutputError: If it is.
-    """
+    """Check that a file that will be written is none that is read, by whatever name or link."""
     for read in reads:
         if read is not None and any(_same(out, file) for file in _files_read(read)):
             raise OutputError(
@@ -70,9 +58,6 @@ def check_outside_runs(out: Path, *reads: Path | None) -> None:
     """Check that nothing is written into the folder of a run that is read; `out` may be the folder.
 
     The next run into such a folder would refuse the file, or replace it.
-
-    Raises:
-        OutputError: If it would be.
     """
     # a link is replaced, not followed
     target = _real(out.parent) / out.name

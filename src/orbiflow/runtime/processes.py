@@ -87,9 +87,6 @@ def work(
         cancel: Stops the work; the workers' tokens follow it.
         tries: Number of workers that may die of an item. Each is replaced by a new one; the news of an
             item that has killed so many say `died`. None: no worker may die.
-
-    Raises:
-        OrbiflowError: If a worker dies without `tries`; and whatever `function` raises.
     """
     pool = _Pool(function, items, context or process_context(), cancel or Cancel(), tries)
     try:

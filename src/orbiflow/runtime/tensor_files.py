@@ -27,11 +27,7 @@ KEY = "orbiflow"
 def tensor_bytes(
     header: Mapping[str, Any], tensors: Mapping[str, Tensor], what: str = "tensors"
 ) -> bytes:
-    """The content of a file that `read_tensors` reads again; `what` it holds is for messages.
-
-    Raises:
-        OrbiflowError: for a header that is not JSON, or more than a file may hold.
-    """
+    """The content of a file that `read_tensors` reads again; `what` it holds is for messages."""
     from safetensors.torch import save
 
     try:
@@ -58,9 +54,6 @@ def read_tensors(
         what: What it is to hold, such as "a flow", for messages.
         key: The name under which the header stands.
         max_bytes: The largest size of the file, checked before it is read.
-
-    Raises:
-        InputFileError: if the file is missing, too large, damaged or of another kind.
     """
     from safetensors.torch import load
 

@@ -69,11 +69,7 @@ class Budget:
         return max(0.0, self.seconds - (clock() - self._began))
 
     def spend(self) -> None:
-        """Count an evaluation that is about to begin.
-
-        Raises:
-            Spent: if it must not.
-        """
+        """Count an evaluation that is about to begin."""
         if self.is_spent:
             raise Spent(str(self._reason))
         self.used += 1

@@ -61,9 +61,6 @@ def folds_of(rows: Rows, *, together: bool, generator: torch.Generator) -> Folds
     do rows held out at random. Where equal rows are an accident of rounding, that would reward peaks
     at the values that happened to be recorded: then they are kept `together`, in one fold. So are rows
     of one group, whatever they are: each of fewer than ten groups is a fold.
-
-    Raises:
-        OrbiflowError: for groups without which too few rows are left.
     """
     rows = rows[torch.randperm(len(rows), generator=generator)]
     folds = FOLDS
@@ -89,11 +86,7 @@ def folds_of(rows: Rows, *, together: bool, generator: torch.Generator) -> Folds
 
 
 def _check_rest(folds: Folds) -> None:
-    """Check that enough rows are left to fit to.
-
-    Raises:
-        OrbiflowError: if too few are left where a fold is held out.
-    """
+    """Check that enough rows are left to fit to."""
     left = min(len(places(folds.train(number).points)[0]) for number in range(folds.used))
     if left < LEAST_PLACES:
         raise OrbiflowError(

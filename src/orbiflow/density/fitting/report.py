@@ -143,21 +143,13 @@ def _figures(values: list[float | None]) -> tuple[float, ...]:
 
 
 def own_points(space: Space, points: Any) -> Tensor:
-    """Canonical points (N, d), float64: a copy, for those of `torch.inference_mode` cannot be used.
-
-    Raises:
-        OrbiflowError: for another shape or values that are not finite, or what is no `Space`.
-    """
+    """Canonical points (N, d), float64: a copy, for those of `torch.inference_mode` cannot be used."""
     check_kind(space, Space, "space", "see `make_space`")
     return space.project(points_tensor(points, space.dim, flat=True).detach().double().clone())
 
 
 def sides(points: Tensor, share: float, generator: torch.Generator) -> tuple[Tensor, Tensor, int]:
-    """An order of points (N, d), which of them (N,) are held out in it, how many repeat another.
-
-    Raises:
-        OrbiflowError: if there are fewer than ten different points.
-    """
+    """An order of points (N, d), which of them (N,) are held out in it, how many repeat another."""
     # rounding keeps together what differs by the projection's last digit
     places, where = unique((points * 1e9).round(), dim=0, return_inverse=True)
     if len(places) < 10:

@@ -66,11 +66,7 @@ def effective_rows(weights: Tensor) -> float:
 
 
 def weights_of(weights: Any, known: Tensor) -> Tensor:
-    """Return the weights of the rows that are `known` (N,).
-
-    Raises:
-        OrbiflowError: for another number of weights than rows.
-    """
+    """Return the weights of the rows that are `known` (N,)."""
     own = float_tensor(weights, "weights")
     if own.shape != known.shape:
         raise OrbiflowError(
@@ -81,9 +77,6 @@ def weights_of(weights: Any, known: Tensor) -> Tensor:
 
 def group_numbers(labels: ArrayLike, rows: int) -> NDArray[np.int64]:
     """Return the group (N,) of each row as a whole number from 0, from labels of any kind.
-
-    Raises:
-        OrbiflowError: for another number of labels.
 
     >>> group_numbers(["a", "b", "a"], 3).tolist()
     [0, 1, 0]
@@ -154,22 +147,14 @@ BLOCK_ENTRIES = 2_000_000
 
 
 def check_missing(missing: Any) -> str:
-    """Return what is done with rows that lack an angle.
-
-    Raises:
-        OrbiflowError: for what is not one of `MISSING`.
-    """
+    """Return what is done with rows that lack an angle."""
     if not isinstance(missing, str) or missing not in MISSING:
         raise OrbiflowError(f"missing must be one of {', '.join(MISSING)}, got {missing!r}")
     return missing
 
 
 def observed_points(space: Space, points: Any) -> tuple[Tensor, Tensor]:
-    """Return canonical points (N, d) of a torus, and which rows have an angle at all.
-
-    Raises:
-        OrbiflowError: for another space or shape, infinite angles, or what is no `Space`.
-    """
+    """Return canonical points (N, d) of a torus, and which rows have an angle at all."""
     check_kind(space, Space, "space", "see `make_space`")
     check_torus(space, "densities of rows that lack angles")
     own = float_tensor(points, "points").detach().double().clone()

@@ -18,11 +18,7 @@ from orbiflow.errors import OrbiflowError
 
 
 def check_torus(space: Space, what: str) -> Torus:
-    """Return the space if it is a torus.
-
-    Raises:
-        OrbiflowError: if it is not; the message says why others have no `what`.
-    """
+    """Return the space if it is a torus."""
     if isinstance(space, Torus):
         return space
     if space.is_round:
@@ -36,11 +32,7 @@ def check_torus(space: Space, what: str) -> Torus:
 
 
 def kept_axes(axes: Iterable[int] | int, dim: int) -> tuple[int, ...]:
-    """Return the numbers of the angles to keep, 0 to dim - 1, each once.
-
-    Raises:
-        OrbiflowError: for other numbers, or none.
-    """
+    """Return the numbers of the angles to keep, 0 to dim - 1, each once."""
     listed: Any = [axes] if isinstance(axes, numbers.Integral) else axes
     try:
         found = tuple(_axis(axis, dim) for axis in listed)
@@ -52,11 +44,7 @@ def kept_axes(axes: Iterable[int] | int, dim: int) -> tuple[int, ...]:
 
 
 def given_axes(given: Mapping[int, float], dim: int) -> tuple[tuple[int, ...], tuple[float, ...]]:
-    """Return the numbers of the angles that are known, and their values.
-
-    Raises:
-        OrbiflowError: if there are none or no others, or for values that are not finite.
-    """
+    """Return the numbers of the angles that are known, and their values."""
     if not is_a(given, Mapping) or not given:
         raise OrbiflowError(f"given must hold known angles, such as {{1: 0.25}}, got {given!r}")
     axes = tuple(_axis(axis, dim) for axis in given)

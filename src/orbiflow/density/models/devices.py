@@ -20,10 +20,6 @@ class _Movable(Protocol):
 def destination(*wanted: Any) -> tuple[torch.device | None, torch.dtype | None]:
     """Return a device and a dtype from what `torch.Tensor.to` takes: either, both, or a tensor.
 
-    Raises:
-        OrbiflowError: for another thing, a device that torch does not know, or a dtype that is not
-            floating.
-
     >>> destination("cpu", torch.float32)
     (device(type='cpu'), torch.float32)
     """
@@ -58,11 +54,7 @@ def _device(wanted: Any) -> torch.device:
 
 
 def source_of(generator: torch.Generator | None) -> torch.Generator:
-    """Return the source of random numbers, by default torch's own.
-
-    Raises:
-        OrbiflowError: for a generator that is not on the CPU.
-    """
+    """Return the source of random numbers, by default torch's own."""
     if generator is None:
         return torch.default_generator
     if generator.device.type != "cpu":
@@ -74,11 +66,7 @@ def source_of(generator: torch.Generator | None) -> torch.Generator:
 
 
 def shape_of(sample_shape: Any) -> torch.Size:
-    """Return the shape of samples, which may be given as their number.
-
-    Raises:
-        OrbiflowError: for another thing, or a negative number.
-    """
+    """Return the shape of samples, which may be given as their number."""
     sizes = (int(sample_shape),) if isinstance(sample_shape, numbers.Integral) else sample_shape
     try:
         shape = torch.Size(sizes)

@@ -28,9 +28,6 @@ def density_parts(
         density: The density.
         name: What it is in messages, such as "base".
         prefix: The beginning of the tensors' names.
-
-    Raises:
-        OrbiflowError: naming a class that has no kind of its own.
     """
     kind = type(density).kind
     if KINDS.get(kind) is not type(density):
@@ -44,12 +41,7 @@ def density_parts(
 
 
 def density_from(space: Space, header: Mapping[str, Any], tensors: Mapping[str, Tensor]) -> Density:
-    """Make the density of `density_parts` again, bit for bit.
-
-    Raises:
-        OrbiflowError: for an unknown kind.
-        OrbiflowError, ValueError, KeyError, TypeError: for what does not fit.
-    """
+    """Make the density of `density_parts` again, bit for bit."""
     kind = header["kind"]
     if kind not in KINDS:
         raise OrbiflowError(
@@ -68,11 +60,7 @@ def within(tensors: Mapping[str, Tensor], prefix: str) -> dict[str, Tensor]:
 
 
 def check_same_space(density: Density, component: Density, name: str) -> None:
-    """Check that a component is on the space of the density.
-
-    Raises:
-        OrbiflowError: if it is not.
-    """
+    """Check that a component is on the space of the density."""
     one, other = ((s.name, s.settings()) for s in (density.space, component.space))
     if one != other:
         raise OrbiflowError(
@@ -84,11 +72,7 @@ def check_same_space(density: Density, component: Density, name: str) -> None:
 def checked_tensors(
     tensors: Mapping[str, Tensor], shapes: Mapping[str, tuple[int, ...]], *, least: float = -1e30
 ) -> list[Tensor]:
-    """Return the tensors of these names and shapes, in this order.
-
-    Raises:
-        OrbiflowError: if one is missing, has another shape, or values below `least` or not finite.
-    """
+    """Return the tensors of these names and shapes, in this order."""
     found: list[Tensor] = []
     for name, shape in shapes.items():
         if name not in tensors:
@@ -103,11 +87,7 @@ def checked_tensors(
 
 
 def checked_integer(header: Mapping[str, Any], name: str, most: int) -> int:
-    """Return an entry of a header that must be an integer from 1 to `most`.
-
-    Raises:
-        OrbiflowError: for another value.
-    """
+    """Return an entry of a header that must be an integer from 1 to `most`."""
     value = header.get(name)
     if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= most:
         raise OrbiflowError(f"{name} must be an integer from 1 to {most}, got {value!r}")
@@ -133,11 +113,7 @@ def is_same_group(one: CrystallographicGroup, other: CrystallographicGroup) -> b
 
 
 def check_group(header: Any, group: CrystallographicGroup) -> None:
-    """Check that `header`, from `group_header`, describes this group.
-
-    Raises:
-        OrbiflowError: if it describes another one.
-    """
+    """Check that `header`, from `group_header`, describes this group."""
     try:
         tables = [np.array(header[name], dtype=float) for name in group_header(group)]
         lattice, linear, translations = tables
@@ -164,11 +140,7 @@ FIELD_NAMES = {kind: name for name, kind in FIELDS.items()}
 
 
 def series_parts(flow: Flow, space: Space) -> tuple[dict[str, Any], dict[str, Tensor]]:
-    """Return a header ready for JSON and a float64 tensor "flow.k" for each segment of a flow.
-
-    Raises:
-        OrbiflowError: naming the part of the flow that cannot be saved.
-    """
+    """Return a header ready for JSON and a float64 tensor "flow.k" for each segment of a flow."""
     if type(flow) is not Flow:
         raise OrbiflowError(
             f"the flow is a {type(flow).__name__}: only flows of Fourier and spline fields are "
@@ -226,11 +198,7 @@ def _segment(number: int, field: Any, space: Space) -> dict[str, Any]:
 def series_from_header(
     header: Mapping[str, Any], tensors: Mapping[str, Tensor], space: Space
 ) -> Flow:
-    """Make the flow of `series_parts` again; headers of the first files of version 0.1 work as well.
-
-    Raises:
-        OrbiflowError, ValueError, KeyError, TypeError: for what does not fit.
-    """
+    """Make the flow of `series_parts` again; headers of the first files of version 0.1 work as well."""
     if space.dim > MAX_DIM:
         raise ValueError(f"a flow of Fourier or spline fields has {MAX_DIM} dimensions at most")
     if header["kind"] != "series":

@@ -237,11 +237,7 @@ def _drawn(chains: VonMisesChains, angle: Tensor, generator: torch.Generator) ->
 
 
 def averaged_networks(networks: Sequence[VonMisesNetwork]) -> VonMisesNetwork:
-    """Return the network whose factors are the means of those of networks with the same arrows.
-
-    Raises:
-        OrbiflowError: if the arrows differ.
-    """
+    """Return the network whose factors are the means of those of networks with the same arrows."""
     first = networks[0]
     if len({tuple(axes for axes, _ in one.factors) for one in networks}) > 1:
         raise OrbiflowError("networks with other arrows have no common mean")
