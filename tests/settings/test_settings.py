@@ -97,7 +97,7 @@ WORD = st.text("abcxyz{}0 ", min_size=1).map(str.strip).filter(bool)
 def values_of(kind: Kind) -> st.SearchStrategy[Any]:
     """Values that a kind takes, as Python has them."""
     match kind:
-        case NumberKind(allowed, whole):
+        case NumberKind(allowed=allowed, whole=whole):
             low = allowed.least if allowed.least is not None else allowed.above
             high = allowed.most if allowed.most is not None else allowed.below
             if whole:
@@ -106,17 +106,17 @@ def values_of(kind: Kind) -> st.SearchStrategy[Any]:
                 )
             numbers = st.floats(low, high, allow_nan=False, allow_infinity=False)
             return numbers.filter(lambda number: number in allowed)
-        case ChoiceKind(choices):
+        case ChoiceKind(choices=choices):
             return st.sampled_from(choices)
-        case ListKind(item):
+        case ListKind(item=item):
             return st.lists(values_of(item), min_size=1, max_size=3).map(tuple)
-        case TupleKind(items):
+        case TupleKind(items=items):
             return st.tuples(*map(values_of, items))
-        case EitherKind(kinds):
+        case EitherKind(kinds=kinds):
             return st.one_of(*map(values_of, kinds))
-        case OptionalKind(inner):
+        case OptionalKind(inner=inner):
             return st.none() | values_of(inner)
-        case ParsedKind(_, inner):
+        case ParsedKind(inner=inner):
             if kind.metavar == "COLOUR":
                 return st.integers(0, 0xFFFFFF).map(lambda number: f"#{number:06x}")
             if kind.metavar == "PALETTE":

@@ -47,12 +47,12 @@ from .models.evaluation import midpoints as midpoints
 from .models.files import density_to_bytes as density_to_bytes
 from .models.files import read_density as read_density
 from .models.flow import FlowDensity as FlowDensity
+from .models.flow import UniformDensity as UniformDensity
+from .models.flow import VonMisesDensity as VonMisesDensity
 from .models.kernels import AdaptiveKernels as AdaptiveKernels
 from .models.mixture import Mixture as Mixture
 from .models.network import Factor as Factor
 from .models.network import VonMisesNetwork as VonMisesNetwork
-from .models.uniform import UniformDensity as UniformDensity
-from .models.uniform import VonMisesDensity as VonMisesDensity
 from .pictures.axes import space_title as space_title
 from .pictures.coastlines import read_coastlines as read_coastlines
 from .pictures.corner import corner_picture as corner_picture

@@ -29,10 +29,6 @@ class Budget:
     A fit that ends by its evaluations is the same on a busy machine; one that ends by time is not, so
     it has to say so: `notes`.
 
-    Args:
-        evaluations: The largest number of them.
-        seconds: The time from now. Default: no limit.
-
     >>> budget = Budget(evaluations=1)
     >>> budget.spend()
     >>> budget.is_spent
@@ -55,11 +51,6 @@ class Budget:
             elif self._is_late():
                 self._reason = "time"
         return self._reason is not None
-
-    @property
-    def is_late(self) -> bool:
-        """Whether a look at the clock has found it spent."""
-        return self._reason == "time"
 
     @property
     def seconds_left(self) -> float | None:

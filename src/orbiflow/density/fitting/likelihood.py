@@ -64,7 +64,7 @@ class Objective:
     Args:
         density: A density whose flow has Fourier or spline fields.
         points: Canonical training points (N, d).
-        weights: Weights (N,) of sum 1; default: equal.
+        weights: Weights (N,) of sum 1.
         kinetic: Weight of the flow's kinetic energy, E|V|^2 summed over segments.
         roughness: Weight of E|grad^3 V|^2 summed over segments, with lengths in wavelengths.
     """
@@ -73,16 +73,17 @@ class Objective:
         self,
         density: FlowDensity,
         points: Tensor,
-        weights: Tensor | None = None,
-        *,
+        weights: Tensor,
         kinetic: float,
         roughness: float,
     ) -> None:
-        self.density, self.points = density, points
-        self.weights = _even(points) if weights is None else weights
+        self.density, self.points, self.weights = density, points, weights
         self.parameters = [p for p in density.flow.parameters() if p.requires_grad]
         self.fields = [f for f in density.flow.segments if isinstance(f, InvariantField)]
-        self._weights = [self._penalty_weights(f, kinetic, roughness) for f in self.fields]
+        self._weights: list[Tensor] = []
+        for field in self.fields:  # of each coefficient's square, (P,)
+            magnitude = torch.as_tensor(field.basis.magnitude).to(field.parameters_)
+            self._weights.append(kinetic + roughness * magnitude ** (2 * ORDER))
         self.last = math.inf
 
     def get(self) -> Array:
@@ -105,12 +106,6 @@ class Objective:
         for field, weights in zip(self.fields, self._weights, strict=True):
             total = total + ((field.parameters_ * field.scale) ** 2 * weights).sum()
         return total * count  # a segment of duration 1 stands for a time 1 / count
-
-    @staticmethod
-    def _penalty_weights(field: InvariantField, kinetic: float, roughness: float) -> Tensor:
-        """Return the weights (P,) of each coefficient's square."""
-        magnitude = torch.as_tensor(field.basis.magnitude).to(field.parameters_)
-        return kinetic + roughness * magnitude ** (2 * ORDER)
 
     def __call__(self, values: Array) -> tuple[float, Array]:
         """Return loss and gradient, or a barrier where the density is not finite."""
@@ -145,25 +140,16 @@ def refine(
     budget: Budget | None = None,
     watch: Watch | None = None,
 ) -> Refinement:
-    """Descend on the negative log-likelihood, and leave the parameters best on `validation`.
+    """Descend on the negative log-likelihood, and leave the flow's parameters best on `validation`.
 
-    Args:
-        density: The density; the parameters of its flow are changed.
-        train: Canonical training points (N, d) in the parameters' dtype.
-        validation: Canonical validation points (M, d).
-        weights: Weights of the training points, of sum 1; default: equal.
-        held_weights: Weights of the validation points, of sum 1; default: equal.
-        iterations: Maximum number of iterations. It stops if validation has not improved for
-            `PATIENCE` of them.
-        kinetic: Weight of the kinetic energy, see `Objective`.
-        roughness: Weight of the roughness.
-        budget: The budget of evaluations and time; when it is spent, the best so far is left.
-        watch: A function called with every score.
+    Canonical points (N, d) are in the parameters' dtype; weights have the sum 1, by default equal ones.
+    It ends after `iterations`, or `PATIENCE` of them that do not improve the validation score, or when
+    the `budget` is spent. `watch` is told every score.
     """
     weights = _even(train) if weights is None else weights
     budget = Budget() if budget is None else budget
     began = time.monotonic()
-    objective = Objective(density, train, weights, kinetic=kinetic, roughness=roughness)
+    objective = Objective(density, train, weights, kinetic, roughness)
     descent = _Descent(objective, validation, held_weights, watch)
 
     def loss(values: Array) -> tuple[float, Array]:
@@ -264,14 +250,8 @@ def merged(
     within a cell, which is below 1 / (6 cells^2). Where the density is sharp, points crowd: cells of
     more than `crowd` points are quartered, again and again.
 
-    Args:
-        points: (N, d) in [0, 1]^d.
-        cells: along a side, of the coarsest grid.
-        row_weights: of the points (N,); default equal.
-        crowd: points in a cell, at most; more only where cells have been halved `LEVELS` times.
-
-    Returns:
-        Points (M, d) and weights (M,) of sum 1, M <= N, in the points' dtype.
+    Points (N, d) in [0, 1]^d, with `row_weights` (N,) or equal ones, and so many `cells` along a side
+    of the coarsest grid, become points (M, d) and weights (M,) of sum 1, M <= N, in the points' dtype.
 
     >>> merged(torch.tensor([[0.1], [0.2], [0.9]]), 2, crowd=2)[1]
     tensor([0.6667, 0.3333])
@@ -280,9 +260,12 @@ def merged(
     left = torch.arange(len(points), device=points.device)
     groups = 0
     for level in range(LEVELS + 1):
-        _, where, counts = unique(
-            _labels(points[left], cells << level), return_inverse=True, return_counts=True
+        side = cells << level
+        cell = (points[left] * side).floor().clamp(0, side - 1).long()
+        label = (cell * side ** torch.arange(points.shape[1], device=left.device).flip(0)).sum(
+            dim=1
         )
+        _, where, counts = unique(label, return_inverse=True, return_counts=True)
         settled = (counts[where] <= crowd) | (level == LEVELS)
         group[left[settled]] = groups + where[settled]
         left, groups = left[~settled], groups + len(counts)
@@ -296,12 +279,3 @@ def merged(
         return sums / counts[:, None], (counts / counts.sum()).to(points)
     sums = points.new_zeros(len(counts), points.shape[1]).index_add_(0, where, points)
     return sums / counts[:, None], counts.to(points) / len(points)
-
-
-def _labels(points: Tensor, cells: int) -> Tensor:
-    """Return the number (N,) of each point's cell."""
-    cell = (points * cells).floor().clamp(0, cells - 1).long()
-    label = cell[:, 0]
-    for axis in range(1, points.shape[1]):
-        label = label * cells + cell[:, axis]
-    return label

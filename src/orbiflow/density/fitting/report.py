@@ -11,13 +11,12 @@ import torch
 from torch import Tensor
 
 from orbiflow.density.arguments import check_kind, points_tensor
-from orbiflow.density.fitting.folds import Repeats
+from orbiflow.density.fitting.folds import LEAST_PLACES, Repeats, places
 from orbiflow.density.fitting.likelihood import Refinement
-from orbiflow.density.fitting.rows import mean_of
+from orbiflow.density.fitting.rows import log_prob_of_rows, mean_of
 from orbiflow.density.models import Density, FlowDensity
 from orbiflow.density.spaces import Space
 from orbiflow.errors import OrbiflowError
-from orbiflow.typed_torch import unique
 
 MASS_TOLERANCE = 1e-3
 """Of the integral over the square, and of the log-likelihood at doubled steps."""
@@ -150,24 +149,23 @@ def own_points(space: Space, points: Any) -> Tensor:
 
 def sides(points: Tensor, share: float, generator: torch.Generator) -> tuple[Tensor, Tensor, int]:
     """An order of points (N, d), which of them (N,) are held out in it, how many repeat another."""
-    # rounding keeps together what differs by the projection's last digit
-    places, where = unique((points * 1e9).round(), dim=0, return_inverse=True)
-    if len(places) < 10:
+    counts, where = places(points)
+    if len(counts) < LEAST_PLACES:
         raise OrbiflowError(
-            f"a density needs at least 10 different points, got {len(places)} among {len(points)}"
+            f"a density needs at least {LEAST_PLACES} different points, got {len(counts)} among "
+            f"{len(points)}"
         )
-    held = torch.zeros(len(places), dtype=torch.bool)
-    held[torch.randperm(len(places), generator=generator)[: max(1, round(share * len(places)))]] = (
-        True
-    )
+    chosen = torch.randperm(len(counts), generator=generator)
+    held = torch.zeros(len(counts), dtype=torch.bool)
+    held[chosen[: max(1, round(share * len(counts)))]] = True
     order = torch.randperm(len(points), generator=generator)
-    return order, held[where][order], len(points) - len(places)
+    return order, held[where][order], len(points) - len(counts)
 
 
 @torch.no_grad()
 def mean_nll(density: Density, points: Tensor, weights: Tensor | None = None) -> float:
     """Mean negative log density at `points` (N, d), weighted, per area of the square."""
-    return -mean_of(density.log_prob(points), weights)
+    return -mean_of(log_prob_of_rows(density, points), weights)
 
 
 def nll_at(
@@ -185,13 +183,8 @@ def step_error(density: FlowDensity, points: Tensor) -> float:
 def settle(density: FlowDensity, points: Tensor, most: int) -> tuple[float, float | None]:
     """Double the steps until the mean log density has settled and, in two dimensions, the mass is 1.
 
-    Args:
-        density: its flow's steps are changed, up to `most`.
-        points: (N, d), at which it is looked at.
-        most: steps a segment.
-
-    Returns:
-        By how much the mean log density still changes, and the mass (None in other dimensions).
+    Return by how much the mean at `points` (N, d) still changes, and the mass, None in other
+    dimensions. The density's flow is given up to `most` steps a segment.
     """
     now = mean_nll(density, points)
     while True:

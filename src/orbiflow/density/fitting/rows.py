@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -201,35 +200,22 @@ def with_incomplete(kernels: AdaptiveKernels, rows: Rows, total: float) -> Adapt
     """Return kernels about whole rows whose weights follow the rows that lack angles, too.
 
     Each such row shares its weight out among the kernels as they explain the angles that it has: one
-    step of EM, from kernels of the whole rows' weights.
-
-    Args:
-        kernels: Kernels about whole rows.
-        rows: The rows that lack angles.
-        total: The weight of the whole rows.
+    step of EM, from kernels of the whole rows' weights, of which there are `total`.
     """
     some = rows[:MOST_SPREAD]
     lacking = float(len(rows)) if rows.weights is None else float(rows.weights.sum())
     gained = torch.zeros_like(kernels.weights)
     logs = kernels.weights.log()
-    for observed, part in _patterns(some):
-        for block in _blocks(part, len(logs)):
+    size = max(1, BLOCK_ENTRIES // len(logs))
+    # one pattern of angles that are there after the other
+    kinds, number = unique(~some.points.isnan(), dim=0, return_inverse=True)
+    for k, kind in enumerate(kinds):
+        observed, part = listed(torch.nonzero(kind)[:, 0]), some[number == k]
+        for start in range(0, len(part), size):
+            block = part[start : start + size]
             share = torch.softmax(kernels.log_each(block.points[:, observed], observed) + logs, 1)
             gained += share.sum(dim=0) if block.weights is None else block.weights @ share
     weights = total * kernels.weights + lacking * gained / gained.sum()
     return AdaptiveKernels(
         kernels.space, kernels.centers, kernels.concentrations, weights / weights.sum()
     )
-
-
-def _patterns(rows: Rows) -> Iterator[tuple[list[int], Rows]]:
-    """Yield the angles that rows have, and the rows that have just these."""
-    kinds, number = unique(~rows.points.isnan(), dim=0, return_inverse=True)
-    for k, kind in enumerate(kinds):
-        yield listed(torch.nonzero(kind)[:, 0]), rows[number == k]
-
-
-def _blocks(rows: Rows, kernels: int) -> Iterator[Rows]:
-    size = max(1, BLOCK_ENTRIES // kernels)
-    for start in range(0, len(rows), size):
-        yield rows[start : start + size]

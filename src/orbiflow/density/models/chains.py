@@ -238,14 +238,3 @@ def chained(order: Tensor) -> Tensor:
     place = order.argsort(dim=-1)
     before = place[..., None, :] < place[..., :, None]
     return torch.cat([torch.ones_like(before[..., :1]), before, before], dim=-1)
-
-
-def averaged(mixtures: Sequence[VonMisesChains]) -> VonMisesChains:
-    """Return the mean of several densities, again a mixture of chains."""
-    return VonMisesChains(
-        mixtures[0].space,
-        torch.cat([m.log_weights for m in mixtures]) - math.log(len(mixtures)),
-        torch.cat([m.means for m in mixtures]),
-        torch.cat([m.concentrations for m in mixtures]),
-        torch.cat([m.order for m in mixtures]),
-    )

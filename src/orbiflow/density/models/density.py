@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import copy
 import math
+import numbers
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol, Self, runtime_checkable
 
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 from torch.distributions import Distribution, constraints
 
 from orbiflow.density.arguments import check_kind, points_tensor
-from orbiflow.density.models.devices import destination, moved, shape_of, source_of
 from orbiflow.density.spaces import CHART, Space, Torus, check_measure
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import one_thread
@@ -358,3 +358,68 @@ def log_area_factor(space: Space, measure: str) -> float:
     volume = math.log(space.volume)
     natural = 0.0 if space.is_round else -volume
     return natural + (volume if measure == "uniform" else 0.0)
+
+
+@runtime_checkable
+class _Movable(Protocol):
+    def to(self, device: torch.device, /) -> Any: ...
+
+
+def destination(*wanted: Any) -> tuple[torch.device | None, torch.dtype | None]:
+    """Return a device and a dtype from what `torch.Tensor.to` takes: either, both, or a tensor.
+
+    >>> destination("cpu", torch.float32)
+    (device(type='cpu'), torch.float32)
+    """
+    device: torch.device | None = None
+    dtype: torch.dtype | None = None
+    for one in wanted:
+        if isinstance(one, torch.dtype):
+            dtype = one
+        elif isinstance(one, Tensor):
+            device, dtype = one.device, one.dtype
+        elif one is not None:
+            device = _device(one)
+    if dtype is not None and not dtype.is_floating_point:
+        raise OrbiflowError(f"a density is evaluated in floating-point numbers, not in {dtype}")
+    return device, dtype
+
+
+def moved(value: Any, device: torch.device | None, dtype: torch.dtype | None = None) -> Any:
+    """Return a copy on the device of whatever can be moved; only modules change their dtype."""
+    if isinstance(value, nn.Module):  # which would move in place
+        return copy.deepcopy(value).to(device=device, dtype=dtype)
+    return value.to(device) if device is not None and isinstance(value, _Movable) else value
+
+
+def _device(wanted: Any) -> torch.device:
+    try:
+        return torch.device(wanted)
+    except (RuntimeError, TypeError) as error:
+        raise OrbiflowError(
+            f"expected a device or a dtype, such as 'cuda' or torch.float32, got {wanted!r}"
+        ) from error
+
+
+def source_of(generator: torch.Generator | None) -> torch.Generator:
+    """Return the source of random numbers, by default torch's own."""
+    if generator is None:
+        return torch.default_generator
+    if generator.device.type != "cpu":
+        raise OrbiflowError(
+            f"samples are drawn on the CPU, the generator is on {generator.device}: give a "
+            "torch.Generator() without a device"
+        )
+    return generator
+
+
+def shape_of(sample_shape: Any) -> torch.Size:
+    """Return the shape of samples, which may be given as their number."""
+    sizes = (int(sample_shape),) if isinstance(sample_shape, numbers.Integral) else sample_shape
+    try:
+        shape = torch.Size(sizes)
+    except TypeError as error:
+        raise OrbiflowError(f"expected a number or shape of samples: {error}") from error
+    if any(size < 0 for size in shape):
+        raise OrbiflowError(f"expected a number or shape of samples, got {tuple(shape)}")
+    return shape

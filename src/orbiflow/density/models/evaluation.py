@@ -13,8 +13,7 @@ from torch import Tensor
 
 from orbiflow.arrays import Array
 from orbiflow.density.arguments import check_kind, check_range, float_tensor, points_tensor
-from orbiflow.density.models.density import Density, log_area_factor
-from orbiflow.density.models.devices import destination, moved
+from orbiflow.density.models.density import Density, destination, log_area_factor, moved
 from orbiflow.density.models.kernels import AdaptiveKernels
 from orbiflow.density.spaces import CHART, Space, rectangle
 from orbiflow.errors import OrbiflowError

@@ -13,7 +13,7 @@ from torch import Tensor
 
 from orbiflow.density.arguments import check_kind
 from orbiflow.density.models.chain_integrals import SCALES, quantiles, waves
-from orbiflow.density.models.chains import BLOCK, VonMisesChains, averaged
+from orbiflow.density.models.chains import BLOCK, VonMisesChains
 from orbiflow.density.models.density import Density, Split
 from orbiflow.density.models.headers import within
 from orbiflow.density.models.terms import log_sum_exp, shares_of
@@ -241,10 +241,14 @@ def averaged_networks(networks: Sequence[VonMisesNetwork]) -> VonMisesNetwork:
     first = networks[0]
     if len({tuple(axes for axes, _ in one.factors) for one in networks}) > 1:
         raise OrbiflowError("networks with other arrows have no common mean")
+    even = torch.ones(len(networks), dtype=torch.float64)
     columns = zip(*(one.factors for one in networks), strict=True)
     return VonMisesNetwork(
         first.space,
-        [Factor(column[0].axes, averaged([own.chains for own in column])) for column in columns],
+        [
+            Factor(column[0].axes, VonMisesChains.joined([own.chains for own in column], even))
+            for column in columns
+        ],
     )
 
 
