@@ -42,9 +42,8 @@ from typing import Any, Literal, ParamSpec, TypeVar, cast
 
 from orbiflow.arguments import as_instance, described, meant
 from orbiflow.errors import OrbiflowError, SettingError, literal
-from orbiflow.runtime.cancel import Cancel, Cancelled
-from orbiflow.runtime.events import Event, Failed, Finished, Progress, Started
-from orbiflow.settings import Field, Settings, check_names, check_rules, fields_of, make_field
+from orbiflow.runtime.events import Cancel, Cancelled, Event, Failed, Finished, Progress, Started
+from orbiflow.settings import Field, Settings, check_names, check_rules, fields_of
 
 SCHEMA_VERSION = 2
 SCHEMA = "https://json-schema.org/draft/2020-12/schema"
@@ -97,7 +96,9 @@ class Operation:
     @cached_property
     def fields(self) -> tuple[Field, ...]:
         """All parameters, settings flattened, in the order of the signature."""
-        found = [entry for part in self._parts.values() for entry in _flat(part)]
+        found: list[Field] = []
+        for part in self._parts.values():
+            found += [part] if isinstance(part, Field) else fields_of(part)
         names = [entry.name for entry in found]
         if len(set(names)) < len(names):
             raise TypeError(f"settings of {self.name} share a name: {sorted(names)}")
@@ -116,7 +117,7 @@ class Operation:
                 parts[name] = hint
                 continue
             required = parameter.default is parameter.empty
-            parts[name] = make_field(
+            parts[name] = Field(
                 name,
                 hint,
                 MISSING if required else parameter.default,
@@ -343,10 +344,6 @@ def call_from_json(document: object) -> Call:
     if not isinstance(name, str):
         raise SettingError(f"{{operation}} must be a name, got {literal(described(name))}")
     return find(name).call(given)
-
-
-def _flat(part: Field | type[Settings]) -> tuple[Field, ...]:
-    return (part,) if isinstance(part, Field) else fields_of(part)
 
 
 class _Teller:

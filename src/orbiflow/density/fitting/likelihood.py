@@ -64,7 +64,7 @@ class Objective:
     Args:
         density: A density whose flow has Fourier or spline fields.
         points: Canonical training points (N, d).
-        weights: Weights (N,) of sum 1.
+        weights: Weights (N,) of sum 1; default: equal.
         kinetic: Weight of the flow's kinetic energy, E|V|^2 summed over segments.
         roughness: Weight of E|grad^3 V|^2 summed over segments, with lengths in wavelengths.
     """
@@ -73,11 +73,13 @@ class Objective:
         self,
         density: FlowDensity,
         points: Tensor,
-        weights: Tensor,
+        weights: Tensor | None = None,
+        *,
         kinetic: float,
         roughness: float,
     ) -> None:
-        self.density, self.points, self.weights = density, points, weights
+        self.density, self.points = density, points
+        self.weights = _even(points) if weights is None else weights
         self.parameters = [p for p in density.flow.parameters() if p.requires_grad]
         self.fields = [f for f in density.flow.segments if isinstance(f, InvariantField)]
         self._weights: list[Tensor] = []
@@ -146,10 +148,9 @@ def refine(
     It ends after `iterations`, or `PATIENCE` of them that do not improve the validation score, or when
     the `budget` is spent. `watch` is told every score.
     """
-    weights = _even(train) if weights is None else weights
     budget = Budget() if budget is None else budget
     began = time.monotonic()
-    objective = Objective(density, train, weights, kinetic, roughness)
+    objective = Objective(density, train, weights, kinetic=kinetic, roughness=roughness)
     descent = _Descent(objective, validation, held_weights, watch)
 
     def loss(values: Array) -> tuple[float, Array]:

@@ -12,7 +12,7 @@ from torch import Tensor
 
 from orbiflow.arguments import described
 from orbiflow.density.arguments import check_kind, float_tensor
-from orbiflow.density.inference import at_observed, check_torus
+from orbiflow.density.inference import at_observed, check_torus, observed_rows
 from orbiflow.density.models import AdaptiveKernels, Density
 from orbiflow.density.spaces import Space, row_count
 from orbiflow.errors import OrbiflowError
@@ -156,11 +156,7 @@ def observed_points(space: Space, points: Any) -> tuple[Tensor, Tensor]:
     """Return canonical points (N, d) of a torus, and which rows have an angle at all."""
     check_kind(space, Space, "space", "see `make_space`")
     check_torus(space, "densities of rows that lack angles")
-    own = float_tensor(points, "points").detach().double().clone()
-    if own.dim() != 2 or own.shape[1] != space.dim:
-        raise OrbiflowError(f"expected points (N, {space.dim}), got {tuple(own.shape)}")
-    if bool(own.isinf().any()):
-        raise OrbiflowError("angles may be missing (NaN), but not infinite")
+    own = observed_rows(points, "points", space).detach().clone()
     known = ~own.isnan().all(dim=1)
     return space.project(own[known]), known
 

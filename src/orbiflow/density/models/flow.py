@@ -16,7 +16,6 @@ from orbiflow.density.arguments import check_kind
 from orbiflow.density.models.density import Density, Restriction, Split
 from orbiflow.density.models.evaluation import midpoints
 from orbiflow.density.models.headers import (
-    check_same_space,
     density_from,
     density_parts,
     series_from_header,
@@ -195,10 +194,9 @@ class FlowDensity(Density, kind="flow"):
         return split.dim > len(split.observed)
 
     def header(self) -> dict[str, Any]:
-        check_same_space(self, self.base, "base")
         return {
             "flow": series_parts(self.flow, self.space)[0],
-            "base": density_parts(self.base, "base")[0],
+            "base": density_parts(self.base, "base", space=self.space)[0],
         }
 
     def tensors(self) -> dict[str, Tensor]:

@@ -49,12 +49,9 @@ class AdaptiveKernels(Density, kind="kernels"):
     ) -> None:
         super().__init__(space)
         centers, concentrations, weights = (
-            float_tensor(value, name)
-            for name, value in (
-                ("centers", centers),
-                ("concentrations", concentrations),
-                ("weights", weights),
-            )
+            float_tensor(centers, "centers"),
+            float_tensor(concentrations, "concentrations"),
+            float_tensor(weights, "weights"),
         )
         width = 1 if space.is_round else space.dim
         shapes = [tuple(t.shape) for t in (centers, concentrations, weights)]
