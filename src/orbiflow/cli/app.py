@@ -68,7 +68,7 @@ def app_for(words: Sequence[str]) -> App:
         name="orbiflow",
         help=HELP,
         help_epilogue=START,
-        version=__version__,
+        version=f"orbiflow {__version__}",
         version_flags="--version",
         help_flags=["--help", "-h"],
         help_format="plaintext",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import math
 import os
@@ -177,10 +178,9 @@ def test_stopping_keeps_what_was_finished(here: Here, tmp_path: Path) -> None:
 
 
 def dying_once(
-    order: tuple[str, bytes], _tell: Callable[[Any], None], cancel: Cancel
+    mark: Path, order: tuple[str, bytes], _tell: Callable[[Any], None], cancel: Cancel
 ) -> tuple[str, dict[str, bytes]]:
     """The work of a process, which dies of the second fold once."""
-    mark = Path(os.environ["ORBIFLOW_TEST_MARK"])
     if '"fold": 2' in order[0] and not mark.exists():
         mark.touch()
         os._exit(3)
@@ -194,8 +194,7 @@ def test_processes_and_their_deaths_change_nothing(
     with monkeypatch.context() as patch:
         patch.setattr(work, "executor_for", lambda *_: Here())
         run_call(call_of(data, group="protein", out=tmp_path / "here"))
-    monkeypatch.setattr(executors, "_serve", dying_once)
-    monkeypatch.setenv("ORBIFLOW_TEST_MARK", str(tmp_path / "mark"))
+    monkeypatch.setattr(executors, "_serve", functools.partial(dying_once, tmp_path / "mark"))
     summary, _ = run_call(call_of(data, group="protein", out=tmp_path / "there", workers=2))
     assert (tmp_path / "mark").exists()
     assert (summary["done"], summary["failed"]) == (6, 0)

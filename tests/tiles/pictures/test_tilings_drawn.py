@@ -66,7 +66,7 @@ def test_a_sheet() -> None:
     pixels = np.asarray(picture.convert("RGB")).reshape(-1, 3)
     paper = (pixels == 255).all(axis=1).mean()
     assert 0.2 < paper < 0.8  # five panels of six, names, gaps
-    with pytest.raises(OrbiflowError, match="at least one prototile"):
+    with pytest.raises(OrbiflowError, match="needs at least one"):
         tilings_png({})
     with pytest.raises(OrbiflowError, match="columns"):
         tilings_png(shown, columns=0)

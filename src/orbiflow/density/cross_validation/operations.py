@@ -9,7 +9,8 @@ from typing import Annotated
 
 from orbiflow.arguments import refusal
 from orbiflow.batch import WorkSettings
-from orbiflow.density.fitting import COMPONENTS, ComponentSettings
+from orbiflow.density.fitting import COMPONENTS, ComponentSettings, DensitySettings
+from orbiflow.density.operations import check_marginalised
 from orbiflow.density.tables import RowSettings, SpaceSettings
 from orbiflow.errors import SettingError, literal
 from orbiflow.runtime import Cancel, Outcome, Sink, ignore, operation
@@ -86,6 +87,9 @@ class CrossValidation:
                 f"{{components}} and {{against}} are both {name}; compare it with others, or with "
                 "uniform"
             )
+        if self.rows.missing == "marginalise":
+            for components in self.settings.values():
+                check_marginalised(self.where, DensitySettings(components=components))
 
     @property
     def settings(self) -> dict[str, tuple[str, ...] | None]:

@@ -1,5 +1,8 @@
 """Islands and holes as small as a grid's cells, drawn with finer cells around seeds in them."""
 
+# pyright: reportUnknownMemberType=false
+# shapely's stubs leave the keyword arguments of its functions of arrays without types.
+
 from __future__ import annotations
 
 import numpy as np
@@ -9,7 +12,6 @@ from numpy.typing import NDArray
 from orbiflow.arrays import Array
 from orbiflow.density.regions.contours import filled
 from orbiflow.density.regions.grid import Function, LevelGrid, Seeds
-from orbiflow.typed_shapely import ufuncs
 
 PARTS = 12
 """Parts into which each side of a cell is cut."""
@@ -74,7 +76,8 @@ def _wrong(
 ) -> NDArray[np.int64]:
     """Return cells (C, 2) with seeds on the wrong side, those with most first."""
     shapely.prepare(shape)
-    wrong = ufuncs.intersects_xy(shape, *seeds.points.T) != (seeds.values >= level)
+    inside = np.asarray(shapely.intersects_xy(shape, *seeds.points.T), bool)
+    wrong = inside != (seeds.values >= level)
     most = np.array(grid.values.shape) - 2
     at = np.clip(np.floor((seeds.points[wrong] - grid.low) / grid.step).astype(int), 0, most)
     cells, counts = np.unique(at, axis=0, return_counts=True)

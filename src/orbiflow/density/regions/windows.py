@@ -1,5 +1,8 @@
 """Windows in which regions of a space are drawn: rectangles that hold each point once."""
 
+# pyright: reportUnknownMemberType=false
+# shapely's stubs leave the keyword arguments of its functions of arrays without types.
+
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -12,7 +15,6 @@ from torch import Tensor
 from orbiflow.arrays import Array
 from orbiflow.density.spaces import RoundSpace, Space, to_latlon, to_vectors, whole_turn
 from orbiflow.errors import OrbiflowError
-from orbiflow.typed_shapely import ufuncs
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +43,7 @@ class Window:
         On the globe it is in steradians, and sides are straight in longitude and latitude.
         """
         if not self.on_globe:
-            return float(ufuncs.area(shape))
+            return float(shapely.area(shape))
         return sum(_steradians(part) for part in shapely.get_parts(shape))
 
 

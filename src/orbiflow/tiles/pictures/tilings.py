@@ -168,7 +168,7 @@ def tilings_png(
     """
     columns = whole(columns, "columns", 1, 100)
     if not tilings:
-        raise OrbiflowError("a sheet of tilings needs one at least")
+        raise OrbiflowError("a sheet of tilings needs at least one")
     chosen = palette(palette_name)
     side = width_px / columns
     gap, name = round(_GAP * side), round(_NAME * side)

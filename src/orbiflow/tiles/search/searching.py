@@ -119,6 +119,7 @@ def fit_tile(
 
     >>> boot = Target.from_polygon([[0, 0], [3, 0], [3.4, 1.2], [2.2, 1.5], [2, 2.8], [0.8, 2.5]])
     >>> few = LikenessSearch(placements=10, held=3, finalists=1, rounds=2)
+    >>> from orbiflow.tiles import certified_tiles
     >>> best, *_ = certified_tiles(boot, fit_tile(boot, "IH4", few))
     >>> best.name, best.certificate.valid
     ('IH4', True)
