@@ -31,14 +31,8 @@ took, so that most of the time is for the work, however many results there are."
 class BatchFolder:
     """Where the results of a batch go; in a `with` block, no other batch can use it.
 
-    - `keys`: The keys of the items, in the order of the overview.
-    - `current`: The keys of those that have finished with the present settings; only these are in the
-      overview.
-
-    Args:
-        path: The folder, made if need be. An earlier batch there is resumed.
-        kind: The kind of batch.
-        overview: What shows all results.
+    The folder is made if need be, and an earlier batch there is resumed. `keys` are those of the items,
+    in the order of the overview; it has only the `current` ones, finished with the present settings.
     """
 
     def __init__(self, path: Path, kind: Kind, overview: Overview) -> None:
@@ -75,12 +69,9 @@ class BatchFolder:
             self.write_all(last=True)
 
     def keep(self, entry: Entry, files: Mapping[str, bytes], picture: str | None) -> None:
-        """Put a result where it belongs, and then add it to the journal.
+        """Put the files of a result where they belong, and then add it to the journal.
 
-        Args:
-            entry: What came of the item.
-            files: The files of the result, by path; none leaves what was there.
-            picture: The path of the one that the page shows small.
+        No files leave what was there; `picture` is the path of the one that the page shows small.
         """
         if files:
             folder = ResultFolder(self.path / entry.name, self.kind.written)

@@ -93,16 +93,10 @@ class Item:
 
 
 def listed(folder: Path, endings: Collection[str], match: str | None, out: Path) -> list[str]:
-    """Return the paths of a folder's files that can be read, relative and with slashes, in order.
+    """Return the paths of a folder's files with some `endings`, relative and with slashes, in order.
 
     Folders inside are searched as well, links to folders are not. Names that begin with a dot are left
-    out.
-
-    Args:
-        folder: The folder.
-        endings: Endings of names in small letters, such as ".svg".
-        match: A pattern that the name or the path must fit.
-        out: Where the results go.
+    out, and those that do not fit the pattern `match`. The results must go to an `out` elsewhere.
     """
     if not folder.is_dir():
         why = "it is a file" if folder.exists() else "there is no such folder"

@@ -55,11 +55,7 @@ class Entry:
 
 
 class Journal:
-    """The last entry of each item; in a `with` block more can be added.
-
-    Args:
-        path: The file, which need not exist.
-    """
+    """The last entry of each item, from a file if it exists; a `with` block can add more."""
 
     def __init__(self, path: Path) -> None:
         self.path = path

@@ -77,21 +77,10 @@ def run_files(
 ) -> Outcome:
     """Make a call for every file of a folder, and put its result into a folder as it comes.
 
-    Args:
-        source: The folder of files.
-        out: The folder of results; an earlier batch there is resumed.
-        kind: The kind of batch.
-        title: The title of the page.
-        call_of: Returns the call for a file of this name.
-        match: A pattern of names. Default: all that can be read.
-        settings: Who works.
-        tell: Is told all that a user should see.
-        cancel: Ends the batch; what has finished is kept.
-
-    Returns:
-        An outcome whose summary has `folder`, `table` and `page`; the number of `files`, and how many
-        of them are `done`, gave `nothing`, `failed` or are `left`; how many were `kept` from before;
-        and `seconds`.
+    `call_of` returns the call for a file's name; `match` is a pattern of names, None for all that can
+    be read. The outcome's summary has `folder`, `table` and `page`; the number of `files`, and how many
+    of them are `done`, gave `nothing`, `failed` or are `left`; how many were `kept` from before;
+    `seconds`.
     """
     begin = time.perf_counter()
     if match is not None and not match.strip():
@@ -127,15 +116,9 @@ def run_items(
     *,
     gone: str,
 ) -> Counts:
-    """Do what has not been done, and put it into the folder as it comes.
+    """Do what has not been done of items with different keys, and put it into the folder as it comes.
 
-    Args:
-        items: Items with different keys.
-        settings: Who works.
-        folder: The folder, entered.
-        tell: Is told all that a user should see.
-        cancel: Ends the batch; what has finished is kept.
-        gone: What earlier results are of that belong to no item, in words.
+    `gone` says in words what earlier results are of that belong to no item.
     """
     folder.keys = [item.key for item in items]
     todo = list(_todo(items, settings, folder))

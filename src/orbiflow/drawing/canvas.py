@@ -106,13 +106,8 @@ def mark_symmetry(
 ) -> None:
     """Mark all rotation centres and lines of a group in a window.
 
-    Args:
-        axes: The axes.
-        group: The group.
-        window: The window.
-        size: Radius of the signs, in the group's units.
-        halo: Colour of the thin rim that separates the marks from the picture.
-        pen: A function from widths of lines on a screen to those here, in points.
+    Signs have the radius `size` in the group's units; `halo` is the colour of a thin rim that separates
+    marks from the picture; `pen` makes widths of lines here, in points, from those on a screen.
     """
     low, high = np.array(window[:2]), np.array(window[2:])
     middle, reach = (low + high) / 2, float(np.linalg.norm(high - low)) / 2

@@ -160,15 +160,7 @@ def draw_flow(
     *,
     pen: Callable[[float], float] = float,
 ) -> None:
-    """Draw lines with heads and fading tails.
-
-    Args:
-        axes: The axes.
-        velocity: The field, as for `field_picture`.
-        group: The group whose orbits the lines start at.
-        window: The window.
-        pen: A function from widths of lines on a screen to those here, in points.
-    """
+    """Draw lines with heads and fading tails from orbits of a group, with a pen as `mark_symmetry`."""
     from matplotlib.collections import LineCollection, PolyCollection
 
     scale = np.sqrt((window[2] - window[0]) * (window[3] - window[1]))

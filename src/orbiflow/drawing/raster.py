@@ -218,12 +218,7 @@ def _draw_with_holes(band: Image.Image, shape: Filled, top: int) -> None:
 
 
 def palette_png(picture: Image.Image, colours: Sequence[str]) -> bytes:
-    """Return a picture as PNG whose palette is these colours, and steps between any two of them.
-
-    Args:
-        picture: RGB picture of these colours and their mixtures; others become the nearest.
-        colours: The colours, 1 to 256 of them, as #rrggbb.
-    """
+    """Return an RGB picture as PNG whose palette is 1 to 256 colours, and steps between any two."""
     buffer = io.BytesIO()
     limited(picture, colours).save(buffer, "PNG", compress_level=6)
     return buffer.getvalue()
@@ -276,14 +271,9 @@ MIN_WIDTH = 0.25
 
 
 def vector_picture(raster: Raster, sheet: Sheet, *, title: str, caption: str) -> Picture:
-    """Draw a raster as curves, as wide as the sheet, with lines in proportion.
+    """Draw a raster without a strip as curves, as wide as the sheet, with lines in proportion.
 
-    Args:
-        raster: A raster without a strip, whose words would be too small on a narrow sheet; the caption
-            has them.
-        sheet: The sheet.
-        title: The title of the picture.
-        caption: Its caption.
+    The words of a strip would be too small on a narrow sheet; the caption has them.
     """
     from matplotlib.collections import LineCollection, PathCollection
 
@@ -327,14 +317,7 @@ TEXT = 0.018
 
 
 def captioned(rings: Sequence[Array], width_px: int, *, y_down: bool, text: str) -> Raster:
-    """Return a raster that shows all of `rings` (N, 2) with a margin, and a text in its strip.
-
-    Args:
-        rings: Rings in the plane's units.
-        width_px: Width in pixels; the height follows.
-        y_down: Whether the y axis points down, as in images.
-        text: The text. If it is empty there is no strip.
-    """
+    """Return a raster that shows all of `rings` (N, 2) with a margin, and a text in a strip, if any."""
     strip = round(STRIP * width_px) if text else 0
     raster = Raster(window_of(rings), width_px, y_down=y_down, strip_px=strip)
     if text:

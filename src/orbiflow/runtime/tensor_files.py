@@ -47,14 +47,7 @@ def tensor_bytes(
 def read_tensors(
     path: str | Path, what: str, *, key: str = KEY, max_bytes: int = MAX_BYTES
 ) -> tuple[dict[str, Any], dict[str, Tensor]]:
-    """Return the header and the tensors of a file.
-
-    Args:
-        path: The file.
-        what: What it is to hold, such as "a flow", for messages.
-        key: The name under which the header stands.
-        max_bytes: The largest size of the file, checked before it is read.
-    """
+    """Return the header and the tensors of a file that is to hold `what`, such as "a flow"."""
     from safetensors.torch import load
 
     return _read(path, what, key, max_bytes, load)

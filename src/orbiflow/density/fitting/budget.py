@@ -80,14 +80,10 @@ class Budget:
 
 @contextlib.contextmanager
 def training() -> Generator[None]:
-    """For a block, or for a function as its decorator; the caller's settings are left alone.
+    """Train in a block, or in a function that it decorates; the caller's settings are left alone.
 
     Under `torch.no_grad()` or `torch.inference_mode()` there would be no gradients, and what is made
     in the latter could never be differentiated.
-
-    >>> with torch.no_grad(), training():
-    ...     torch.is_grad_enabled(), torch.get_num_threads()
-    (True, 1)
     """
     with one_thread(), torch.inference_mode(False), torch.enable_grad():
         yield

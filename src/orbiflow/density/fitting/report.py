@@ -31,15 +31,13 @@ Progress = Callable[[float, str], None]
 
 @dataclass(frozen=True)
 class ComponentEvidence:
-    """What a component of a density is worth.
+    """What a component of a density is worth, by `rows` that were held out.
 
-    - `name`: "flow", "kernels", "mixture", "chains" or "network".
-    - `share`: of the density.
-    - `alone`: mean log density of the part alone at held-out rows, in nats above the uniform one.
-    - `gain`, `error`: nats that the density would lose without it, and their standard error.
-    - `rows`: held-out rows by which it was judged.
-    - `others`: as `alone`, of all other parts together, at the same rows; None where these are the rows
-      of all parts. A flow is tried on fewer: compare `alone` with this.
+    - `name`: "flow", "kernels", "mixture", "chains" or "network"; `share`: Its weight in the density.
+    - `alone`: Its mean log density at held-out rows, in nats above the uniform one.
+    - `gain`, `error`: Nats that the density would lose without it, and their standard error.
+    - `others`: As `alone`, of all other components together; None where the rows are those of all. A
+      flow is tried on fewer: compare `alone` with this.
     """
 
     name: str

@@ -147,9 +147,8 @@ class _Group:
 def chains_at(chains: VonMisesChains, points: Tensor, observed: list[int], seed: int = 0) -> Tensor:
     """Return log densities (N,) of the `observed` angles alone, at points (N, len(observed)).
 
-    Angles that come before others and are not observed are integrated out at `nodes_of` them, spread
-    about their means, which makes a mixture that is normalised however many nodes there are; `seed` is
-    of those that are quasi-random.
+    Angles before others that are not observed are integrated out at `nodes_of` them, spread about their
+    means, which makes a mixture that is normalised however many nodes there are.
     """
     angle = torch.zeros(len(points), chains.order.shape[1], dtype=torch.float64)
     angle[:, observed] = 2 * math.pi * points.double()

@@ -315,13 +315,10 @@ class Density(Distribution):
 
 @dataclass(frozen=True)
 class Split:
-    """The angles of a torus in three: kept, given and integrated out.
+    """The angles of a torus, of which there are `dim`, in three: kept, given and integrated out.
 
-    Attributes:
-        dim: The number of angles of the torus.
-        kept: The numbers of the angles of the density that is asked for, in its order.
-        given: The numbers of the angles that are known.
-        values: Where these are, in turns.
+    `kept` are in the order of the density that is asked for; `values` say where those given are, in
+    turns.
     """
 
     dim: int
@@ -343,10 +340,9 @@ class Split:
 class Restriction(NamedTuple):
     """A density of some angles, given others, as far as there is a closed form.
 
-    Attributes:
-        closed: Densities of the angles kept, each with the logarithm of its weight; what is given
-            makes these weights, whose sum is the density of what is given.
-        left: Densities of all angles that have no closed form, with the logarithms of their weights.
+    - `closed`: Densities of the angles kept, each with the logarithm of its weight; what is given
+      makes these weights, whose sum is the density of what is given.
+    - `left`: Densities of all angles that have no closed form, with the logarithms of their weights.
     """
 
     closed: list[tuple[float, Density]]
