@@ -60,12 +60,7 @@ class DaskCluster(Executor):
         self._client: Client | None = None
 
     def __enter__(self) -> Self:
-        """Connect.
-
-        Raises:
-            OrbiflowError: If dask.distributed is not installed, no scheduler answers, or there is no
-                worker or one with another version of orbiflow.
-        """
+        """Connect, if there is a scheduler with workers that have the same orbiflow."""
         try:
             importlib.import_module("distributed")
         except ImportError as error:
@@ -101,25 +96,20 @@ class DaskCluster(Executor):
     def answers(
         self, parcels: Iterable[Parcel], tell: Sink, cancel: Cancel
     ) -> Generator[Answer, None, None]:
-        """Yield an answer for each parcel; see `Executor.answers`.
-
-        No more parcels are on the cluster than its workers have threads.
-        """
-        client = self._working()
-        out, crew = _Out(client), _Crew(client, self.address, tell)
+        """Yield an answer for each parcel; no more are out than the workers have threads."""
+        out = _Out(self._working(), self.address, tell)
         waiting, suspects = iter(parcels), list[Parcel]()
         alone = False
         try:
             while not cancel.cancelled:
-                room = crew.room()
+                room = out.room()
                 out.fill(waiting, room)
-                if not len(out) and room:
+                if not out.sent and room:
                     if not suspects:
                         return
                     alone = True
                     out.send(suspects.pop())
-                came = out.came()
-                for one in came:
+                for one in out.came():
                     out.fill(waiting, room)  # now: what comes next takes the caller its time
                     answer = self._answer(one, alone)
                     if answer is not None:
@@ -128,8 +118,6 @@ class DaskCluster(Executor):
                     key = one.parcel.key
                     tell(Note(f"workers died while they were at {key}; it is tried again alone"))
                     suspects.append(one.parcel)
-                if not came:
-                    time.sleep(POLL)
         finally:
             out.recall()
 
@@ -156,7 +144,6 @@ class DaskCluster(Executor):
         return Answer.from_worker(one.parcel.key, *result)
 
     def _check_workers(self, client: Client) -> None:
-        """Raise an `OrbiflowError` if there is no worker, or one with another orbiflow."""
         try:
             client.wait_for_workers(1, timeout=self.timeout)
         except TimeoutError as error:
@@ -198,17 +185,32 @@ class _Sent:
 
 
 class _Out:
-    """The parcels that are on the cluster."""
+    """The parcels that are on the cluster, and the number of threads that work there."""
 
-    def __init__(self, client: Client) -> None:
-        self.client = client
+    def __init__(self, client: Client, address: str, tell: Sink) -> None:
+        self.client, self.address, self.tell = client, address, tell
         self.sent: list[_Sent] = []
+        self.threads = _threads(client)
+        self.looked = self.seen = time.monotonic()
 
-    def __len__(self) -> int:
-        return len(self.sent)
+    def room(self) -> int:
+        """Return how many parcels may be here at a time; raise an error if it was none for long."""
+        now = time.monotonic()
+        if now - self.looked >= LOOK:
+            before, self.threads, self.looked = self.threads, _threads(self.client), now
+            if before and not self.threads:
+                self.tell(Note(f"no worker is left at {self.address}; waiting for one"))
+        if self.threads:
+            self.seen = now
+        elif now - self.seen > PATIENCE:
+            raise OrbiflowError(
+                f"no worker has been at {self.address} for {PATIENCE:.0f} s; the same command goes on "
+                "from here once there is one"
+            )
+        return self.threads
 
     def fill(self, waiting: Iterator[Parcel], room: int) -> None:
-        while len(self) < room and (parcel := next(waiting, None)) is not None:
+        while len(self.sent) < room and (parcel := next(waiting, None)) is not None:
             self.send(parcel)
 
     def send(self, parcel: Parcel) -> None:
@@ -220,9 +222,11 @@ class _Out:
         self.sent.append(_Sent(parcel, future, fetched))
 
     def came(self) -> list[_Sent]:
-        """Those that have come back."""
+        """Return those that have come back; if there are none, after a while."""
         came = [one for one in self.sent if one.result.done()]
         self.sent = [one for one in self.sent if one not in came]
+        if not came:
+            time.sleep(POLL)
         return came
 
     def recall(self) -> None:
@@ -242,31 +246,6 @@ async def _fetched(client: Client, future: Future) -> Any:
     then fails, and `Client.get_executor` takes the status "lost" of a result for its failure.
     """
     return await client.gather(future, asynchronous=True)
-
-
-class _Crew:
-    """The number of threads that work, looked at now and then."""
-
-    def __init__(self, client: Client, address: str, tell: Sink) -> None:
-        self.client, self.address, self.tell = client, address, tell
-        self.threads = _threads(client)
-        self.looked = self.seen = time.monotonic()
-
-    def room(self) -> int:
-        """Return how many parcels may be on the cluster at a time."""
-        now = time.monotonic()
-        if now - self.looked >= LOOK:
-            before, self.threads, self.looked = self.threads, _threads(self.client), now
-            if before and not self.threads:
-                self.tell(Note(f"no worker is left at {self.address}; waiting for one"))
-        if self.threads:
-            self.seen = now
-        elif now - self.seen > PATIENCE:
-            raise OrbiflowError(
-                f"no worker has been at {self.address} for {PATIENCE:.0f} s; the same command goes on "
-                "from here once there is one"
-            )
-        return self.threads
 
 
 def _connected(address: str, timeout: float) -> Client:

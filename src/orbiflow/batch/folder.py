@@ -106,7 +106,8 @@ class BatchFolder:
         try:
             if not self.path.exists() or (self.path / self.overview.journal).exists():
                 return
-            found = next((p for p in sorted(self.path.iterdir()) if not _is_litter(p)), None)
+            known = (*LITTER, LOCK)
+            found = next((p for p in sorted(self.path.iterdir()) if p.name not in known), None)
         except OSError as error:
             raise OutputError(
                 f"cannot write into {self.path}: {error.strerror or error}; choose another --out"
@@ -116,10 +117,6 @@ class BatchFolder:
                 f"{self.path} holds {found.name}, which is of no earlier {self.overview.what}: "
                 "choose another --out or move it"
             )
-
-
-def _is_litter(path: Path) -> bool:
-    return path.name in LITTER or path.name == LOCK
 
 
 def _write(folder: Path, files: Mapping[str, bytes]) -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Literal, Self, cast, get_args
@@ -93,24 +93,17 @@ class Journal:
             lines = self.path.read_bytes().splitlines()
         except OSError as error:
             raise _cannot(self.path, error) from error
-        read = list(_entries(lines))
-        if lines and not read and len(lines) > 1:
+        for line in lines:
+            with suppress(ValueError, TypeError, RecursionError):  # cut short: to be done again
+                document = json.loads(line)
+                if is_object(document) and document.pop("kind", None) == "entry":
+                    entry = Entry(**document)
+                    if _is_sound(entry):
+                        self.entries[entry.file] = entry
+        if len(lines) > 1 and not self.entries:
             raise OutputError(
                 f"{self.path} is no journal of a batch; move it or choose another --out"
             )
-        self.entries = {entry.file: entry for entry in read}
-
-
-def _entries(lines: Iterable[bytes]) -> Iterator[Entry]:
-    for line in lines:
-        try:
-            document = json.loads(line)
-            if is_object(document) and document.pop("kind", None) == "entry":
-                entry = Entry(**document)
-                if _is_sound(entry):
-                    yield entry
-        except (ValueError, TypeError, RecursionError):
-            continue  # cut short: to be done again
 
 
 def _is_sound(entry: Entry) -> bool:

@@ -97,13 +97,8 @@ def run_files(
         gone = f"of files that are not in {source}{left_out}"
         counts = run_items(items, settings, folder, tell, cancel, gone=gone)
     table, page = out / TABLE, out / PAGE
-    summary = {
-        "folder": str(out),
-        "table": str(table),
-        "page": str(page),
-        "files": len(files),
-        "seconds": time.perf_counter() - begin,
-    }
+    summary: dict[str, Any] = {"folder": str(out), "table": str(table), "page": str(page)}
+    summary |= {"files": len(files), "seconds": time.perf_counter() - begin}
     return counts.outcome(len(files), table, page, summary, tell)
 
 

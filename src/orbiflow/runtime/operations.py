@@ -150,30 +150,10 @@ class Operation:
             else:
                 own = {entry.name for entry in fields_of(part)}
                 arguments[name] = part(**{key: given[key] for key in given if key in own})
-        call = Call(self, arguments, frozenset(given))
-        self._check_rules(call)
-        return call
+        return self._ruled(Call(self, arguments, frozenset(given)))
 
-    def run(self, arguments: Mapping[str, Any], on_event: Sink, cancel: Cancel) -> Outcome:
-        """Check the function's arguments, run it and tell the events."""
-        checked = self._checked(arguments)
-        tell = _Teller(on_event)
-        tell(Started(self.name))
-        try:
-            outcome = self.function(**checked, on_event=tell, cancel=cancel)
-        except Cancelled:
-            tell(Finished("cancelled", {}))
-            raise
-        except OrbiflowError as error:
-            tell.failed(Failed(str(error), "mistake"))
-            raise
-        except Exception as error:
-            tell.failed(Failed(f"{type(error).__name__}: {error}", "error"))
-            raise
-        tell(Finished(outcome.state, outcome.summary))
-        return outcome
-
-    def _checked(self, arguments: Mapping[str, Any]) -> dict[str, Any]:
+    def bound(self, arguments: Mapping[str, Any]) -> Call:
+        """Return a call with these arguments of the function, checked."""
         checked = dict(arguments)
         given: set[str] = set()
         for name, part in self._parts.items():
@@ -184,13 +164,13 @@ class Operation:
                 given.add(name)
             else:
                 given |= as_instance(arguments[name], part, name).fields_given
-        self._check_rules(Call(self, checked, frozenset(given)))
-        return checked
+        return self._ruled(Call(self, checked, frozenset(given)))
 
-    def _check_rules(self, call: Call) -> None:
+    def _ruled(self, call: Call) -> Call:
         simple = [part for part in self._parts.values() if isinstance(part, Field)]
         defaults = {entry.name: entry.default for entry in simple}
         check_rules(simple, {**defaults, **call.flat}, call.given)
+        return call
 
     @property
     def schema(self) -> dict[str, Any]:
@@ -227,8 +207,24 @@ class Call:
     given: frozenset[str]
 
     def run(self, on_event: Sink = ignore, cancel: Cancel | None = None) -> Outcome:
-        """Run the operation."""
-        return self.operation.run(self.arguments, on_event, cancel or Cancel())
+        """Run the operation and tell its events."""
+        tell = _Teller(on_event)
+        tell(Started(self.operation.name))
+        try:
+            outcome = self.operation.function(
+                **self.arguments, on_event=tell, cancel=cancel or Cancel()
+            )
+        except Cancelled:
+            tell(Finished("cancelled", {}))
+            raise
+        except OrbiflowError as error:
+            tell.failed(Failed(str(error), "mistake"))
+            raise
+        except Exception as error:
+            tell.failed(Failed(f"{type(error).__name__}: {error}", "error"))
+            raise
+        tell(Finished(outcome.state, outcome.summary))
+        return outcome
 
     @property
     def flat(self) -> dict[str, Any]:
@@ -278,7 +274,7 @@ def operation(
             arguments = dict(signature.bind(*args, **kwargs).arguments)
             on_event: Any = arguments.pop("on_event", ignore)
             cancel: Any = arguments.pop("cancel", None)
-            return cast(R, made.run(arguments, on_event, cancel or Cancel()))
+            return cast(R, made.bound(arguments).run(on_event, cancel))
 
         checked.__dict__["operation"] = made
         return checked

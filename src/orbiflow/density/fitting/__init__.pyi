@@ -1,5 +1,4 @@
 from .automatic import fit_automatic as fit_automatic
-from .evidence import flow_settings as flow_settings
 from .flow import fit_density as fit_density
 from .folds import LEAST_PLACES as LEAST_PLACES
 from .folds import lightest_folds as lightest_folds

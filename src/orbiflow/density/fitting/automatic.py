@@ -145,9 +145,16 @@ def fit_automatic(
     beside = 1 - tried.share
     others = [replace(one, share=one.share * beside) for one in judged(candidates, weights)]
     parts = (*tried.evidence, *others)
-    return density, _report(
-        density, folds, candidates, weights, tried, parts, found, settings, budget, notes
+    report = _report(density, folds, candidates, weights, tried, parts, found)
+    after = (
+        *weights_note(folds.rows),
+        *report.notes,
+        *_untried_note(space, folds, settings),
+        *found.notes(settings.repeats),
+        *budget.notes(),
+        *steps_note(report.steps, report.integration_error),
     )
+    return density, replace(report, notes=(*notes, *after))
 
 
 def _rows(
@@ -247,15 +254,12 @@ def _report(
     tried: TriedFlow,
     parts: tuple[ComponentEvidence, ...],
     found: Repeats,
-    settings: DensitySettings,
-    budget: Budget,
-    notes: list[str],
 ) -> FitReport:
+    """Return what was done, with notes on how it was chosen."""
     own_weights = candidates.row_weights
     held = mean_of(stacked(candidates.table, weights), own_weights)
     held += sum(part.gain for part in parts if part.name == "flow")
     flow = tried.report if tried.share else None
-    error = flow.integration_error if flow else 0.0
     total = candidates.table.shape[1]
     uniform = mean_of(candidates.table[-1], own_weights)
     shares = "of a tenth each"
@@ -282,18 +286,10 @@ def _report(
         stages=flow.stages if flow else (),
         steps=flow.steps if flow else 1,
         mass=mass,
-        integration_error=error,
+        integration_error=flow.integration_error if flow else 0.0,
         weights=density.weight_of_kind,
         components=parts,
         repeats=found,
         effective=None if folds.rows.weights is None else effective_rows(folds.rows.weights),
-        notes=(
-            *notes,
-            *weights_note(folds.rows),
-            *chosen,
-            *_untried_note(density.space, folds, settings),
-            *found.notes(settings.repeats),
-            *budget.notes(),
-            *steps_note(flow.steps if flow else 1, error),
-        ),
+        notes=tuple(chosen),
     )

@@ -3,7 +3,6 @@ from .chain_integrals import waves as waves
 from .chains import VonMisesChains as VonMisesChains
 from .chains import chained as chained
 from .density import Density as Density
-from .density import Restriction as Restriction
 from .density import Split as Split
 from .evaluation import CHECKED as CHECKED
 from .evaluation import TabulatedDensity as TabulatedDensity
@@ -25,7 +24,6 @@ from .network import Factor as Factor
 from .network import VonMisesNetwork as VonMisesNetwork
 from .network import averaged_networks as averaged_networks
 from .network import log_conditional as log_conditional
-from .network import log_of_parents as log_of_parents
 from .terms import FAINT as FAINT
 from .terms import log_sum_exp as log_sum_exp
 from .terms import shares_of as shares_of
