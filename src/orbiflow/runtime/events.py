@@ -14,12 +14,11 @@ from __future__ import annotations
 import dataclasses
 import json
 import typing
-from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any, ClassVar, Literal, Self
+from typing import Any, ClassVar, Literal
 
 from orbiflow.arguments import described
 from orbiflow.errors import SettingError, literal
@@ -39,13 +38,6 @@ class Event:
             for name, value in vars(self).items()
         }
         return {"kind": self.KIND, **values}
-
-    @classmethod
-    def from_fields(cls, document: Mapping[str, Any]) -> Self:
-        """Return an event of this class with the fields of a JSON object."""
-        fields = _fields(cls)
-        check_names(document, fields.values(), cls.KIND)
-        return cls(**{name: _read(fields[name], value) for name, value in document.items()})
 
 
 @dataclass(frozen=True)
@@ -218,7 +210,10 @@ def event_from_json(document: object) -> Event:
         raise SettingError(
             f"unknown kind of event {literal(described(kind))}; there are {', '.join(EVENTS)}"
         )
-    return EVENTS[kind].from_fields({k: v for k, v in document.items() if k != "kind"})
+    given = {name: value for name, value in document.items() if name != "kind"}
+    fields = _fields(EVENTS[kind])
+    check_names(given, fields.values(), kind)
+    return EVENTS[kind](**{name: _read(fields[name], value) for name, value in given.items()})
 
 
 @cache

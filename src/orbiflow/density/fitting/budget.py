@@ -48,7 +48,8 @@ class Budget:
         if self._reason is None:
             if self.used >= self.evaluations:
                 self._reason = "evaluations"
-            elif self._is_late():
+            # no limit needs no clock
+            elif self.seconds < math.inf and clock() - self._began >= self.seconds:
                 self._reason = "time"
         return self._reason is not None
 
@@ -72,10 +73,6 @@ class Budget:
         if self._reason == "evaluations":
             return [f"stopped by the budget of {self.evaluations:g} evaluations"]
         return []
-
-    def _is_late(self) -> bool:
-        # no limit needs no clock
-        return self.seconds < math.inf and clock() - self._began >= self.seconds
 
 
 @contextlib.contextmanager

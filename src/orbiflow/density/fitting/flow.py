@@ -80,6 +80,7 @@ def refine_in_stages(
     # never merged: means of cells would call overfitting to means of cells good
     held = validation[:MOST_HELD]
     held = Rows(held.points.to(dtype), held.weights)
+    shares = None if held.weights is None else (held.weights / held.weights.sum()).to(dtype)
     count = len(settings.roughness)
     while len(stages) < count and not budget.is_spent:
         number = len(stages)
@@ -94,15 +95,17 @@ def refine_in_stages(
             points,
             held.points,
             weights=weights,
-            held_weights=_shares(held),
+            held_weights=shares,
             iterations=settings.iterations,
             kinetic=settings.kinetic,
             roughness=settings.roughness[number],
             budget=budget,
             watch=watch,
         )
-        if _exploits(density, held, stage):
-            _restore(density, before)
+        if stage.best and _exploits(density, held, stage):
+            with torch.no_grad():
+                for parameter, value in zip(density.flow.parameters(), before, strict=True):
+                    parameter.copy_(value)
             if density.flow.steps >= MOST_TRAINING_STEPS:
                 break
             density.flow = density.flow.with_steps(2 * density.flow.steps)
@@ -117,21 +120,8 @@ def refine_in_stages(
 
 
 def _exploits(density: FlowDensity, held: Rows, stage: Refinement) -> bool:
-    if stage.best == 0:
-        return False
     honest = nll_at(density, held.points, 4 * density.flow.steps, held.weights)
     return not honest <= stage.validation[0] + MASS_TOLERANCE
-
-
-def _shares(rows: Rows) -> Tensor | None:
-    """Weights of sum 1, in the points' dtype."""
-    return None if rows.weights is None else (rows.weights / rows.weights.sum()).to(rows.points)
-
-
-@torch.no_grad()
-def _restore(density: FlowDensity, values: list[Tensor]) -> None:
-    for parameter, value in zip(density.flow.parameters(), values, strict=True):
-        parameter.copy_(value)
 
 
 MOST_STEPS = 256

@@ -96,7 +96,10 @@ class VonMisesChains(Density, kind="chains"):
         residual = self.residuals(points)
         kappa = self.concentrations.to(points)
         fit = torch.einsum("nkd,kd->nk", residual.cos() - 1, kappa)
-        return fit[:, None] / fit.new_tensor(SCALES)[:, None] + self._constant().to(points)
+        # log weights less log normalising constants, per unit of the cube: (L, K)
+        scaled = self.concentrations / self.concentrations.new_tensor(SCALES)[:, None, None]
+        constant = self.log_weights.mT - special.i0e(scaled).log().sum(dim=-1)
+        return fit[:, None] / fit.new_tensor(SCALES)[:, None] + constant.to(points)
 
     def residuals(self, points: Tensor) -> Tensor:
         """Return angles less their regressions, in radians (N, K, d), for points (N, d)."""
@@ -208,11 +211,6 @@ class VonMisesChains(Density, kind="chains"):
             raise OrbiflowError(f"scales {header.get('scales')!r}, expected {list(SCALES)}")
         # a component of no weight has the logarithm -inf
         return cls(space, *checked_tensors(tensors, _shapes(count, d), least=-math.inf))
-
-    def _constant(self) -> Tensor:
-        """Return log weights less log normalising constants, per unit of the cube: (L, K)."""
-        kappa = self.concentrations / self.concentrations.new_tensor(SCALES)[:, None, None]
-        return self.log_weights.mT - special.i0e(kappa).log().sum(dim=-1)
 
 
 def _shapes(count: int, d: int) -> dict[str, tuple[int, ...]]:
