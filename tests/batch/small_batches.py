@@ -40,10 +40,12 @@ def boot_parcels(count: int) -> list[Parcel]:
 class Here(Executor):
     """An executor without processes; remembers the keys of what it has done."""
 
-    place = "this process"
-
     def __init__(self) -> None:
         self.done: list[str] = []
+
+    @property
+    def place(self) -> str:
+        return "this process"
 
     def answers(
         self,

@@ -30,13 +30,13 @@ def check_size(width_px: int, height_px: int) -> None:
         )
 
 
-def blank_figure(width_px: int, height_px: int, paper: str = "#ffffff") -> Figure:
+def blank_figure(width_px: int, height_px: int) -> Figure:
     """Return an empty figure of this size in pixels."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     check_size(width_px, height_px)
-    figure = Figure(figsize=(width_px / DPI, height_px / DPI), dpi=DPI, facecolor=paper)
+    figure = Figure(figsize=(width_px / DPI, height_px / DPI), dpi=DPI, facecolor="#ffffff")
     FigureCanvasAgg(figure)
     return figure
 
@@ -130,12 +130,11 @@ def outline_cell(
     group: CrystallographicGroup,
     middle: Array,
     *,
-    colour: str = "#111111",
     pen: Callable[[float], float] = float,
 ) -> None:
     """Outline the lattice cell `cell_ring(group, middle)`, with a pen as in `mark_symmetry`."""
     ring = cell_ring(group, middle)
-    for ink, width, alpha in (("#ffffff", 3.2, 0.7), (colour, 1.7, 1.0)):
+    for ink, width, alpha in (("#ffffff", 3.2, 0.7), ("#111111", 1.7, 1.0)):
         axes.plot(
             *ring.T, color=ink, linewidth=pen(width), alpha=alpha, solid_joinstyle="miter", zorder=5
         )

@@ -35,6 +35,9 @@ MIN_DIFFERENCE = 16
 SHARP_TURN = 0.3
 """Turn in radians beyond which a line's joint is rounded: flatter ones show no notch."""
 
+INK = "#1a1a1a"
+"""Colour of texts."""
+
 
 class Filled(NamedTuple):
     """A polygon in pixels, in the colour with this number."""
@@ -59,7 +62,6 @@ class Words(NamedTuple):
     text: str
     size: float
     anchor: str
-    colour: str
 
 
 class Raster:
@@ -135,19 +137,10 @@ class Raster:
         """Fill a polygon (N, 2) in pixels of the picture."""
         self.shapes.append(Filled(np.asarray(ring, float), (), self._number(colour)))
 
-    def text(
-        self,
-        x: float,
-        y: float,
-        text: str,
-        size: float,
-        *,
-        anchor: str = "lm",
-        colour: str = "#1a1a1a",
-    ) -> None:
+    def text(self, x: float, y: float, text: str, size: float, *, anchor: str = "lm") -> None:
         """Write text at a place in pixels, `size` pixels high, with Pillow's `anchor`."""
-        self._number(colour)
-        self.texts.append(Words((x, y), text, size, anchor, colour))
+        self._number(INK)
+        self.texts.append(Words((x, y), text, size, anchor))
 
     def image(self) -> Image.Image:
         """Return the picture in RGB."""
@@ -156,8 +149,8 @@ class Raster:
         for top in range(0, self.height, rows):
             picture.paste(self._band(top, min(rows, self.height - top)), (0, top))
         pen = ImageDraw.Draw(picture)
-        for place, text, size, anchor, colour in self.texts:
-            pen.text(place, text, fill=colour, font=font(size), anchor=anchor)
+        for place, text, size, anchor in self.texts:
+            pen.text(place, text, fill=INK, font=font(size), anchor=anchor)
         return picture
 
     def png(self) -> bytes:

@@ -44,13 +44,11 @@ def tensor_bytes(
     return data
 
 
-def read_tensors(
-    path: str | Path, what: str, *, key: str = KEY, max_bytes: int = MAX_BYTES
-) -> tuple[dict[str, Any], dict[str, Tensor]]:
+def read_tensors(path: str | Path, what: str) -> tuple[dict[str, Any], dict[str, Tensor]]:
     """Return the header and the tensors of a file that is to hold `what`, such as "a flow"."""
     from safetensors.torch import load
 
-    return _read(path, what, key, max_bytes, load)
+    return _read(path, what, KEY, MAX_BYTES, load)
 
 
 def read_arrays(

@@ -63,6 +63,13 @@ class Candidates:
         """Return a mask (P,) of the floor and the candidates of these families."""
         return torch.tensor([family in (FLOOR, *families) for family in self.families])
 
+    def mixed(self, chosen: Tensor) -> Tensor:
+        """Return the best weights (P,) of those of a mask (P,)."""
+        weights = torch.zeros(len(self.table), dtype=self.table.dtype)
+        table, floor = self.table[chosen], self.floor[chosen]
+        weights[chosen] = sparse_weights(table, floor, self.row_weights)
+        return weights
+
 
 def candidates_of(
     space: Space, families: list[Family[Any]], folds: Folds, say: Progress, budget: Budget
@@ -133,10 +140,7 @@ def without_idle(candidates: Candidates, weights: Tensor) -> Tensor:
         rest = torch.tensor([family != worst for family in candidates.families]) & (
             (weights > 0) | candidates.floor
         )
-        weights = torch.zeros_like(weights)
-        weights[rest] = sparse_weights(
-            candidates.table[rest], candidates.floor[rest], candidates.row_weights
-        )
+        weights = candidates.mixed(rest)
 
 
 def judged(candidates: Candidates, weights: Tensor) -> list[ComponentEvidence]:
@@ -147,13 +151,11 @@ def judged(candidates: Candidates, weights: Tensor) -> list[ComponentEvidence]:
     names = [name for name in dict.fromkeys(candidates.families) if name != FLOOR]
     for name in names:
         own = candidates.of(name)
-        alone = stacked(table[own], sparse_weights(table[own], candidates.floor[own], own_weights))
+        alone = stacked(table, candidates.mixed(own))
         share = float(weights[own & ~candidates.floor].sum())
         gain = Gain(0.0, 0.0)
         if share:
-            rest = ~own | candidates.floor
-            others = sparse_weights(table[rest], candidates.floor[rest], own_weights)
-            without = stacked(table[rest], others)
+            without = stacked(table, candidates.mixed(~own | candidates.floor))
             gain = gain_of(whole, without, own_weights)
         above = mean_of(alone - uniform, own_weights)
         found.append(ComponentEvidence(name, share, above, gain.nats, gain.error, table.shape[1]))

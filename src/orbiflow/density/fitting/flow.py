@@ -22,7 +22,6 @@ from orbiflow.density.fitting.report import (
     Progress,
     mass_with,
     mean_nll,
-    nll_at,
     own_points,
     repeats_note,
     settle,
@@ -120,7 +119,8 @@ def refine_in_stages(
 
 
 def _exploits(density: FlowDensity, held: Rows, stage: Refinement) -> bool:
-    honest = nll_at(density, held.points, 4 * density.flow.steps, held.weights)
+    finer = density.with_steps(4 * density.flow.steps)
+    honest = mean_nll(finer, held.points, held.weights)
     return not honest <= stage.validation[0] + MASS_TOLERANCE
 
 
@@ -270,6 +270,9 @@ def _mass_note(space: Space, mass: float | None) -> list[str]:
 ORDER = 3
 """Of the derivatives that the ridge holds small: the displacements are smooth, their noise is not."""
 
+REPEATS = 2
+"""Times at each geodesic and segment."""
+
 GROUP = 400
 """Points matched optimally at a time: the cost of an assignment grows with the cube."""
 
@@ -299,25 +302,24 @@ def match_flow(
     start: Tensor,
     move: Tensor,
     *,
-    repeats: int = 2,
     ridge: float = 1e-3,
     iterations: int = 15,
     generator: torch.Generator | None = None,
 ) -> None:
     """Set the parameters of `fields`, the equal segments of a flow, by ridge regression.
 
-    Segment k of K regresses the displacements at points on the geodesics at times in
-    [k / K, (k + 1) / K] (Lipman et al., Flow Matching for Generative Modeling, 2023). A segment of
-    duration 1 carries what takes time 1 / K, hence the factor. `repeats` are times at each geodesic and
-    segment, `ridge` is the weight of E|V|^2 + E|grad^3 V|^2, lengths in wavelengths, beside the data's
-    1, `iterations` those of conjugate gradients at most.
+    Segment k of K regresses the displacements at points on the geodesics at times in [k / K, (k + 1) /
+    K] (Lipman et al., Flow Matching for Generative Modeling, 2023). A segment of duration 1 carries
+    what takes time 1 / K, hence the factor. At each geodesic and segment there are `REPEATS` times.
+    `ridge` is the weight of E|V|^2 + E|grad^3 V|^2, lengths in wavelengths, beside the data's 1,
+    `iterations` those of conjugate gradients at most.
     """
     count = len(fields)
     for k, field in enumerate(fields):
-        shape = (repeats, len(start), 1)
+        shape = (REPEATS, len(start), 1)
         time = torch.rand(shape, dtype=start.dtype, generator=generator)
         points = (start + (k + time) / count * move).reshape(-1, space.dim)
-        values = (move / count).expand(repeats, -1, -1).reshape(-1, space.dim)
+        values = (move / count).expand(REPEATS, -1, -1).reshape(-1, space.dim)
         field.parameters_.copy_(_least_squares(field, points, values, ridge, iterations))
 
 

@@ -166,16 +166,10 @@ def mean_nll(density: Density, points: Tensor, weights: Tensor | None = None) ->
     return -mean_of(log_prob_of_rows(density, points), weights)
 
 
-def nll_at(
-    density: FlowDensity, points: Tensor, steps: int, weights: Tensor | None = None
-) -> float:
-    """`mean_nll` with another number of Runge-Kutta steps a segment."""
-    return mean_nll(density.with_steps(steps), points, weights)
-
-
 def step_error(density: FlowDensity, points: Tensor) -> float:
     """Change of the mean log density at `points` when the steps are doubled."""
-    return abs(nll_at(density, points, 2 * density.flow.steps) - mean_nll(density, points))
+    finer = density.with_steps(2 * density.flow.steps)
+    return abs(mean_nll(finer, points) - mean_nll(density, points))
 
 
 def settle(density: FlowDensity, points: Tensor, most: int) -> tuple[float, float | None]:
@@ -186,7 +180,7 @@ def settle(density: FlowDensity, points: Tensor, most: int) -> tuple[float, floa
     """
     now = mean_nll(density, points)
     while True:
-        finer = nll_at(density, points, 2 * density.flow.steps)
+        finer = mean_nll(density.with_steps(2 * density.flow.steps), points)
         error = abs(finer - now)
         last = density.flow.steps >= most
         if last or error <= MASS_TOLERANCE / 2:

@@ -158,7 +158,7 @@ class Chart:
         local, found = _sphere(grid), 0.0
         block = max(1, BLOCK_ENTRIES // local.shape[1])
         (centers,) = self._turned(terms.centers)
-        for at in torch.arange(terms.size).split(block):
+        for at in torch.split(torch.arange(terms.size), block):
             table = _exponents(centers[:, at], terms.kappa[0][at], local)
             found = table.add_(terms.peaks[at] - top).clamp_min_(-WIDE).exp_().sum(dim=1) + found
         assert isinstance(found, Tensor)
