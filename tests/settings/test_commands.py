@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from orbiflow.cli import app
-from orbiflow.runtime import Call, Outcome, all_operations, find
+from orbiflow.runtime import Call, Operation, Outcome, all_operations, find
 
 
 @pytest.fixture

@@ -36,8 +36,8 @@ RIDGE = 10.0
 STRAIGHT = 5
 """First iterations of EM, without regressions."""
 
-EVERY, PATIENCE = 5, 2
-"""Iterations between looks at the held-out points, and looks that may gain nothing."""
+EVERY, IDLE = 5, 1e-3
+"""Iterations between looks at the held-out points, and nats between two of them that are too few."""
 
 
 def _nll(mixture: VonMisesChains, rows: Rows) -> float:
@@ -46,29 +46,20 @@ def _nll(mixture: VonMisesChains, rows: Rows) -> float:
 
 @torch.no_grad()
 def fit_chain_mixture(
-    start: VonMisesChains,
-    train: Rows,
-    held: Rows,
-    iterations: int,
-    *,
-    patience: int = PATIENCE,
-    worthwhile: float = 0.0,
+    start: VonMisesChains, train: Rows, held: Rows, iterations: int
 ) -> VonMisesChains:
-    """Fit by EM from a start whose chains have one order; return the iterate best on `held`.
-
-    It ends after more than `patience` looks at `held` that gain no more than `worthwhile` nats.
-    """
+    """Fit by EM from a start whose chains have one order; return the iterate best on `held`."""
     step = _Maximization(train, start.order[0])
     mixture = best = start
-    least, idle = _nll(start, held), 0
+    least = _nll(start, held)
     for iteration in range(1, iterations + 1):
         mixture = step(mixture, bent=iteration > STRAIGHT)
         if iteration % EVERY == 0 or iteration == iterations:
             score = _nll(mixture, held)
-            idle = 0 if score < least - worthwhile else idle + 1
-            if score < least:
+            gain = least - score
+            if gain > 0:
                 best, least = mixture, score
-            if idle > patience:
+            if not gain > IDLE:
                 break
     return best
 
@@ -231,8 +222,8 @@ WORTHWHILE = 0.005
 SEARCHED = 4_000
 """The most rows by which the arrows are chosen."""
 
-ITERATIONS, IDLE = 40, 1e-3
-"""Maximum iterations of EM; it ends when five gain fewer nats than the latter."""
+ITERATIONS = 40
+"""Maximum iterations of EM."""
 
 HARMONICS, NOISE = 4, 1e-3
 """Waves of each angle by which dependence is screened, and what is added to their variances."""
@@ -302,7 +293,7 @@ def _fitted(
 ) -> VonMisesChains:
     own, beside = (Rows(part.points[:, list(axes)], part.weights) for part in (rows, held))
     start = spread_chains(Torus(len(axes)), own, size, torch.arange(len(axes)), generator)
-    return fit_chain_mixture(start, own, beside, ITERATIONS, patience=0, worthwhile=IDLE)
+    return fit_chain_mixture(start, own, beside, ITERATIONS)
 
 
 class Screen:

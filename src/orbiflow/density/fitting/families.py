@@ -44,8 +44,8 @@ MOST_MIXED, MOST_CHAINED = 20_000, 12_000
 CLEARLY = 2.0
 """Standard errors by which a larger mixture must be worse to be the last that is tried."""
 
-ITERATIONS, IDLE = 60, 1e-3
-"""Of EM at most; it ends where five bring fewer nats than the latter."""
+ITERATIONS = 60
+"""Maximum iterations of EM."""
 
 Say = Callable[[str], None]
 """A function that is called with what is being tried."""
@@ -182,7 +182,7 @@ class ChainFamily(SizedFamily[VonMisesChains]):
             turned = number + turn > 0
             order = torch.randperm(self.space.dim, generator=generator) if turned else natural
             start = spread_chains(self.space, train, size, order, generator)
-            return fit_chain_mixture(start, train, held, ITERATIONS, patience=0, worthwhile=IDLE)
+            return fit_chain_mixture(start, train, held, ITERATIONS)
 
         if self.sizes is None:
             sizes = [k for k in SIZES if k >= SMALLEST_CHAINS and CHAIN_ROWS * k <= len(train)]

@@ -7,7 +7,7 @@ import math
 import numbers
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol, Self, runtime_checkable
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 
 import torch
 from torch import Tensor, nn
@@ -356,11 +356,6 @@ def log_area_factor(space: Space, measure: str) -> float:
     return natural + (volume if measure == "uniform" else 0.0)
 
 
-@runtime_checkable
-class _Movable(Protocol):
-    def to(self, device: torch.device, /) -> Any: ...
-
-
 def destination(*wanted: Any) -> tuple[torch.device | None, torch.dtype | None]:
     """Return a device and a dtype from what `torch.Tensor.to` takes: either, both, or a tensor.
 
@@ -375,7 +370,12 @@ def destination(*wanted: Any) -> tuple[torch.device | None, torch.dtype | None]:
         elif isinstance(one, Tensor):
             device, dtype = one.device, one.dtype
         elif one is not None:
-            device = _device(one)
+            try:
+                device = torch.device(one)
+            except (RuntimeError, TypeError) as error:
+                raise OrbiflowError(
+                    f"expected a device or a dtype, such as 'cuda' or torch.float32, got {one!r}"
+                ) from error
     if dtype is not None and not dtype.is_floating_point:
         raise OrbiflowError(f"a density is evaluated in floating-point numbers, not in {dtype}")
     return device, dtype
@@ -385,16 +385,7 @@ def moved(value: Any, device: torch.device | None, dtype: torch.dtype | None = N
     """Return a copy on the device of whatever can be moved; only modules change their dtype."""
     if isinstance(value, nn.Module):  # which would move in place
         return copy.deepcopy(value).to(device=device, dtype=dtype)
-    return value.to(device) if device is not None and isinstance(value, _Movable) else value
-
-
-def _device(wanted: Any) -> torch.device:
-    try:
-        return torch.device(wanted)
-    except (RuntimeError, TypeError) as error:
-        raise OrbiflowError(
-            f"expected a device or a dtype, such as 'cuda' or torch.float32, got {wanted!r}"
-        ) from error
+    return value.to(device) if device is not None and hasattr(value, "to") else value
 
 
 def source_of(generator: torch.Generator | None) -> torch.Generator:
