@@ -10,7 +10,6 @@ import torch
 from orbiflow.density import DensitySettings, FlowSettings, Torus, fit_automatic, weighed
 from orbiflow.density.fitting import COMPONENTS
 from orbiflow.density.fitting.automatic import BEFORE_END
-from orbiflow.density.fitting.budget import Budget
 from orbiflow.density.fitting.evidence import (
     FIRST,
     Candidates,
@@ -21,6 +20,7 @@ from orbiflow.density.fitting.evidence import (
 )
 from orbiflow.density.fitting.families import KernelFamily
 from orbiflow.density.fitting.folds import Folds, folds_of
+from orbiflow.density.fitting.likelihood import Budget
 from orbiflow.density.fitting.report import ComponentEvidence
 from orbiflow.density.fitting.settings import Component
 from orbiflow.density.fitting.weights import Gain, stacked, supported_weights

@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike
 from torch import Tensor
 
 from orbiflow.density.arguments import check_kind, silent
-from orbiflow.density.fitting.budget import Budget, training
 from orbiflow.density.fitting.evidence import (
     Candidates,
     TriedFlow,
@@ -31,6 +30,7 @@ from orbiflow.density.fitting.families import (
 )
 from orbiflow.density.fitting.folds import LEAST_PLACES, Folds, Repeats, folds_of, repeats_of
 from orbiflow.density.fitting.kernels import NARROWEST
+from orbiflow.density.fitting.likelihood import Budget, training
 from orbiflow.density.fitting.report import (
     ComponentEvidence,
     FitReport,

@@ -10,10 +10,10 @@ from typing import Any, NamedTuple
 import torch
 from torch import Tensor
 
-from orbiflow.density.fitting.budget import Budget
 from orbiflow.density.fitting.families import Family
 from orbiflow.density.fitting.flow import fit_density
 from orbiflow.density.fitting.folds import Folds
+from orbiflow.density.fitting.likelihood import Budget
 from orbiflow.density.fitting.report import ComponentEvidence, FitReport, Progress
 from orbiflow.density.fitting.rows import Rows, log_prob_of_rows, mean_of
 from orbiflow.density.fitting.settings import FlowSettings

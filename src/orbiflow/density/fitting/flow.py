@@ -12,9 +12,8 @@ from scipy.optimize import linear_sum_assignment
 from torch import Tensor
 
 from orbiflow.density.arguments import check_kind, silent
-from orbiflow.density.fitting.budget import Budget, training
 from orbiflow.density.fitting.kernels import blend_kernels
-from orbiflow.density.fitting.likelihood import Refinement, merged, refine
+from orbiflow.density.fitting.likelihood import Budget, Refinement, merged, refine, training
 from orbiflow.density.fitting.report import (
     MASS_TOLERANCE,
     MOST_REPORTED,

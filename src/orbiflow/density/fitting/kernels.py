@@ -12,9 +12,9 @@ from scipy.spatial import KDTree
 from torch import Tensor
 
 from orbiflow.density.arguments import check_kind, points_tensor
-from orbiflow.density.fitting.budget import training
 from orbiflow.density.fitting.chains import PRIOR, PRIOR_RESULTANT, concentration, far_apart
 from orbiflow.density.fitting.folds import places
+from orbiflow.density.fitting.likelihood import training
 from orbiflow.density.fitting.rows import mean_of
 from orbiflow.density.models import (
     FAINT,
