@@ -41,7 +41,16 @@ PRESENT = Renamed(
         "density cv --parts": "--components",
         "density fit --detail": "--max-frequency",
     },
-    keys={"parts": "components", "detail": "max_frequency"},
+    keys={"parts": "components", "detail": "max_frequency", "shares": None},
+    added=frozenset({"weights"}),  # the shares, by the names of the components
+    expected={
+        "* density.safetensors": "saved as a mixture, in format 5",
+        "*fit-torus4-flow*": "flows on tori of four or more angles are gone",
+        "*batch* batch.csv": "the settings of a line are those of the operation",
+        "density-marginal samples.csv": "no sham kernel stands for the uniform density: others are drawn",
+        "density-marginal density.png": "has a histogram of such samples",
+        "density-conditional density.png": "has a histogram of such samples",
+    },
 )
 """The one table to change with the present tree."""
 
