@@ -381,13 +381,8 @@ class Settings:
         return {f.name: f.kind.plain(getattr(self, f.name)) for f in fields_of(type(self))}
 
     def to_json(self) -> dict[str, Any]:
-        """Return the fields that were given, as JSON has them; `from_json` restores an equal object."""
+        """Return the fields that were given, as JSON has them: keywords of an equal object."""
         return {name: value for name, value in self.values().items() if name in self.fields_given}
-
-    @classmethod
-    def from_json(cls, document: Mapping[str, Any]) -> Self:
-        """Return settings from a JSON object."""
-        return cls(**document)
 
 
 class FileSettings(Settings):

@@ -12,7 +12,7 @@ from torch import Tensor
 
 from orbiflow.density.arguments import float_tensor
 from orbiflow.density.models.chain_integrals import SCALES, chains_at, waves
-from orbiflow.density.models.density import Density, Restriction, Split
+from orbiflow.density.models.density import Density, Restriction, Split, in_blocks
 from orbiflow.density.models.headers import checked_integer, checked_tensors
 from orbiflow.density.models.terms import log_sum_exp, shares_of
 from orbiflow.density.spaces import Space, Torus
@@ -87,9 +87,7 @@ class VonMisesChains(Density, kind="chains"):
         self.order = order.detach().long().clone()
 
     def log_chart(self, points: Tensor) -> Tensor:
-        flat = points.reshape(-1, self.space.dim)
-        parts = [log_sum_exp(self.joint(block).flatten(1)) for block in torch.split(flat, BLOCK)]
-        return torch.cat(parts).reshape(points.shape[:-1])
+        return in_blocks(lambda p: log_sum_exp(self.joint(p).flatten(1)), points, BLOCK)
 
     def joint(self, points: Tensor) -> Tensor:
         """Return the log density (N, L, K) at points (N, d) of each scale and component, weighted."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import math
 import numbers
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 
@@ -85,9 +85,11 @@ class Density(Distribution):
     def log_chart(self, points: Tensor) -> Tensor:
         """Return log densities (...,) per area of the chart's square, at points (..., d).
 
-        Differentiable in the points, in their dtype.
+        Differentiable in the points, in their dtype. This follows from `log_density` or the other way
+        round: a subclass gives one of them.
         """
-        raise NotImplementedError
+        values = self.log_density(points)
+        return values + self.space.log_area(points) if self.space.is_round else values
 
     def draw(self, count: int, generator: torch.Generator) -> Tensor:
         """Return `count` random canonical points (count, d), the same on every device."""
@@ -214,9 +216,7 @@ class Density(Distribution):
         own = points.to(self.dtype)
         if torch.is_grad_enabled() or own[..., 0].numel() <= BLOCK:
             return self._log_prob(own, measure).to(points.dtype)
-        flat = own.reshape(-1, self.space.dim)
-        parts = [self._log_prob(block, measure) for block in torch.split(flat, BLOCK)]
-        return torch.cat(parts).reshape(points.shape[:-1]).to(points.dtype)
+        return in_blocks(lambda p: self._log_prob(p, measure), own, BLOCK).to(points.dtype)
 
     def _log_prob(self, points: Tensor, measure: str) -> Tensor:
         check_measure(measure)
@@ -347,6 +347,13 @@ class Restriction(NamedTuple):
 
     closed: list[tuple[float, Density]]
     left: list[tuple[float, Density]]
+
+
+def in_blocks(function: Callable[[Tensor], Tensor], points: Tensor, size: int) -> Tensor:
+    """Return a function of points (N, d) at points (..., d), evaluated at some of them at a time."""
+    flat = points.reshape(-1, points.shape[-1])
+    parts = [function(block) for block in torch.split(flat, size)]
+    return torch.cat(parts).reshape(points.shape[:-1])
 
 
 def log_area_factor(space: Space, measure: str) -> float:

@@ -13,7 +13,7 @@ from torch import Tensor
 
 from orbiflow.arguments import is_a
 from orbiflow.density.arguments import check_kind
-from orbiflow.density.models.density import Density, Restriction, Split
+from orbiflow.density.models.density import Density, Restriction, Split, in_blocks
 from orbiflow.density.models.evaluation import midpoints
 from orbiflow.density.models.headers import (
     density_from,
@@ -81,9 +81,7 @@ class FlowDensity(Density, kind="flow"):
         # flow, base and area are invariant: no need to project
         if torch.is_grad_enabled() or points[..., 0].numel() <= BLOCK:
             return self._carried_back(points)
-        flat = points.reshape(-1, self.space.dim)
-        parts = [self._carried_back(block) for block in torch.split(flat, BLOCK)]
-        return torch.cat(parts).reshape(points.shape[:-1])
+        return in_blocks(self._carried_back, points, BLOCK)
 
     def _carried_back(self, points: Tensor) -> Tensor:
         start, log_det = self.flow.inverse_and_log_det(points)
@@ -251,10 +249,6 @@ class UniformDensity(Density, kind="uniform"):
     def log_density(self, points: Tensor, beside: float = -math.inf) -> Tensor:
         del beside
         return self.log_floor + 0 * points[..., 0]  # which has gradients
-
-    def log_chart(self, points: Tensor) -> Tensor:
-        values = self.log_density(points)
-        return self.space.log_area(points) + values if self.space.is_round else values
 
     def draw(self, count: int, generator: torch.Generator) -> Tensor:
         return self.space.uniform(count, generator)

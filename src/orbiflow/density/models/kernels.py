@@ -81,10 +81,6 @@ class AdaptiveKernels(Density, kind="kernels"):
     def log_density_without_kernels(self, points: Tensor) -> Tensor:
         return points.new_full(points.shape[:-1], -math.inf)
 
-    def log_chart(self, points: Tensor) -> Tensor:
-        values = self.log_density(points)
-        return values + self.space.log_area(points) if self.space.is_round else values
-
     def log_density(
         self, points: Tensor, beside: float = -math.inf, tolerance: float = TOLERANCE
     ) -> Tensor:

@@ -108,10 +108,6 @@ class Mixture(Density, kind="mixture"):
                 return weight * own[0], own[1]
         return None
 
-    def log_chart(self, points: Tensor) -> Tensor:
-        values = self.log_density(points)
-        return values + self.space.log_area(points) if self.space.is_round else values
-
     def log_density(self, points: Tensor, beside: float = -math.inf) -> Tensor:
         floor = float(torch.logaddexp(*torch.tensor([self.log_floor, beside], dtype=torch.float64)))
         return _log_sum(

@@ -14,7 +14,7 @@ from torch import Tensor
 from orbiflow.density.arguments import check_kind
 from orbiflow.density.models.chain_integrals import SCALES, quantiles, waves
 from orbiflow.density.models.chains import BLOCK, VonMisesChains
-from orbiflow.density.models.density import Density, Split
+from orbiflow.density.models.density import Density, Split, in_blocks
 from orbiflow.density.models.headers import within
 from orbiflow.density.models.terms import log_sum_exp, shares_of
 from orbiflow.density.spaces import Space, Torus
@@ -87,15 +87,15 @@ class VonMisesNetwork(Density, kind="network"):
         self.factors = tuple(factors)
 
     def log_chart(self, points: Tensor) -> Tensor:
-        parts: list[Tensor] = []
-        for block in torch.split(points.reshape(-1, self.space.dim), BLOCK):
-            angles = block.unbind(dim=1)
-            logs = [
-                log_conditional(chains, torch.stack([angles[axis] for axis in axes], dim=1))
-                for axes, chains in self.factors
-            ]
-            parts.append(torch.stack(logs).sum(dim=0))
-        return torch.cat(parts).reshape(points.shape[:-1])
+        return in_blocks(self._log_product, points, BLOCK)
+
+    def _log_product(self, points: Tensor) -> Tensor:
+        angles = points.unbind(dim=1)
+        logs = [
+            log_conditional(chains, torch.stack([angles[axis] for axis in axes], dim=1))
+            for axes, chains in self.factors
+        ]
+        return torch.stack(logs).sum(dim=0)
 
     def draw(self, count: int, generator: torch.Generator) -> Tensor:
         rng = np.random.default_rng(int(torch.randint(2**31, (), generator=generator)))
