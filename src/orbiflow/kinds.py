@@ -71,6 +71,7 @@ class Refused(ValueError):
         self.hint = hint
 
 
+@dataclass(eq=False)
 class Kind:
     """A kind of value.
 
@@ -83,21 +84,14 @@ class Kind:
     - `needs`: A field without whose value a text cannot be read.
     """
 
-    def __init__(
-        self,
-        wanted: str,
-        schema: dict[str, Any],
-        *,
-        limits: str = "",
-        unit: str = "",
-        metavar: str = "TEXT",
-        choices: tuple[str, ...] = (),
-        repeated: bool = False,
-        needs: str = "",
-    ) -> None:
-        self.wanted, self.schema, self.limits = wanted, schema, limits
-        self.unit, self.metavar, self.choices = unit, metavar, choices
-        self.repeated, self.needs = repeated, needs
+    wanted: str
+    schema: dict[str, Any]
+    limits: str = ""
+    unit: str = ""
+    metavar: str = "TEXT"
+    choices: tuple[str, ...] = ()
+    repeated: bool = False
+    needs: str = ""
 
     def read(self, value: Any) -> Any:
         """Return a value from Python or JSON as it will be used; raise `Refused` otherwise."""
