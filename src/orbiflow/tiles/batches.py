@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path, PurePath
 from typing import Annotated, Any
 
-from orbiflow.batch import Column, FolderKind, Summary, WorkSettings, run_files
+from orbiflow.batch import Column, Kind, Summary, WorkSettings, run_files
 from orbiflow.runtime import Call, Cancel, Outcome, Sink, find, ignore, operation
 from orbiflow.settings import Option
 from orbiflow.tiles.operations import ReadingSettings
@@ -74,7 +74,7 @@ def _written(folder: Path) -> set[str]:
     return written_files(folder)
 
 
-TILES = FolderKind(
+TILES = Kind(
     things="silhouettes",
     items="files",
     endings=(".png", ".jpg", ".jpeg", ".webp", ".svg", ".json", ".geojson", ".dat"),
