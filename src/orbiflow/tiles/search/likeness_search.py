@@ -96,10 +96,8 @@ class LikenessSearch(SearchMethod):
         from orbiflow.tiles.search.certifying import best_tiles
         from orbiflow.tiles.search.co_deformation import hands
 
-        both, quick = (
-            hands(goal.target, self, emphasis=goal.emphasis, pins=goal.pins),
-            replace(self, below=0, **SKETCH),
-        )
+        both = hands(goal.target, self, emphasis=goal.emphasis, pins=goal.pins)
+        quick = replace(self, below=0, **SKETCH)
         try:
             found = fit_bending(goal.target, preferred_class(names), quick, both, cancel=cancel)
             return best_tiles(goal.target, found._replace(enough=1))[0]
