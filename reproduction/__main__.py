@@ -3,8 +3,6 @@
 One page, DIR/index.html; each picture as PNG and PDF, all numbers in DIR/paper.json.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import sys
@@ -37,14 +35,11 @@ def main(words: list[str] | None = None) -> int:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m reproduction", description=__doc__)
-    parser.add_argument(
-        "-o", "--out", type=Path, default=Path("paper"), help="folder for the page (default paper)"
-    )
-    parser.add_argument("--fast", action="store_true", help="a preview: less work in each exhibit")
-    parser.add_argument("--only", help="exhibits, such as figure-9,table-3; default all")
-    parser.add_argument(
-        "--workers", type=int, help="number of processes; default one for each core"
-    )
+    add = parser.add_argument
+    add("-o", "--out", type=Path, default=Path("paper"), help="folder for the page (default paper)")
+    add("--fast", action="store_true", help="a preview: less work in each exhibit")
+    add("--only", help="exhibits, such as figure-9,table-3; default all")
+    add("--workers", type=int, help="number of processes; default one for each core")
     return parser
 
 
@@ -61,17 +56,13 @@ def _reproduced(options: argparse.Namespace) -> list[Shown]:
             extent,
             staged,
             workers=options.workers or os.cpu_count() or 1,
-            progress=_print_progress,
+            progress=lambda share, what: print(f"{share:4.0%} {what}", flush=True),
             cancel=Cancel(),
         )
         write_page(shown, extent, staged, time.perf_counter() - begin)
     seconds = time.perf_counter() - begin
     print(f"written to {options.out} in {seconds:.0f} s; open {options.out / 'index.html'}")
     return shown
-
-
-def _print_progress(share: float, what: str) -> None:
-    print(f"{share:4.0%} {what}", flush=True)
 
 
 def _chosen(only: str | None) -> list[Exhibit]:

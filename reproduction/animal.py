@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import shapely
 
 from orbiflow.arrays import Array
-from orbiflow.drawing import draw_flow, draw_magnitude, mark_symmetry, outline_cell
+from orbiflow.drawing import draw_flow, draw_magnitude, fill_rings, mark_symmetry, outline_cell
+from orbiflow.fields import FourierField
 from orbiflow.tiles import (
     CLASSES,
     ClassFailure,
@@ -17,25 +20,26 @@ from orbiflow.tiles import (
     placed_field,
 )
 from reproduction.drawing import (
-    INK,
+    EDGE,
+    GOAL,
     SAMPLES,
+    TILE,
     Box,
     Canvas,
     around,
     caption,
     draw_over,
     draw_tiling,
+    label,
     panel,
-    text_size,
     tiny,
     window_of,
 )
 from reproduction.exhibit import Exhibit, Extent, Findings, Table, Work
-from reproduction.nested import equivariance_error
 from reproduction.published import animal
+from reproduction.symmetrization import equivariance_error
 
-OMEGA = 5
-"""The paper's maximum frequency for its figure of one animal."""
+OMEGA = 5  # the paper's maximum frequency for its figure of one animal
 
 
 def animal_tile(name: str, omega: int, affine: int, iterations: int) -> EscherTile | ClassFailure:
@@ -55,9 +59,8 @@ def animal_work(extent: Extent, omega: int) -> list[Work]:
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+# three pictures of three rows each
 PARTS = (("a", ("IH1", "IH2", "IH3")), ("b", ("IH4", "IH5", "IH6")), ("c", ("IH7", "IH21", "IH28")))
-"""Three pictures of three rows each."""
-
 COLUMNS = (
     "(a) tile, and the animal in red",
     "(b) tiling",
@@ -88,8 +91,12 @@ def _draw(canvas: Canvas, extent: Extent, values: list[Any]) -> Findings:
             part=part,
         )
     good = {name: one for name, one in outcomes.items() if isinstance(one, EscherTile)}
-    symmetry = {name: _symmetry_error(one) for name, one in good.items()}
-    rows = tuple(_row(name, one, symmetry.get(name)) for name, one in outcomes.items())
+    symmetry = {
+        name: equivariance_error(placed_field(one.model()), one.normal_tile.group)
+        for name, one in good.items()
+    }
+    rows = [_row(name, one, symmetry.get(name)) for name, one in outcomes.items()]
+    headings = ("class", "IoU", "edges match to", "field symmetric to", "certified")
     worst = max(symmetry.values(), default=float("inf"))
     certified = sum(one.certificate.valid for one in good.values())
     return Findings(
@@ -99,22 +106,14 @@ def _draw(canvas: Canvas, extent: Extent, values: list[Any]) -> Findings:
         f"that match to rounding. The field has its group's symmetry to {tiny(worst)} of its "
         "size. The animal is a turtle in the public domain: the paper's rabbit does not come "
         "with it.",
-        numbers={
-            name: {
-                "iou": one.metrics.iou,
-                "edge_mismatch": one.certificate.edge_mismatch,
-                "symmetry_error": symmetry[name],
-            }
-            for name, one in good.items()
-        },
-        tables=[
-            Table(
-                f"The tiles of Ω = {OMEGA}.",
-                ("class", "IoU", "edges match to", "field symmetric to", "certified"),
-                rows,
-            )
-        ],
+        numbers={name: _numbers(one, symmetry[name]) for name, one in good.items()},
+        tables=[Table(f"The tiles of Ω = {OMEGA}.", headings, rows)],
     )
+
+
+def _numbers(tile: EscherTile, symmetry_error: float) -> dict[str, float]:
+    measures = {"iou": tile.metrics.iou, "edge_mismatch": tile.certificate.edge_mismatch}
+    return {**measures, "symmetry_error": symmetry_error}
 
 
 def _box(row: int, column: int) -> Box:
@@ -123,22 +122,10 @@ def _box(row: int, column: int) -> Box:
 
 
 def _draw_row(figure: Figure, row: int, outcome: Any, outline: Array) -> None:
-    size = text_size(figure)
     middle = _box(row, 0)[1] + _box(row, 0)[3] / 2
-    figure.text(
-        _LEFT / 2,
-        middle,
-        outcome.name,
-        ha="center",
-        va="center",
-        fontsize=size,
-        weight="bold",
-        color=INK,
-    )
+    label(figure, _LEFT / 2, middle, outcome.name, weight="bold")
     if not isinstance(outcome, EscherTile):
-        figure.text(
-            0.5, middle, f"no certified tile: {outcome.reason}", ha="center", fontsize=0.8 * size
-        )
+        label(figure, 0.5, middle, f"no certified tile: {outcome.reason}", size=0.8, va="baseline")
         return
     tile = outcome.normal_tile
     boxes = [_box(row, column) for column in range(4)]
@@ -155,19 +142,14 @@ def _draw_row(figure: Figure, row: int, outcome: Any, outline: Array) -> None:
         if box is boxes[2]:
             draw_magnitude(axes, field, window, samples=SAMPLES)
         else:
-            axes.fill(
-                *np.array(window)[[[0, 2, 2, 0], [1, 1, 3, 3]]], facecolor="#1d2b3a", zorder=0
-            )
+            corners = np.array(window)[[[0, 2, 2, 0], [1, 1, 3, 3]]]
+            axes.fill(*corners, facecolor="#1d2b3a", zorder=0)
             draw_flow(axes, field, tile.group, window)
         outline_cell(axes, tile.group, tile.center)
         axes.plot(*ring.T, color="#111111", linewidth=2.2, zorder=5)
         axes.plot(*ring.T, color="#ffd166", linewidth=1.2, zorder=5)
         halo = "#ffffff" if box is boxes[2] else "#1d2b3a"
         mark_symmetry(axes, tile.group, window, size=0.075, halo=halo)
-
-
-def _symmetry_error(result: EscherTile) -> float:
-    return equivariance_error(placed_field(result.model()), result.normal_tile.group)
 
 
 def _row(name: str, outcome: Any, error: float | None) -> tuple[str, ...]:
@@ -192,4 +174,102 @@ EXHIBIT = Exhibit(
     "symmetry inherent in the class's group. Computed for Ω = 5.",
     _draw,
     lambda extent: animal_work(extent, OMEGA),
+)
+
+_GRID_LEFT, _GRID_HEAD = 0.06, 0.025
+
+
+def _draw_frequencies(canvas: Canvas, extent: Extent, values: list[Any]) -> Findings:
+    omegas, names = extent.frequencies, list(CLASSES)
+    table = dict(zip(((w, name) for w in omegas for name in names), values, strict=True))
+    outline = animal().normal
+    height = 0.097 * len(omegas) + 0.025
+    figure = canvas.figure(height)
+    for row, omega in enumerate(omegas):
+        for column, name in enumerate(names):
+            outcome, box = table[omega, name], _grid_box(row, column, len(omegas), height)
+            rings = [outcome.normal_tile.polygon] if isinstance(outcome, EscherTile) else []
+            view = window_of([outline, *rings], box[2] / (box[3] * height), margin=0.04)
+            axes = panel(figure, box, view)
+            fill_rings(axes, rings, TILE, EDGE, 0.7)
+            fill_rings(axes, [outline], "none", GOAL, 0.8)
+    for column, name in enumerate(names):
+        box = _grid_box(0, column, len(omegas), height)
+        label(figure, box[0] + box[2] / 2, 1 - 0.6 * _GRID_HEAD / height, name, weight="bold")
+    for row, omega in enumerate(omegas):
+        box = _grid_box(row, 0, len(omegas), height)
+        label(figure, _GRID_LEFT / 2, box[1] + box[3] / 2, f"Ω = {omega}")
+    canvas.add(
+        figure,
+        "A grid of tiles, a column for each class and a row for each maximum frequency: polygons "
+        "above, turtles below.",
+        "Blue: the tile of each class and frequency, fitted to the animal in red. Same start, "
+        "loss and number of iterations in every panel.",
+    )
+    ious = {w: [_iou(table[w, name]) for name in names] for w in omegas}
+    means = {w: float(np.nanmean(ious[w])) for w in omegas}
+    lengths = {w: float(np.nanmean([_length(table[w, name]) for name in names])) for w in omegas}
+    free = {name: FourierField(kind.group(), 0).size for name, kind in CLASSES.items()}
+    moving = ", ".join(f"{name} {n}" for name, n in free.items() if n)
+    straight = max(_straightness(table[omegas[0], name], name) for name in names)
+    rising = all(lengths[a] <= lengths[b] for a, b in pairwise(omegas))
+    rows = (
+        *((name, *(f"{_iou(table[w, name]):.3f}" for w in omegas)) for name in names),
+        ("mean IoU", *(f"{means[w]:.3f}" for w in omegas)),
+        ("mean length of the outline", *(f"{lengths[w]:.2f}" for w in omegas)),
+    )
+    return Findings(
+        "agrees in part" if rising and straight < 1e-6 else "differs",
+        "At Ω = 0 every tile is a polygon with the template's number of sides (to "
+        f"{straight:.0e}); the mean length of the outline, of tiles of area 1, grows from "
+        f"{lengths[omegas[0]]:.2f} to {lengths[omegas[-1]]:.2f}, and the mean IoU from "
+        f"{means[omegas[0]]:.3f} to {means[omegas[-1]]:.3f}.",
+        "Ω = 0 leaves translations in p1 alone, and along the glide in pg (free parameters: "
+        f"{moving}); a constant field that commutes with a rotation is zero. And our tile at Ω = "
+        "0 is not the regular template: pentagons have two shape parameters and lattices up to "
+        "two, which the fit uses.",
+        numbers={
+            "mean_iou": {str(w): m for w, m in means.items()},
+            "mean_length": {str(w): v for w, v in lengths.items()},
+        },
+        tables=[Table("IoU with the animal.", ("class", *(f"Ω = {w}" for w in omegas)), rows)],
+    )
+
+
+def _grid_box(row: int, column: int, rows: int, height: float) -> Box:
+    head = _GRID_HEAD / height
+    wide, tall = (1 - _GRID_LEFT) / len(CLASSES), (1 - head) / rows
+    x, y = _GRID_LEFT + column * wide + 0.002, 1 - head - (row + 1) * tall + 0.004
+    return x, y, wide - 0.004, tall - 0.008
+
+
+def _iou(outcome: Any) -> float:
+    return outcome.metrics.iou if isinstance(outcome, EscherTile) else float("nan")
+
+
+def _length(outcome: Any) -> float:
+    if not isinstance(outcome, EscherTile):
+        return float("nan")
+    polygon = shapely.Polygon(outcome.normal_tile.polygon)
+    return polygon.length / polygon.area**0.5
+
+
+def _straightness(outcome: Any, name: str) -> float:
+    """Return how far a tile is from the polygon through its corners."""
+    if not isinstance(outcome, EscherTile):
+        return 0.0
+    tile = outcome.normal_tile
+    corners = shapely.LinearRing(tile.polygon[list(tile.corners)])
+    assert len(tile.corners) == len(CLASSES[name].template())
+    return float(shapely.hausdorff_distance(corners, shapely.LinearRing(tile.polygon)))
+
+
+FREQUENCIES = Exhibit(
+    "figure-8",
+    "Figure 8",
+    "The effect of the maximum frequency Ω",
+    "For Ω = 0 there is no deformation in the shape of the tile, as the diffeomorphism only has "
+    "translational effects. The higher the allowed frequency, the more complex the tile shape.",
+    _draw_frequencies,
+    lambda extent: [one for omega in extent.frequencies for one in animal_work(extent, omega)],
 )

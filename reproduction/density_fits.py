@@ -4,8 +4,6 @@ They are four and six Gaussians of variance 0.005, and the 5 x 5 checkerboard (p
 round spaces they are also taken per round area: the same function times the area factor.
 """
 
-from __future__ import annotations
-
 import math
 import tempfile
 from pathlib import Path
@@ -33,8 +31,8 @@ TargetMeasure = Literal["flat", "round"]
 
 _SMOOTH = {"max_frequency": 6, "segments": 8, "roughness": (1e-3, 1e-3)}
 _SHARP = {"max_frequency": 8, "segments": 6, "roughness": (1e-4, 1e-4)}
+# the `FlowSettings` that suit each target
 FIT_SETTINGS = {"4-gaussian": _SMOOTH, "6-gaussian": _SMOOTH, "checkerboard": _SHARP}
-"""The `FlowSettings` that suit each target."""
 
 
 def target(name: str, points: Tensor) -> Tensor:

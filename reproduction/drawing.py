@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import torch
@@ -13,16 +13,16 @@ from PIL import Image
 
 from orbiflow.arrays import Array, Window
 from orbiflow.density import Space, immersion, viewpoint
-from orbiflow.drawing import DPI, PALETTES, Palette, blank_figure, fill_rings, plane_axes, png_bytes
+from orbiflow.drawing import DPI, PALETTES, blank_figure, fill_rings, plane_axes, png_bytes
 from orbiflow.runtime import write_atomic
+from orbiflow.symmetry import CrystallographicGroup
 from orbiflow.tiles import Tile, colouring, copies_meeting
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-WIDTH = 1800
-"""The usual width of a picture in pixels."""
+WIDTH = 1800  # the usual width of a picture in pixels
 
 
 class Picture(NamedTuple):
@@ -44,14 +44,7 @@ class Picture(NamedTuple):
 
 
 class Canvas:
-    """A writer of an exhibit's figures.
-
-    - `pictures`: The pictures that were added.
-
-    Args:
-        folder: An existing folder.
-        name: The exhibit's name, with which all its files begin.
-    """
+    """A writer of an exhibit's figures into a folder, in files whose names begin with `name`."""
 
     def __init__(self, folder: Path, name: str) -> None:
         self.folder, self.name = folder, name
@@ -71,18 +64,10 @@ class Canvas:
         pages: dict[str, str] | None = None,
         exact: bool = False,
     ) -> None:
-        """Write a figure as PNG and PDF.
+        """Write a figure as PNG and PDF, with its `Picture`; `part` sets apart several of an exhibit.
 
-        Args:
-            figure: A figure of `self.figure`.
-            alt: What one sees, for readers who cannot see it.
-            caption: The words below it.
-            part: A name that sets it apart if the exhibit has several pictures.
-            pages: Texts of further files that belong to it, by their names.
-            exact: Whether the PNG keeps all its colours; else it has 256, and a third of the bytes.
-
-        Raises:
-            OutputError: If a file cannot be written.
+        `pages` are texts of further files by their names. Unless it must be `exact`, the PNG has 256
+        colours and a third of the bytes.
         """
         stem = f"{self.name}-{part}" if part else self.name
         picture = png_bytes(figure)
@@ -123,9 +108,7 @@ def pdf_bytes(figure: Figure) -> bytes:
 
 
 INK, FAINT = "#16202a", "#56626e"
-
-SAMPLES = 200
-"""Number of samples of a field's magnitude along a panel's side."""
+SAMPLES = 200  # number of samples of a field's magnitude along a panel's side
 
 Box = tuple[float, float, float, float]
 """Left, bottom, width and height in shares of the figure."""
@@ -143,23 +126,15 @@ def grid_box(
     left: float = 0.0,
     top: float = 0.0,
 ) -> Box:
-    """Return the box of a panel in an even grid.
+    """Return the box of a panel in an even grid, counted from the upper left.
 
-    Args:
-        row, column: The panel's place, from the upper left.
-        rows, columns: The size of the grid.
-        title: The share of the cell's height above the panel that is kept free.
-        gap: The space around the panel, as a share of the figure's width.
-        low, left, top: The shares of the figure kept free at its foot, on its left and at its head.
+    Kept free are the share `title` of the cell's height above the panel, the share `gap` of the
+    figure's width between panels, and the shares `low`, `left` and `top` of the figure at its sides.
     """
     width, height = (1 - left) / columns, (1 - low - top) / rows
     bottom = low + (rows - 1 - row) * height
-    return (
-        left + column * width + gap / 2,
-        bottom + 0.03 * height,
-        width - gap,
-        (0.97 - title) * height,
-    )
+    x, y = left + column * width + gap / 2, bottom + 0.03 * height
+    return x, y, width - gap, (0.97 - title) * height
 
 
 def text_size(figure: Figure) -> float:
@@ -181,16 +156,30 @@ def caption(
     figure: Figure, box: Box, title: str, *, weight: str = "normal", size: float = 1.0
 ) -> None:
     """Write a title above a box."""
-    figure.text(
-        box[0] + box[2] / 2, box[1] + box[3] + 0.006, title, ha="center", va="bottom",
-        fontsize=size * text_size(figure), color=INK, weight=weight,
-    )  # fmt: skip
+    x, y = box[0] + box[2] / 2, box[1] + box[3] + 0.006
+    label(figure, x, y, title, size=size, va="bottom", weight=weight)
+
+
+def label(
+    figure: Figure, x: float, y: float, text: str, *, size: float = 1.0, **style: Any
+) -> None:
+    """Write a text about a place of the figure."""
+    style = {"ha": "center", "va": "center", "color": INK, **style}
+    figure.text(x, y, text, fontsize=size * text_size(figure), **style)
 
 
 def around(middle: ArrayLike, half_width: float, half_height: float) -> Window:
     """Return the window around a point (2,)."""
     x, y = (float(value) for value in np.asarray(middle))
     return x - half_width, y - half_height, x + half_width, y + half_height
+
+
+def same_orbit(
+    group: CrystallographicGroup, point: Array, others: list[Array], tolerance: float
+) -> bool:
+    """Return whether a point (2,) is an image of one of the others."""
+    steps = [(group.images(point) - other) @ group.inverse_lattice.T for other in others]
+    return any((np.abs(s - s.round()).max(axis=-1) < tolerance).any() for s in steps)
 
 
 def tiny(value: float) -> str:
@@ -202,8 +191,8 @@ def tiny(value: float) -> str:
     return "0" if value == 0 else f"{value:.0e}"
 
 
+# A tile's fill, a goal's outline over it, a tile's outline
 TILE, GOAL, EDGE = "#8ab6d9", "#c2410c", "#16202a"
-"""A tile's fill, a goal's outline over it, a tile's outline."""
 
 
 def draw_over(axes: Axes, ring: Array, goal: Array, *, width: float = 1.0) -> None:
@@ -212,15 +201,14 @@ def draw_over(axes: Axes, ring: Array, goal: Array, *, width: float = 1.0) -> No
     fill_rings(axes, [goal], "none", GOAL, width)
 
 
-def draw_tiling(axes: Axes, tile: Tile, window: Window, palette: Palette | None = None) -> None:
+def draw_tiling(axes: Axes, tile: Tile, window: Window) -> None:
     """Draw all copies of a tile that meet a window, neighbours in different colours."""
-    palette = palette or PALETTES["delft"]
+    palette = PALETTES["delft"]
     copies = copies_meeting(tile, window)
     rings, own = copies.images(tile.polygon), colouring(tile).colours(copies)
     for number in np.unique(own):
-        fill_rings(
-            axes, list(rings[own == number]), palette.fill(int(number)), palette.outline, 0.5
-        )
+        fill = palette.fill(int(number))
+        fill_rings(axes, list(rings[own == number]), fill, palette.outline, 0.5)
 
 
 def window_of(rings: list[Array], aspect: float, margin: float = 0.05) -> Window:
@@ -232,11 +220,8 @@ def window_of(rings: list[Array], aspect: float, margin: float = 0.05) -> Window
     return around((low + high) / 2, float(half[0]), float(half[1]))
 
 
-LIGHT = np.array([-0.45, 0.55, 0.70])
-"""The direction of the light, from the left above the eye."""
-
-EYE = 6.0
-"""The distance of the eye, in radii of the surface."""
+LIGHT = np.array([-0.45, 0.55, 0.70])  # the direction of the light, from the left above the eye
+EYE = 6.0  # the distance of the eye, in radii of the surface
 
 
 def draw_surface(
@@ -249,12 +234,9 @@ def draw_surface(
 ) -> None:
     """Draw a space's surface into axes without a frame: small faces, from the back to the front.
 
-    Args:
-        axes: The axes.
-        space: The space.
-        colours: The RGB colours (n, n, 3), 0 to 1, of the faces of the square's even grid, x first.
-        turn: The yaw and pitch of the eye in radians. Default: so that `front` is seen.
-        front: A place in the canonical square.
+    The RGB `colours` (n, n, 3), 0 to 1, are those of the faces of the square's even grid, x first.
+    `turn` is the yaw and pitch of the eye in radians. By default the place `front` of the square is
+    seen.
     """
     from matplotlib.collections import PolyCollection
 

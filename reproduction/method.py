@@ -14,7 +14,7 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.tiles import CLASSES, EscherTile, OccupancySamples, TileModel, occupancy_loss
 from reproduction.animal import OMEGA, animal_work
 from reproduction.drawing import Canvas, caption, draw_over, grid_box, panel, window_of
-from reproduction.exhibit import Exhibit, Extent, Findings, Work
+from reproduction.exhibit import Exhibit, Extent, Findings
 from reproduction.published import animal
 
 if TYPE_CHECKING:
@@ -22,9 +22,7 @@ if TYPE_CHECKING:
 
 CLASS = "IH4"
 COUNT = 2500
-HARDNESS = 70.0
-"""tau, as at the end of the fit."""
-
+HARDNESS = 70.0  # tau, as at the end of the fit
 INSIDE, OUTSIDE, WRONG = "#1d4e79", "#b8c4cf", "#d1242f"
 HEIGHT = 0.30
 
@@ -55,10 +53,6 @@ class Pulled:
         """Return whether (N,) a point is inside the animal and outside the template, or the reverse."""
         region = shapely.Polygon(self.template)
         return shapely.contains_xy(region, *places.T) != self.inside
-
-
-def _needs(extent: Extent) -> list[Work]:
-    return [animal_work(extent, OMEGA)[list(CLASSES).index(CLASS)]]
 
 
 def _draw(canvas: Canvas, _extent: Extent, values: list[Any]) -> Findings:
@@ -123,5 +117,5 @@ EXHIBIT = Exhibit(
     "inside S must land inside the template T, points outside S outside; the occupancy loss "
     "punishes those that do not. The diffeomorphism that minimises it yields the tile.",
     _draw,
-    _needs,
+    lambda extent: [animal_work(extent, OMEGA)[list(CLASSES).index(CLASS)]],
 )

@@ -1,8 +1,7 @@
 """The folder of a reproduction: its page, `paper.json` with all numbers, and what a run wrote."""
 
-from __future__ import annotations
-
 import html
+import itertools
 import json
 import re
 from collections.abc import Sequence
@@ -17,19 +16,13 @@ from reproduction.exhibit import Extent, Shown
 
 NUMBERS, INDEX = "paper.json", "index.html"
 SCHEMA_VERSION = 1
-
 _OURS = re.compile(r"(figure|table)-[a-z0-9-]+\.(png|pdf|html)")
+_INDEX = re.compile(r"\b([A-Z])_(\w+)")  # such as the c of R_c
 _BADGES = {"agrees": "yes", "agrees in part": "partly", "differs": "no", "": "failed"}
 
 
 def paper_page(shown: Sequence[Shown], extent: Extent, seconds: float) -> str:
-    """Return the page, to be written beside the pictures.
-
-    Args:
-        shown: The exhibits, in the paper's order.
-        extent: How much work they were.
-        seconds: The time that all of them took.
-    """
+    """Return the page of exhibits in the paper's order, which all together took `seconds`."""
     return rendered(
         "reproduction",
         "page.html",
@@ -39,46 +32,31 @@ def paper_page(shown: Sequence[Shown], extent: Extent, seconds: float) -> str:
         fast=extent.name == "fast",
         seconds=seconds,
         badges=_BADGES,
-        words=_words,
+        words=lambda text: Markup(_INDEX.sub(r"\1<sub>\2</sub>", html.escape(text))),
     )
 
 
-def _words(text: str) -> Markup:
-    """Return text as HTML, with the index of R_c below."""
-    return Markup(re.sub(r"\b([A-Z])_(\w+)", r"\1<sub>\2</sub>", html.escape(text)))
-
-
 def write_page(shown: Sequence[Shown], extent: Extent, folder: Path, seconds: float) -> None:
-    """Write `index.html` and `paper.json` beside the pictures.
-
-    Raises:
-        OutputError: If a file cannot be written.
-    """
+    """Write `index.html` and `paper.json` beside the pictures."""
     write_atomic(folder / INDEX, paper_page(shown, extent, seconds))
-    document = numbers(shown, extent, seconds)
-    write_atomic(folder / NUMBERS, json.dumps(document, allow_nan=False, indent=1))
-
-
-def numbers(shown: Sequence[Shown], extent: Extent, seconds: float) -> dict[str, Any]:
-    """Return everything that was measured, ready for JSON."""
-    return {
+    document = {
         "schema_version": SCHEMA_VERSION,
         "extent": extent._asdict(),
         "seconds": round(seconds, 1),
         "exhibits": [_exhibit(one) for one in shown],
     }
+    write_atomic(folder / NUMBERS, json.dumps(document, allow_nan=False, indent=1))
 
 
 def _exhibit(one: Shown) -> dict[str, Any]:
     findings = one.findings
+    files = ((picture.file, *dict(picture.others).values()) for picture in one.pictures)
     return {
         "name": one.exhibit.name,
         "label": one.exhibit.label,
         "verdict": None if findings is None else findings.verdict,
         "failure": one.failure or None,
-        "files": [
-            f for picture in one.pictures for f in (picture.file, *dict(picture.others).values())
-        ],
+        "files": list(itertools.chain(*files)),
         "numbers": {} if findings is None else dict(findings.numbers),
     }
 

@@ -1,8 +1,7 @@
 """Data of the exhibits: nine goals, tiles of EST and ARAP, a silhouette, and printed figures."""
 
-from __future__ import annotations
-
 import json
+from dataclasses import replace
 from functools import cache
 from importlib import resources
 from typing import Any, NamedTuple
@@ -12,17 +11,16 @@ import numpy as np
 from orbiflow.arrays import Array
 from orbiflow.tiles import Target
 
+# the paper's table of KL divergences, as printed
 KL = {
     "torus": {"4-gaussian": 0.03, "6-gaussian": 0.45, "checkerboard": 0.67},
     "sphere": {"4-gaussian": 0.03, "6-gaussian": 0.47, "checkerboard": 0.56},
 }
-"""The paper's table of KL divergences, as printed."""
-
+# the paper's table of symmetry groups, as printed
 GROUPS = {
     "IH1": "p1", "IH2": "pg", "IH3": "pg", "IH4": "p2", "IH5": "pgg", "IH6": "pgg", "IH7": "p3",
     "IH21": "p6", "IH28": "p4",
 }  # fmt: skip
-"""The paper's table of symmetry groups, as printed."""
 
 
 class PublishedTile(NamedTuple):
@@ -62,30 +60,22 @@ class Goal(NamedTuple):
 def goals() -> dict[str, Goal]:
     """Return the nine goals by name, in the order of the paper's table."""
     document = json.loads(_data("nine_goals.json").read_text("utf-8"))
-    return {name: _goal(name, row) for name, row in document["goals"].items()}
+    return {
+        name: Goal(name, np.array(row["outline"]), _tiles(row), row["table"])
+        for name, row in document["goals"].items()
+    }
 
 
 def animal() -> Target:
     """Return the silhouette of the exhibits on one animal: a turtle, read from a picture."""
     with resources.as_file(_data("turtle.png")) as path:
         target = Target.read(path)
-    return Target(
-        target.outline,
-        target.y_down,
-        target.notes,
-        "turtle.png",
-        target.kind,
-        target.size,
-        target.corner,
-    )
+    return replace(target, source="turtle.png")
 
 
-def _goal(name: str, row: dict[str, Any]) -> Goal:
-    tiles = {
-        key: PublishedTile(row[key]["class"], np.array(row[key]["tile"]))
-        for key in ("est", "est_largest", "arap", "arap_largest")
-    }
-    return Goal(name, np.array(row["outline"]), tiles, row["table"])
+def _tiles(row: dict[str, Any]) -> dict[str, PublishedTile]:
+    keys = ("est", "est_largest", "arap", "arap_largest")
+    return {key: PublishedTile(row[key]["class"], np.array(row[key]["tile"])) for key in keys}
 
 
 def _data(name: str) -> Any:

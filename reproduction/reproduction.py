@@ -1,7 +1,5 @@
 """The reproduction of all exhibits: first the work that they share, then the drawing of each."""
 
-from __future__ import annotations
-
 import contextlib
 import functools
 import time
@@ -16,18 +14,16 @@ from reproduction import (
     classes,
     comparison,
     densities,
-    density_surfaces,
-    frequencies,
     method,
     spaces,
     square,
     symmetries,
     symmetrization,
-    tilings,
 )
 from reproduction.drawing import Canvas, Picture
 from reproduction.exhibit import Draw, Exhibit, Extent, Findings, Shown, Work
 
+# all exhibits, in the order of the paper
 EXHIBITS: tuple[Exhibit, ...] = (
     square.EXHIBIT,
     classes.TEMPLATES,
@@ -35,25 +31,23 @@ EXHIBITS: tuple[Exhibit, ...] = (
     spaces.SPACES_FIGURE,
     symmetries.EXHIBIT,
     method.EXHIBIT,
-    tilings.EXHIBIT,
+    classes.TILINGS,
     symmetrization.EXHIBIT,
     animal.EXHIBIT,
-    frequencies.EXHIBIT,
+    animal.FREQUENCIES,
     comparison.TILES,
     comparison.TABLE,
     spaces.SYMMETRIZATION,
     densities.TABLE,
     densities.SIX_GAUSSIANS,
-    density_surfaces.EXHIBIT,
+    densities.SURFACES,
     densities.CHECKERBOARD,
 )
-"""All exhibits, in the order of the paper."""
 
 Progress = Callable[[float, str], None]
 """Called with the share of everything that is done, and with what was done last."""
 
-DRAWING_COST = 4.0
-"""About how many seconds a drawing takes, for the progress."""
+DRAWING_COST = 4.0  # about how many seconds a drawing takes, for the progress
 
 
 class Outcome(NamedTuple):
@@ -73,30 +67,24 @@ def reproduce(
     progress: Progress | None = None,
     cancel: Cancel | None = None,
 ) -> list[Shown]:
-    """Draw exhibits into a folder.
+    """Draw exhibits into an existing folder, and return what came of each, in their order.
 
     Work that several exhibits need is done once. An exhibit that fails is shown with the reason, and
-    the others are drawn all the same.
-
-    Args:
-        exhibits: The exhibits, in the order in which they are shown.
-        extent: How much work they are.
-        folder: An existing folder.
-        workers: The number of processes; 1 stays in this one.
-        progress: Called in this thread with how much is done.
-        cancel: Stops the work between steps.
-
-    Returns:
-        What came of each exhibit, in their order.
-
-    Raises:
-        Cancelled: If it was cancelled.
+    the others are drawn all the same. With one worker everything stays in this process.
     """
     cancel = cancel or Cancel()
     needs = [exhibit.needs(extent) for exhibit in exhibits]
     chosen = {one.key: one for needed in needs for one in needed}
     jobs = sorted(chosen.values(), key=lambda one: -one.cost)
-    tell = _Share(progress, sum(one.cost for one in jobs) + DRAWING_COST * len(exhibits))
+    total = sum(one.cost for one in jobs) + DRAWING_COST * len(exhibits)
+    worked = 0.0
+
+    def tell(cost: float, what: str) -> None:
+        nonlocal worked
+        worked += cost
+        if progress is not None:
+            progress(min(1.0, worked / total), what)
+
     run = functools.partial(_run, workers=workers, cancel=cancel)
     done: dict[Any, Outcome] = {}
     for index, outcome in run(_work_done, jobs):
@@ -118,16 +106,6 @@ def reproduce(
 _LOST = Outcome(None, "the process that worked on it died; was memory short?", 0.0)
 
 
-class _Share:
-    def __init__(self, progress: Progress | None, total: float) -> None:
-        self.progress, self.total, self.done = progress, total, 0.0
-
-    def __call__(self, cost: float, what: str) -> None:
-        self.done += cost
-        if self.progress is not None:
-            self.progress(min(1.0, self.done / self.total), what)
-
-
 def _run(
     function: Callable[[Any], Any], items: Sequence[Any], *, workers: int, cancel: Cancel
 ) -> Iterator[tuple[int, Outcome]]:
@@ -135,7 +113,7 @@ def _run(
     if min(workers, len(items)) <= 1:
         for index, item in enumerate(items):
             cancel.check()
-            yield index, _outcome(function, item, _ignore, cancel)
+            yield index, _outcome(function, item, lambda _news: None, cancel)
         return
     told = functools.partial(_outcome, function)
     context = process_context(("orbiflow.tiles.search.searching",))
@@ -144,10 +122,6 @@ def _run(
         for news in pool:
             yield news.index, news.value
     cancel.check()
-
-
-def _ignore(_news: Any) -> None:
-    """Ignore what is reported on the way."""
 
 
 def _outcome(

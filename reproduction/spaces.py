@@ -10,34 +10,31 @@ from orbiflow.arrays import Array
 from orbiflow.density import SPACES, Space, edge_pairs, make_space
 from orbiflow.drawing import mark_symmetry
 from orbiflow.symmetry import IDENTIFICATION_SPACES, CrystallographicGroup
-from reproduction.drawing import Canvas, around, caption, draw_surface, grid_box, panel, tiny
+from reproduction.drawing import (
+    Canvas,
+    around,
+    caption,
+    draw_surface,
+    grid_box,
+    panel,
+    same_orbit,
+    tiny,
+)
 from reproduction.exhibit import Exhibit, Extent, Findings, Table
-from reproduction.nested import nested_error, terms
+from reproduction.symmetrization import nested_error, terms
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-TITLES = {
-    "torus": "torus",
-    "sphere": "sphere",
-    "klein-bottle": "Klein bottle",
-    "projective-plane": "projective plane",
-}
+TITLES = dict(zip(SPACES, ("torus", "sphere", "Klein bottle", "projective plane"), strict=True))
 EDGES = ("#c2410c", "#1d4e79")
-FILLS = ("#f4ecdc", "#c9dcec", "#f2cfa5", "#cfe3d4")
-"""Of cells, by coset."""
-
+FILLS = ("#f4ecdc", "#c9dcec", "#f2cfa5", "#cfe3d4")  # of cells, by coset
 CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 LETTER = np.array(
     [[0, 0], [0, 5], [3, 5], [3, 4], [1, 4], [1, 3], [2.4, 3], [2.4, 2], [1, 2], [1, 0]]
 )
-TURNS = {
-    "torus": (0.5, 0.75),
-    "sphere": (0.6, 0.35),
-    "klein-bottle": (0.3, 0.75),
-    "projective-plane": (0.4, 0.5),
-}
-"""From where the surfaces are seen: yaw and pitch."""
+# from where the surfaces are seen: yaw and pitch
+TURNS = dict(zip(SPACES, ((0.5, 0.75), (0.6, 0.35), (0.3, 0.75), (0.4, 0.5)), strict=True))
 
 
 def euler_characteristic(group: CrystallographicGroup) -> int:
@@ -49,9 +46,7 @@ def euler_characteristic(group: CrystallographicGroup) -> int:
     """
     orbits: list[Array] = []
     for corner in CORNERS:
-        images = group.images(corner)
-        steps = [(images - other) @ group.inverse_lattice.T for other in orbits]
-        if not any((np.abs(s - s.round()).max(axis=-1) < 1e-9).any() for s in steps):
+        if not same_orbit(group, corner, orbits, 1e-9):
             orbits.append(corner)
     return len(orbits) - len(edge_pairs(group)) + 1
 
@@ -63,19 +58,18 @@ def orientable(group: CrystallographicGroup) -> bool:
 
 def _draw_spaces(canvas: Canvas, extent: Extent, _values: list[Any]) -> Findings:
     figure = canvas.figure(0.80)
-    rows = []
+    rows, found = [], {}
     for column, name in enumerate(SPACES):
         space = make_space(name)
         box = grid_box(0, column, 3, 4, title=0.10, gap=0.02)
         caption(figure, box, TITLES[name], weight="bold", size=1.1)
         _draw_square(panel(figure, box, around((0.5, 0.5), 0.72, 0.72)), space.group)
         box = grid_box(1, column, 3, 4, gap=0.02)
-        _draw_cells(
-            panel(figure, box, around((1.0, 1.0), 2.0, 2.0 * box[3] * 0.8 / box[2])), space.group
-        )
+        window = around((1.0, 1.0), 2.0, 2.0 * box[3] * 0.8 / box[2])
+        _draw_cells(panel(figure, box, window), space.group)
         axes = figure.add_axes(grid_box(2, column, 3, 4, gap=0.0))
         draw_surface(axes, space, _checked(space, extent.resolution), turn=TURNS[name])
-        chi, sided = euler_characteristic(space.group), orientable(space.group)
+        found[name] = chi, sided = euler_characteristic(space.group), orientable(space.group)
         rows.append((TITLES[name], space.group.name, str(chi), "yes" if sided else "no"))
     canvas.add(
         figure,
@@ -88,18 +82,10 @@ def _draw_spaces(canvas: Canvas, extent: Extent, _values: list[Any]) -> Findings
         "8 fields, and its edges.",
         exact=True,
     )
-    wanted = {
-        "torus": (0, True),
-        "sphere": (2, True),
-        "klein-bottle": (0, False),
-        "projective-plane": (1, False),
-    }
-    groups = {name: make_space(name).group for name in SPACES}
-    right = all(
-        (euler_characteristic(g), orientable(g)) == wanted[name] for name, g in groups.items()
-    )
+    headings = ("space", "group", "Euler characteristic", "orientable")
+    wanted = dict(zip(SPACES, ((0, True), (2, True), (0, False), (1, False)), strict=True))
     return Findings(
-        "agrees" if right else "differs",
+        "agrees" if found == wanted else "differs",
         "Each group identifies the square's edges in pairs, and counting vertices, edges and the "
         "face that are left gives the Euler characteristic: with orientability it proves which "
         "surface each is.",
@@ -107,14 +93,8 @@ def _draw_spaces(canvas: Canvas, extent: Extent, _values: list[Any]) -> Findings
         "plane's group has rotation centres at the square's corners. There the square's flat "
         "metric has cone points, of a quarter or half turn, that no symmetric flow can move; a "
         "density must be taken with respect to the round area to be one on the round sphere.",
-        numbers={name: euler_characteristic(g) for name, g in groups.items()},
-        tables=[
-            Table(
-                "What the identifications make.",
-                ("space", "group", "Euler characteristic", "orientable"),
-                tuple(rows),
-            )
-        ],
+        numbers={name: chi for name, (chi, _) in found.items()},
+        tables=[Table("What the identifications make.", headings, rows)],
     )
 
 
@@ -129,9 +109,8 @@ def _draw_square(axes: Axes, group: CrystallographicGroup) -> None:
                 tip = edge[0] + (0.56 + 0.075 * (k - number / 2)) * along
                 back = tip - 0.11 * along
                 head = np.stack([tip, back + 0.055 * across, back - 0.055 * across])
-                axes.fill(
-                    *head.T, facecolor=EDGES[number], edgecolor="#ffffff", linewidth=0.6, zorder=5
-                )
+                edging = {"edgecolor": "#ffffff", "linewidth": 0.6, "zorder": 5}
+                axes.fill(*head.T, facecolor=EDGES[number], **edging)
     axes.fill(*(0.39 + 0.05 * LETTER).T, facecolor="#16202a")
 
 
@@ -185,6 +164,17 @@ def _draw_symmetrization(_canvas: Canvas, _extent: Extent, _values: list[Any]) -
              str(terms(operators)), tiny(errors[-1]), tiny(closure))
         )  # fmt: skip
     closed = all(row[-1] == "0" for row in rows)
+    title = "The paper's operators against the mean over the group (Reynolds operator)."
+    headings = [
+        "space",
+        "cell",
+        "generators",
+        "group",
+        "order",
+        "terms of the nested sums",
+        "difference",
+    ]
+    headings.append("order against |det B|")
     return Findings(
         "agrees in part" if max(errors) < 1e-12 and closed else "differs",
         "The printed lattices and generators close: each group's order is the number of squares "
@@ -196,15 +186,8 @@ def _draw_symmetrization(_canvas: Canvas, _extent: Extent, _values: list[Any]) -
         "sphere and projective plane, so that a flow can never correct a density there: the base "
         "for these is the round area.",
         numbers={"nested_error": max(errors)},
-        tables=[
-            Table(
-                "The paper's operators against the mean over the group (Reynolds operator).",
-                ("space", "cell", "generators", "group", "order", "terms of the nested sums",
-                 "difference", "order against |det B|"),
-                tuple(rows),
-            )
-        ],
-    )  # fmt: skip
+        tables=[Table(title, headings, rows)],
+    )
 
 
 SPACES_FIGURE = Exhibit(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import shapely
@@ -19,15 +19,10 @@ from reproduction.exhibit import Exhibit, Extent, Findings
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-SIDES = ("#1d4e79", "#c2410c")
-"""Of the pair left and right, and of the pair bottom and top."""
-
-TWICE, BARE = "#d33f49", "#2b3440"
-"""What copies cover twice, and what they leave bare."""
-
-POINTS = 120
-"""Along each side."""
-
+SIDES = ("#1d4e79", "#c2410c")  # of the pair left and right, and of the pair bottom and top
+TWICE, BARE = "#d33f49", "#2b3440"  # what copies cover twice, and what they leave bare
+POINTS = 120  # along each side
+SHIFTS = [np.array([i, j]) for i in range(-2, 3) for j in range(-2, 3)]
 _LARGER = CrystallographicGroup.generate(np.diag([2.7, 2.7]))
 
 
@@ -69,19 +64,18 @@ def deformed(field: VectorField) -> Deformed:
         sides = Flow(field, steps=32)(torch.tensor(square)).numpy()
     bottom, right, top, left = sides
     pairs = np.concatenate([right - left - [1, 0], top - bottom - [0, 1]])
-    return _with_areas(Deformed(sides, float(np.linalg.norm(pairs, axis=1).max()), 0.0, 0.0))
-
-
-def _with_areas(found: Deformed) -> Deformed:
-    polygon = shapely.make_valid(shapely.Polygon(found.ring))
-    shifts = [(i, j) for i in range(-2, 3) for j in range(-2, 3)]
-    copies = [shapely.transform(polygon, lambda p, s=shift: p + s) for shift in shifts]
-    # a cell in the middle of copies enough
-    cell = shapely.box(0, 0, 1, 1)
+    found = Deformed(sides, float(np.linalg.norm(pairs, axis=1).max()), 0.0, 0.0)
+    copies = _shifted(shapely.make_valid(shapely.Polygon(found.ring)))
+    cell = shapely.box(0, 0, 1, 1)  # in the middle of copies enough
     covered = shapely.union_all(copies)
     gap = 1.0 - covered.intersection(cell).area
     twice = sum(copy.intersection(cell).area for copy in copies) - (1.0 - gap)
     return found._replace(overlap=max(0.0, twice), gap=max(0.0, gap))
+
+
+def _shifted(geometry: Any) -> list[Any]:
+    """Return the copies by the vectors of the lattice near the geometry."""
+    return [shapely.transform(geometry, lambda p, s=shift: p + s) for shift in SHIFTS]
 
 
 def _draw(canvas: Canvas, _extent: Extent, _values: list[object]) -> Findings:
@@ -130,16 +124,14 @@ def _draw(canvas: Canvas, _extent: Extent, _values: list[object]) -> Findings:
 def _draw_square(axes: Axes, found: Deformed, *, copies: bool) -> None:
     ring = found.ring
     if copies:
-        shifts = [np.array([i, j]) for i in range(-2, 3) for j in range(-2, 3)]
         own = shapely.make_valid(shapely.Polygon(ring))
-        others = [shapely.transform(own, lambda p, s=shift: p + s) for shift in shifts]
-        fill_rings(axes, [ring + shift for shift in shifts], "#e9eef3", "#9aa7b4", 0.8)
+        others = _shifted(own)
+        fill_rings(axes, [ring + shift for shift in SHIFTS], "#e9eef3", "#9aa7b4", 0.8)
         fill_rings(axes, [ring], "#f4ecdc", "none", 0.0)
         window = shapely.box(-1.5, -1.5, 2.5, 2.5)
         _fill(axes, shapely.normalize(window - shapely.union_all(others)), BARE)
         twice = shapely.union_all([own & other for other in others if other != own])
-        moved = [shapely.transform(twice, lambda p, s=shift: p + s) for shift in shifts]
-        _fill(axes, shapely.normalize(shapely.union_all(moved)), TWICE)
+        _fill(axes, shapely.normalize(shapely.union_all(_shifted(twice))), TWICE)
     else:
         fill_rings(axes, [ring], "#f4ecdc", "none", 0.0)
     for side, colour in zip(found.sides, (SIDES[1], SIDES[0], SIDES[1], SIDES[0]), strict=True):

@@ -12,16 +12,14 @@ from orbiflow.arrays import Array
 from orbiflow.drawing import CENTER_COLOURS, LINE_COLOUR, center_sign, evaluate, plane_axes
 from orbiflow.fields import VectorField, periodic_operator
 from orbiflow.symmetry import Isometry, Line, identity, rotation, transflection, translation
-from reproduction.drawing import INK, Canvas, around, caption, grid_box, text_size, tiny
+from reproduction.drawing import INK, Canvas, around, caption, grid_box, label, text_size, tiny
 from reproduction.exhibit import Exhibit, Extent, Findings, Table
-from reproduction.nested import Operator, nested, unit_field
+from reproduction.symmetrization import Operator, nested, unit_field
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-HALF = 1.3
-"""Half the side of a panel's window."""
-
+HALF = 1.3  # half the side of a panel's window
 _MARKED, _FIRST = "#c2410c", "#7a1f00"
 _CELL = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]])
 
@@ -58,32 +56,20 @@ def _kinds() -> tuple[Kind, ...]:
     turn = rotation((0.0, 0.0), 4)
     glide = transflection(Line((0.0, 0.0), (0.0, 1.0)), 0.75)
     steps = ((0, 0), (1, 0), (0, 1), (1, 1), (-1, 0), (0, -1), (-1, -1))
+    moves = tuple(translation(oblique @ np.array(step)) for step in steps)
+    turns = (identity(2), turn, turn @ turn, turn.inverse())
+    glides = (identity(2), glide, glide.inverse())
     return (
+        Kind("B-periodic", "V(p + m b₁ + n b₂) = V(p)", oblique, (), (-0.35, -0.12), moves),
         Kind(
-            "B-periodic",
-            "V(p + m b₁ + n b₂) = V(p)",
-            oblique,
-            (),
-            (-0.35, -0.12),
-            tuple(translation(oblique @ np.array(step)) for step in steps),
+            "(c, 4)-rotation equivariant", "V(R_c p) = R_o V(p)", 1.6 * np.eye(2), ((turn, 4),),
+            (0.62, 0.15), turns,
         ),
         Kind(
-            "(c, 4)-rotation equivariant",
-            "V(R_c p) = R_o V(p)",
-            1.6 * np.eye(2),
-            ((turn, 4),),
-            (0.62, 0.15),
-            (identity(2), turn, turn @ turn, turn.inverse()),
+            "(ℓ, μ)-transflection equivariant", "V(T M p) = M_o V(p)", np.diag([1.6, 1.5]),
+            ((glide, 2),), (0.42, -0.15), glides,
         ),
-        Kind(
-            "(ℓ, μ)-transflection equivariant",
-            "V(T M p) = M_o V(p)",
-            np.diag([1.6, 1.5]),
-            ((glide, 2),),
-            (0.42, -0.15),
-            (identity(2), glide, glide.inverse()),
-        ),
-    )
+    )  # fmt: skip
 
 
 KINDS = _kinds()
@@ -108,14 +94,8 @@ def _draw(canvas: Canvas, _extent: Extent, _values: list[Any]) -> Findings:
         _draw_field(axes, kind)
         _draw_element(axes, kind, text_size(figure))
         caption(figure, box, kind.title, size=1.1)
-        figure.text(
-            box[0] + box[2] / 2,
-            0.055,
-            re.sub(r"([A-Z])_(\w)", r"$\\mathrm{\1}_\\mathrm{\2}$", kind.equation),
-            ha="center",
-            fontsize=text_size(figure),
-            color=INK,
-        )
+        equation = re.sub(r"([A-Z])_(\w)", r"$\\mathrm{\1}_\\mathrm{\2}$", kind.equation)
+        label(figure, box[0] + box[2] / 2, 0.055, equation, va="baseline")
         found = residue(kind.before(), kind.images), residue(kind.after(), kind.images)
         after.append(found[1])
         rows.append((kind.title, kind.equation, f"{found[0]:.1f}", tiny(found[1])))
@@ -128,19 +108,14 @@ def _draw(canvas: Canvas, _extent: Extent, _values: list[Any]) -> Findings:
         "cell. R_c turns by a quarter about c, R_o vectors by as much; M is the mirror in ℓ, T "
         "moves along it by μ, M_o mirrors vectors.",
     )
+    title = "Largest violation of each equation, in root mean squares of the field."
     return Findings(
         "agrees" if max(after) < 1e-12 else "differs",
         "Each operator applied to a random Fourier field without the symmetry gives it to "
         f"rounding error: the equations hold to {tiny(max(after))} of the field's size at 300 "
         "points.",
         numbers={kind.title: value for kind, value in zip(KINDS, after, strict=True)},
-        tables=[
-            Table(
-                "Largest violation of each equation, in root mean squares of the field.",
-                ("symmetry", "equation", "before", "after"),
-                tuple(rows),
-            )
-        ],
+        tables=[Table(title, ("symmetry", "equation", "before", "after"), rows)],
     )
 
 

@@ -13,8 +13,8 @@ from awkward import NOT_SIMPLE, SQUARE, STRANGE, USELESS
 from orbiflow import tiles
 from orbiflow.errors import CertificationError, OrbiflowError
 from orbiflow.symmetry import translation, wallpaper_group
-from orbiflow.tiles.search.boundary import extract_tile
 from orbiflow.tiles.search.starts import outline_starts, template_starts
+from orbiflow.tiles.search.stored_models import extract_tile
 
 Call = Callable[..., object]
 
@@ -45,12 +45,11 @@ polygon_functions: dict[str, Call] = {
     "compare": lambda ring: tiles.compare(SQUARE, ring),
     "hausdorff": lambda ring: tiles.hausdorff(ring, SQUARE),
     "Recogniser": lambda ring: tiles.Recogniser(ring)(ring),
-    "tile_similarity": lambda ring: tiles.tile_similarity([ring], ["IH1"]),
     "prepared_region": tiles.prepared_region,
     "Overlap": tiles.Overlap,
     "overlay_png": lambda ring: tiles.overlay_png(TILE, ring, width_px=200),
 }
-MEASURING = ("Target", "iou", "compare", "hausdorff", "Recogniser", "tile_similarity")
+MEASURING = ("Target", "iou", "compare", "hausdorff", "Recogniser")
 
 
 @pytest.mark.parametrize("name", polygon_functions)

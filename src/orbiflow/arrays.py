@@ -1,7 +1,5 @@
 """The types of arrays, and rectangles of the plane."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, TypeAlias
 
@@ -24,8 +22,7 @@ Window: TypeAlias = tuple[float, float, float, float]
 def checked_window(window: Sequence[float]) -> Window:
     """Return `window` as four numbers xmin < xmax and ymin < ymax.
 
-    Raises:
-        OrbiflowError: for anything else.
+    Raises `OrbiflowError` for anything else.
     """
     try:
         values = numbers(window, "window", (4,)).tolist()

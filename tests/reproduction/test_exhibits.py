@@ -13,20 +13,23 @@ from orbiflow.fields import symmetrize
 from orbiflow.symmetry import identification_group, rotation_matrix
 from orbiflow.tiles import CLASSES, EscherTile, Target, compare
 from reproduction.animal import animal_tile
-from reproduction.classes import constrained_angles, identification_error, symbol
-from reproduction.comparison import impossible_rows
+from reproduction.classes import (
+    center_orbits,
+    constrained_angles,
+    drawn_elements,
+    identification_error,
+    symbol,
+)
+from reproduction.comparison import goal_tile, impossible_rows
 from reproduction.density_fits import TARGETS, drawn, fitted, kl_of_uniform, target, weighted
 from reproduction.exhibit import FAST, Extent, Findings
-from reproduction.goal_fits import goal_tile
 from reproduction.method import Pulled
-from reproduction.nested import equivariance_error, nested_error
 from reproduction.published import GROUPS, KL, animal, goals
 from reproduction.reproduction import EXHIBITS, reproduce
 from reproduction.spaces import euler_characteristic, orientable
 from reproduction.square import deformed, unconstrained_field
 from reproduction.symmetries import KINDS, residue
-from reproduction.symmetrization import as_printed, pushed
-from reproduction.tilings import center_orbits, drawn_elements
+from reproduction.symmetrization import as_printed, equivariance_error, nested_error, pushed
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "silhouettes"
 

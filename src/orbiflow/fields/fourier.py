@@ -1,10 +1,7 @@
 """Fourier fields: trigonometric vector fields that commute with a crystallographic group."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
-from functools import lru_cache
 
 import numpy as np
 import torch
@@ -14,13 +11,11 @@ from orbiflow.arrays import Array
 from orbiflow.fields.invariants import (
     InvariantBasis,
     InvariantField,
-    constant_tensors,
-    invariant_basis,
+    coefficient_bound,
     sobolev_weights,
 )
-from orbiflow.fields.lipschitz import coefficient_bound
 from orbiflow.fields.series import differentiate, evaluate, weight_cotangent
-from orbiflow.symmetry import CrystallographicGroup, cached_by_basis
+from orbiflow.symmetry import CrystallographicGroup
 
 
 class FourierField(InvariantField):
@@ -41,16 +36,13 @@ class FourierField(InvariantField):
     Shapes:
         `parameters_`: (P,) or (S, P). Points (..., d), or (S, ..., d) for a stack.
 
-    Raises:
-        OrbiflowError: for a negative, fractional or too large `max_frequency`.
+    Raises `OrbiflowError` for a negative, fractional or too large `max_frequency`.
 
     >>> from orbiflow.symmetry import rotation, wallpaper_group
     >>> field = FourierField(wallpaper_group("p4"), 5)
     >>> field.size
     60
     """
-
-    frame: Tensor
 
     def __init__(
         self,
@@ -66,10 +58,37 @@ class FourierField(InvariantField):
             group, max_frequency, batch=batch, smoothness=smoothness, dtype=dtype, device=device
         )
         self._orders = _orders(self.basis)
-        self._fill_buffers()
 
-    def _constants(self, dtype: torch.dtype, device: torch.device) -> dict[str, Tensor]:
-        return _constants(self.group, self.max_frequency, self.smoothness, dtype, device)
+    @staticmethod
+    def layout(group: CrystallographicGroup, basis: InvariantBasis) -> tuple[Array, Array, Array]:
+        """Rewrite the invariant basis in the tensor basis of `series`, as sparse (row, column, value).
+
+        exp(2 pi i k.u) is a product over the axes of cos(2 pi k u) + i sin(2 pi k u): each mode becomes
+        2^d products of cosines and sines.
+        """
+        d, orders = group.dim, _orders(basis)
+        mode, within = basis.rows // (2 * d), basis.rows % (2 * d)
+        is_sine, component = within // d, within % d
+        k = basis.frequencies[mode]
+        size = np.abs(k)
+        norm = np.where(k.any(axis=1), math.sqrt(2.0), 1.0)
+        entries: list[tuple[Array, Array, Array]] = []
+        for choice in np.ndindex(*(2,) * d):
+            sines = np.array(choice)
+            # i^(number of sines): real for cosines of the phase, imaginary for sines
+            quarter = sines.sum()
+            flips = ((sines == 1) & (k < 0)).sum(axis=1)
+            sign = (-1.0) ** (quarter // 2 + flips)
+            exists = ~((sines == 1) & (k == 0)).any(axis=1)
+            keep = exists & (quarter % 2 == is_sine)
+            position = size + sines * np.array(orders)
+            flat = component.copy()
+            for axis in range(d):
+                flat = flat * (2 * orders[axis] + 1) + position[:, axis]
+            weights = basis.values * norm * sign
+            entries.append((flat[keep], basis.columns[keep], weights[keep]))
+        rows, columns, values = (np.concatenate(part) for part in zip(*entries, strict=True))
+        return rows, columns, values
 
     @staticmethod
     def _stacked(parameters: Tensor) -> Tensor:
@@ -176,54 +195,3 @@ class FourierField(InvariantField):
 
 def _orders(basis: InvariantBasis) -> tuple[int, ...]:
     return tuple(np.abs(basis.frequencies).max(axis=0).tolist())
-
-
-@cached_by_basis(maxsize=64)  # the segments of a flow share them
-@torch.inference_mode(False)  # cached in inference mode, they could never be trained
-def _constants(
-    group: CrystallographicGroup,
-    max_frequency: int,
-    smoothness: float,
-    dtype: torch.dtype,
-    device: torch.device,
-) -> dict[str, Tensor]:
-    basis = invariant_basis(group, max_frequency)
-    scale = sobolev_weights(group, basis, smoothness)
-    layout = tensor_layout(basis, _orders(basis))
-    return constant_tensors(layout, dtype, device, scale=scale, frame=group.inverse_lattice)
-
-
-@lru_cache(maxsize=64)  # bases hash by identity
-def tensor_layout(basis: InvariantBasis, orders: tuple[int, ...]) -> tuple[Array, Array, Array]:
-    """Rewrite the invariant basis in the tensor basis of `series`, as sparse (row, column, value).
-
-    exp(2 pi i k.u) is a product over the axes of cos(2 pi k u) + i sin(2 pi k u): each mode becomes
-    2^d products of cosines and sines.
-    """
-    d = basis.frequencies.shape[1]
-    sides = [2 * k + 1 for k in orders]
-    mode, within = basis.rows // (2 * d), basis.rows % (2 * d)
-    is_sine, component = within // d, within % d
-    k = basis.frequencies[mode]
-    size = np.abs(k)
-    norm = np.where(k.any(axis=1), math.sqrt(2.0), 1.0)
-    rows: list[Array] = []
-    columns: list[Array] = []
-    values: list[Array] = []
-    for choice in np.ndindex(*(2,) * d):
-        sines = np.array(choice)
-        # i^(number of sines): real for cosines of the phase, imaginary for sines
-        quarter = sines.sum()
-        wanted = (quarter % 2) == is_sine
-        flips = ((sines == 1) & (k < 0)).sum(axis=1)
-        sign = (-1.0) ** (quarter // 2 + flips)
-        exists = ~((sines == 1) & (k == 0)).any(axis=1)
-        keep = wanted & exists
-        position = size + sines * np.array(orders)
-        flat = component.copy()
-        for axis in range(d):
-            flat = flat * sides[axis] + position[:, axis]
-        rows.append(flat[keep])
-        columns.append(basis.columns[keep])
-        values.append((basis.values * norm * sign)[keep])
-    return np.concatenate(rows), np.concatenate(columns), np.concatenate(values)

@@ -1,11 +1,28 @@
-"""The Fourier coefficients that are invariant under a crystallographic group (design point 3)."""
+"""The Fourier coefficients that are invariant under a crystallographic group (design point 3).
 
-from __future__ import annotations
+Bounds of their fields' Jacobians follow from the waves. A wave of unit root mean square is
+sqrt 2 (a cos(phase) + b sin(phase)) at each frequency kappa of an orbit, with |a|^2 + |b|^2 summed over
+the orbit equal to 1. Its Jacobian is the sum over the orbit of
+
+    2 pi sqrt 2 (b cos(phase) - a sin(phase)) (x) kappa.
+
+A single frequency is therefore at most 2 pi sqrt 2 |kappa| steep; `steepness` adds that up. An orbit
+of M pairs +-kappa can be `group_factor` times steeper: sqrt M by the triangle inequality and the even
+share 1 / sqrt M of each, but less where the matrices at its frequencies point differently.
+
+Proof of the smaller bound. Decompose the (d, 2) matrix [b, -a] at each frequency as the sum of its
+singular values times u (x) v: as (cos, sin) runs over the unit circle, v . (cos, sin) stays in
+[-1, 1]. So the Jacobian is 2 pi sqrt 2 times a sum of s_i A_i with A_i = sigma_i u_i (x) kappa_i and
+s_i in [-1, 1]. The spectral norm is convex in s, hence largest at a corner of the cube: the largest
+over all choices of signs is a bound, and there are few signs (design point 17).
+"""
 
 import itertools
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Self
 
 import numpy as np
@@ -16,8 +33,8 @@ from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import CrystallographicGroup, cached_by_basis, checked_group
 
+# the largest number of real coefficients before symmetrization, for about a gigabyte of memory
 MAX_COEFFICIENTS = 2_000_000
-"""The largest number of real coefficients before symmetrization, for about a gigabyte of memory."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,9 +67,6 @@ def frequency_set(group: CrystallographicGroup, max_frequency: int) -> Array:
 
     The box |k_i| <= max_frequency and its images under the dual point group: a set that is not a
     union of orbits would lose symmetry (hexagonal groups).
-
-    Raises:
-        OrbiflowError: if `max_frequency` is negative or too large to handle.
     """
     if isinstance(max_frequency, bool) or int(max_frequency) != max_frequency or max_frequency < 0:
         raise OrbiflowError(f"max_frequency must be an integer >= 0, got {max_frequency!r}")
@@ -85,13 +99,6 @@ def _half(k: Array) -> tuple[Array, Array]:
     return np.where(flipped[:, None], -k, k), flipped
 
 
-def _index(frequencies: Array, k: Array) -> Array:
-    """Return rows of `frequencies` (sorted lexicographically) at which the rows of `k` stand."""
-    base = int(np.abs(frequencies).max(initial=0)) * 2 + 3
-    radix = base ** np.arange(frequencies.shape[1] - 1, -1, -1, dtype=np.int64)
-    return np.searchsorted(frequencies @ radix, k @ radix)
-
-
 def _action(group: CrystallographicGroup, frequencies: Array) -> tuple[Array, Array]:
     """Return where each element sends each frequency, and the (2d, 2d) block it applies.
 
@@ -101,9 +108,11 @@ def _action(group: CrystallographicGroup, frequencies: Array) -> tuple[Array, Ar
     integral = _integral_parts(group)
     targets = np.empty((group.order, len(frequencies)), dtype=np.int64)
     blocks = np.zeros((group.order, len(frequencies), 2, d, 2, d))
+    base = int(np.abs(frequencies).max(initial=0)) * 2 + 3
+    radix = base ** np.arange(d - 1, -1, -1, dtype=np.int64)  # frequencies are sorted by digits
     for g, element in enumerate(group.cosets):
         image, flipped = _half(frequencies @ integral[g])
-        targets[g] = _index(frequencies, image)
+        targets[g] = np.searchsorted(frequencies @ radix, image @ radix)
         turns = frequencies @ (group.inverse_lattice @ element.translation)
         phase = 2 * np.pi * (turns - np.round(turns))
         c, s = np.cos(phase)[:, None, None], np.sin(phase)[:, None, None]
@@ -134,21 +143,17 @@ def _orthonormal_columns(projector: Array) -> Array:
 
 @cached_by_basis(maxsize=64)  # a flow of many segments shares one basis
 def invariant_basis(group: CrystallographicGroup, max_frequency: int) -> InvariantBasis:
-    """Build the basis orbit by orbit: the range of the mean over coset representatives.
-
-    Raises:
-        OrbiflowError: if `max_frequency` is negative or too large to handle.
-    """
+    """Build the basis orbit by orbit: the range of the mean over coset representatives."""
     d = group.dim
     frequencies = frequency_set(group, max_frequency)
     targets, blocks = _action(group, frequencies)
-    rows: list[Array] = []
-    columns: list[Array] = []
-    values: list[Array] = []
+    entries: list[tuple[Array, Array, Array]] = []
     magnitude: list[Array] = []
     orbit_of = targets.min(axis=0)
     size = 0
-    for orbit in _members(orbit_of):
+    order = np.argsort(orbit_of, kind="stable")
+    cuts = np.flatnonzero(np.diff(orbit_of[order])) + 1
+    for orbit in np.split(order, cuts):  # positions that share an orbit, each ascending
         m = len(orbit)
         local = np.searchsorted(orbit, targets[:, orbit])
         projector = np.zeros((m, 2 * d, m, 2 * d))
@@ -159,28 +164,14 @@ def invariant_basis(group: CrystallographicGroup, max_frequency: int) -> Invaria
             projector[:, d:] = projector[:, :, :, d:] = 0.0
         basis = _orthonormal_columns(projector.reshape(2 * d * m, 2 * d * m))
         row, column = np.nonzero(np.abs(basis) > 1e-14)
-        values.append(basis[row, column])
-        rows.append(orbit[row // (2 * d)] * 2 * d + row % (2 * d))
-        columns.append(column + size)
-        count: int = basis.shape[1]
+        place: Array = orbit[row // (2 * d)] * 2 * d + row % (2 * d)
+        entries.append((place, column + size, basis[row, column]))
         kappa = np.linalg.norm(group.inverse_lattice.T @ frequencies[orbit[0]])
+        count: int = basis.shape[1]
         magnitude.append(np.full(count, kappa))
         size += count
-    return InvariantBasis(
-        frequencies,
-        np.concatenate(rows),
-        np.concatenate(columns),
-        np.concatenate(values),
-        size,
-        np.concatenate(magnitude),
-    )
-
-
-def _members(labels: Array) -> list[Array]:
-    """Return positions that share a label, each list ascending, in the order of the labels."""
-    order = np.argsort(labels, kind="stable")
-    cuts = np.flatnonzero(np.diff(labels[order])) + 1
-    return np.split(order, cuts)
+    rows, columns, values = (np.concatenate(part) for part in zip(*entries, strict=True))
+    return InvariantBasis(frequencies, rows, columns, values, size, np.concatenate(magnitude))
 
 
 class InvariantField(nn.Module, ABC):
@@ -198,6 +189,7 @@ class InvariantField(nn.Module, ABC):
     columns: Tensor
     values: Tensor
     scale: Tensor
+    frame: Tensor
 
     def __init__(
         self,
@@ -218,10 +210,12 @@ class InvariantField(nn.Module, ABC):
         shape = (self.size,) if batch is None else (batch, self.size)
         with torch.inference_mode(False):
             self.parameters_ = nn.Parameter(torch.zeros(shape, dtype=dtype, device=device))
+        self._fill_buffers()
 
+    @staticmethod
     @abstractmethod
-    def _constants(self, dtype: torch.dtype, device: torch.device) -> dict[str, Tensor]:
-        """Return buffers by name; segments of a flow should share them."""
+    def layout(group: CrystallographicGroup, basis: InvariantBasis) -> tuple[Array, Array, Array]:
+        """Return the basis in the coefficients that the field evaluates, as (row, column, value)."""
 
     @abstractmethod
     def adjoint(self, points: Tensor, forces: Tensor) -> Tensor:
@@ -243,8 +237,9 @@ class InvariantField(nn.Module, ABC):
             )
 
     def _fill_buffers(self) -> None:
-        like = self.parameters_
-        for name, tensor in self._constants(like.dtype, like.device).items():
+        own = self.parameters_
+        key = self.max_frequency, self.smoothness, own.dtype, own.device, self.layout
+        for name, tensor in _constants(self.group, *key).items():
             self.register_buffer(name, tensor, persistent=False)
 
     def _apply(self, fn: Callable[[Tensor], Tensor], recurse: bool = True) -> Self:
@@ -265,14 +260,116 @@ def sobolev_weights(
     return (1.0 + (basis.magnitude * size) ** 2) ** (-smoothness / 2)
 
 
-def constant_tensors(
-    layout: tuple[Array, Array, Array], dtype: torch.dtype, device: torch.device, **others: Array
+@cached_by_basis(maxsize=64)  # the segments of a flow share them
+@torch.inference_mode(False)  # cached in inference mode, they could never be trained
+def _constants(
+    group: CrystallographicGroup,
+    max_frequency: int,
+    smoothness: float,
+    dtype: torch.dtype,
+    device: torch.device,
+    layout: Callable[..., tuple[Array, Array, Array]],
 ) -> dict[str, Tensor]:
-    """Return a sparse basis (rows, columns, values) and other real arrays as tensors by name."""
-    rows, columns, values = layout
-    reals = {"values": values, **others}
+    basis = invariant_basis(group, max_frequency)
+    rows, columns, values = layout(group, basis)
+    scale = sobolev_weights(group, basis, smoothness)
+    reals = {"values": values, "scale": scale, "frame": group.inverse_lattice}
     return {
         "rows": torch.tensor(rows, device=device),
         "columns": torch.tensor(columns, device=device),
         **{name: torch.tensor(x, dtype=dtype, device=device) for name, x in reals.items()},
     }
+
+
+# the largest number of terms whose signs are all tried; orbits of plane groups have no more
+MAX_SIGNED_TERMS = 6
+
+
+def steepness(parameters: Tensor, magnitude: Tensor) -> Tensor:
+    """Return sum_j |c_j| 2 pi sqrt 2 |kappa_j|: times `group_factor`, a bound of |DV| anywhere.
+
+    Args:
+        parameters: Coordinates c (..., P) in the orthonormal basis.
+        magnitude: |kappa| (P,) of each, `InvariantBasis.magnitude`.
+
+    Returns:
+        The bounds (...,), per unit of time.
+    """
+    return math.sqrt(2.0) * (parameters.abs() * (2.0 * math.pi * magnitude)).sum(dim=-1)
+
+
+@lru_cache(maxsize=64)  # bases hash by identity
+def group_factor(group: CrystallographicGroup, basis: InvariantBasis) -> float:
+    """Return the smallest known f with |DV| <= f `steepness` for all parameters and points.
+
+    It depends on the group, its lattice and the frequencies: 1 for p1 and p2, up to sqrt 2 for pg and
+    pgg, sqrt 1/2 for p4, sqrt 3/4 for p3 and p6, sqrt 3/2 for p6m.
+
+    >>> from orbiflow.fields import FourierField
+    >>> from orbiflow.symmetry import wallpaper_group
+    >>> p4 = FourierField(wallpaper_group("p4"), 3)
+    >>> round(group_factor(p4.group, p4.basis), 6)
+    0.707107
+    """
+    owner, terms = _terms(group, basis)
+    counts = np.bincount(owner, minlength=basis.size)
+    steepest = 0.0
+    for count in np.unique(counts[counts > 0]):
+        mine = terms[np.isin(owner, np.flatnonzero(counts == count))]
+        mine = mine.reshape(-1, count, group.dim, group.dim)
+        steepest = max(steepest, float(_largest_sum(mine).max()))
+    return steepest
+
+
+def _terms(group: CrystallographicGroup, basis: InvariantBasis) -> tuple[Array, Array]:
+    """Return ascending parameter indices (T,) and their matrices A_i (T, d, d) for |kappa| = 1."""
+    d, modes = group.dim, len(basis.frequencies)
+    pair = basis.columns * modes + basis.rows // (2 * d)
+    pairs, place = np.unique(pair, return_inverse=True)
+    blocks = np.zeros((len(pairs), 2 * d))
+    np.add.at(blocks, (place, basis.rows % (2 * d)), basis.values)
+    owner, mode = np.divmod(pairs, modes)
+    waves = basis.magnitude[owner] > 0.0
+    owner, mode, blocks = owner[waves], mode[waves], blocks[waves].reshape(-1, 2, d)
+    u, sigma, _ = np.linalg.svd(blocks.swapaxes(1, 2), full_matrices=False)
+    kappa = basis.frequencies[mode] @ group.inverse_lattice
+    kappa = kappa / np.linalg.norm(kappa, axis=1, keepdims=True)
+    every = np.einsum("tk,tik,tj->tkij", sigma, u, kappa)
+    real = sigma > 1e-12
+    return np.repeat(owner, real.sum(axis=1)), every[real]
+
+
+def _largest_sum(terms: Array) -> Array:
+    """Return a bound (P,) of the spectral norm of sum_i s_i A_i over all signs, A (P, n, d, d)."""
+    count = terms.shape[1]
+    if count > MAX_SIGNED_TERMS:
+        return np.linalg.norm(terms, axis=(2, 3)).sum(axis=1)
+    signs = np.array([(1.0, *s) for s in itertools.product((1.0, -1.0), repeat=count - 1)])
+    sums = np.einsum("sn,pnij->psij", signs, terms)
+    return np.linalg.norm(sums, ord=2, axis=(2, 3)).max(axis=1)
+
+
+def coefficient_bound(
+    group: CrystallographicGroup, basis: InvariantBasis, coefficients: Tensor
+) -> Tensor:
+    """Return an upper bound of the Jacobian's spectral norm for given coefficients.
+
+    The bound is the sum over kappa of 2 pi sqrt 2 |kappa| |[a, b]|.
+
+    Sharper than `group_factor` for given coefficients, since parameters at one frequency are added
+    before their size is taken.
+    """
+    d, modes = group.dim, len(basis.frequencies)
+    rows, columns = (
+        torch.as_tensor(index, device=coefficients.device) for index in (basis.rows, basis.columns)
+    )
+    lengths = np.linalg.norm(basis.frequencies @ group.inverse_lattice, axis=1)
+    values, kappa = (torch.as_tensor(x).to(coefficients) for x in (basis.values, lengths))
+    z = coefficients.new_zeros(len(coefficients), 2 * d * modes)
+    z.index_add_(1, rows, coefficients[:, columns] * values)
+    a, b = z.reshape(-1, modes, 2, d).unbind(dim=2)
+    # largest singular value of the (d, 2) matrix [a, b]
+    half = (a.square().sum(-1) + b.square().sum(-1)) / 2
+    skew = (a.square().sum(-1) - b.square().sum(-1)) / 2
+    largest = (half + torch.hypot(skew, (a * b).sum(-1))).sqrt()
+    return 2.0 * math.pi * math.sqrt(2.0) * largest @ kappa

@@ -1,8 +1,9 @@
-"""The protocols of vector fields, and their derivatives.
+"""The protocol of vector fields, and their derivatives.
 
 A field is any callable from points (..., d) to vectors of the same shape: a function, a lambda, a torch
-module. Nothing else is required. These protocols find what else it offers; a method of one of these
-names must do what is described here.
+module. Nothing else is required. What else it offers is found by name; a method of one of these names
+must do what is described here. `jacobian` returns dV_i / dp_j (..., d, d), `divergence` (...,), and
+`lipschitz_bound` an upper bound of the Jacobian's spectral norm anywhere, () or (S,).
 
 | the field has | then |
 |---|---|
@@ -11,79 +12,36 @@ names must do what is described here.
 | `bound_with_divergence()` | V and its divergence come from shared work |
 | `lipschitz_bound()` | the accuracy of integration steps is judged without trying them |
 | `time_dependent` true | it is called as V(points, time), see `TimeDependentField` |
+| `with_divergence(points, time)`, if time-dependent | V and its divergence come from shared work |
+
+Built-in fields are evaluated by autograd functions with hand-written derivatives. Under `torch.func`
+ordinary operations compute the same sums: nested forward mode (`jacfwd` of `jacfwd`) through an
+autograd function is silently wrong in torch 2.13, even if the function has its own rules.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import torch
 from torch import Tensor, nn
+from torch.autograd import forward_ad
 
-from orbiflow.fields.transforms import transformed
+from orbiflow.errors import OrbiflowError
 
 VectorField = Callable[[Tensor], Tensor]
 """A map from points (..., d) to vectors (..., d)."""
 
 
 @runtime_checkable
-class HasJacobian(Protocol):
-    """A field that knows its Jacobian: dV_i / dp_j at points (..., d), as (..., d, d)."""
-
-    def __call__(self, points: Tensor, /) -> Tensor: ...
-
-    def jacobian(self, points: Tensor, /) -> Tensor: ...
-
-
-@runtime_checkable
-class HasDivergence(Protocol):
-    """A field that knows the trace of its Jacobian at points (..., d), as (...,)."""
-
-    def __call__(self, points: Tensor, /) -> Tensor: ...
-
-    def divergence(self, points: Tensor, /) -> Tensor: ...
-
-
-@runtime_checkable
-class Bindable(Protocol):
-    """A field that prepares itself: the same map, for parameters that stay as they are."""
-
-    def bound(self) -> VectorField: ...
-
-
-@runtime_checkable
-class BindableWithDivergence(Protocol):
-    """A field that prepares a function for V (..., d) and its divergence (...,) together."""
-
-    def bound_with_divergence(self) -> Callable[[Tensor], tuple[Tensor, Tensor]]: ...
-
-
-@runtime_checkable
-class HasLipschitzBound(Protocol):
-    """A field that knows an upper bound of its Jacobian's spectral norm anywhere: () or (S,)."""
-
-    def lipschitz_bound(self) -> Tensor: ...
-
-
-@runtime_checkable
 class TimeDependentField(Protocol):
     """A field V(x, t): called with points (..., d) and a time, a tensor of shape ().
 
-    It may have `with_divergence(points, time)`, giving V and its divergence in the points (...,).
     Mark a plain function by `time_dependent`.
     """
 
     time_dependent: bool
 
     def __call__(self, points: Tensor, time: Tensor, /) -> Tensor: ...
-
-
-@runtime_checkable
-class HasDivergenceInTime(Protocol):
-    """A time-dependent field that knows V and its divergence in the points together."""
-
-    def with_divergence(self, points: Tensor, time: Tensor, /) -> tuple[Tensor, Tensor]: ...
 
 
 class _Marked:
@@ -118,59 +76,49 @@ def is_time_dependent(field: object) -> bool:
 
 def jacobian(field: VectorField, points: Tensor) -> Tensor:
     """Return dV_i / dp_j at points (..., d), as (..., d, d): exact, d backward passes."""
-    if isinstance(field, HasJacobian):
-        return field.jacobian(points)
-    return _by_autograd(field, points, field)[1]
+    own: Any = getattr(field, "jacobian", None)
+    return own(points) if own else _by_autograd(field, points, field)[1]
 
 
 def divergence(field: VectorField, points: Tensor) -> Tensor:
     """Return the trace of the Jacobian at points (..., d), as (...,): exact."""
-    if isinstance(field, HasDivergence):
-        return field.divergence(points)
-    return _trace(jacobian(field, points))
+    own: Any = getattr(field, "divergence", None)
+    return own(points) if own else _trace(jacobian(field, points))
 
 
 def prepared(field: Callable[..., Tensor]) -> Callable[..., Tensor]:
     """Return a function with the field's arguments, for many evaluations at fixed parameters."""
-    return field.bound() if isinstance(field, Bindable) else field
+    own: Any = getattr(field, "bound", None)
+    return own() if own else field
 
 
 def prepared_with_divergence(field: Callable[..., Tensor]) -> Callable[..., tuple[Tensor, Tensor]]:
     """Return, as `prepared` does, a function for V and its divergence, sharing work if possible."""
-    if is_time_dependent(field):
-        if isinstance(field, HasDivergenceInTime):
-            return field.with_divergence
+    own: Any = field
+    timed = is_time_dependent(field)
+    if timed and hasattr(field, "with_divergence"):
+        return own.with_divergence
+    if not timed and hasattr(field, "bound_with_divergence"):
+        return own.bound_with_divergence()
+    in_closed_form = not timed and (hasattr(field, "divergence") or hasattr(field, "jacobian"))
 
-        def in_time(points: Tensor, time: Tensor) -> tuple[Tensor, Tensor]:
-            return _with_trace(lambda p: field(p, time), points, field)
-
-        return in_time
-    if isinstance(field, BindableWithDivergence):
-        return field.bound_with_divergence()
-    in_closed_form = isinstance(field, HasDivergence | HasJacobian)
-
-    def both(points: Tensor) -> tuple[Tensor, Tensor]:
+    def both(points: Tensor, *time: Tensor) -> tuple[Tensor, Tensor]:
         if in_closed_form:
             return field(points), divergence(field, points)
-        return _with_trace(field, points, field)
+        values, slopes = _by_autograd(lambda p: field(p, *time), points, field)
+        return values, _trace(slopes)
 
     return both
 
 
 def lipschitz_bound(field: object) -> float | None:
     """Return the field's own bound of its Jacobian's spectral norm, or None if it has none."""
-    if isinstance(field, HasLipschitzBound):
-        return float(field.lipschitz_bound().max())
-    return None
+    own: Any = getattr(field, "lipschitz_bound", None)
+    return float(own().max()) if own else None
 
 
 def _trace(slopes: Tensor) -> Tensor:
     return slopes.diagonal(dim1=-2, dim2=-1).sum(dim=-1)
-
-
-def _with_trace(function: VectorField, points: Tensor, owner: object) -> tuple[Tensor, Tensor]:
-    values, slopes = _by_autograd(function, points, owner)
-    return values, _trace(slopes)
 
 
 def _by_autograd(function: VectorField, points: Tensor, owner: object) -> tuple[Tensor, Tensor]:
@@ -185,16 +133,9 @@ def _by_autograd(function: VectorField, points: Tensor, owner: object) -> tuple[
         values = function(inputs)
         if not values.requires_grad:  # a constant field
             return values, points.new_zeros(*points.shape, points.shape[-1])
-        rows = [
-            torch.autograd.grad(
-                values[..., i].sum(),
-                inputs,
-                create_graph=keep,
-                retain_graph=True,
-                materialize_grads=True,
-            )[0]
-            for i in range(points.shape[-1])
-        ]
+        options: Any = {"create_graph": keep, "retain_graph": True, "materialize_grads": True}
+        sums = [values[..., i].sum() for i in range(points.shape[-1])]
+        rows = [torch.autograd.grad(total, inputs, **options)[0] for total in sums]
     return values if keep else values.detach(), torch.stack(rows, dim=-2)
 
 
@@ -213,3 +154,52 @@ def _is_differentiable(function: VectorField, points: Tensor, owner: object) -> 
         return True
     # a plain function may use parameters that show only in its values
     return function(points).requires_grad
+
+
+# torch uses these itself, but has neither public names nor types for them
+_core: Any = torch._C  # pyright: ignore[reportPrivateUsage]
+_forward_mode: Any = forward_ad
+
+
+def transformed() -> bool:
+    """Return whether `torch.func` (vmap, grad, jvp and what builds on them) or forward mode is active.
+
+    Tensors may then stand for batches, or carry tangents. torch has no public function for this; its
+    own autograd functions ask the same.
+    """
+    return _core._are_functorch_transforms_active() or _forward_mode._current_level >= 0
+
+
+def plain_gradients(
+    function: Callable[..., Any], inputs: tuple[Tensor, ...], ctx: Any, cotangents: Any
+) -> list[Tensor | None]:
+    """Return the gradients of `function`, written in ordinary operations, for a backward pass.
+
+    They can be differentiated in any mode and batched; None for inputs that need no gradient.
+    """
+    needed = ctx.needs_input_grad[: len(inputs)]
+    if not transformed():
+        # views, because one input may depend on another: the gradient would follow that path here
+        # and again in the outer pass
+        inputs = tuple(t.view_as(t) for t in inputs)
+        chosen = [t for n, t in zip(needed, inputs, strict=True) if n]
+        values = function(*inputs)
+        gradients = iter(torch.autograd.grad(values, chosen, cotangents, create_graph=True))
+        return [next(gradients) if n else None for n in needed]
+
+    def of_wanted(*wanted: Tensor) -> Any:
+        given = iter(wanted)
+        return function(*(next(given) if n else t for n, t in zip(needed, inputs, strict=True)))
+
+    wanted = [t for n, t in zip(needed, inputs, strict=True) if n]
+    found = iter(torch.func.vjp(of_wanted, *wanted)[1](cotangents))
+    return [next(found) if n else None for n in needed]
+
+
+def refuse_old_batches(*gradients: Tensor) -> None:
+    """Refuse gradients that torch's older vectorization has batched."""
+    if any(_core._functorch.is_legacy_batchedtensor(gradient) for gradient in gradients):
+        raise OrbiflowError(
+            "a field cannot be differentiated with vectorize=True or is_grads_batched=True: "
+            "torch.func.vmap(torch.func.jacrev(field))(points) gives its Jacobians"
+        )

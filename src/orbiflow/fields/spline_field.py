@@ -1,7 +1,5 @@
 """Symmetric fields evaluated by splines, at a cost that does not grow with the frequency."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 
@@ -11,19 +9,13 @@ from torch import Tensor
 
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
-from orbiflow.fields.invariants import (
-    InvariantBasis,
-    InvariantField,
-    constant_tensors,
-    invariant_basis,
-    sobolev_weights,
-)
+from orbiflow.fields.invariants import InvariantBasis, InvariantField
 from orbiflow.fields.splines import padded, spline_sum, spline_sum_with_divergence, symbol
-from orbiflow.symmetry import CrystallographicGroup, cached_by_basis
+from orbiflow.symmetry import CrystallographicGroup
 from orbiflow.typed_torch import fft, linalg
 
+# the least number of grid points on the shortest wave, for an error of about 2 per cent
 POINTS_PER_WAVE = 3
-"""The least number of grid points on the shortest wave, for an error of about 2 per cent."""
 
 
 class SplineField(InvariantField):
@@ -41,8 +33,7 @@ class SplineField(InvariantField):
     Shapes:
         `parameters_`: (P,). Points (..., d).
 
-    Raises:
-        OrbiflowError: for another group, or a `max_frequency` out of range.
+    Raises `OrbiflowError` for another group, or a `max_frequency` out of range.
 
     >>> from orbiflow.symmetry import wallpaper_group
     >>> SplineField(wallpaper_group("p4"), 5).sides
@@ -62,10 +53,33 @@ class SplineField(InvariantField):
         self.sides = grid_sides(group, self.basis)
         lengths = np.diag(group.lattice)
         self._per_length = tuple(float(m / a) for m, a in zip(self.sides, lengths, strict=True))
-        self._fill_buffers()
 
-    def _constants(self, dtype: torch.dtype, device: torch.device) -> dict[str, Tensor]:
-        return _constants(self.group, self.max_frequency, self.smoothness, dtype, device)
+    @staticmethod
+    def layout(group: CrystallographicGroup, basis: InvariantBasis) -> tuple[Array, Array, Array]:
+        """Return the basis as sparse (row, column, value) of the half spectrum's real numbers.
+
+        sqrt 2 (a cos + b sin) is (a - i b) / sqrt 2 at k and its conjugate at -k; divided by the
+        B-splines' own transform, so that the spline goes through the field's values.
+        """
+        d, sides = group.dim, grid_sides(group, basis)
+        mode, within = basis.rows // (2 * d), basis.rows % (2 * d)
+        is_sine, component = within // d, within % d
+        k = basis.frequencies[mode]
+        constant = ~k.any(axis=1)
+        strength = np.where(constant, 1.0, math.sqrt(0.5))
+        for axis, side in enumerate(sides):
+            strength = strength / symbol(side).numpy()[k[:, axis] % side]
+        entries: list[tuple[Array, Array, Array]] = []
+        for sign in (1, -1):
+            image = sign * k
+            keep = (image[:, -1] >= 0) & (~constant if sign < 0 else True)
+            flat = component.copy()
+            for axis, side in enumerate((*sides[:-1], sides[-1] // 2 + 1)):
+                flat = flat * side + (image[:, axis] % side if axis < d - 1 else image[:, axis])
+            weights = basis.values * strength * np.where(is_sine, -sign, 1)
+            entries.append(((2 * flat + is_sine)[keep], basis.columns[keep], weights[keep]))
+        rows, columns, values = (np.concatenate(part) for part in zip(*entries, strict=True))
+        return rows, columns, values
 
     def table(self) -> Tensor:
         """Return the spline's coefficients (d, M_1, ..., M_d)."""
@@ -136,9 +150,6 @@ def grid_sides(group: CrystallographicGroup, basis: InvariantBasis) -> tuple[int
     """Return the number of points along each lattice vector of a grid that the group preserves.
 
     The points are equally spaced.
-
-    Raises:
-        OrbiflowError: if there is no such grid.
     """
     lengths = np.diag(group.lattice)
     permute = np.abs(group.linear_parts)
@@ -161,47 +172,3 @@ def grid_sides(group: CrystallographicGroup, basis: InvariantBasis) -> tuple[int
     if not np.allclose(sides, np.round(sides)) or not np.allclose(shifts, np.round(shifts)):
         raise OrbiflowError(f"no even grid is mapped to itself by {group!r}: use FourierField")
     return tuple(round(m) for m in sides)
-
-
-@cached_by_basis(maxsize=64)  # the segments of a flow share them
-@torch.inference_mode(False)  # cached in inference mode, they could never be trained
-def _constants(
-    group: CrystallographicGroup,
-    max_frequency: int,
-    smoothness: float,
-    dtype: torch.dtype,
-    device: torch.device,
-) -> dict[str, Tensor]:
-    basis = invariant_basis(group, max_frequency)
-    layout = _spectrum_layout(basis, grid_sides(group, basis))
-    scale = sobolev_weights(group, basis, smoothness)
-    return constant_tensors(layout, dtype, device, scale=scale)
-
-
-def _spectrum_layout(basis: InvariantBasis, sides: tuple[int, ...]) -> tuple[Array, Array, Array]:
-    """Return the invariant basis as sparse (row, column, value) of the half spectrum's real numbers.
-
-    sqrt 2 (a cos + b sin) is (a - i b) / sqrt 2 at k and its conjugate at -k; divided by the
-    B-splines' own transform, so that the spline goes through the field's values.
-    """
-    d = len(sides)
-    mode, within = basis.rows // (2 * d), basis.rows % (2 * d)
-    is_sine, component = within // d, within % d
-    k = basis.frequencies[mode]
-    constant = ~k.any(axis=1)
-    strength = np.where(constant, 1.0, math.sqrt(0.5))
-    for axis, side in enumerate(sides):
-        strength = strength / symbol(side).numpy()[k[:, axis] % side]
-    rows: list[Array] = []
-    columns: list[Array] = []
-    values: list[Array] = []
-    for sign in (1, -1):
-        image = sign * k
-        keep = (image[:, -1] >= 0) & (~constant if sign < 0 else True)
-        flat = component.copy()
-        for axis, side in enumerate((*sides[:-1], sides[-1] // 2 + 1)):
-            flat = flat * side + (image[:, axis] % side if axis < d - 1 else image[:, axis])
-        rows.append((2 * flat + is_sine)[keep])
-        columns.append(basis.columns[keep])
-        values.append((basis.values * strength * np.where(is_sine, -sign, 1))[keep])
-    return np.concatenate(rows), np.concatenate(columns), np.concatenate(values)

@@ -6,8 +6,6 @@ derivatives, because the divergence is a result too; cubic splines have them eve
 differentiates the backward pass itself.
 """
 
-from __future__ import annotations
-
 import math
 from functools import lru_cache, partial
 from typing import Any
@@ -16,11 +14,10 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from orbiflow.fields.transforms import plain_gradients, refuse_old_batches, transformed
+from orbiflow.fields.protocol import plain_gradients, refuse_old_batches, transformed
 from orbiflow.typed_torch import applied
 
-TAPS = 4
-"""The number of coefficients along an axis that a cubic spline's value depends on."""
+TAPS = 4  # the number of coefficients along an axis that a cubic spline's value depends on
 
 
 @lru_cache(maxsize=16)
@@ -37,10 +34,6 @@ def _polynomials(orders: int, dtype: torch.dtype, device: torch.device) -> Tenso
 
 def cubic_weights(fraction: Tensor, orders: int = 1) -> Tensor:
     """Return weights (d, orders, 4, N) of the four nearest B-splines, and of their derivatives.
-
-    Args:
-        fraction: The positions (d, N) in a cell, 0 to 1.
-        orders: 1 for values only, 2 or 3 for first and second derivatives as well.
 
     >>> float(cubic_weights(torch.tensor([[0.25]])).sum())
     1.0
@@ -216,17 +209,13 @@ def spline_sum(table: Tensor, u: Tensor) -> Tensor:
     First derivatives in both arguments are in closed form; higher ones, and those of `torch.func`, use
     ordinary operations. A cubic spline's third derivatives are constant in each cell.
     """
-    return _sum(table, u, None)[0]
+    return spline_sum_with_divergence(table, u, None)[0]
 
 
 def spline_sum_with_divergence(
-    table: Tensor, u: Tensor, rates: tuple[float, ...]
+    table: Tensor, u: Tensor, rates: tuple[float, ...] | None
 ) -> tuple[Tensor, Tensor]:
     """Return `spline_sum` of a vector field (C = d), and sum_i rates_i d value_i / du_i (N,)."""
-    return _sum(table, u, rates)
-
-
-def _sum(table: Tensor, u: Tensor, rates: tuple[float, ...] | None) -> tuple[Tensor, Tensor]:
     if transformed():
         return _plain_sum(table, u, rates)  # pyright: ignore[reportReturnType]
     return applied(_SplineSum, table, u, rates)

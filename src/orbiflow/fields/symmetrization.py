@@ -1,12 +1,12 @@
 """Symmetrization, which makes any vector field commute with a crystallographic group.
 
 The mean over coset representatives (Reynolds operator, design point 2) and the paper's three
-operators (equations for P_B, R_c^K and G_l^mu of section 3), which are unnormalised sums.
+operators (equations for P_B, R_c^K and G_l^mu of section 3), which are unnormalised sums; and networks
+that are periodic by themselves.
 """
 
-from __future__ import annotations
-
 import itertools
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -15,6 +15,7 @@ import torch
 from numpy.typing import ArrayLike
 from torch import Tensor, nn
 
+from orbiflow.errors import OrbiflowError
 from orbiflow.fields.protocol import VectorField, is_time_dependent, prepared_with_divergence
 from orbiflow.symmetry import (
     CrystallographicGroup,
@@ -25,7 +26,7 @@ from orbiflow.symmetry import (
     rotation,
     transflection,
 )
-from orbiflow.typed_torch import linalg
+from orbiflow.typed_torch import linalg, random
 
 
 class Symmetrized(nn.Module):
@@ -57,10 +58,9 @@ class Symmetrized(nn.Module):
         """
         images = self.group.images(points)
         joint = _at_time(prepared_with_divergence(self.field), time)
-        if not self.periodic:
-            values, divergence = blend_with_divergence(joint, self.group.lattice, images)
-        else:
-            values, divergence = joint(images)
+        lattice = self.group.lattice
+        both = joint(images) if self.periodic else blend_with_divergence(joint, lattice, images)
+        values, divergence = both
         return self._mean(values, points), divergence.mean(dim=0)
 
     def divergence(self, points: Tensor, *time: Tensor) -> Tensor:
@@ -160,30 +160,93 @@ def _inverse(lattice: ArrayLike, like: Tensor) -> Tensor:
 def periodic_operator(field: VectorField, lattice: ArrayLike) -> VectorField:
     """Return P_B(V) = B o V o B^-1: a field with period 1 on each axis becomes B-periodic (eq. P_B)."""
     basis = torch.as_tensor(np.array(lattice), dtype=torch.float64)
-
-    def operated(points: Tensor) -> Tensor:
-        b = basis.to(points)
-        return field(points @ linalg.inv(b).mT) @ b.mT
-
-    return operated
+    return lambda points: field(points @ _inverse(lattice, points).mT) @ basis.to(points).mT
 
 
 def rotation_operator(field: VectorField, center: ArrayLike, order: int) -> VectorField:
     """Return R_c^K(V) = sum over k = 1..K of R_o^-k o V o R_c^k (eq. R_c^K): a sum, not a mean."""
-    turn = rotation(center, order)
-    powers = [identity(2)]
-    for _ in range(order - 1):
-        powers.append(turn @ powers[-1])
-    return _summed(field, powers)
+    return summed_over_powers(field, rotation(center, order), order)
 
 
 def transflection_operator(field: VectorField, line: Line, mu: float) -> VectorField:
     """Return G_l^mu(V) = V + M_l0 o V o T_l^mu o M_l (eq. G_l^mu): a sum, not a mean."""
-    return _summed(field, [identity(2), transflection(line, mu)])
+    return summed_over_powers(field, transflection(line, mu), 2)
 
 
-def _summed(field: VectorField, elements: list[Isometry]) -> VectorField:
-    def operated(points: Tensor) -> Tensor:
-        return torch.stack([g.inverse().push(field(g(points))) for g in elements]).sum(dim=0)
+def summed_over_powers(field: VectorField, isometry: Isometry, terms: int) -> VectorField:
+    """Return the sum over k < terms of g^-k o V o g^k for an isometry g: an operator of the paper."""
+    powers = [identity(isometry.dim)]
+    for _ in range(terms - 1):
+        powers.append(isometry @ powers[-1])
+    return lambda points: torch.stack([g.inverse().push(field(g(points))) for g in powers]).sum(
+        dim=0
+    )
 
-    return operated
+
+class PeriodicFeatures(nn.Module):
+    """Periodic features of points (..., d): cosines and sines of low frequencies, (..., 2 M).
+
+    Args:
+        group: The group whose lattice is the period.
+        max_frequency: The largest frequency. If d <= 3, all k in [-max, max]^d are taken up to sign,
+            without 0; in higher dimensions only the multiples 1..max of each axis.
+
+    Raises `OrbiflowError` if `max_frequency` < 1 or `group` is no group.
+    """
+
+    frequencies: Tensor
+
+    def __init__(self, group: CrystallographicGroup, max_frequency: int = 1) -> None:
+        super().__init__()
+        if max_frequency < 1:
+            raise OrbiflowError(f"max_frequency must be at least 1, got {max_frequency}")
+        d = checked_group(group).dim
+        if d <= 3:
+            box = itertools.product(range(-max_frequency, max_frequency + 1), repeat=d)
+            k = np.array([v for v in box if v > (0,) * d], dtype=np.float64)
+        else:
+            k = np.concatenate([m * np.eye(d) for m in range(1, max_frequency + 1)])
+        with torch.inference_mode(False):  # otherwise it could never be differentiated
+            waves = torch.tensor(k @ group.inverse_lattice)
+        self.group, self.max_frequency = group, max_frequency
+        self.register_buffer("frequencies", waves, persistent=False)
+
+    @property
+    def size(self) -> int:
+        """Number of features 2 M."""
+        return 2 * self.frequencies.shape[0]
+
+    def forward(self, points: Tensor) -> Tensor:
+        """Return features of shape (..., 2 M)."""
+        phase = 2.0 * math.pi * points @ self.frequencies.to(points).mT
+        return torch.cat([phase.cos(), phase.sin()], dim=-1)
+
+
+@torch.inference_mode(False)  # its divergence is taken by autograd
+def neural_field(
+    group: CrystallographicGroup,
+    *,
+    hidden: tuple[int, ...] = (64, 64),
+    max_frequency: int = 1,
+    seed: int = 0,
+    dtype: torch.dtype = torch.float64,
+) -> Symmetrized:
+    """Return a multilayer perceptron on periodic features, symmetrized over `group`.
+
+    The last layer starts at zero, so the flow starts at the identity. The same seed gives the same
+    weights; the global random state does not change.
+    """
+    features = PeriodicFeatures(group, max_frequency)
+    sizes = (features.size, *hidden, group.dim)
+    layers: list[nn.Module] = [features]
+    with random.fork_rng(devices=[]):
+        random.manual_seed(seed)
+        for i, (a, b) in enumerate(itertools.pairwise(sizes)):
+            layers.append(nn.Linear(a, b, dtype=dtype))
+            if i < len(sizes) - 2:
+                layers.append(nn.Tanh())
+    last = layers[-1]
+    assert isinstance(last, nn.Linear)  # by construction
+    nn.init.zeros_(last.weight)
+    nn.init.zeros_(last.bias)
+    return Symmetrized(nn.Sequential(*layers), group, periodic=True)

@@ -1,7 +1,5 @@
 """The flow of vector fields: a diffeomorphism, its inverse and its log-determinant."""
 
-from __future__ import annotations
-
 import contextlib
 import copy
 from collections.abc import Callable, Iterable, Iterator
@@ -27,8 +25,8 @@ from orbiflow.typed_torch import linalg
 AnyField = VectorField | TimeDependentField
 State = tuple[Tensor, ...]
 
+# the number of coordinates from which several threads can be faster than one
 MULTITHREADED_COORDINATES = 2**17
-"""The number of coordinates from which several threads can be faster than one."""
 
 
 class _FunctionSegment(nn.Module):
@@ -58,9 +56,8 @@ class Flow(nn.Module):
         duration: The length of time of each segment.
         warn: Whether to check, for new parameters, that the steps are fine enough.
 
-    Raises:
-        OrbiflowError: for no field, `steps` < 1 or an unknown method; when called, for points of a
-            dtype or shape that the fields do not take, or a field whose values have another shape.
+    Raises `OrbiflowError` for no field, `steps` < 1 or an unknown method; when called, for points
+    of a dtype or shape that the fields do not take, or a field whose values have another shape.
 
     Warns:
         CoarseStepsWarning: once, when called, if the steps are too coarse for the fields.
@@ -83,24 +80,21 @@ class Flow(nn.Module):
         warn: bool = True,
     ) -> None:
         super().__init__()
-        if isinstance(fields, nn.ModuleList) or not callable(fields):
-            listed: list[Any] = list(fields)
-        else:
-            listed = [fields]
+        given: Any = fields
+        several = isinstance(fields, nn.ModuleList) or not callable(fields)
+        listed: list[Any] = list(given) if several else [given]
         if not listed:
             raise OrbiflowError("a flow needs at least one vector field")
         for field in listed:
             if not callable(field):
-                raise OrbiflowError(
-                    f"a field is a callable from points to vectors, got {field!r}: see "
-                    "orbiflow.fields"
-                )
+                how = "a field is a callable from points to vectors"
+                raise OrbiflowError(f"{how}, got {field!r}: see orbiflow.fields")
         self.segments = nn.ModuleList(
             f if isinstance(f, nn.Module) else _FunctionSegment(f) for f in listed
         )
         self._duration = float(duration)
         self._steps = _checked_steps(steps)
-        self._method: RungeKutta = runge_kutta(method)
+        self.integrator: RungeKutta = runge_kutta(method)
         self._step_check = StepCheck() if warn else None
 
     @property
@@ -109,19 +103,14 @@ class Flow(nn.Module):
         return self._steps
 
     @property
-    def method(self) -> str:
-        """Name of the integrator."""
-        return self._method.name
-
-    @property
-    def integrator(self) -> RungeKutta:
-        """The integrator."""
-        return self._method
-
-    @property
     def duration(self) -> float:
         """Length of time of each segment."""
         return self._duration
+
+    @property
+    def method(self) -> str:
+        """Name of the integrator."""
+        return self.integrator.name
 
     @property
     def warns(self) -> bool:
@@ -141,8 +130,7 @@ class Flow(nn.Module):
             steps: The number of Runge-Kutta steps in each segment.
             method: As in the constructor. Default: this flow's.
 
-        Raises:
-            OrbiflowError: for `steps` < 1 or an unknown method.
+        Raises `OrbiflowError` for `steps` < 1 or an unknown method.
 
         >>> flow = Flow(torch.sin, steps=8)
         >>> flow.with_steps(2 * flow.steps).steps, flow.steps
@@ -151,7 +139,7 @@ class Flow(nn.Module):
         view = copy.copy(self)  # shallow: it shares modules and parameters
         view._steps = _checked_steps(steps)
         if method is not None:
-            view._method = runge_kutta(method)
+            view.integrator = runge_kutta(method)
         view._step_check = None if self._step_check is None else StepCheck()
         return view
 
@@ -211,8 +199,7 @@ class Flow(nn.Module):
 
     def _with_log_det(self, points: Tensor, *, inverse: bool) -> tuple[Tensor, Tensor]:
         start = (points, points.new_zeros(points.shape[:-1]))
-        moved, log_det = self._last(points, start, inverse=inverse)
-        return moved, log_det
+        return self._last(points, start, inverse=inverse)  # pyright: ignore[reportReturnType]
 
     def _last(self, points: Tensor, start: State, *, inverse: bool) -> State:
         last = start
@@ -237,7 +224,7 @@ class Flow(nn.Module):
                 one = state[0].new_ones(())
                 state = (*state, one * (self.duration if inverse else 0.0))
             for _ in range(self.steps):
-                state = self._method.step(slope, state, h)
+                state = self.integrator.step(slope, state, h)
                 yield state[:size]
             state = state[:size]
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 import contextlib
 import math
 import warnings
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, TypeVar
@@ -116,25 +116,17 @@ METHODS: dict[str, RungeKutta] = {
 def method(name: str) -> RungeKutta:
     """Look a method up.
 
-    Raises:
-        OrbiflowError: for an unknown name.
+    Raises `OrbiflowError` for an unknown name.
     """
     if name not in METHODS:
         raise OrbiflowError(f"unknown integrator {name!r}; choose from {', '.join(METHODS)}")
     return METHODS[name]
 
 
-CHECKED_POINTS = 128
-"""The number of points that are also moved with twice the steps."""
-
-COARSE_ERROR = 0.05
-"""The largest accepted error, as a share of the distance that the points move."""
-
-FINE_ERROR = 1e-4
-"""The largest error with the number of steps that a warning advises."""
-
-MAX_ADVISED_STEPS = 1024
-"""The largest number of steps that a warning tries."""
+CHECKED_POINTS = 128  # the number of points that are also moved with twice the steps
+COARSE_ERROR = 0.05  # the largest accepted error, as a share of the distance that the points move
+FINE_ERROR = 1e-4  # the largest error with the number of steps that a warning advises
+MAX_ADVISED_STEPS = 1024  # the largest number of steps that a warning tries
 
 
 class StepCheck:
@@ -146,11 +138,7 @@ class StepCheck:
         self._calls, self._next = 0, 1
 
     def look(self, flow: Flow, points: Tensor, *, inverse: bool) -> None:
-        """Warn if `flow` moves some of `points` (..., d) elsewhere with twice its steps.
-
-        Warns:
-            CoarseStepsWarning: with the error found and how many steps to take.
-        """
+        """Warn if `flow` moves some of `points` (..., d) elsewhere with twice its steps."""
         if self.warned or transformed() or points.numel() == 0 or not self._is_due(flow):
             return  # under the transforms of torch there are no numbers to check
         # the check must not break a flow that is being traced
@@ -178,7 +166,10 @@ class StepCheck:
 def _warning(flow: Flow, points: Tensor, inverse: bool) -> str:
     if _provably_fine(flow):
         return ""
-    few = _sampled(points.detach())
+    # a sample of the points; the first axes may be those of a stack of fields
+    few, count = points.detach(), points.shape[-2] if points.dim() > 1 else 0
+    if count > CHECKED_POINTS:
+        few = few[..., [i * count // CHECKED_POINTS for i in range(CHECKED_POINTS)], :]
     error = _relative_error(flow, few, inverse)
     if not error > COARSE_ERROR:
         return ""
@@ -204,15 +195,6 @@ def _provably_fine(flow: Flow) -> bool:
     product = abs(flow.duration) / flow.steps * max(known)
     order = flow.integrator.order
     return product**order / math.factorial(order + 1) <= COARSE_ERROR / 10
-
-
-def _sampled(points: Tensor) -> Tensor:
-    """Return a sample of the points; the first axes may be those of a stack of fields."""
-    if points.dim() < 2 or points.shape[-2] <= CHECKED_POINTS:
-        return points
-    count = points.shape[-2]
-    chosen: Iterable[int] = (i * count // CHECKED_POINTS for i in range(CHECKED_POINTS))
-    return points[..., list(chosen), :]
 
 
 def _relative_error(flow: Flow, points: Tensor, inverse: bool) -> float:

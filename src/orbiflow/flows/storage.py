@@ -1,7 +1,5 @@
 """Flows on disk: safetensors, never pickle."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -18,8 +16,8 @@ from orbiflow.flows.flow import Flow
 from orbiflow.runtime import is_list, read_tensors, tensor_bytes, write_atomic
 from orbiflow.symmetry import CrystallographicGroup, group_from_header, group_header
 
+# functions that create a user's own fields, by the name or the place of the field
 FieldFactories = Mapping[str, Callable[[], Any]]
-"""Functions that create a user's own fields, by the name or the place of the field."""
 
 MAX_GROUPS, MAX_LAYERS, MAX_NESTING, MAX_FREQUENCY = 64, 64, 4, 10**6
 
@@ -41,22 +39,14 @@ class Writer:
         self.groups: list[dict[str, Any]] = []
 
     def header(self, field: Any, place: str) -> dict[str, Any]:
-        """Return the field at `place` in the flow, ready for JSON.
-
-        Raises:
-            OrbiflowError: for a function without a name.
-        """
+        """Return the field at `place` in the flow, ready for JSON."""
         kind = type(cast(object, field))
         if kind in _SERIES_NAMES:
             return self._series(field)
         if kind is Symmetrized:
             inner = self.header(field.field, f"{place}.field")
-            return {
-                "kind": "symmetrized",
-                "group": self._group(field.group),
-                "periodic": field.periodic,
-                "field": inner,
-            }
+            own = {"group": self._group(field.group), "periodic": field.periodic, "field": inner}
+            return {"kind": "symmetrized", **own}
         if is_perceptron(field):
             features, *layers = field
             linear = [layer for layer in layers if isinstance(layer, nn.Linear)]
@@ -100,11 +90,7 @@ class Reader:
         self.shapes, self.makers = shapes, makers
 
     def field(self, header: Mapping[str, Any], place: str, nesting: int = 0) -> Any:
-        """Return the field whose tensors' names begin with `place`.
-
-        Raises:
-            OrbiflowError, KeyError, TypeError, ValueError: for what does not fit.
-        """
+        """Return the field whose tensors' names begin with `place`."""
         if nesting > MAX_NESTING:
             raise OrbiflowError(f"fields are nested more than {MAX_NESTING} deep")
         kind = header["kind"]
@@ -209,11 +195,6 @@ def _dtype(tensor: torch.Tensor) -> str:
     return name
 
 
-def finite(value: Any, name: str) -> float:
-    """Return `value` if it is a finite number."""
-    return number(value, name, -math.inf)
-
-
 FORMAT = "orbiflow-flow/1"
 MAX_SEGMENTS, MAX_STEPS = 256, 2**20
 
@@ -251,15 +232,9 @@ def save_flow(flow: Flow, path: str | Path) -> Path:
         segments.append(
             {"kind": "same", "segment": first} if first < index else writer.header(field, place)
         )
-    header = {
-        "format": FORMAT,
-        "groups": writer.groups,
-        "segments": segments,
-        "steps": flow.steps,
-        "method": flow.method,
-        "duration": flow.duration,
-        "warn": flow.warns,
-    }
+    settings = {name: getattr(flow, name) for name in ("steps", "method", "duration")}
+    header = {"format": FORMAT, "groups": writer.groups, "segments": segments, **settings}
+    header["warn"] = flow.warns
     return write_atomic(path, tensor_bytes(header, tensors, "a flow"))
 
 
@@ -272,9 +247,8 @@ def load_flow(path: str | Path, *, modules: FieldFactories | None = None) -> Flo
             class or function, or by its place such as "segments.0.field". Its parameters are filled
             in. Nothing in a file is ever run.
 
-    Raises:
-        InputFileError: if the file is missing, too large, damaged or of another kind, or asks for a
-            field that is not among `modules`.
+    Raises `InputFileError` if the file is missing, too large, damaged or of another kind, or asks
+    for a field that is not among `modules`.
 
     >>> import tempfile
     >>> from orbiflow.fields import FourierField
@@ -313,7 +287,7 @@ def _restored(
         fields,
         steps=whole(header["steps"], "steps", 1, MAX_STEPS),
         method=str(header["method"]),
-        duration=finite(header["duration"], "duration"),
+        duration=number(header["duration"], "duration", -math.inf),
         warn=bool(header["warn"]),
     )
     _fill(flow, tensors)

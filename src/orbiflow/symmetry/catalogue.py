@@ -1,7 +1,5 @@
 """The 17 wallpaper groups and the groups of the four identification spaces, as tables."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np
@@ -70,8 +68,7 @@ def wallpaper_group(name: str, lattice: ArrayLike | None = None) -> Crystallogra
         name: The group's name, one of `WALLPAPER_GROUPS`.
         lattice: The basis vectors as columns, shape (2, 2). Default: a lattice of the group's system.
 
-    Raises:
-        GroupError: for an unknown name, or a lattice that is not of the group's system.
+    Raises `GroupError` for an unknown name, or a lattice that is not of the group's system.
 
     >>> wallpaper_group("p6m").order
     12
@@ -124,8 +121,7 @@ IDENTIFICATION_SPACES: dict[str, IdentificationSpace] = {
 def identification_group(space: str) -> CrystallographicGroup:
     """Return the group of an identification space, with canonical square [0, 1]^2.
 
-    Raises:
-        GroupError: for an unknown space.
+    Raises `GroupError` for an unknown space.
     """
     if space not in IDENTIFICATION_SPACES:
         raise GroupError(

@@ -1,15 +1,19 @@
-"""Rotation centres and mirror and glide lines of a plane group, found from the group itself."""
+"""What a group makes of space: rotation centres, mirror and glide lines, Dirichlet domains.
 
-from __future__ import annotations
+Dirichlet domains contain one point of each orbit. All are found from the group itself.
+"""
 
-from typing import NamedTuple
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from orbiflow.arguments import is_tensor
 from orbiflow.arrays import Array
 from orbiflow.errors import GroupError
 from orbiflow.symmetry.group import CrystallographicGroup
-from orbiflow.symmetry.isometry import Isometry, Line
+from orbiflow.symmetry.isometry import Isometry, Line, Points, cast_like
 
 
 class RotationCenter(NamedTuple):
@@ -48,8 +52,7 @@ def symmetry_elements(
         center: The centre (2,) of the disc. Default: the middle of the cell B [0, 1)^2.
         radius: The radius of the disc. Default: the cell's, so that every orbit is represented.
 
-    Raises:
-        GroupError: if the group is not one of the plane.
+    Raises `GroupError` if the group is not one of the plane.
 
     >>> from orbiflow.symmetry import wallpaper_group
     >>> found = symmetry_elements(wallpaper_group("p4"), np.zeros(2), 0.1)
@@ -109,7 +112,65 @@ def _axis(g: Isometry, middle: Array, reach: float) -> GlideLine:
 
 def _same(first: GlideLine, second: GlideLine, reach: float) -> bool:
     # the points are feet of perpendiculars from one point, so equal lines have equal points
-    parallel = (
-        abs(float(np.linalg.det(np.stack([first.line.direction, second.line.direction])))) < 1e-6
-    )
-    return parallel and bool(np.linalg.norm(first.line.point - second.line.point) < 1e-6 * reach)
+    (ux, uy), (vx, vy) = first.line.direction, second.line.direction
+    apart = np.linalg.norm(first.line.point - second.line.point)
+    return bool(abs(ux * vy - uy * vx) < 1e-6 and apart < 1e-6 * reach)
+
+
+class DirichletDomain:
+    """The fundamental domain of the points nearer to `site` than to any other point of its orbit.
+
+    For the four identification spaces and the site (1/2, 1/2) it is the paper's canonical square,
+    and `project` the canonical projection (paper, section 5.2; design point 12).
+
+    Args:
+        group: Any crystallographic group.
+        site: A point (d,) that every element but the identity moves.
+
+    Raises `GroupError` if an element fixes the site.
+    """
+
+    def __init__(self, group: CrystallographicGroup, site: ArrayLike) -> None:
+        self.group = group
+        self.site = np.asarray(site, dtype=np.float64)
+        if self.site.shape != (group.dim,) or not np.isfinite(self.site).all():
+            raise GroupError(f"the site must be {group.dim} finite numbers, got {site!r}")
+        size = group.cell_volume ** (1 / group.dim)
+        for g in group.elements_near(self.site, 1e-6 * size)[1:]:
+            raise GroupError(f"the site {self.site.tolist()} is fixed by {g!r}: choose another")
+
+    @cached_property
+    def _candidates(self) -> list[Isometry]:
+        # every point of the cell lies within `diameter` of some image of the site
+        center = self.group.lattice.sum(axis=1) / 2
+        diameter = float(np.linalg.norm(self.group.lattice, axis=0).sum())
+        return self.group.elements_near(center, 1.5 * diameter, source=self.site)
+
+    @cached_property
+    def _sites(self) -> Array:
+        return np.stack([g(self.site) for g in self._candidates])
+
+    def locate(self, points: Points) -> tuple[Points, Array]:
+        """Return the points wrapped to the lattice cell, and the nearest image of the site."""
+        wrapped = self.group.wrap(points)
+        own: Any = wrapped
+        plain: Array = own.detach().cpu().numpy() if is_tensor(own) else own
+        flat = np.asarray(plain, dtype=np.float64).reshape(-1, self.group.dim)
+        nearest = np.empty(len(flat), dtype=np.int64)
+        for start in range(0, len(flat), 65536):  # bounds the distance table
+            block = flat[start : start + 65536]
+            squared = (self._sites**2).sum(axis=1) - 2.0 * block @ self._sites.T
+            nearest[start : start + 65536] = squared.argmin(axis=1)
+        return wrapped, nearest.reshape(plain.shape[:-1])
+
+    def project(self, points: Points) -> Points:
+        """Return the points (..., d) of the domain in the orbits of `points` (..., d).
+
+        Differentiable almost everywhere for torch tensors.
+        """
+        wrapped, nearest = self.locate(points)
+        linear = np.stack([g.linear for g in self._candidates])[nearest]
+        shift = np.stack([g.translation for g in self._candidates])[nearest]
+        offset = wrapped - cast_like(shift, wrapped)
+        # inverse of an isometry: transpose of the linear part
+        return (offset[..., None, :] @ cast_like(linear, wrapped))[..., 0, :]

@@ -1,7 +1,5 @@
 """A check for tests: does a function commute with a crystallographic group?"""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Callable, Iterator
 from typing import Literal
@@ -17,6 +15,7 @@ from orbiflow.symmetry.isometry import Isometry, translation
 from orbiflow.typed_torch import listed
 
 Kind = Literal["field", "map", "invariant"]
+_LAWS = {"field": "V(g p) = R_g V(p)", "map": "D(g p) = g D(p)", "invariant": "f(g p) = f(p)"}
 
 
 class EquivarianceError(AssertionError):
@@ -74,7 +73,7 @@ def assert_equivariant(
     orbiflow.symmetry.equivariance.EquivarianceError: V(g p) = R_g V(p) fails for ...
     """
     group = checked_group(group)
-    if kind not in ("field", "map", "invariant"):
+    if kind not in _LAWS:
         raise OrbiflowError(f"kind must be 'field', 'map' or 'invariant', got {kind!r}")
     if points is None:
         source = torch.Generator().manual_seed(seed)
@@ -83,32 +82,23 @@ def assert_equivariant(
     values = _values(function, points, kind)
     worst: tuple[float, int, Isometry, Tensor] | None = None
     for number, element in _elements(group, cells, seed):
-        expected = {"field": element.push, "map": element, "invariant": _same}[kind](values)
-        error = (_values(function, element(points), kind) - expected).abs()
-        largest = float(error.max())
+        moved = {"field": element.push, "map": element}.get(kind)
+        expected = moved(values) if moved else values
+        errors = (_values(function, element(points), kind) - expected).abs()
+        largest = float(errors.max())
         # NaN compares as false
         if worst is None or not largest <= worst[0]:
-            at = points[int(error.reshape(len(points), -1).amax(dim=1).argmax())]
+            at = points[int(errors.reshape(len(points), -1).amax(dim=1).argmax())]
             worst = (largest, number, element, at)
     allowed = atol + rtol * float(values.abs().max())
     if worst is not None and not worst[0] <= allowed:
-        raise _failure(kind, group, worst, allowed)
-
-
-def _failure(
-    kind: Kind,
-    group: CrystallographicGroup,
-    worst: tuple[float, int, Isometry, Tensor],
-    allowed: float,
-) -> EquivarianceError:
-    error, number, element, at = worst
-    law = {"field": "V(g p) = R_g V(p)", "map": "D(g p) = g D(p)", "invariant": "f(g p) = f(p)"}
-    return EquivarianceError(
-        f"{law[kind]} fails for {group!r}, worst in coset {number} of {group.order}, g = "
-        f"{element!r}: off by {error:.1e} at p = {listed(at)}, {allowed:.1e} allowed",
-        element,
-        error,
-    )
+        error, number, element, at = worst
+        raise EquivarianceError(
+            f"{_LAWS[kind]} fails for {group!r}, worst in coset {number} of {group.order}, g = "
+            f"{element!r}: off by {error:.1e} at p = {listed(at)}, {allowed:.1e} allowed",
+            element,
+            error,
+        )
 
 
 def _elements(
@@ -137,8 +127,4 @@ def _values(function: Callable[[Tensor], Tensor], points: Tensor, kind: Kind) ->
             f"({'of length N for' if kind == 'invariant' else 'expected for'} every point), got "
             f"{tuple(values.shape)}"
         )
-    return values
-
-
-def _same(values: Tensor) -> Tensor:
     return values

@@ -1,11 +1,15 @@
-"""Crystallographic groups of R^d: a lattice and coset representatives modulo it."""
+"""Crystallographic groups of R^d: a lattice and coset representatives modulo it.
+
+Their headers are JSON with the exact bases, in which saved parameters are coordinates.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache, wraps
+from typing import Any, TypeVar, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,6 +25,8 @@ from orbiflow.symmetry.isometry import (
     identity,
     translation,
 )
+
+MAX_ORDER, MAX_DIM, MAX_NAME = 2048, 64, 200
 
 
 def checked_lattice(lattice: ArrayLike) -> Array:
@@ -130,7 +136,11 @@ class CrystallographicGroup:
         ):
             return False
         pairs = (self, other), (other, self)
-        return all(mine.contains(g) for mine, its in pairs for g in its._own_generators())
+        return all(
+            mine.contains(g)
+            for mine, its in pairs
+            for g in (*(translation(vector) for vector in its.lattice.T), *its.cosets)
+        )
 
     def __hash__(self) -> int:
         return hash(self._invariants)
@@ -149,10 +159,6 @@ class CrystallographicGroup:
         rows = zip(values.tolist(), counts.tolist(), strict=True)
         return self.dim, tuple((trace, det, count) for (trace, det), count in rows)
 
-    def _own_generators(self) -> Iterator[Isometry]:
-        yield from (translation(vector) for vector in self.lattice.T)
-        yield from self.cosets
-
     def contains(self, isometry: Isometry, tolerance: float = TOLERANCE) -> bool:
         """Return whether `isometry` is in the group, within `tolerance` of the cell's size."""
         if isometry.dim != self.dim:
@@ -165,8 +171,7 @@ class CrystallographicGroup:
     def wrap(self, points: Points) -> Points:
         """Move points, shape (..., d), by lattice vectors into the cell B [0, 1)^d.
 
-        Raises:
-            GroupError: for points of another dimension.
+        Raises `GroupError` for points of another dimension.
         """
         check_dimension(points, self.dim)
         fractional = points @ cast_like(self.inverse_lattice, points).T
@@ -179,8 +184,7 @@ class CrystallographicGroup:
     def images(self, points: Points) -> Points:
         """Return images of points (..., d) under the coset representatives, shape (|G|, ..., d).
 
-        Raises:
-            GroupError: for points of another dimension.
+        Raises `GroupError` for points of another dimension.
         """
         check_dimension(points, self.dim)
         linear, shift = (cast_like(a, points) for a in (self.linear_parts, self.translations))
@@ -257,8 +261,7 @@ class CrystallographicGroup:
 def checked_group(group: object) -> CrystallographicGroup:
     """Return `group` if it is a group.
 
-    Raises:
-        GroupError: if it is anything else, such as a group's name.
+    Raises `GroupError` if it is anything else, such as a group's name.
     """
     if isinstance(group, CrystallographicGroup):
         return group
@@ -294,27 +297,6 @@ def _reduce_translation(basis: Array, element: Isometry) -> Isometry:
     return Isometry(element.linear, basis @ fractional)
 
 
-class _Seen:
-    """The elements found so far, keyed by linear part and translation modulo the lattice."""
-
-    def __init__(self, basis: Array) -> None:
-        self._basis = basis
-        self._translations: dict[bytes, list[Array]] = {}
-
-    def add(self, element: Isometry) -> bool:
-        """Record `element` and return whether it is new."""
-        integral = np.linalg.solve(self._basis, element.linear @ self._basis)
-        key = np.round(integral).astype(np.int64).tobytes()
-        fractional = np.linalg.solve(self._basis, element.translation)
-        known = self._translations.setdefault(key, [])
-        if known:
-            offset = np.stack(known) - fractional
-            if (np.abs(offset - np.round(offset)).max(axis=1) <= 10 * TOLERANCE).any():
-                return False
-        known.append(fractional)
-        return True
-
-
 def _closure(basis: Array, generators: Sequence[Isometry], max_order: int) -> tuple[Isometry, ...]:
     elements = _finite_closure(basis, generators, max_order)
     if elements is not None:
@@ -335,17 +317,21 @@ def _finite_closure(
     basis: Array, generators: Sequence[Isometry], max_order: int
 ) -> tuple[Isometry, ...] | None:
     """Return all products modulo the lattice, or None if there are more than `max_order`."""
-    elements = [identity(basis.shape[0])]
-    seen = _Seen(basis)
-    seen.add(elements[0])
-    for element in elements:  # grows while it is walked
-        for generator in generators:
-            product = _reduce_translation(basis, generator @ element)
-            if not seen.add(product):
-                continue
-            if len(elements) >= max_order:
-                return None
-            elements.append(product)
+    elements: list[Isometry] = []
+    waiting = [identity(basis.shape[0])]
+    known: dict[bytes, list[Array]] = {}  # translations modulo the lattice, by linear part
+    for element in waiting:  # grows while it is walked
+        integral = np.linalg.solve(basis, element.linear @ basis)
+        same = known.setdefault(np.round(integral).astype(np.int64).tobytes(), [])
+        fractional = np.linalg.solve(basis, element.translation)
+        offsets = [fractional - other for other in same]
+        if any(np.abs(o - np.round(o)).max() <= 10 * TOLERANCE for o in offsets):
+            continue
+        if len(elements) >= max_order:
+            return None
+        same.append(fractional)
+        elements.append(element)
+        waiting += [_reduce_translation(basis, generator @ element) for generator in generators]
     return tuple(elements)
 
 
@@ -365,3 +351,79 @@ def reduced_basis(lattice: Array) -> Array:
         if steps == 0:
             return np.stack([first, second], axis=1)
         second = second - steps * first
+
+
+def group_header(group: CrystallographicGroup) -> dict[str, Any]:
+    """Return the lattice (columns are basis vectors) and coset representatives, ready for JSON."""
+    return {
+        "lattice": group.lattice.tolist(),
+        "linear": group.linear_parts.tolist(),
+        "translations": group.translations.tolist(),
+    }
+
+
+def group_from_header(header: Mapping[str, Any], name: str = "") -> CrystallographicGroup:
+    """Return the group of a `group_header`, with bit-identical basis and representatives.
+
+    Raises `GroupError` if the header does not describe a group.
+    """
+    try:
+        lattice, linear, shifts = (
+            np.array(header[key], dtype=np.float64) for key in ("lattice", "linear", "translations")
+        )
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
+        raise GroupError(f"the group's numbers are missing or invalid: {error}") from error
+    d, order = len(np.atleast_1d(lattice)), len(np.atleast_1d(linear))
+    shapes = (lattice.shape, linear.shape, shifts.shape)
+    if shapes != ((d, d), (order, d, d), (order, d)) or not (d <= MAX_DIM and order <= MAX_ORDER):
+        raise GroupError(f"the group's tables have invalid shapes {', '.join(map(str, shapes))}")
+    cosets = tuple(Isometry(*parts) for parts in zip(linear, shifts, strict=True))
+    if not order or not cosets[0].is_close(Isometry(np.eye(d), np.zeros(d))):
+        raise GroupError("the group's first coset is not that of the identity")
+    closed = CrystallographicGroup.generate(lattice)
+    chosen: list[Isometry] = []
+    for coset in cosets:  # each that is new at least doubles the order
+        if not closed.contains(coset):
+            chosen.append(coset)
+            closed = CrystallographicGroup.generate(lattice, chosen, max_order=order)
+    if closed.order != order:
+        raise GroupError(f"the group has {order} cosets, of which only {closed.order} differ")
+    return CrystallographicGroup(closed.lattice, cosets, str(name)[:MAX_NAME])
+
+
+class _ExactGroup:
+    """A cache key for a group, equal to another only if their numbers are bit-identical."""
+
+    def __init__(self, group: CrystallographicGroup) -> None:
+        self.group = group
+        tables = group.lattice, group.linear_parts, group.translations
+        self._key = tuple((table.shape, table.tobytes()) for table in tables)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _ExactGroup) and other._key == self._key
+
+    def __hash__(self) -> int:
+        return hash(self._key)
+
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+def cached_by_basis(maxsize: int) -> Callable[[Function], Function]:
+    """Cache a function of a group, as `lru_cache` does, by the group's exact basis and cosets.
+
+    `lru_cache` would mix up equal groups with different bases, whose Fourier coefficients differ.
+    """
+
+    def decorate(function: Function) -> Function:
+        @lru_cache(maxsize=maxsize)
+        def cached(exact: _ExactGroup, *arguments: Any) -> Any:
+            return function(exact.group, *arguments)
+
+        @wraps(function)
+        def call(group: CrystallographicGroup, *arguments: Any) -> Any:
+            return cached(_ExactGroup(group), *arguments)
+
+        return cast(Any, call)
+
+    return decorate

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 else:  # torch is imported by those who have tensors
     Points = TypeVar("Points")
 
+# the largest deviation from orthogonality, or from a lattice vector, that counts as rounding
 TOLERANCE = 1e-9
-"""The largest deviation from orthogonality, or from a lattice vector, that counts as rounding."""
 
 
 def cast_like(array: Array, like: Points) -> Points:
@@ -29,8 +29,7 @@ def cast_like(array: Array, like: Points) -> Points:
 
     For NumPy it is returned as it is, for torch as a tensor of the dtype and device of `like`.
 
-    Raises:
-        GroupError: for an integer tensor, in which a rotation would be truncated.
+    Raises `GroupError` for an integer tensor, in which a rotation would be truncated.
     """
     if is_tensor(like):
         import torch
@@ -56,8 +55,7 @@ class Isometry:
         linear: An orthogonal matrix (d, d).
         translation: A vector (d,), in the units of the points.
 
-    Raises:
-        NotAnIsometryError: if `linear` is not orthogonal within 1e-9 or the shapes disagree.
+    Raises `NotAnIsometryError` if `linear` is not orthogonal within 1e-9 or the shapes disagree.
 
     >>> quarter = Isometry(np.array([[0.0, -1.0], [1.0, 0.0]]), np.zeros(2))
     >>> (quarter @ quarter)(np.array([1.0, 2.0])).tolist()
@@ -102,8 +100,7 @@ class Isometry:
     def __call__(self, points: Points) -> Points:
         """Return the image of points, shape (..., d), NumPy or torch.
 
-        Raises:
-            GroupError: for points of another dimension.
+        Raises `GroupError` for points of another dimension.
         """
         check_dimension(points, self.dim)
         linear, translation = (cast_like(a, points) for a in (self.linear, self.translation))
@@ -112,8 +109,7 @@ class Isometry:
     def push(self, vectors: Points) -> Points:
         """Return the push-forward of tangent vectors, shape (..., d): the linear part alone.
 
-        Raises:
-            GroupError: for vectors of another dimension.
+        Raises `GroupError` for vectors of another dimension.
         """
         check_dimension(vectors, self.dim)
         return vectors @ cast_like(self.linear, vectors).T
@@ -168,8 +164,7 @@ class Line:
 
     The direction is kept at unit length.
 
-    Raises:
-        GroupError: if the direction is zero or a coordinate is not finite.
+    Raises `GroupError` if the direction is zero or a coordinate is not finite.
     """
 
     def __init__(self, point: ArrayLike, direction: ArrayLike) -> None:
@@ -197,8 +192,7 @@ def rotation_matrix(angle: float) -> Array:
 def rotation(center: ArrayLike, order: int) -> Isometry:
     """Return the (c, K)-rotation: counter-clockwise by 2 pi / `order` about `center`.
 
-    Raises:
-        GroupError: if `order` is not a non-zero integer (negative turns clockwise).
+    Raises `GroupError` if `order` is not a non-zero integer (negative turns clockwise).
 
     >>> rotation((1.0, 0.0), 2)(np.array([0.0, 0.0])).tolist()
     [2.0, 0.0]

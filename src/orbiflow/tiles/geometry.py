@@ -1,12 +1,10 @@
 """Closed rings of the plane: area, centroid, orientation, similarity and even sampling.
 
-A ring is a float64 array (..., N, 2) whose last vertex does not repeat the first; leading axes are a
-stack of rings. Functions with `AnyRing` take tensors as well and are differentiable.
+A ring is a float64 array (..., N, 2) whose last vertex does not repeat the first; leading axes are
+a stack of rings. Functions with `AnyRing` take tensors as well and are differentiable.
 """
 
-from __future__ import annotations
-
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
@@ -16,7 +14,6 @@ from shapely.geometry.base import BaseGeometry
 
 from orbiflow.arguments import is_tensor
 from orbiflow.arrays import Array, Complex
-from orbiflow.errors import OrbiflowError
 
 if TYPE_CHECKING:
     import torch
@@ -151,7 +148,10 @@ def points_along(ring: Array, at: ArrayLike) -> Array:
     [[0.5, 0.0], [0.5, 0.0]]
     """
     knots = arc_lengths(ring)
-    return _interpolated(ring, knots, np.asarray(at, dtype=np.float64) % knots[-1])
+    place = np.asarray(at, dtype=np.float64) % knots[-1]
+    closed = np.concatenate([ring, ring[:1]])
+    coordinates: list[Array] = [np.interp(place, knots, closed[:, k]) for k in (0, 1)]
+    return np.stack(coordinates, axis=-1)
 
 
 def resampled(ring: Array, count: int, phase: float = 0.0) -> Array:
@@ -163,55 +163,7 @@ def resampled(ring: Array, count: int, phase: float = 0.0) -> Array:
     >>> resampled(square, 4, phase=0.5).tolist()
     [[0.5, 0.0], [1.0, 0.5], [0.5, 1.0], [0.0, 0.5]]
     """
-    knots = arc_lengths(ring)
-    return _interpolated(ring, knots, (np.arange(count) + phase) / count * knots[-1])
-
-
-def resampled_with_corners(
-    ring: Array, corners: Sequence[int], count: int
-) -> tuple[Array, list[int]]:
-    """Resample like `resampled`, keeping some vertices of the ring as they are.
-
-    Points between one corner and the next are evenly spaced; their number is in proportion to the
-    length between the corners (largest remainders), and at least the corner itself.
-
-    Args:
-        ring: A ring (N, 2).
-        corners: The increasing indices of the vertices to keep; the first one is the first point.
-        count: The number of all points, at least the number of corners.
-
-    Returns:
-        The points (count, 2), and the index of each corner among them.
-
-    Raises:
-        OrbiflowError: if corners do not increase or are not vertices, or if `count` is too small.
-
-    >>> square = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]])
-    >>> points, at = resampled_with_corners(square, [1, 3], 4)
-    >>> points.tolist(), at
-    ([[2.0, 0.0], [1.5, 1.0], [0.0, 1.0], [0.5, 0.0]], [0, 2])
-    """
-    kept = [int(k) for k in corners]
-    if not kept or kept[0] < 0 or kept[-1] >= len(ring) or (np.diff(kept) < 1).any():
-        raise OrbiflowError(
-            f"corners must be increasing indices of the {len(ring)} vertices, got {kept}"
-        )
-    if count < len(kept):
-        raise OrbiflowError(
-            f"count must be at least the number of corners, {len(kept)}, got {count}"
-        )
-    knots = arc_lengths(ring)
-    starts = knots[kept]
-    lengths = np.diff(starts, append=starts[0] + knots[-1])
-    shares = _shared_out(lengths, count)
-    at: list[Array] = [
-        start + length * np.arange(share) / share
-        for start, length, share in zip(starts, lengths, shares, strict=True)
-    ]
-    points = _interpolated(ring, knots, np.concatenate(at) % knots[-1])
-    indices = (np.cumsum(shares) - shares).tolist()
-    points[indices] = ring[kept]  # bit for bit
-    return points, indices
+    return points_along(ring, (np.arange(count) + phase) / count * arc_lengths(ring)[-1])
 
 
 def arc_lengths(ring: Array) -> Array:
@@ -222,21 +174,6 @@ def arc_lengths(ring: Array) -> Array:
     """
     sides = np.roll(ring, -1, axis=0) - ring
     return np.concatenate([[0.0], np.cumsum(np.linalg.norm(sides, axis=1))])
-
-
-def _interpolated(ring: Array, knots: Array, at: Array) -> Array:
-    closed = np.concatenate([ring, ring[:1]])
-    return np.stack([np.interp(at, knots, closed[:, k]) for k in (0, 1)], axis=-1)
-
-
-def _shared_out(lengths: Array, count: int) -> Array:
-    """Return whole numbers of at least 1 with sum `count`, in proportion to `lengths`."""
-    spare = count - len(lengths)
-    exact = spare * lengths / lengths.sum()
-    whole = np.floor(exact).astype(int)
-    largest = np.argsort(whole - exact, kind="stable")[: spare - whole.sum()]
-    whole[largest] += 1
-    return whole + 1
 
 
 def polygons_in(geometry: BaseGeometry) -> list[Polygon]:

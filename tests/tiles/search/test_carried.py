@@ -15,8 +15,7 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.tiles import CLASSES, Bending, EscherTile, Frame, TileMap, signed_area
 from orbiflow.tiles.search.bent_map import map_of_bent, onto_polygon
 from orbiflow.tiles.silhouette import triangulate, unfolded
-from orbiflow.tiles.silhouette.bending import MAX_POINTS
-from orbiflow.tiles.silhouette.unfolding import folded
+from orbiflow.tiles.silhouette.bending import MAX_POINTS, folded
 from outlines import BentTile, animal, bent_squirrel, disc
 from strategies import seeds
 

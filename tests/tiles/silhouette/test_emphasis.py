@@ -7,15 +7,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image, ImageDraw
 from torch.nn.functional import grid_sample
 
 from mask_files import CORNERS, SIZE, assert_emphasised, drawing, mask, picture, polygon, save
 from orbiflow.errors import InputFileError, OrbiflowError
-from orbiflow.tiles import Emphasis, Target, iou
-from orbiflow.tiles.silhouette.emphasis import FADE_WIDTH, emphasised_iou
+from orbiflow.tiles import Emphasis, Target
+from orbiflow.tiles.silhouette.emphasis import FADE_WIDTH
 
 # Which way round
 
@@ -245,58 +245,6 @@ def test_a_shape_thinner_than_the_grid_is_still_met(tmp_path: Path) -> None:
     emphasis = Emphasis.read(save(tmp_path, mask("bottom left", (90, 90))), needle)
     assert emphasis.share is not None
     assert 0.2 < emphasis.share < 0.8
-
-
-# The weighted overlap
-
-
-def star(seed: int) -> np.ndarray:
-    rng = np.random.default_rng(seed)
-    n = int(rng.integers(5, 40))
-    angle = 2 * np.pi * np.arange(n) / n
-    radii = rng.uniform(0.4, 1, n)
-    ring = radii[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    return Target.from_polygon(ring).normal + rng.uniform(-0.1, 0.1, 2)
-
-
-@settings(max_examples=25, deadline=None)
-@given(st.integers(0, 2**32 - 1), st.integers(0, 2**32 - 1))
-def test_without_strength_it_is_the_plain_one(one: int, other: int) -> None:
-    even = Emphasis(np.eye(2), (-1, -1, 1, 1), strength=1 + 1e-9)
-    a, b = star(one), star(other)
-    assert emphasised_iou(a, b, even) == pytest.approx(iou(a, b), abs=2e-3)
-
-
-@settings(max_examples=10, deadline=None)
-@given(st.integers(0, 2**32 - 1), st.floats(1.1, 100))
-def test_it_is_symmetric_and_one_for_the_target_itself(seed: int, strength: float) -> None:
-    emphasis = Emphasis(np.eye(2), (-1, -1, 1, 1), strength)
-    a, b = star(seed), star(seed + 1)
-    value = emphasised_iou(a, b, emphasis)
-    assert 0 < value < 1
-    assert value == emphasised_iou(b, a, emphasis)
-    assert emphasised_iou(a, a, emphasis) == 1
-
-
-def test_what_is_lost_counts_by_its_weight() -> None:
-    square = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) / 2
-    left = Emphasis(np.array([[1.0, 1.0, 0.0, 0.0]]), (-0.5, -0.5, 0.5, 0.5), strength=3.0)
-    lost_left, lost_right = square.copy(), square.copy()
-    lost_left[square[:, 0] < 0, 0] += 0.2
-    lost_right[square[:, 0] > 0, 0] -= 0.2
-    # The square weighs 2, a strip of 0.2 on its left 0.6, one on its right 0.2.
-    assert emphasised_iou(lost_left, square, left) == pytest.approx(1.4 / 2, abs=2e-3)
-    assert emphasised_iou(lost_right, square, left) == pytest.approx(1.8 / 2, abs=2e-3)
-
-
-def test_shapes_apart_and_shapes_that_are_none() -> None:
-    emphasis = Emphasis(np.eye(2), (-1, -1, 1, 1))
-    square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
-    assert emphasised_iou(square, square + 2, emphasis) == 0
-    with pytest.raises(OrbiflowError, match=r"^tile: .*crosses"):
-        emphasised_iou(square[[0, 2, 1, 3]], square, emphasis)
-    with pytest.raises(OrbiflowError, match=r"^target: .*at least 3"):
-        emphasised_iou(square, square[:2], emphasis)
 
 
 PHYLOPIC = Path(__file__).parents[3].parent / "shared" / "data" / "silhouettes" / "phylopic"

@@ -77,14 +77,14 @@ def test_what_targets_say(tmp_path: Path) -> None:
 
 make: Any = Frame
 BAD: dict[str, tuple[Callable[[], Any], str]] = {
-    "a vector": (lambda: make([1, 2], [0, 0]), r"linear must be finite numbers of shape \(2, 2\)"),
-    "words": (lambda: make([["a", 0], [0, 1]], [0, 0]), "linear must be numbers"),
-    "ragged": (lambda: make([[1, 0], [1]], [0, 0]), "linear must be numbers"),
+    "a vector": (lambda: make([1, 2], [0, 0]), r"linear must be real numbers of shape \(2, 2\)"),
+    "words": (lambda: make([["a", 0], [0, 1]], [0, 0]), "linear must be real numbers"),
+    "ragged": (lambda: make([[1, 0], [1]], [0, 0]), "linear must be real numbers"),
     "NaN": (lambda: make(np.eye(2), [0, np.nan]), "offset must be finite"),
     "flat": (lambda: make([[1, 2], [2, 4]], [0, 0]), "has no inverse"),
     "zero": (lambda: make(np.zeros((2, 2)), [0, 0]), "has no inverse"),
     "size": (lambda: make(np.eye(2), [0, 0], size=(0, 3)), "size must be positive"),
-    "size of one": (lambda: make(np.eye(2), [0, 0], size=(3,)), "size must be finite numbers"),
+    "size of one": (lambda: make(np.eye(2), [0, 0], size=(3,)), "size must be real numbers"),
     "nothing": (lambda: Frame.from_dict({}), "incomplete: 'size'"),
     "a list": (lambda: Frame.from_dict([]), "incomplete"),  # pyright: ignore[reportArgumentType]
     "other sense": (

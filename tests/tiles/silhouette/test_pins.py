@@ -62,8 +62,8 @@ def test_each_connected_part_is_one() -> None:
     [
         ([(0, 0)], r"the pin at 0,0 lies outside the silhouette, which spans x from 114 to 781"),
         ([(300, 650, 20)], "lies outside the silhouette"),
-        ([(300, 300, 0)], "the radius of a pin must be positive, got 0"),
-        ([(300, 300, -5)], "the radius of a pin must be positive, got -5"),
+        ([(300, 300, 0)], "the radius of a pin must be above 0, got 0"),
+        ([(300, 300, -5)], "the radius of a pin must be above 0, got -5"),
         ([(300,)], "a pin must be x,y or x,y,radius, got 1 numbers"),
         ([(1, 2, 3, 4)], "a pin must be x,y or x,y,radius, got 4 numbers"),
         ([(np.nan, 2)], "a pin.*finite"),

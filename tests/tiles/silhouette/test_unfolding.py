@@ -9,7 +9,7 @@ from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles import signed_area
 from orbiflow.tiles.silhouette import Mesh, triangulate, unfolded
-from orbiflow.tiles.silhouette.unfolding import _Distortion, folded
+from orbiflow.tiles.silhouette.bending import _Distortion, folded
 from outlines import ANIMALS, SHAPES, animal, disc
 from strategies import seeds
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from orbiflow import runtime
-from orbiflow.batch import Column, FolderKind, Summary, WorkSettings, run_files
+from orbiflow.batch import Column, Kind, Summary, WorkSettings, run_files
 from orbiflow.density import comparing, models, pictures, tables
 from orbiflow.density.fitting import ComponentSettings, DensitySettings
 from orbiflow.density.run_folder import write_files, written_files
@@ -202,7 +202,7 @@ def _figures(summary: Summary) -> dict[str, Any]:
     }
 
 
-DENSITIES = FolderKind(
+DENSITIES = Kind(
     things="tables",
     items="files",
     endings=(".csv", ".tsv", ".txt", ".npy", ".parquet"),

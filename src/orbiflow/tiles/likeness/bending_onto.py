@@ -1,13 +1,11 @@
 """The least bending of a silhouette onto a given outline.
 
-This is for shapes that were not found by bending. Points of the silhouette's outline slide along the
-other one and the energy is minimised: linear equations in how far each slides, and in the size of the
-other outline, alternate with the choice of rotations. The descent starts from the correspondence of
-`corresponding`, so the outlines must lie over each other. It ends in a local minimum, whose energy is
-an upper bound of the least one.
+This is for shapes that were not found by bending. Points of the silhouette's outline slide along
+the other one and the energy is minimised: linear equations in how far each slides, and in the size
+of the other outline, alternate with the choice of rotations. The descent starts from the
+correspondence of `corresponding`, so the outlines must lie over each other. It ends in a local
+minimum, whose energy is an upper bound of the least one.
 """
-
-from __future__ import annotations
 
 from typing import NamedTuple
 
@@ -24,32 +22,21 @@ from orbiflow.tiles.geometry import (
 )
 from orbiflow.tiles.likeness.elastic import Elastic
 
-PLACES_PER_POINT = 6
-"""The number of places on the second outline for each point of the first."""
-
-MAX_STEP_RATIO = 6
-"""The largest step between places, in usual steps."""
-
-FIRST_PLACES = 6
-"""The number of places that are tried for the first point."""
+PLACES_PER_POINT = 6  # the number of places on the second outline for each point of the first
+MAX_STEP_RATIO = 6  # the largest step between places, in usual steps
+FIRST_PLACES = 6  # the number of places that are tried for the first point
 
 
 def corresponding(
     own: Array, other: Array, near: float = 0.4, stretch: float = 1.0, count: int = 96
 ) -> Array:
-    """Return the places on another outline that correspond to the points of one.
+    """Return the arc lengths (n,) on a ring (M, 2) that correspond to the points of a ring (n, 2).
 
-    Args:
-        own: A ring (n, 2) of area about 1, counter-clockwise.
-        other: A counter-clockwise ring (M, 2) that lies over it.
-        near: The distance, in square roots of the area, that costs as much as a right angle between
-            the directions.
-        stretch: The cost of stretching or shrinking a step by a factor of e.
-        count: The number of matched points; points between them follow in proportion.
-
-    Returns:
-        Arc lengths (n,) along `other` from its first vertex, increasing by less than its length from
-        first to last; they may be larger than its length.
+    Both are counter-clockwise and lie over each other, the first with area about 1. The distance
+    `near`, in square roots of the area, costs as much as a right angle between the directions;
+    `stretch` is the cost of stretching or shrinking a step by a factor of e. `count` points are
+    matched, and points between them follow in proportion. Lengths increase by less than a round from
+    first to last.
 
     >>> square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
     >>> corresponding(square, np.roll(square, 1, axis=0)).round(9) % 4
@@ -119,29 +106,19 @@ def _best_of(cost: Array, begin: list[int], stretch: float) -> Array:
     return best
 
 
+# the values of `near` and `stretch` of `corresponding` that are tried
 STARTS = ((0.15, 0.5), (0.4, 1.0), (0.8, 2.0), (0.4, 4.0))
-"""The values of `near` and `stretch` of `corresponding` that are tried."""
-
+# the steps of each start, and of the best one: with the energy, then with the forgiving energy
 TRIAL_STEPS, ENERGY_STEPS, SOFTENINGS, STEPS_PER_SOFTENING = 3, 20, 4, 5
-"""The steps of each start, and of the best one: with the energy, then with the forgiving energy."""
-
-MAX_SLIDE = 2.0
-"""The largest slide of a point in one step, in spacings."""
-
-MIN_GAP = 0.02
-"""The least distance along the outline of consecutive points, in spacings."""
+MAX_SLIDE = 2.0  # the largest slide of a point in one step, in spacings
+MIN_GAP = 0.02  # the least distance along the outline of consecutive points, in spacings
 
 
 def bent_onto(body: Elastic, ring: Array) -> Complex:
-    """Return the body bent so that its outline's points lie on a ring, in order.
+    """Return the body (N,) bent so that its outline's points lie on a ring, in order.
 
-    Args:
-        body: The silhouette.
-        ring: A simple counter-clockwise ring (M, 2) that lies over the silhouette.
-
-    Returns:
-        The points (N,) of the body; those of the outline lie on a copy of the ring about the origin
-        whose size suits the body best.
+    The simple counter-clockwise ring (M, 2) lies over the silhouette. Points of the outline come to lie
+    on a copy of it about the origin whose size suits the body best.
     """
     tried = [_start(body, ring, near, stretch) for near, stretch in STARTS]
     slide, z = min(tried, key=lambda shape: _objective(body, shape[1]))

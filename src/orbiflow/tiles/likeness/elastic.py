@@ -1,12 +1,12 @@
 """A silhouette as an elastic body, and the energy of its deformations.
 
 As rigid as possible (Sorkine and Alexa, As-Rigid-As-Possible Surface Modeling, SGP 2007; a distance
-for Escher tiles since Nagata and Imahori, 2021): with points x at rest, moved to z, and a rotation r_i
-of each, the energy is the sum over all pairs of w_ij |(z_i - z_j) - r_i (x_i - x_j)|^2. Cotangent
-weights measure the strain of areas; weights along the outline measure strain by length, so that
-small parts count: an ear has little area and much outline. The outline also bends as a rod, at the
-square of the change of its curvature, so that straight parts stay straight and corners stay corners.
-Points are complex numbers x + iy; a batch of C shapes is (N, C).
+for Escher tiles since Nagata and Imahori, 2021): with points x at rest, moved to z, and a rotation
+r_i of each, the energy is the sum over all pairs of w_ij |(z_i - z_j) - r_i (x_i - x_j)|^2.
+Cotangent weights measure the strain of areas; weights along the outline measure strain by length,
+so that small parts count: an ear has little area and much outline. The outline also bends as a rod,
+at the square of the change of its curvature, so that straight parts stay straight and corners stay
+corners. Points are complex numbers x + iy; a batch of C shapes is (N, C).
 """
 
 from __future__ import annotations
@@ -25,20 +25,13 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.geometry import best_similarity, complex_points, plane_points, signed_area
 from orbiflow.tiles.silhouette import Mesh, local_thickness, triangulate
 
+# the bounds of the weights of areas, which are negative for obtuse triangles
 COTANGENT_BOUNDS = (0.05, 40.0)
-"""The bounds of the weights of areas, which are negative for obtuse triangles."""
-
+# the radius of a part that is not thin, in square roots of the area; a disc has 0.56
 THICK_RADIUS = 0.25
-"""The radius of a part that is not thin, in square roots of the area; a disc has 0.56."""
-
-SALIENCE_BOUNDS = (0.25, 8.0)
-"""The bounds of the factor of thin parts' weights."""
-
-POSE_WEIGHT = 4.0
-"""The weight of the displacement relative to the energy, when shapes are ranked."""
-
-MAX_REWEIGHTINGS = 50
-"""The largest number of steps to the rotations of least forgiving energy."""
+SALIENCE_BOUNDS = (0.25, 8.0)  # the bounds of the factor of thin parts' weights
+POSE_WEIGHT = 4.0  # the weight of the displacement relative to the energy, when shapes are ranked
+MAX_REWEIGHTINGS = 50  # the largest number of steps to the rotations of least forgiving energy
 
 
 @dataclass(frozen=True)
@@ -64,14 +57,8 @@ class Stiffness:
 class Elastic:
     """A triangulated silhouette of area about 1 and its energies.
 
-    Args:
-        ring: The outline (n, 2), counter-clockwise; the first n points of the body.
-        stiffness: The costs of deforming.
-        stiff: Factors (n,) or (N,) of the stiffness at the points, if some should deform less.
-        mesh: A mesh of the ring, if there is one already.
-
-    Raises:
-        OrbiflowError: for a ring that cannot be triangulated.
+    Its first n points are the counter-clockwise outline `ring` (n, 2). Where some should deform less,
+    `stiff` holds factors (n,) or (N,) of the stiffness at the points. `mesh` saves triangulating again.
     """
 
     def __init__(
@@ -228,13 +215,10 @@ class Elastic:
         return matrix
 
     def pulled(self, z: Complex, towards: Complex, strength: float, rounds: int) -> Complex:
-        """Return shapes whose outline is pulled towards other points by a spring at each point.
+        """Return shapes (N, C), from `z`, whose outline springs pull towards points (n, C).
 
-        Args:
-            z: The shapes (N, C) to start from.
-            towards: The points (n, C) that the outline is pulled towards.
-            strength: The strength of all springs together, in the unit of the energy.
-            rounds: The number of rounds of choosing rotations and solving.
+        All springs together have `strength`, in the unit of the energy. Each of the rounds chooses
+        rotations and solves.
         """
         mu = strength / self.size
         solve = self._pulled_solver(mu)
@@ -276,23 +260,16 @@ class Elastic:
     def _pairs(self, stiff: Array | None) -> Any:
         triangles, count, n = self.mesh.triangles, len(self), self.size
         factors = self._salience()
-        rows: list[Integers] = []
-        columns: list[Integers] = []
-        values: list[Array] = []
-        for k in range(3):
-            i, j, apex = triangles[:, k], triangles[:, k - 2], triangles[:, k - 1]
-            u = np.conj(self.rest[i] - self.rest[apex]) * (self.rest[j] - self.rest[apex])
-            rows.append(i)
-            columns.append(j)
-            cotangent = np.clip(u.real / np.maximum(abs(u.imag), 1e-300), -5.0, 5.0)
-            values.append(factors * cotangent / 2)
-        areas = _symmetric(rows, columns, values, count)
+        i, j, apex = (np.roll(triangles, -k, axis=1).T.ravel() for k in range(3))
+        u = np.conj(self.rest[i] - self.rest[apex]) * (self.rest[j] - self.rest[apex])
+        cotangent = np.clip(u.real / np.maximum(abs(u.imag), 1e-300), -5.0, 5.0)
+        areas = _symmetric(i, j, np.tile(factors, 3) * cotangent / 2, count)
         areas.data = np.clip(areas.data, *COTANGENT_BOUNDS)
         own = np.arange(n)
         after = (own + 1) % n
         # each side counts twice, with either end's rotation
         sides = self.stiffness.stretch / np.maximum(abs(self.rest[after] - self.rest[own]), 1e-6)
-        total = (areas + _symmetric([own], [after], [sides], count)).tocoo()
+        total = (areas + _symmetric(own, after, sides, count)).tocoo()
         if stiff is not None:
             factors = self._everywhere(stiff)
             total.data = total.data * np.sqrt(factors[total.row] * factors[total.col])
@@ -380,9 +357,6 @@ def _squares(z: Complex) -> Array:
     return z.real**2 + z.imag**2
 
 
-def _symmetric(
-    rows: list[Integers], columns: list[Integers], values: list[Array], count: int
-) -> scipy.sparse.csr_matrix:
-    i, j, v = np.concatenate(rows), np.concatenate(columns), np.concatenate(values)
+def _symmetric(i: Integers, j: Integers, v: Array, count: int) -> scipy.sparse.csr_matrix:
     both = (np.concatenate([v, v]), (np.concatenate([i, j]), np.concatenate([j, i])))
     return scipy.sparse.csr_matrix(both, shape=(count, count))

@@ -17,8 +17,6 @@ People's judgement of bent silhouettes depends on six measures, most of them ind
 Outlines correspond point by point: this compares a shape with the one that was bent into it.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import lru_cache
@@ -36,20 +34,14 @@ from orbiflow.tiles.likeness.metrics import as_region
 from orbiflow.tiles.likeness.overlap import Overlap, best_overlay
 from orbiflow.tiles.silhouette import sampled
 
-PIECE_LENGTHS = (0.04, 0.15, 0.4)
-"""The lengths of the pieces, as shares of the outline."""
-
+PIECE_LENGTHS = (0.04, 0.15, 0.4)  # the lengths of the pieces, as shares of the outline
+# the offset of widths, in square roots of the area, below which differences matter little
 WIDTH_OFFSET = 0.02
-"""The offset of widths, in square roots of the area, below which differences matter little."""
-
+# the values of three pieces, `notches`, `narrowed` and `cost` in a tile of medium likeness
 USUAL_VALUES = (0.12, 0.16, 0.13, 0.3, 0.037, 0.25)
-"""The values of three pieces, `notches`, `narrowed` and `cost` in a tile of medium likeness."""
-
+# the weights of their logarithms, the inverse of how much these vary over a silhouette's tiles
 WEIGHTS = (6.5, 6.5, 6.5, 2.6, 2.3, 6.5)
-"""The weights of their logarithms, the inverse of how much these vary over a silhouette's tiles."""
-
-NEGLIGIBLE_SHARE = 0.3
-"""The share of the usual values below which differences matter little."""
+NEGLIGIBLE_SHARE = 0.3  # the share of the usual values below which differences matter little
 
 
 @dataclass(frozen=True)
@@ -75,9 +67,7 @@ class Fidelity:
         """
         values = (*self.pieces, self.notches, self.narrowed, self.cost)
         relative = [value / usual for value, usual in zip(values, USUAL_VALUES, strict=True)]
-        parts = [
-            math.log((NEGLIGIBLE_SHARE + value) / (NEGLIGIBLE_SHARE + 1)) for value in relative
-        ]
+        parts = np.log((NEGLIGIBLE_SHARE + np.array(relative)) / (NEGLIGIBLE_SHARE + 1))
         return self.necks + float(np.dot(WEIGHTS, parts))
 
     @property
@@ -150,9 +140,7 @@ def _clearance(z: Complex, *, inside: bool = False) -> Array:
     return smooth[::-1] if inside else smooth
 
 
-TURNS = 24
-"""The number of rotations tried for each orientation; the best `REFINED_TURNS` are refined."""
-
+TURNS = 24  # number of rotations tried for each orientation; the best `REFINED_TURNS` are refined
 REFINED_TURNS = 3
 
 
@@ -170,8 +158,7 @@ def faithfulness(silhouette: ArrayLike, shape: ArrayLike, *, mirror: bool = True
         The `Fidelity` of the best overlay; its `score` is 1 for the same shape, and near 0.5 for a
         tile of medium likeness.
 
-    Raises:
-        OrbiflowError: for a polygon that crosses itself, has no area, or is too thin to sample.
+    Raises `OrbiflowError` for a polygon that crosses itself, has no area, or is too thin to sample.
 
     >>> bar = [[0.0, 0.0], [4.0, 0.0], [4.0, 1.0], [0.0, 1.0]]
     >>> faithfulness(bar, [[5.0, 0.0], [5.0, 8.0], [3.0, 8.0], [3.0, 0.0]]).score > 0.99
@@ -179,10 +166,11 @@ def faithfulness(silhouette: ArrayLike, shape: ArrayLike, *, mirror: bool = True
     """
     own, other = _ring(silhouette, "the silhouette"), _ring(shape, "the shape")
     body, overlap = _body(own.tobytes())
+    z = complex_points(other)
     turns = np.exp(2j * np.pi * np.arange(TURNS) / TURNS).tolist()
     rough = [
         _Overlay(overlap.iou(plane_points(turn * ring))[0], turn, ring)
-        for ring in _orientations(other, mirror=mirror)
+        for ring in ([z, np.conj(z[::-1])] if mirror else [z])
         for turn in turns
     ]
     rough.sort(key=lambda overlay: -overlay.iou)
@@ -201,11 +189,6 @@ class _Overlay(NamedTuple):
     iou: float
     turn: complex
     ring: Complex
-
-
-def _orientations(ring: Array, *, mirror: bool) -> list[Complex]:
-    z = complex_points(ring)
-    return [z, np.conj(z[::-1])] if mirror else [z]
 
 
 def _ring(points: ArrayLike, what: str) -> Array:

@@ -18,8 +18,8 @@ from orbiflow.arguments import numbers
 from orbiflow.arrays import Array, Integers, Window
 from orbiflow.errors import OrbiflowError
 
+# the accuracy of Hausdorff distances, as a share of the diagonal of the box around both curves
 HAUSDORFF_TOLERANCE = 1e-6
-"""The accuracy of Hausdorff distances, as a share of the diagonal of the box around both curves."""
 
 
 def hausdorff_distance(a: Array, b: Array, *, tolerance: float) -> float:
@@ -105,7 +105,9 @@ def iou(a: Shape, b: Shape) -> float:
     >>> iou([[0, 0], [2, 0], [2, 2], [0, 2]], [[1, 0], [3, 0], [3, 2], [1, 2]])
     0.3333333333333333
     """
-    return _iou(as_region(a, "a"), as_region(b, "b"))
+    one, other = as_region(a, "a"), as_region(b, "b")
+    shared = one.intersection(other).area
+    return share(shared / (one.area + other.area - shared))
 
 
 def dice(a: Shape, b: Shape) -> float:
@@ -116,7 +118,8 @@ def dice(a: Shape, b: Shape) -> float:
     >>> dice([[0, 0], [2, 0], [2, 2], [0, 2]], [[1, 0], [3, 0], [3, 2], [1, 2]])
     0.5
     """
-    return _dice(as_region(a, "a"), as_region(b, "b"))
+    one, other = as_region(a, "a"), as_region(b, "b")
+    return share(2 * one.intersection(other).area / (one.area + other.area))
 
 
 def pixel_accuracy(a: Shape, b: Shape, window: Shape | None = None) -> float:
@@ -131,9 +134,9 @@ def pixel_accuracy(a: Shape, b: Shape, window: Shape | None = None) -> float:
     >>> pixel_accuracy([[0, 0], [1, 0], [1, 1], [0, 1]], [[0, 0], [2, 0], [2, 1], [0, 1]], (0, 0, 2, 2))
     0.75
     """
-    target = as_region(b, "b")
+    one, target = as_region(a, "a"), as_region(b, "b")
     view = default_window(target) if window is None else _window(window)
-    return _pixel_accuracy(as_region(a, "a"), target, view)
+    return share(1 - one.symmetric_difference(target).intersection(view).area / view.area)
 
 
 def default_window(target: Shape) -> Polygon:
@@ -151,15 +154,18 @@ def hausdorff(a: Shape, b: Shape) -> float:
     """Return the Hausdorff distance between the boundaries of two shapes, in the shapes' own units.
 
     This is the greatest distance from any point of one boundary, not only a vertex, to the nearest
-    point of the other. It is too small by at most 1e-6 of the diagonal of the box around both shapes,
-    never too large.
+    point of the other. It is too small by at most 1e-6 of the diagonal of the box around both
+    shapes, never too large.
 
     Raises `OrbiflowError` naming the argument that is not a valid polygon.
 
     >>> hausdorff([[0, 0], [4, 0], [4, 4], [0, 4]], [[0, 0], [4, 0], [4, 1], [0, 1]])
     3.0
     """
-    return _hausdorff(as_region(a, "a"), as_region(b, "b"))
+    one, other = as_region(a, "a"), as_region(b, "b")
+    xmin, ymin, xmax, ymax = shapely.total_bounds([one, other])
+    tolerance = HAUSDORFF_TOLERANCE * float(np.hypot(xmax - xmin, ymax - ymin))
+    return hausdorff_distance(_edges(one), _edges(other), tolerance=tolerance)
 
 
 def compare(tile: Shape, target: Shape, window: Shape | None = None) -> ShapeMetrics:
@@ -176,37 +182,16 @@ def compare(tile: Shape, target: Shape, window: Shape | None = None) -> ShapeMet
     view = default_window(goal) if window is None else _window(window)
     xmin, ymin, xmax, ymax = view.bounds
     return ShapeMetrics(
-        iou=_iou(own, goal),
-        dice=_dice(own, goal),
-        pixel_accuracy=_pixel_accuracy(own, goal, view),
+        iou=iou(own, goal),
+        dice=dice(own, goal),
+        pixel_accuracy=pixel_accuracy(own, goal, view),
         window=(xmin, ymin, xmax, ymax),
-        hausdorff=_hausdorff(own, goal) / float(np.sqrt(goal.area)),
+        hausdorff=hausdorff(own, goal) / float(np.sqrt(goal.area)),
     )
 
 
-def _iou(a: Region, b: Region) -> float:
-    shared = a.intersection(b).area
-    return _share(shared / (a.area + b.area - shared))
-
-
-def _dice(a: Region, b: Region) -> float:
-    return _share(2 * a.intersection(b).area / (a.area + b.area))
-
-
-def _pixel_accuracy(a: Region, b: Region, window: Region) -> float:
-    return _share(1 - a.symmetric_difference(b).intersection(window).area / window.area)
-
-
-def _hausdorff(a: Region, b: Region) -> float:
-    xmin, ymin, xmax, ymax = shapely.total_bounds([a, b])
-    return hausdorff_distance(
-        _edges(a),
-        _edges(b),
-        tolerance=HAUSDORFF_TOLERANCE * float(np.hypot(xmax - xmin, ymax - ymin)),
-    )
-
-
-def _share(value: float) -> float:
+def share(value: float) -> float:
+    """Return a share, 0 to 1."""
     # rounding in the overlay can exceed the bounds by an ulp
     return min(max(float(value), 0.0), 1.0)
 

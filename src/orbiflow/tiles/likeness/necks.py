@@ -2,15 +2,13 @@
 
 Two points of the outline face each other across a neck if the segment between them is inside and at
 most `MAX_NECK_WIDTH` long, and both ways along the outline between them are long: at least
-`OUTLINE_PER_WIDTH` times the segment and at least `MIN_OUTLINE`. So the tip of a corner is a neck only
-if it is sharper than 23 degrees; its width is then taken where the outline beyond is `MIN_OUTLINE`
-long. A slit is the same with the segment outside.
+`OUTLINE_PER_WIDTH` times the segment and at least `MIN_OUTLINE`. So the tip of a corner is a neck
+only if it is sharper than 23 degrees; its width is then taken where the outline beyond is
+`MIN_OUTLINE` long. A slit is the same with the segment outside.
 """
 
 # pyright: reportUnknownMemberType=false
 # shapely's stubs leave the keyword arguments of its functions of arrays without types.
-
-from __future__ import annotations
 
 import math
 from collections.abc import Callable
@@ -18,7 +16,7 @@ from typing import Any, NamedTuple, cast
 
 import numpy as np
 import shapely
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.spatial import KDTree
 
 from orbiflow.arguments import number, numbers
@@ -26,32 +24,19 @@ from orbiflow.arrays import Array, Integers
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.geometry import arc_lengths, orient, polygons_in, ring_length
 
+# the least length of the outline beyond a neck, in its widths: 1 / sin(11.5 degrees)
 OUTLINE_PER_WIDTH = 5.0
-"""The least length of the outline beyond a neck, in its widths: 1 / sin(11.5 degrees)."""
-
-MIN_OUTLINE = 0.1
-"""The least length of the outline beyond a neck, in square roots of the area."""
-
-MAX_NECK_WIDTH = 0.5
-"""The largest width of a neck, in square roots of the area."""
-
+MIN_OUTLINE = 0.1  # the least length of the outline beyond a neck, in square roots of the area
+MAX_NECK_WIDTH = 0.5  # the largest width of a neck, in square roots of the area
+# the share of the silhouette's narrowest neck below which a tile looks cut through
 PINCHED_SHARE = 0.25
-"""The share of the silhouette's narrowest neck below which a tile looks cut through."""
-
+# the tolerance, in that unit, for simplifying a silhouette before necks are searched
 SIMPLIFICATION = 0.003
-"""The tolerance, in that unit, for simplifying a silhouette before necks are searched."""
-
-SOUND_NECK_WIDTH = 0.05
-"""The width, in square roots of the area, above which no neck looks cut through."""
-
+SOUND_NECK_WIDTH = 0.05  # width, in square roots of the area, above which no neck looks cut through
+# the distance of points on the outline, in square roots of the area: the error for tapering parts
 POINT_SPACING = 0.0125
-"""The distance of points on the outline, in square roots of the area: the error for tapering parts."""
-
-QUARTER_SEGMENTS = 16
-"""The number of sides of a quarter of a disc."""
-
-DISC_OVERREACH = 0.005
-"""What discs of `QUARTER_SEGMENTS` reach beyond themselves, in radii."""
+QUARTER_SEGMENTS = 16  # the number of sides of a quarter of a disc
+DISC_OVERREACH = 0.005  # what discs of `QUARTER_SEGMENTS` reach beyond themselves, in radii
 
 
 class Thinnest(NamedTuple):
@@ -84,8 +69,8 @@ def neck_factor(share: float, min_neck: float) -> float:
 def least_neck(silhouette: ArrayLike, min_neck: float) -> float:
     """Return how wide the necks of a silhouette's tiles should be, in square roots of the area.
 
-    It is the larger of `min_neck` and `PINCHED_SHARE` times the silhouette's own narrowest neck, the
-    latter at most `SOUND_NECK_WIDTH`; 0 if `min_neck` is 0.
+    It is the larger of `min_neck` and `PINCHED_SHARE` times the silhouette's own narrowest neck,
+    the latter at most `SOUND_NECK_WIDTH`; 0 if `min_neck` is 0.
 
     >>> bar = [[0.0, 0.0], [20.0, 0.0], [20.0, 0.2], [0.0, 0.2]]
     >>> least_neck(bar, 0.01), least_neck(bar, 0.1), least_neck(bar, 0.0)
@@ -103,14 +88,14 @@ def least_neck(silhouette: ArrayLike, min_neck: float) -> float:
 def narrowest_neck(ring: ArrayLike) -> Thinnest:
     """Return the narrowest neck of a polygon; without a neck, the diameter of its largest disc.
 
-    The result is exact if the sides of the neck are parallel or a vertex is at its narrowest place; if
-    it tapers, the place is found to two `POINT_SPACING`s along the outline, and never too narrow.
+    The result is exact if the sides of the neck are parallel or a vertex is at its narrowest place;
+    if it tapers, the place is found to two `POINT_SPACING`s along the outline, and never too
+    narrow.
 
     Args:
         ring: The vertices (n, 2) of a simple polygon, in either orientation.
 
-    Raises:
-        OrbiflowError: for a polygon that crosses itself or has no area.
+    Raises `OrbiflowError` for a polygon that crosses itself or has no area.
 
     >>> bar = [[0.0, 0.0], [8.0, 0.0], [8.0, 0.5], [0.0, 0.5]]
     >>> narrowest_neck(bar).width, narrowest_neck(bar).share
@@ -141,18 +126,15 @@ def narrowest_slit(ring: ArrayLike) -> Thinnest | None:
 
 
 def hair_share(ring: ArrayLike, width: float) -> float:
-    """Return the share of a polygon's outline that bounds parts thinner than `width`.
+    """Return the share, 0 to 1, of a polygon's outline that bounds parts thinner than `width`.
 
     A part is thin if no disc of that diameter inside the polygon covers it (the residue of a
-    morphological opening). It counts if it has more than `OUTLINE_PER_WIDTH` widths of the outline, so
-    corners count only if they are sharper than 23 degrees.
+    morphological opening). It counts if it has more than `OUTLINE_PER_WIDTH` widths of the outline,
+    so corners count only if they are sharper than 23 degrees.
 
     Args:
         ring: The vertices (n, 2) of a simple polygon, in either orientation.
         width: The width, in the polygon's own units.
-
-    Returns:
-        The share, 0 to 1.
 
     Raises:
         OrbiflowError: for a polygon that crosses itself or has no area, or a width of 0 or less.
@@ -203,9 +185,8 @@ def _dense(ring: Array, step: float) -> Array:
     pieces = np.maximum(np.ceil(np.linalg.norm(after - ring, axis=1) / step), 1).astype(int)
     start = np.repeat(np.cumsum(pieces) - pieces, pieces)
     share = (np.arange(len(start)) - start) / np.repeat(pieces, pieces)
-    return np.repeat(ring, pieces, axis=0) + share[:, None] * np.repeat(
-        after - ring, pieces, axis=0
-    )
+    sides = np.repeat(after - ring, pieces, axis=0)
+    return np.repeat(ring, pieces, axis=0) + share[:, None] * sides
 
 
 def _nearest_within(
@@ -226,12 +207,13 @@ def _nearest_within(
     ends = points[j] + along[:, None] * steps[j]
     width = np.linalg.norm(points[i] - ends, axis=1)
     way = abs(knots[i] - knots[j] - along * lengths[j])
-    way = np.minimum(way, knots[-1] - way)
-    counts = np.flatnonzero(
-        (way >= np.maximum(apart, OUTLINE_PER_WIDTH * width)) & (width <= reach)
-    )
-    left = _on_the_left(steps, i[counts], j[counts], along[counts], (ends - points[i])[counts])
-    counts = counts[left]
+    beyond = np.minimum(way, knots[-1] - way) >= np.maximum(apart, OUTLINE_PER_WIDTH * width)
+    counts = np.flatnonzero(beyond & (width <= reach))
+    # a quick filter: segments that may leave point i, and reach side j, on the left
+    segments, corner = (ends - points[i])[counts], (along[counts] <= 0) | (along[counts] >= 1)
+    before, after, side = (steps[k[counts]] for k in (i - 1, i, j))
+    leaves = np.maximum(_cross(after, segments), _cross(before, segments)) > 0
+    counts = counts[leaves & (corner | (_cross(side, segments) < 0))]
     counts = counts[_local_minima(i[counts], j[counts], width[counts])]
     counts = counts[np.argsort(width[counts], kind="stable")]
     for start in range(0, len(counts), 256):
@@ -243,15 +225,6 @@ def _nearest_within(
         if len(well):
             return both[well[0]]
     return None
-
-
-def _on_the_left(
-    steps: Array, i: Integers, j: Integers, along: Array, segments: Array
-) -> NDArray[np.bool_]:
-    """Return which segments may leave point i, and reach side j, on the left (a quick filter)."""
-    leaves = np.maximum(_cross(steps[i], segments), _cross(steps[i - 1], segments)) > 0
-    within = (along > 0) & (along < 1)
-    return leaves & (~within | (_cross(steps[j], segments) < 0))
 
 
 def _local_minima(i: Integers, j: Integers, width: Array) -> Integers:
@@ -281,8 +254,6 @@ def _thin_share(
     lines, lengths = lines[lengths > 0], lengths[lengths > 0]
     if not parts or not len(lines):
         return 0.0
-    own = shapely.STRtree(parts).nearest(
-        shapely.line_interpolate_point(lines, 0.5, normalized=True)
-    )
-    totals = np.bincount(own, lengths)
+    middles = shapely.line_interpolate_point(lines, 0.5, normalized=True)
+    totals = np.bincount(shapely.STRtree(parts).nearest(middles), lengths)
     return float(totals[totals > OUTLINE_PER_WIDTH * width].sum() / polygon.exterior.length)

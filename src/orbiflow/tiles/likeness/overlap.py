@@ -1,32 +1,39 @@
-"""The exact overlap of polygons with a region, and its exact gradient in the vertices."""
+"""The exact overlap of polygons with a region, its exact gradient in the vertices, and ranking.
+
+Tiles are ranked by their overlap and recognisability; a short list of the best is without repeats.
+"""
 
 # pyright: reportUnknownMemberType=false
 # shapely's stubs leave the keyword arguments of its functions of arrays without types.
 
-from __future__ import annotations
-
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cache
 
 import numpy as np
 import scipy.optimize
 import shapely
+from numpy.typing import ArrayLike
 
-from orbiflow.arguments import numbers
+from orbiflow.arguments import number, numbers, whole
 from orbiflow.arrays import Array, Complex
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.geometry import centroid, complex_points, orient, plane_points, signed_area
-from orbiflow.tiles.likeness.ranking import Similarity
 
+IOU_WEIGHT = 0.25
+TWIN_SIMILARITY = 0.97
+VARIETY_WEIGHT = 0.1
+
+# A symmetric function of two candidates' indices: how alike they are, 0 to 1
+Similarity = Callable[[int, int], float]
+# the number of vertices beyond which a region of area 1 is simplified, and the tolerance
 MAX_REGION_VERTICES, REGION_TOLERANCE = 1500, 2e-3
-"""The number of vertices beyond which a region of area 1 is simplified, and the tolerance."""
 
 
 def prepared_region(ring: Array) -> shapely.Polygon:
     """Return the prepared region of a ring (N, 2) of area about 1, simplified if it is complex.
 
-    Use it to choose among candidates, as intersections with thousands of vertices take seconds; final
-    results are measured with the ring itself.
+    Use it to choose among candidates, as intersections with thousands of vertices take seconds;
+    final results are measured with the ring itself.
     """
     ring = numbers(ring, "the region's ring", ("N", 2))
     if len(ring) < 3:
@@ -53,8 +60,8 @@ def boundary_iou(goal: shapely.Polygon, boundaries: Array) -> Array:
 class Overlap:
     """The overlap of rings with one region.
 
-    The common area of P and T changes at the rate of the normal speed integrated over the part of P's
-    boundary inside T; along a side the speed is linear between its ends.
+    The common area of P and T changes at the rate of the normal speed integrated over the part of
+    P's boundary inside T; along a side the speed is linear between its ends.
 
     Args:
         target: The simple ring (M, 2) of the region, in either orientation; see `prepared_region`.
@@ -112,15 +119,10 @@ class Overlap:
 def best_overlay(
     ring: Complex, overlap: Overlap, factor: complex = 1.0, middle: complex = 0.0
 ) -> tuple[complex, complex, float]:
-    """Find the similarity of largest IoU with a region near a first one, by L-BFGS.
+    """Find the similarity z -> factor z + middle of largest IoU with a region, by L-BFGS.
 
-    Args:
-        ring: A ring (n,) x + iy about the origin.
-        overlap: The overlap with the region.
-        factor, middle: The first similarity, z -> factor z + middle.
-
-    Returns:
-        The factor and middle of the best one, and its IoU.
+    The ring (n,) x + iy is about the origin. The result is near the first similarity: its factor and
+    middle, and the IoU.
     """
 
     def loss(x: Array) -> tuple[float, Array]:
@@ -139,26 +141,24 @@ def best_overlay(
     return best, complex(middle + found.x[2] + 1j * found.x[3]), -float(found.fun)
 
 
-MAX_IOU_GAIN = 0.15
-"""The largest gain in IoU that is expected from a better overlay of two tiles."""
+MAX_IOU_GAIN = 0.15  # the largest gain in IoU that is expected from a better overlay of two tiles
 
 
 def mutual_iou(tiles: Sequence[Array], decisive: float = 0.9) -> Similarity:
-    """Return the mutual IoU of tiles by their indices, for `diverse`.
+    """Return the mutual IoU of tiles (N, 2) over one silhouette by their indices, for `diverse`.
 
     A better overlay is searched only where it can matter: for pairs whose IoU, with equal areas and
-    centroids, is at most `MAX_IOU_GAIN` below `decisive`.
-
-    Args:
-        tiles: The tiles (n,), simple rings (N, 2) that all lie over one silhouette.
-        decisive: The value that the IoU is compared with.
+    centroids, is at most `MAX_IOU_GAIN` below `decisive`, with which it is compared.
 
     >>> square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
     >>> turned = square @ [[0.98, 0.2], [-0.2, 0.98]] * 3 + 7
     >>> round(mutual_iou([square, turned])(0, 1), 3)
     1.0
     """
-    rings = [_unit(tile) for tile in tiles]
+    rings: list[Array] = []
+    for tile in tiles:
+        ring = orient(np.asarray(tile, dtype=np.float64))
+        rings.append((ring - centroid(ring)) / np.sqrt(signed_area(ring)))
 
     @cache
     def region(index: int) -> Overlap:
@@ -175,6 +175,67 @@ def mutual_iou(tiles: Sequence[Array], decisive: float = 0.9) -> Similarity:
     return lambda i, j: alike(min(i, j), max(i, j))
 
 
-def _unit(ring: Array) -> Array:
-    ring = orient(np.asarray(ring, dtype=np.float64), counter_clockwise=True)
-    return (ring - centroid(ring)) / np.sqrt(signed_area(ring))
+def rank_score(iou: float, recognisability: float) -> float:
+    """Return the score of a tile, 0 to 1: the geometric mean of both, IoU with weight 1/4.
+
+    A geometric mean compares ratios, so it does not matter that IoU varies little between tiles (a
+    blob without limbs has nine tenths of the best tile's) and recognisability much; and a tile needs
+    some of both. With more weight on IoU blobs win; with none, a tile may lie beside its target.
+    docs/recognisability.md has the numbers.
+
+    Raises `OrbiflowError` for a value outside [0, 1].
+
+    >>> rank_score(0.72, 0.55) < rank_score(0.65, 0.74)
+    True
+    """
+    for name, value in (("iou", iou), ("recognisability", recognisability)):
+        number(value, name, 0, 1)
+    return float(iou**IOU_WEIGHT * recognisability ** (1 - IOU_WEIGHT))
+
+
+def diverse(
+    scores: ArrayLike,
+    count: int,
+    similarity: Similarity,
+    *,
+    twin: float = TWIN_SIMILARITY,
+    variety: float = VARIETY_WEIGHT,
+) -> list[int]:
+    """Choose up to `count` good candidates that differ from each other, the best first.
+
+    This is maximal marginal relevance (Carbonell, Goldstein, 1998): the first candidate has the
+    largest score, each next one the largest score minus `variety` times its largest similarity to a
+    chosen one. Candidates with a similarity above `twin` to a chosen one are left out, so there may be
+    fewer than `count`.
+
+    Args:
+        scores: The scores (n,), larger is better; of equal ones the earlier comes first.
+        count: The largest number of candidates, at least 1.
+        similarity: The similarity of a candidate and a chosen one, called once for each pair.
+        twin: The largest similarity, 0 to 1; with 1 nothing is left out.
+        variety: The weight of similarity, at least 0, in the unit of the scores.
+
+    Returns:
+        Indices of `scores`, in the order of choice.
+
+    Raises `OrbiflowError` for scores that are not finite numbers, and for arguments out of range.
+
+    >>> position = [0.0, 0.01, 0.5, 1.0]
+    >>> diverse([0.9, 0.89, 0.8, 0.81], 3, lambda i, j: 1 - abs(position[i] - position[j]))
+    [0, 3, 2]
+    """
+    values = numbers(scores, "scores", ("n",))
+    whole(count, "count", 1)
+    number(twin, "twin", 0, 1)
+    number(variety, "variety", 0)
+    nearest = np.zeros(len(values))
+    left = np.ones(len(values), dtype=bool)
+    chosen: list[int] = []
+    while left.any() and len(chosen) < count:
+        best = int(np.argmax(np.where(left, values - variety * nearest, -np.inf)))
+        chosen.append(best)
+        left[best] = False
+        for other in np.flatnonzero(left):
+            nearest[other] = max(nearest[other], similarity(int(other), best))
+        left &= nearest <= twin
+    return chosen

@@ -1,14 +1,16 @@
 """An elastic body with pinned parts, which keep their shape.
 
 A part costs, for each of its points, the squared distance from the nearest similar copy a x + b of
-the part x at rest, with complex a and b (shape matching: Mueller et al., Meshless Deformations Based
-on Shape Matching, 2005). Stiffer springs would do the same, but with them a part turns, in each step
-of choosing rotations and solving, only by the ratio of the stiffnesses; a and b are solved for
-together with the points, so that a part moves freely at once. A cost is added if a differs from a
-rotation at the whole body's size or, if parts keep their angle, from the whole body's own rotation.
+the part x at rest, with complex a and b (shape matching: Mueller et al., Meshless Deformations
+Based on Shape Matching, 2005). Stiffer springs would do the same, but with them a part turns, in
+each step of choosing rotations and solving, only by the ratio of the stiffnesses; a and b are
+solved for together with the points, so that a part moves freely at once. A cost is added if a
+differs from a rotation at the whole body's size or, if parts keep their angle, from the whole
+body's own rotation.
 
-With a and b eliminated, the stiffness matrix is a real one less W W^H, where W has two complex columns
-per part. All equations are solved with the real matrix and corrected (Sherman, Morrison, Woodbury).
+With a and b eliminated, the stiffness matrix is a real one less W W^H, where W has two complex
+columns per part. All equations are solved with the real matrix and corrected (Sherman, Morrison,
+Woodbury).
 """
 
 from __future__ import annotations
@@ -24,33 +26,19 @@ from orbiflow.tiles.geometry import best_similarity
 from orbiflow.tiles.likeness.elastic import Condensed, Elastic, Stiffness
 from orbiflow.tiles.silhouette import Mesh
 
-SHAPE_WEIGHT = 1e5
-"""The weight of the mean squared distance of the body's points from similar copies."""
-
-SIZE_WEIGHT = 30.0
-"""The weight of a part's change of size, for the whole body."""
-
-ANGLE_WEIGHT = 3e4
-"""The weight of a part's rotation, for the whole body, if it keeps its angle."""
-
-MIN_PART_POINTS = 3
-"""The least number of points of a part: a similarity can take two points anywhere."""
+SHAPE_WEIGHT = 1e5  # weight of the mean squared distance of the body's points from similar copies
+SIZE_WEIGHT = 30.0  # the weight of a part's change of size, for the whole body
+ANGLE_WEIGHT = 3e4  # the weight of a part's rotation, for the whole body, if it keeps its angle
+MIN_PART_POINTS = 3  # least number of points of a part: a similarity can take two points anywhere
 
 
 class Pinned(Elastic):
     """A triangulated silhouette with parts that keep their shape.
 
     `energy` and `lenient_energy` include the parts' cost; `forgiving_energy` leaves it out, so that it
-    can be compared with that of bodies with other pins or none.
-
-    Args:
-        ring: The outline (n, 2), counter-clockwise; the first n points of the body.
-        parts: The indices of the points of each part; parts of fewer than three points are ignored.
-        keep_angle: Whether parts rotate only with the whole body.
-        stiffness, stiff, mesh: As in `Elastic`.
-
-    Raises:
-        OrbiflowError: for a ring that cannot be triangulated.
+    can be compared with that of bodies with other pins or none. `parts` are the indices of the points
+    of each part; parts of fewer than three points are ignored. With `keep_angle` they rotate only with
+    the whole body.
     """
 
     def __init__(
@@ -135,14 +123,10 @@ class Pinned(Elastic):
         plain, n = super().condensed, self.size
         low = self._low
         spread = _complex(plain.inverse @ low[n:])
-        return PinnedCondensed(
-            plain.outline,
-            plain.follow,
-            plain.inverse,
-            coupling=_complex(low[:n] + plain.follow.T @ low[n:]),
-            spread=spread,
-            solve=_complex(np.linalg.inv(_one_less(low[n:], spread))),
-        )
+        coupling = _complex(low[:n] + plain.follow.T @ low[n:])
+        solve = _complex(np.linalg.inv(_one_less(low[n:], spread)))
+        own = plain.outline, plain.follow, plain.inverse
+        return PinnedCondensed(*own, coupling, spread, solve)
 
     def pulled(self, z: Complex, towards: Complex, strength: float, rounds: int) -> Complex:
         """Let the outline be pulled towards other points, as `Elastic.pulled` does."""
@@ -193,13 +177,10 @@ class PinnedCondensed(Condensed):
 
 
 class _Part:
-    """Points that keep their shape.
+    """Points `index` of a body at rest (N,) that keep their shape.
 
-    Args:
-        rest: The points (N,) of the body at rest.
-        index: The indices of the part's points.
-        weight: The weight of each point's squared distance from the part's similar copy.
-        held: The weight of |a - goal|^2.
+    `weight` is that of each point's squared distance from the part's similar copy, `held` that of
+    |a - goal|^2.
     """
 
     def __init__(self, rest: Complex, index: Integers, weight: float, held: float) -> None:

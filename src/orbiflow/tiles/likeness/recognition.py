@@ -24,7 +24,7 @@ from shapely.geometry.polygon import orient
 
 from orbiflow.arrays import Array, Integers
 from orbiflow.tiles.geometry import points_along, polygons_in, ring_length
-from orbiflow.tiles.likeness.metrics import Region, Shape, as_region
+from orbiflow.tiles.likeness.metrics import Region, Shape, as_region, share
 
 POINTS = 256  # on the target's outline, and as dense on the tile's
 MOST_POINTS = 4 * POINTS  # on a tile's outline, however long it is
@@ -99,10 +99,10 @@ class Recogniser:
         found = agreement[goal_points, own_points]
         total = float(found.sum())
         return Recognisability(
-            score=_share(2 * total / sum(agreement.shape)),
-            kept=_share(total / agreement.shape[0]),
-            clean=_share(total / agreement.shape[1]),
-            limbs=_share(float(self._limb_weights[goal_points] @ found)),
+            score=share(2 * total / sum(agreement.shape)),
+            kept=share(total / agreement.shape[0]),
+            clean=share(total / agreement.shape[1]),
+            limbs=share(float(self._limb_weights[goal_points] @ found)),
         )
 
     def _rings(self, region: Region) -> list[Array]:
@@ -115,8 +115,9 @@ class Recogniser:
 def recognisability(tile: Shape, target: Shape) -> Recognisability:
     """Return how much of `target` is recognised in `tile`, both in one frame.
 
-    The result is invariant under a similarity of both shapes. To compare many tiles with one target,
-    use a `Recogniser`. Raises `OrbiflowError` naming the argument that is not a valid polygon.
+    The result is invariant under a similarity of both shapes. To compare many tiles with one
+    target, use a `Recogniser`. Raises `OrbiflowError` naming the argument that is not a valid
+    polygon.
 
     >>> square = [[0, 0], [2, 0], [2, 2], [0, 2]]
     >>> recognisability(square, square).score
@@ -198,7 +199,3 @@ def _inscribed_radius(points: Array, normals: Array) -> Array:
     np.fill_diagonal(squared, np.inf)
     depth /= np.maximum(squared, 1e-18, out=squared)
     return 1 / np.maximum(2 * depth.max(axis=1), 1 / THICKEST)
-
-
-def _share(value: float) -> float:
-    return min(max(value, 0.0), 1.0)

@@ -1,6 +1,6 @@
 from .bending import Bending as Bending
+from .bending import unfolded as unfolded
 from .emphasis import Emphasis as Emphasis
-from .frame import Frame as Frame
 from .mesh import Locator as Locator
 from .mesh import Mesh as Mesh
 from .mesh import local_thickness as local_thickness
@@ -29,5 +29,5 @@ from .readers.svg_shapes import DrawnShape as DrawnShape
 from .readers.svg_shapes import parse_xml as parse_xml
 from .soft_target import SoftTarget as SoftTarget
 from .soft_target import signed_distance as signed_distance
+from .target import Frame as Frame
 from .target import Target as Target
-from .unfolding import unfolded as unfolded

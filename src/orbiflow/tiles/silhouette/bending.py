@@ -1,4 +1,4 @@
-"""The map from a silhouette to its tile, triangle by triangle."""
+"""Maps of a triangulated silhouette: the one to its tile, and how folds are taken out of a map."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from orbiflow.arguments import is_tensor, numbers
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.geometry import best_similarity, complex_points
-from orbiflow.tiles.silhouette.mesh import Locator
+from orbiflow.tiles.silhouette.mesh import Locator, Mesh, doubled_areas
 
 if TYPE_CHECKING:
     import torch
@@ -21,28 +21,29 @@ if TYPE_CHECKING:
 MAX_POINTS, MAX_TRIANGLES = 100_000, 200_000
 """Beyond these a mesh is refused: real ones have some thousands."""
 
+# twice the area of a triangle, in squares of the whole's extent, that rounding can turn over
 FLAT = 1e-18
-"""Twice the area of a triangle, in squares of the whole's extent, that rounding can turn over."""
+
+MAX_SHARPENINGS = 30  # the largest number of times that the penalty on folds is sharpened
 
 
 @dataclass(frozen=True, eq=False)
 class Bending:
     """A map of the plane that takes a triangulated silhouette to its tile, affine on each triangle.
 
-    Both sides are in the target's normal form. The image's outline is the tile's polygon, vertex for
-    vertex, and no triangle is turned over, so that inside the silhouette the map is a homeomorphism
-    onto the tile. A point outside goes with the nearest point of the silhouette, and the rest of its
-    way under the similarity nearest to the whole map: continuous across the outline, meant for what
-    lies close to it.
+    Both sides are in the target's normal form. The image's outline is the tile's polygon, vertex
+    for vertex, and no triangle is turned over, so that inside the silhouette the map is a
+    homeomorphism onto the tile. A point outside goes with the nearest point of the silhouette, and
+    the rest of its way under the similarity nearest to the whole map: continuous across the
+    outline, meant for what lies close to it.
 
     Args:
         rest: (N, 2) points of the silhouette.
         images: (N, 2) where they go.
         triangles: (M, 3) indices of the points, counter-clockwise in both.
 
-    Raises:
-        OrbiflowError: for arrays of other shapes, numbers that are not finite, indices out of range,
-            too many points, and triangles that are flat or turned over.
+    Raises `OrbiflowError` for arrays of other shapes, numbers that are not finite, indices out of
+    range, too many points, and triangles that are flat or turned over.
 
     >>> corners = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]
     >>> bending = Bending(corners, [[0.0, 0.0], [2.0, 0.0], [0.0, 1.0]], [[0, 1, 2]])
@@ -60,7 +61,7 @@ class Bending:
         triangles = _indices(self.triangles, len(rest))
         for name, array in (("rest", rest), ("images", images)):
             with np.errstate(all="ignore"):  # an overflow counts as turned over
-                sound = _determinants(array, triangles) > FLAT * np.ptp(array, axis=0).max() ** 2
+                sound = doubled_areas(array, triangles) > FLAT * np.ptp(array, axis=0).max() ** 2
             if not sound.all():
                 raise OrbiflowError(
                     f"the bending's {name}: {int((~sound).sum())} triangles are flat or turned over"
@@ -83,7 +84,7 @@ class Bending:
         Returns:
             (..., 2): for a tensor, one of its dtype and device, without a gradient.
         """
-        return _kind_of(points, self._forward(_checked(points)))
+        return _mapped(points, self._forward)
 
     @overload
     def inverse(self, points: torch.Tensor) -> torch.Tensor: ...
@@ -91,7 +92,7 @@ class Bending:
     def inverse(self, points: ArrayLike) -> Array: ...
     def inverse(self, points: torch.Tensor | ArrayLike) -> torch.Tensor | Array:
         """Where points (..., 2) of the tile come from; as `forward`."""
-        return _kind_of(points, self._backward(_checked(points)))
+        return _mapped(points, self._backward)
 
     @cached_property
     def _forward(self) -> _PiecewiseAffine:
@@ -117,7 +118,9 @@ class _PiecewiseAffine:
         )
         self.origin, self.image = before[:, 0], after[:, 0]
         self.linear = images @ np.linalg.inv(sides)
-        self.similarity = _similarity(start, end)
+        # the linear part of the similarity that takes points nearest to their images
+        factor = complex(best_similarity(complex_points(start), complex_points(end)))
+        self.similarity = np.array([[factor.real, -factor.imag], [factor.imag, factor.real]])
 
     def __call__(self, points: Array) -> Array:
         flat = points.reshape(-1, 2)
@@ -128,18 +131,6 @@ class _PiecewiseAffine:
         inside = np.einsum("pij,pj->pi", self.linear[triangle], nearest - self.origin[triangle])
         result[finite] = self.image[triangle] + inside + (own - nearest) @ self.similarity.T
         return result.reshape(points.shape)
-
-
-def _similarity(start: Array, end: Array) -> Array:
-    """Linear part (2, 2) of the similarity that takes points nearest to their images."""
-    factor = complex(best_similarity(complex_points(start), complex_points(end)))
-    return np.array([[factor.real, -factor.imag], [factor.imag, factor.real]])
-
-
-def _determinants(points: Array, triangles: NDArray[np.int64]) -> Array:
-    corners = points[triangles]
-    u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    return u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
 
 
 def _indices(values: ArrayLike, count: int) -> NDArray[np.int64]:
@@ -159,14 +150,127 @@ def _indices(values: ArrayLike, count: int) -> NDArray[np.int64]:
     return triangles.astype(np.int64)
 
 
-def _checked(points: Any) -> Array:
-    return numbers(points, "points", (..., 2), finite=False)
-
-
-def _kind_of(given: Any, result: Array) -> Any:
+def _mapped(given: Any, function: _PiecewiseAffine) -> Any:
+    """Return the images of an array or a tensor as the same."""
+    result = function(numbers(given, "points", (..., 2), finite=False))
     if not is_tensor(given):
         return result
     import torch
 
     dtype = given.dtype if given.is_floating_point() else torch.float64
     return torch.as_tensor(result, dtype=dtype, device=given.device)
+
+
+def folded(mesh: Mesh, points: Array) -> NDArray[np.bool_]:
+    """Return which triangles (M,) are flat or turned over with corners at `points` (N, 2)."""
+    return doubled_areas(points, mesh.triangles) <= 0
+
+
+def unfolded(mesh: Mesh, points: Array) -> Array:
+    """Move the inner points of a map (N, 2) until no triangle is turned over.
+
+    Foldover-free maps in few steps (Garanzha, Kaporin, Kudryavtseva, Protais, Ray and Sokolov,
+    SIGGRAPH 2021): L-BFGS minimises the distortion |J|^2 / det J of each triangle, with det J bounded
+    away from 0 by a shrinking parameter; if that fails, again from points each in the middle of its
+    neighbours. Points on the outline, which bound a simple polygon, stay in place; and all do if
+    nothing was turned over. Raises `OrbiflowError` if triangles stay turned over.
+    """
+    if not folded(mesh, points).any():
+        return points
+    for start in (points, _spread(mesh, points)):  # the second is a start for tangled points
+        found = _untangled(_Distortion(mesh, start))
+        if found is not None:
+            return found
+    raise OrbiflowError(
+        "the silhouette cannot be carried to this tile without folds: parts of it are too thin"
+    )
+
+
+def _untangled(work: _Distortion) -> Array | None:
+    import scipy.optimize
+
+    x = work.start
+    for _ in range(MAX_SHARPENINGS):
+        found = scipy.optimize.minimize(
+            work.value, x, jac=True, method="L-BFGS-B", options={"maxiter": 60, "maxcor": 20}
+        )
+        x = found.x
+        smallest = work.smallest(x)
+        if smallest > 0:
+            return work.points(x)
+        work.sharpen(smallest)
+    return None
+
+
+def _spread(mesh: Mesh, points: Array) -> Array:
+    """Return inner points in the middle of their neighbours (Tutte, 1963)."""
+    import scipy.sparse
+    import scipy.sparse.linalg
+
+    fixed, count = mesh.size + len(mesh.sides), len(points)
+    i, j = (np.concatenate([mesh.triangles[:, k] for k in turn]) for turn in ((0, 1, 2), (1, 2, 0)))
+    ones = np.ones(2 * len(i))
+    pairs = (np.concatenate([i, j]), np.concatenate([j, i]))
+    touching: Any = scipy.sparse.csr_matrix((ones, pairs), shape=(count, count))
+    degree: Any = scipy.sparse.diags(np.asarray(touching.sum(axis=1)).ravel())
+    laplacian: Any = (degree - touching).tocsc()[fixed:]
+    spread = points.copy()
+    right = -(laplacian[:, :fixed] @ points[:fixed])
+    inner: Any = scipy.sparse.linalg.spsolve(laplacian[:, fixed:].tocsc(), right)
+    spread[fixed:] = inner
+    return spread
+
+
+class _Distortion:
+    """The distortion as a function of the inner points, with its gradient."""
+
+    def __init__(self, mesh: Mesh, points: Array) -> None:
+        self.mesh, self.images = mesh, points.copy()
+        self.fixed = mesh.size + len(mesh.sides)
+        rest = mesh.points[mesh.triangles]
+        edges = np.stack([rest[:, 1] - rest[:, 0], rest[:, 2] - rest[:, 0]], axis=2)
+        self.inverse = np.linalg.inv(edges)
+        self.area = np.linalg.det(edges) / 2
+        self.area /= self.area.sum()
+        self.start = points[self.fixed :].ravel()
+        self.epsilon = 1.0
+        self.sharpen(self.smallest(self.start))
+
+    def points(self, x: Array) -> Array:
+        images = self.images.copy()
+        images[self.fixed :] = x.reshape(-1, 2)
+        return images
+
+    def smallest(self, x: Array) -> float:
+        return float(np.linalg.det(self._jacobians(x)).min())
+
+    def sharpen(self, smallest: float) -> None:
+        """Bound the determinants less far from 0, so that the smallest still has an effect."""
+        self.epsilon = min(0.5 * self.epsilon, 0.1 * abs(min(smallest, 0.0)) + 1e-6)
+
+    def _jacobians(self, x: Array) -> Array:
+        corners = self.points(x)[self.mesh.triangles]
+        edges = np.stack([corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=2)
+        return edges @ self.inverse
+
+    def value(self, x: Array) -> tuple[float, Array]:
+        j = self._jacobians(x)
+        det: Array = np.linalg.det(j)
+        root = np.sqrt(det**2 + self.epsilon**2)
+        # (det + root) / 2 without cancellation
+        bounded = np.where(det > 0, det + root, self.epsilon**2 / (root + abs(det))) / 2
+        norm = (j**2).sum(axis=(1, 2))
+        cofactor = np.stack(
+            [np.stack([j[:, 1, 1], -j[:, 1, 0]], -1), np.stack([-j[:, 0, 1], j[:, 0, 0]], -1)], 1
+        )
+        energy = self.area * norm / bounded
+        slope = -norm / (bounded * root)
+        by_j = self.area[:, None, None] * (
+            2 * j / bounded[:, None, None] + slope[:, None, None] * cofactor
+        )
+        by_edge = by_j @ np.swapaxes(self.inverse, 1, 2)
+        gradient = np.zeros_like(self.images)
+        for corner, part in ((1, by_edge[:, :, 0]), (2, by_edge[:, :, 1])):
+            np.add.at(gradient, self.mesh.triangles[:, corner], part)
+            np.add.at(gradient, self.mesh.triangles[:, 0], -part)
+        return float(energy.sum()), gradient[self.fixed :].ravel()

@@ -1,7 +1,5 @@
 """Emphasis, a mask painted over the input picture that gives the plane's points weights."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
@@ -14,8 +12,8 @@ from scipy.ndimage import gaussian_filter, map_coordinates
 from orbiflow.arguments import instance, number, numbers
 from orbiflow.arrays import Array, Window
 from orbiflow.errors import InputFileError, OrbiflowError
-from orbiflow.tiles.silhouette.outlines import clean_ring, percent
-from orbiflow.tiles.silhouette.readers import MaskReading, read_mask
+from orbiflow.tiles.silhouette.outlines import percent
+from orbiflow.tiles.silhouette.readers import Picture, read_mask
 from orbiflow.tiles.silhouette.target import Target
 
 MAX_STRENGTH = 100.0
@@ -25,11 +23,9 @@ MAX_ASPECT_ERROR = 0.01
 SMOOTHING = 0.02  # standard deviation
 FADE_WIDTH = 0.05  # beyond the mask's box
 MAX_SMOOTHING = 32.0  # pixels: a bound of the work
-MIN_TOUCHING_LEVEL = (
-    0.01  # of full emphasis: what is nowhere above this on the silhouette does not touch it
-)
+# of full emphasis: what is nowhere above this on the silhouette does not touch it
+MIN_TOUCHING_LEVEL = 0.01
 GRID_SIDE = 512  # pixels along a side of the grids that integrals are taken on
-
 _OUTLINE_BOX = "the outline's bounding box"
 
 
@@ -78,13 +74,14 @@ class Emphasis:
     def read(cls, path: str | Path, target: Target, *, strength: float = 4.0) -> Self:
         """Read a mask (PNG, JPEG, WebP) painted over the picture that `target` was read from.
 
-        White is fully emphasised and black not at all. If some of the mask is more transparent than the
-        rest, opaque is emphasised, in any colour. The mask covers the picture of an image, the page
-        (viewBox) of an SVG drawing, or else the outline's bounding box, and must have its aspect
-        within 1%. Its edges are smoothed by 1/50 of the square root of the silhouette's area.
+        White is fully emphasised and black not at all. If some of the mask is more transparent than
+        the rest, opaque is emphasised, in any colour. The mask covers the picture of an image, the
+        page (viewBox) of an SVG drawing, or else the outline's bounding box, and must have its
+        aspect within 1%. Its edges are smoothed by 1/50 of the square root of the silhouette's
+        area.
 
-        Raises `InputFileError` for a file over 64 MB or 40 megapixels, one that is damaged or not an
-        image, a mask of another aspect, a uniform mask, and one that emphasises no part of the
+        Raises `InputFileError` for a file over 64 MB or 40 megapixels, one that is damaged or not
+        an image, a mask of another aspect, a uniform mask, and one that emphasises no part of the
         silhouette; `OrbiflowError` for a strength that is not above 1 and at most 100.
         """
         instance(target, Target, "the target", "Target.read and Target.from_polygon make one")
@@ -92,11 +89,14 @@ class Emphasis:
         picture = read_mask(path)
         box, covered = _covered(target)
         placed = _check_aspect(path, picture, box, covered)
-        levels = picture.levels
+        levels = picture.channel
         # the last row and column of an averaged mask may extend beyond the picture
         overhang = np.array(levels.shape[::-1]) * picture.reduced / picture.size
         own = _normal_box(target, box, overhang)
-        plain = cls(_smoothed(levels, own), own, strength, str(path))
+        pixel = np.array([own[3] - own[1], own[2] - own[0]]) / levels.shape
+        sigma = np.minimum(SMOOTHING / pixel, MAX_SMOOTHING)
+        smooth = np.clip(gaussian_filter(levels, tuple(sigma), mode="nearest"), 0, 1)
+        plain = cls(smooth.astype(np.float32), own, strength, str(path))
         share = _share_of(plain, target)
         notes = (*picture.notes, *placed, *_warnings(levels, share, plain.strength))
         return cls(plain.mask, own, strength, str(path), share, notes)
@@ -147,59 +147,17 @@ class Emphasis:
         return level * (1 - beyond**2 * (3 - 2 * beyond))
 
 
-def emphasised_iou(tile: ArrayLike, target: ArrayLike, emphasis: Emphasis) -> float:
-    """Return the weighted intersection over union, 0 to 1, of two rings (N, 2) in the normal form.
-
-    The areas are sums of weights over the pixel centres of a grid of 512 x 512 on the box around
-    both shapes, the same ones every time. For outlines of animals the result is within 0.001 of
-    the exact integral (measured without emphasis, against `metrics.iou`); shapes that are thinner
-    than a pixel, 1/512 of that box, are lost.
-
-    Raises `OrbiflowError` naming the ring that is not a simple polygon.
-
-    >>> square = [[0, 0], [2, 0], [2, 2], [0, 2]]
-    >>> right = Emphasis(np.array([[0.0, 1.0]]), (-2, -2, 4, 4), strength=3.0)
-    >>> emphasised_iou(square, square, right)
-    1.0
-    >>> emphasised_iou([[0, 0], [1, 0], [1, 2], [0, 2]], square, right) < 0.5
-    True
-    """
-    rings = [clean_ring(tile, "tile")[0], clean_ring(target, "target")[0]]
-    points = _grid(np.concatenate(rings))
-    own, goal = (_contains(ring, points) for ring in rings)
-    either = own | goal
-    weight = emphasis.weight(points[either])
-    total = float(weight.sum())
-    return float(weight[(own & goal)[either]].sum()) / total if total else 0.0
-
-
-def _grid(points: Array) -> Array:
-    """Return centres (GRID_SIDE^2, 2) of the pixels of the box around `points`."""
-    low, high = points.min(axis=0), points.max(axis=0)
-    steps = (np.arange(GRID_SIDE) + 0.5) / GRID_SIDE
-    along: list[Array] = [low[i] + (high[i] - low[i]) * steps for i in range(2)]
-    return np.stack(np.meshgrid(*along), axis=-1).reshape(-1, 2)
-
-
-def _contains(ring: Array, points: Array) -> NDArray[np.bool_]:
-    region = shapely.Polygon(ring)
-    shapely.prepare(region)
-    return shapely.contains_xy(region, points[:, 0], points[:, 1])
-
-
 def _covered(target: Target) -> tuple[Window, str]:
     """Return what a mask covers, (xmin, ymin, xmax, ymax) in input units, and its name."""
     if target.size is None:
-        xmin, ymin = target.outline.min(axis=0)
-        xmax, ymax = target.outline.max(axis=0)
-        return (float(xmin), float(ymin), float(xmax), float(ymax)), _OUTLINE_BOX
+        return shapely.Polygon(target.outline).bounds, _OUTLINE_BOX
     width, height = target.size
     xmin, ymin = target.corner
     name = "the drawing's page" if target.kind == "svg" else "the input picture"
     return (xmin, ymin, xmin + width, ymin + height), name
 
 
-def _check_aspect(path: Path, picture: MaskReading, box: Window, covered: str) -> list[str]:
+def _check_aspect(path: Path, picture: Picture, box: Window, covered: str) -> list[str]:
     """Return notes of where the mask was placed, or raise an error if it does not fit."""
     (width, height), wide, high = picture.size, box[2] - box[0], box[3] - box[1]
     mask, size = f"{width} x {height} pixels", f"{wide:.6g} x {high:.6g}"
@@ -216,30 +174,20 @@ def _check_aspect(path: Path, picture: MaskReading, box: Window, covered: str) -
 def _normal_box(target: Target, box: Window, overhang: Array) -> Window:
     """Return `box` in the normal form, extended to the right and downwards by `overhang`."""
     corners = target.to_normal([box[:2], box[2:]])
-    xmin, ymin = corners.min(axis=0)
-    xmax, ymax = corners.max(axis=0)
-    right, down = overhang
-    return (
-        float(xmin),
-        float(ymax - down * (ymax - ymin)),
-        float(xmin + right * (xmax - xmin)),
-        float(ymax),
-    )
-
-
-def _smoothed(levels: Array, box: Window) -> NDArray[np.float32]:
-    xmin, ymin, xmax, ymax = box
-    pixel = np.array([ymax - ymin, xmax - xmin]) / levels.shape
-    sigma = np.minimum(SMOOTHING / pixel, MAX_SMOOTHING)
-    smooth = gaussian_filter(levels, tuple(sigma), mode="nearest")
-    return np.clip(smooth, 0, 1).astype(np.float32)
+    (xmin, ymin), (xmax, ymax) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
+    right, down = overhang.tolist()
+    return xmin, ymax - down * (ymax - ymin), xmin + right * (xmax - xmin), ymax
 
 
 def _share_of(emphasis: Emphasis, target: Target) -> float:
     """Return the mean emphasis of the silhouette; an error where the mask does not touch it."""
-    ring = target.normal
-    points = _grid(ring)
-    levels = emphasis.level(points[_contains(ring, points)])
+    ring, region = target.normal, shapely.Polygon(target.normal)
+    shapely.prepare(region)
+    low, size = ring.min(axis=0), np.ptp(ring, axis=0)
+    steps = (np.arange(GRID_SIDE) + 0.5) / GRID_SIDE
+    along: list[Array] = [low[i] + size[i] * steps for i in range(2)]
+    points = np.stack(np.meshgrid(*along), axis=-1).reshape(-1, 2)
+    levels = emphasis.level(points[shapely.contains_xy(region, points[:, 0], points[:, 1])])
     on_outline = emphasis.level(ring)
     if max(levels.max(initial=0), on_outline.max()) < MIN_TOUCHING_LEVEL:
         raise InputFileError(

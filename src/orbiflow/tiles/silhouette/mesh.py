@@ -3,8 +3,6 @@
 # pyright: reportUnknownMemberType=false
 # shapely's stubs leave the keyword arguments of its functions of arrays without types.
 
-from __future__ import annotations
-
 from typing import NamedTuple, cast
 
 import numpy as np
@@ -16,11 +14,8 @@ from orbiflow.arrays import Array, Integers
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.geometry import subdivided
 
-MAX_HALVINGS = 24
-"""The number of times that missing sides of the outline are halved."""
-
-FLAT_AREA = 1e-12
-"""Twice the area, in areas of the polygon, below which a triangle counts as flat."""
+MAX_HALVINGS = 24  # the number of times that missing sides of the outline are halved
+FLAT_AREA = 1e-12  # twice the area, in areas of the polygon, below which a triangle counts as flat
 
 
 class Mesh(NamedTuple):
@@ -41,19 +36,13 @@ class Mesh(NamedTuple):
 
 
 def triangulate(ring: Array, spacing: float | None = None) -> Mesh:
-    """Triangulate the inside of a simple polygon, its sides among the triangles' sides.
+    """Triangulate the inside of a simple, counter-clockwise ring (n, 2), with its sides.
 
     This is a Delaunay triangulation of the vertices and of points inside. Sides of the polygon that
     are not sides of triangles are halved until they are (Ruppert's first rule). Sides of triangles
     that connect two points of the outline through the inside are halved, so that every triangle can
-    follow when the outline moves.
-
-    Args:
-        ring: A counter-clockwise ring (n, 2).
-        spacing: The spacing of inner points next to the outline. Default: the mean length of a side.
-
-    Raises:
-        OrbiflowError: for a ring that crosses itself, or too thin to be filled in double precision.
+    follow when the outline moves. Next to the outline inner points are `spacing` apart, by default the
+    mean length of a side. Raises `OrbiflowError` for a ring that crosses itself or is too thin.
     """
     polygon = shapely.Polygon(ring)
     if not polygon.is_valid or not polygon.area > 0:
@@ -119,12 +108,17 @@ def _are_sides(ends: Integers, triangles: Integers, count: int) -> NDArray[np.bo
     return np.isin(wanted[:, 0] * count + wanted[:, 1], known)
 
 
+def doubled_areas(points: Array, triangles: Integers) -> Array:
+    """Return twice the area (M,) of triangles, negative where they are clockwise."""
+    corners = points[triangles]
+    u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    return u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
+
+
 def _kept(mesh: Mesh, polygon: shapely.Polygon) -> Mesh:
     """Return the triangles inside the polygon, counter-clockwise, and the points that they use."""
-    corners = mesh.points[mesh.triangles]
-    middle = corners.mean(axis=1)
-    u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    area = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
+    middle = mesh.points[mesh.triangles].mean(axis=1)
+    area = doubled_areas(mesh.points, mesh.triangles)
     triangles = np.where((area < 0)[:, None], mesh.triangles[:, ::-1], mesh.triangles)
     inside = cast(NDArray[np.bool_], shapely.contains_xy(polygon, *middle.T))
     flat = abs(area) < FLAT_AREA * polygon.area
@@ -202,12 +196,7 @@ class Located(NamedTuple):
 
 
 class Locator:
-    """A search tree of the triangles of a mesh.
-
-    Args:
-        points: The points (N, 2).
-        triangles: The indices (M, 3) of the corners; no triangle may be flat.
-    """
+    """A search tree of triangles (M, 3) over points (N, 2), none of them flat."""
 
     def __init__(self, points: Array, triangles: Integers) -> None:
         self._tree = shapely.STRtree(np.asarray(shapely.polygons(points[triangles])))
@@ -227,11 +216,8 @@ class Locator:
         return Located(found, nearest)
 
 
-PIECES_PER_SIDE = 3
-"""The number of parts of each side of the outline: more make the medial axis finer."""
-
-DISC_OVERREACH = 1.02
-"""The factor of the discs' radii that makes up for the size of triangles."""
+PIECES_PER_SIDE = 3  # number of parts of each side of the outline: more make the medial axis finer
+DISC_OVERREACH = 1.02  # the factor of the discs' radii that makes up for the size of triangles
 
 
 def local_thickness(mesh: Mesh) -> Array:
@@ -239,16 +225,12 @@ def local_thickness(mesh: Mesh) -> Array:
 
     This is the local thickness of Hildebrand and Rüegsegger (1997), over discs about the Voronoi
     vertices of points on the outline, which lie near the medial axis.
-
-    Args:
-        mesh: A mesh of the polygon.
     """
     polygon = shapely.Polygon(mesh.points[: mesh.size])
-    corners = mesh.points[mesh.triangles]
     dense = subdivided(mesh.points[: mesh.size], PIECES_PER_SIDE)
     centers = Voronoi(dense).vertices
     centers = centers[shapely.contains_xy(polygon, centers[:, 0], centers[:, 1])]
-    middle = corners.mean(axis=1)
+    middle = mesh.points[mesh.triangles].mean(axis=1)
     outline = polygon.exterior
     shapely.prepare(outline)
     own: Array = shapely.distance(cast(NDArray[np.object_], shapely.points(middle)), outline)

@@ -1,7 +1,5 @@
 """Outlines of silhouettes: checking, simplifying and sampling them."""
 
-from __future__ import annotations
-
 import re
 from typing import NamedTuple
 
@@ -28,11 +26,9 @@ MAX_COORDINATE = 1e12
 # Below these a shape has no digits left: relative to its distance from the origin, and absolute.
 MIN_RELATIVE_SIZE = 1e-9
 MIN_SIZE = 1e-100
-# Relative to the square of the longer side of the bounding box.
-MIN_RELATIVE_AREA = 1e-9
+MIN_RELATIVE_AREA = 1e-9  # Relative to the square of the longer side of the bounding box.
 # Of the box's longer side: a polygon that is simple by less would cross itself when it is rescaled.
 CLEARANCE_DIGITS = 12
-
 _POSITION = re.compile(r"\[(\S+) (\S+)\]")
 
 
@@ -41,8 +37,8 @@ def clean_ring(
 ) -> tuple[Array, list[str]]:
     """Check that `points` (N, 2) bound a region, and drop repeated vertices.
 
-    Returns the ring and a note, in plain words, of what was dropped. Each message begins with `where`,
-    such as a file name.
+    Returns the ring and a note, in plain words, of what was dropped. Each message begins with
+    `where`, such as a file name.
 
     Raises `error` when a coordinate is not a finite number, when fewer than 3 or more than 100,000
     vertices are given, when no area is enclosed, or when the polygon crosses or touches itself.
@@ -68,15 +64,10 @@ def clean_ring(
 
 def _as_points(points: ArrayLike, where: str, error: type[OrbiflowError]) -> Array:
     try:
-        ring: Array = np.zeros(0)
-        if np.ndim(points):
-            ring = numbers(points, where, (...,), finite=False)
+        ring = numbers(points, where, ("N", 2), finite=False)
     except (TypeError, ValueError) as exc:
-        raise error(
-            f"{where}: the vertices are not numbers in pairs; give them as [[x, y], ...]"
-        ) from exc
-    if ring.ndim != 2 or ring.shape[1] != 2:
-        raise error(f"{where}: vertices must have shape (N, 2), got {ring.shape}")
+        what = "the vertices are not numbers in pairs, of shape (N, 2)"
+        raise error(f"{where}: {what}; give them as [[x, y], ...]") from exc
     if len(ring) > MAX_VERTICES:
         raise error(
             f"{where}: {len(ring)} vertices, at most {MAX_VERTICES} can be read; simplify the outline"
@@ -182,20 +173,17 @@ def outer_outline(geometry: BaseGeometry) -> tuple[Polygon, list[str]]:
     return shape, notes
 
 
+# the length of an outline of area 1 that is sampled with the fewest points; a disc has 3.5
 SHORT_OUTLINE = 8.2
-"""The length of an outline of area 1 that is sampled with the fewest points; a disc has 3.5."""
-
 MIN_POINTS, MAX_POINTS = 60, 120
 """The least and the largest number of points for the search."""
 
+# the least height of a corner over the line past it to be kept, in square roots of the area
 CORNER_DEPTH = 0.004
-"""The least height of a corner over the line past it to be kept, in square roots of the area."""
-
+# the numbers of points of the tile for each point of the search, in order of trial
 FINE_MULTIPLES = (4, 6)
-"""The numbers of points of the tile for each point of the search, in order of trial."""
-
+# the number of middle points for each point of the search, a divisor of `FINE_MULTIPLES`
 MIDDLE_MULTIPLE = 2
-"""The number of middle points for each point of the search, a divisor of `FINE_MULTIPLES`."""
 
 
 class Samples(NamedTuple):
@@ -214,18 +202,12 @@ class Samples(NamedTuple):
 def sampled(
     ring: Array, phase: float = 0.0, multiples: tuple[int, ...] = FINE_MULTIPLES
 ) -> Samples:
-    """Sample an outline, more densely if it is long or rich in corners.
+    """Sample a counter-clockwise ring (M, 2) of area about 1, more densely if long or rich in corners.
 
-    If twice the coarse points make no simple polygon, or do not divide the fine ones, `middle` is
-    `fine`.
-
-    Args:
-        ring: A counter-clockwise ring (M, 2) of area about 1.
-        phase: The shift of the points, in coarse spacings.
-        multiples: The numbers of fine points for each coarse one, in order of trial.
-
-    Raises:
-        OrbiflowError: if all samplings cross themselves because the silhouette has hairs.
+    Points are shifted by `phase` coarse spacings; `multiples` are numbers of fine points for each
+    coarse one, in order of trial. If twice the coarse points make no simple polygon, or do not divide
+    the fine ones, `middle` is `fine`. Raises `OrbiflowError` if all cross themselves because there
+    are hairs.
     """
     longer = ring_length(ring) / SHORT_OUTLINE
     count = int(np.clip(6 * round(MIN_POINTS * longer / 6), MIN_POINTS, MAX_POINTS))

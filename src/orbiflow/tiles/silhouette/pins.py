@@ -1,7 +1,5 @@
 """Pins, the parts of a silhouette that must not bend, given as spots or painted on a mask."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
@@ -14,7 +12,7 @@ import scipy.sparse.csgraph
 import shapely
 from numpy.typing import ArrayLike, NDArray
 
-from orbiflow.arguments import instance, numbers
+from orbiflow.arguments import instance, number, numbers
 from orbiflow.arrays import Array, Integers
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.tiles.geometry import resampled
@@ -22,15 +20,10 @@ from orbiflow.tiles.silhouette.emphasis import Emphasis
 from orbiflow.tiles.silhouette.outlines import percent
 from orbiflow.tiles.silhouette.target import Target
 
-DEFAULT_RADIUS = 0.08
-"""The default radius of a spot, in longer sides of the silhouette's bounding box."""
-
+DEFAULT_RADIUS = 0.08  # default radius of a spot, in longer sides of the silhouette's bounding box
+# the shares of the outline beyond which the tile cannot be similar, and nothing is left to bend
 MUCH_PINNED, ALL_PINNED = 0.4, 0.9
-"""The shares of the outline beyond which the tile cannot be similar, and nothing is left to bend."""
-
-REACH_PAST_OUTLINE = 1.5
-"""The reach of a spot without a radius, in distances from the outline."""
-
+REACH_PAST_OUTLINE = 1.5  # the reach of a spot without a radius, in distances from the outline
 _NUMBER = r"\s*[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?\s*"
 _SPOT = re.compile(rf"{_NUMBER}(?:,{_NUMBER}){{1,2}}")
 
@@ -63,12 +56,12 @@ class Pins:
     def at(cls, target: Target, spots: Iterable[ArrayLike], *, keep_angle: bool = False) -> Self:
         """Return pins at spots (x, y) or (x, y, radius), all in the input's units.
 
-        The default radius of a spot is 8% of the longer side of the silhouette's bounding box, or 1.5
-        times its distance from the outline if that is more, so that it holds some of the outline.
+        The default radius of a spot is 8% of the longer side of the silhouette's bounding box, or
+        1.5 times its distance from the outline if that is more, so that it holds some of the
+        outline.
 
-        Raises:
-            OrbiflowError: for an invalid spot, a radius that is not positive, a spot that does not
-                reach the silhouette, no spot, and spots that hold nine tenths of the outline.
+        Raises `OrbiflowError` for an invalid spot, a radius that is not positive, a spot that does
+        not reach the silhouette, no spot, and spots that hold nine tenths of the outline.
         """
         return cls._create(target, list(spots), (), keep_angle)
 
@@ -76,8 +69,8 @@ class Pins:
     def read(cls, given: Iterable[str | Path], target: Target, *, keep_angle: bool = False) -> Self:
         """Return pins from text: spots "x,y" or "x,y,radius", or paths of masks, white where pinned.
 
-        A mask covers the same as in `Emphasis.read`: the picture, the drawing's page, or the outline's
-        bounding box.
+        A mask covers the same as in `Emphasis.read`: the picture, the drawing's page, or the
+        outline's bounding box.
 
         Raises:
             InputFileError: for masks that cannot be read or do not touch the silhouette.
@@ -111,12 +104,8 @@ class Pins:
         scale = np.sqrt(target.area)
         placed = [(*target.to_normal(disc[:2]), disc[2] / scale) for disc in discs]
         sources = [",".join(f"{value:.6g}" for value in disc) for disc in discs]
-        pins = cls(
-            np.array(placed).reshape(-1, 3),
-            masks,
-            keep_angle,
-            (*sources, *(mask.source for mask in masks)),
-        )
+        sources += [mask.source for mask in masks]
+        pins = cls(np.array(placed).reshape(-1, 3), masks, keep_angle, tuple(sources))
         notes = [note for mask in masks for note in mask.notes]
         return replace(pins, notes=(*notes, *_warnings(pins, target)))
 
@@ -140,9 +129,8 @@ class Pins:
         held = self.holds(points)
         pairs = np.concatenate([triangles[:, [k - 1, k]] for k in range(3)])
         pairs = pairs[held[pairs].all(axis=1)]
-        links = scipy.sparse.coo_matrix(
-            (np.ones(len(pairs)), pairs.T), shape=(len(held), len(held))
-        )
+        shape = (len(held), len(held))
+        links = scipy.sparse.coo_matrix((np.ones(len(pairs)), pairs.T), shape=shape)
         _, label = scipy.sparse.csgraph.connected_components(links, directed=False)
         return [np.flatnonzero((label == k) & held) for k in np.unique(label[held])]
 
@@ -178,18 +166,11 @@ def _disc(spot: ArrayLike, target: Target) -> tuple[float, float, float]:
     x, y = (float(value) for value in values[:2])
     region = shapely.Polygon(target.outline)
     centre = shapely.Point(x, y)
+    radius = DEFAULT_RADIUS * float(np.ptp(target.outline, axis=0).max())
     if len(values) == 3:
-        radius = float(values[2])
-        if not radius > 0:
-            raise OrbiflowError(f"the radius of a pin must be positive, got {radius:g}")
-    else:
-        sides = np.ptp(target.outline, axis=0)
-        radius = max(
-            DEFAULT_RADIUS * float(sides.max()),
-            REACH_PAST_OUTLINE * centre.distance(region.exterior),
-        )
-        if not region.contains(centre):
-            radius = DEFAULT_RADIUS * float(sides.max())
+        radius = number(values[2], "the radius of a pin", 0, above=True)
+    elif region.contains(centre):
+        radius = max(radius, REACH_PAST_OUTLINE * centre.distance(region.exterior))
     if centre.distance(region) > radius:
         (xmin, ymin), (xmax, ymax) = target.outline.min(axis=0), target.outline.max(axis=0)
         raise OrbiflowError(

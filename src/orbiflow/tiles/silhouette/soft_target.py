@@ -1,7 +1,5 @@
 """A target as an image of signed distances, for the soft occupancy of thousands of points."""
 
-from __future__ import annotations
-
 import numpy as np
 import shapely
 import torch
@@ -14,8 +12,7 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.silhouette.emphasis import Emphasis
 from orbiflow.tiles.silhouette.target import Target
 
-PIECES_PER_SIDE = 8
-"""The number of pieces of each side of a ring in integrals along it."""
+PIECES_PER_SIDE = 8  # the number of pieces of each side of a ring in integrals along it
 
 
 class SoftTarget:
@@ -77,8 +74,8 @@ class SoftTarget:
     def weighted_iou(self, rings: Tensor) -> Tensor:
         """Return the IoU (S,) of counter-clockwise rings (S, N, 2) with the target, weighted.
 
-        The areas are weighted by the emphasis. By Green's theorem they are integrals over the rings of
-        the weights' integral along x, accurate to a pixel of the image.
+        The areas are weighted by the emphasis. By Green's theorem they are integrals over the rings
+        of the weights' integral along x, accurate to a pixel of the image.
         """
         if self._integrals is None:
             self._integrals = self._integrate()

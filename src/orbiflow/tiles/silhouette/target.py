@@ -1,19 +1,21 @@
 """The silhouette that a tile should look like, in the user's coordinates and in normal form."""
 
+from __future__ import annotations
+
 import os
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import IO, Any, Self
+from typing import IO, TYPE_CHECKING, Any, Self, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from orbiflow.arguments import described, is_a
+from orbiflow.arguments import described, is_a, is_tensor, numbers
 from orbiflow.arrays import Array
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.tiles.geometry import centroid, orient, signed_area
-from orbiflow.tiles.silhouette.frame import Frame
 from orbiflow.tiles.silhouette.outlines import clean_ring
 from orbiflow.tiles.silhouette.readers import (
     MAX_BYTES,
@@ -23,12 +25,140 @@ from orbiflow.tiles.silhouette.readers import (
     read_outline,
 )
 
+if TYPE_CHECKING:
+    import torch
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """The map input = linear normal + offset from a normal form (y up, area 1, centroid 0).
+
+    - `linear`: An invertible matrix (2, 2), in input units per unit of the normal form; read-only.
+    - `offset`: The origin (2,) of the normal form in input units; read-only.
+    - `kind`: The kind of the input: "image", "svg", "dat", "json" or "polygon".
+    - `size`: The width and height of the picture or page in input units, if there is one.
+    - `corner`: Its corner of least coordinates. In an image it is (0, 0) and the unit is the pixel: the
+      pixel in row i, column j, counted from 0, has its centre at (j + 1/2, i + 1/2).
+
+    Raises `OrbiflowError` for arrays of other shapes, entries that are not finite numbers, and a
+    matrix without an inverse.
+
+    >>> frame = Frame([[20, 0], [0, -20]], [50, 40], kind="image", size=(100, 80))
+    >>> frame.to_input([1.0, 1.0]).tolist(), frame.to_normal([70, 20]).tolist(), frame.y_down
+    ([70.0, 20.0], [1.0, 1.0], True)
+    """
+
+    linear: Array
+    offset: Array
+    kind: str = "polygon"
+    size: tuple[float, float] | None = None
+    corner: tuple[float, float] = (0.0, 0.0)
+    inverse: Array = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        linear = numbers(self.linear, "a frame's linear", (2, 2))
+        size = None if self.size is None else _pair(self.size, "size")
+        if size is not None and not min(size) > 0:
+            raise OrbiflowError(f"a frame's size must be positive, got {size}")
+        # relative to the scale: a frame may be tiny
+        determinant = linear[0, 0] * linear[1, 1] - linear[0, 1] * linear[1, 0]
+        if not abs(determinant) > 1e-12 * np.abs(linear).max() ** 2:
+            raise OrbiflowError(f"a frame's linear part has no inverse: {linear.tolist()}")
+        arrays = {
+            "linear": linear,
+            "offset": numbers(self.offset, "a frame's offset", (2,)),
+            "inverse": np.linalg.inv(linear),
+        }
+        for name, array in arrays.items():
+            array.setflags(write=False)
+            object.__setattr__(self, name, array)
+        object.__setattr__(self, "size", size)
+        object.__setattr__(self, "corner", _pair(self.corner, "corner"))
+
+    @property
+    def y_down(self) -> bool:
+        """Whether the input's y axis points down: the frame turns the plane over."""
+        return bool(np.linalg.det(self.linear) < 0)
+
+    @overload
+    def to_input(self, points: torch.Tensor) -> torch.Tensor: ...
+    @overload
+    def to_input(self, points: ArrayLike) -> Array: ...
+    def to_input(self, points: torch.Tensor | ArrayLike) -> torch.Tensor | Array:
+        """Return points (..., 2) of the normal form in the input's units; arrays, lists or tensors."""
+        if is_tensor(points):
+            points = _tensor(points)
+            return points @ points.new_tensor(self.linear).T + points.new_tensor(self.offset)
+        return numbers(points, "points", (..., 2), finite=False) @ self.linear.T + self.offset
+
+    @overload
+    def to_normal(self, points: torch.Tensor) -> torch.Tensor: ...
+    @overload
+    def to_normal(self, points: ArrayLike) -> Array: ...
+    def to_normal(self, points: torch.Tensor | ArrayLike) -> torch.Tensor | Array:
+        """Return points (..., 2) in the input's units, in the normal form; arrays, lists or tensors."""
+        if is_tensor(points):
+            points = _tensor(points)
+            return (points - points.new_tensor(self.offset)) @ points.new_tensor(self.inverse).T
+        local = numbers(points, "points", (..., 2), finite=False) - self.offset
+        scale = np.diag(self.linear)
+        if np.array_equal(self.linear, np.diag(scale)):
+            return local / scale  # rounded once
+        return local @ self.inverse.T
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return everything, ready for JSON; `from_dict` undoes it bit for bit."""
+        return {
+            "linear": self.linear.tolist(),
+            "offset": self.offset.tolist(),
+            "y_down": self.y_down,
+            "kind": self.kind,
+            "size": None if self.size is None else list(self.size),
+            "corner": list(self.corner),
+        }
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> Self:
+        """Return the frame that `as_dict` wrote.
+
+        Raises `OrbiflowError` for values that are missing or do not make a frame.
+        """
+        try:
+            size = values["size"]
+            frame = cls(
+                values["linear"],
+                values["offset"],
+                str(values["kind"]),
+                None if size is None else tuple(size),
+                tuple(values["corner"]),
+            )
+            y_down = values["y_down"]
+        except (KeyError, TypeError) as error:
+            raise OrbiflowError(f"the frame is incomplete: {error}") from error
+        if y_down is not frame.y_down:
+            raise OrbiflowError(
+                f"the frame's y_down is {y_down!r}, but its linear part has y_down {frame.y_down}"
+            )
+        return frame
+
+
+def _tensor(points: torch.Tensor) -> torch.Tensor:
+    if points.ndim == 0 or points.shape[-1] != 2:
+        raise OrbiflowError(f"points: expected shape (..., 2), got {tuple(points.shape)}")
+    return points if points.is_floating_point() else points.double()
+
+
+def _pair(values: Any, name: str) -> tuple[float, float]:
+    first, second = numbers(values, f"a frame's {name}", (2,)).tolist()
+    return first, second
+
 
 @dataclass(frozen=True, eq=False)
 class Target:
     """A silhouette: one simple closed curve.
 
-    Create one with `Target.read`, `from_bytes`, `from_mask` or `from_polygon`, which check the outline.
+    Create one with `Target.read`, `from_bytes`, `from_mask` or `from_polygon`, which check the
+    outline.
 
     - `outline`: The vertices (N, 2), without a repeated last one, in the input's own units. In an image
       the unit is the pixel and (0, 0) the image's top left corner, so that pixel (row 0, column 0)
@@ -57,7 +187,8 @@ class Target:
 
     def __post_init__(self) -> None:
         outline = orient(np.array(self.outline, float), counter_clockwise=not self.y_down)
-        object.__setattr__(self, "outline", _read_only(outline))
+        outline.setflags(write=False)
+        object.__setattr__(self, "outline", outline)
 
     @classmethod
     def read(
@@ -69,9 +200,9 @@ class Target:
     ) -> Self:
         """Read a silhouette from an image (PNG, JPEG, WebP), an SVG, a `.json` or a `.dat` file.
 
-        A binary stream, such as an open file or `io.BytesIO`, is read from its present position. For
-        images, `threshold` (0 to 1) is the level that separates the shape from its background, and
-        `invert` says that the shape is the light (or the transparent) part. By default both are
+        A binary stream, such as an open file or `io.BytesIO`, is read from its present position.
+        For images, `threshold` (0 to 1) is the level that separates the shape from its background,
+        and `invert` says that the shape is the light (or the transparent) part. By default both are
         detected, and `notes` report the result.
 
         Raises `InputFileError` for a file without a usable silhouette, with what to do about it.
@@ -111,9 +242,9 @@ class Target:
     ) -> Self:
         """Return the largest shape in an array (H, W), a row of pixels at a time, the first on top.
 
-        Booleans, and integers that are only 0 and 1, are true in the shape (with `invert`, outside).
-        Other integers and floats are gray levels, from 0 to 255, 65535 or 1, and are read like those of
-        images: by default `threshold` and `invert` are detected.
+        Booleans, and integers that are only 0 and 1, are true in the shape (with `invert`,
+        outside). Other integers and floats are gray levels, from 0 to 255, 65535 or 1, and are read
+        like those of images: by default `threshold` and `invert` are detected.
 
         Raises `OrbiflowError` for another array, and `InputFileError` for one without a shape.
 
@@ -128,15 +259,8 @@ class Target:
 
     @classmethod
     def _of(cls, reading: Reading, source: str) -> Self:
-        return cls(
-            reading.outline,
-            reading.y_down,
-            reading.notes,
-            source,
-            reading.kind,
-            reading.size,
-            reading.corner,
-        )
+        page = reading.kind, reading.size, reading.corner
+        return cls(reading.outline, reading.y_down, reading.notes, source, *page)
 
     @classmethod
     def from_polygon(
@@ -165,7 +289,9 @@ class Target:
     @cached_property
     def normal(self) -> Array:
         """The outline (N, 2), counter-clockwise with y up, area 1 and centroid 0."""
-        return _read_only(self.to_normal(self.outline))
+        normal = self.to_normal(self.outline)
+        normal.setflags(write=False)
+        return normal
 
     def to_input(self, points: ArrayLike) -> Array:
         """Return `points` (..., 2) of the normal form in the input's units: `frame.to_input`."""
@@ -202,8 +328,3 @@ def _held(stream: Any) -> FileContent:
     if not isinstance(data, bytes):
         raise OrbiflowError(f'{name} is a stream of text; open it in binary mode, "rb"')
     return FileContent(data, name)
-
-
-def _read_only(array: Array) -> Array:
-    array.setflags(write=False)
-    return array

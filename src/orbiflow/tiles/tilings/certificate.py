@@ -3,11 +3,9 @@
 # pyright: reportUnknownMemberType=false
 # shapely's stubs leave the keyword arguments of its functions of arrays without types.
 
-from __future__ import annotations
-
 import math
 import re
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any, Literal, TypeAlias, cast
 
 import numpy as np
@@ -41,9 +39,9 @@ _MARGIN = 0.05  # width of the ring around the tile that must be covered; any po
 class Certificate:
     """The result of `certify`.
 
-    Lengths are in square roots of the expected area, areas relative to it. Figures that could not be
-    computed are NaN. With several prototiles each figure is the worst one, and areas are means over the
-    tiles.
+    Lengths are in square roots of the expected area, areas relative to it. Figures that could not
+    be computed are NaN. With several prototiles each figure is the worst one, and areas are means
+    over the tiles.
 
     Args:
         simple: Whether the polygon does not cross or touch itself.
@@ -96,8 +94,7 @@ class Certificate:
     def require(self) -> None:
         """Raise an error unless the tile is valid.
 
-        Raises:
-            CertificationError: with the reasons, if the tile is not valid.
+        Raises `CertificationError` with the reasons, if the tile is not valid.
         """
         if not self.valid:
             raise CertificationError(
@@ -109,19 +106,19 @@ def certify(tile: Tiles, *, tolerance: float = 1e-9) -> Certificate:
     """Check that the tiles of a tiling cover the plane once (design points 9 and 16).
 
     Proof. The tiles are the images g(T_k), one for each coset of the stabiliser S_k. Orient all of
-    them alike and let n(x) be the number of tiles that contain x; n is invariant under the group and
-    constant off the boundaries. Suppose that each boundary segment is the reverse of an image of its
-    partner, and that partners are evenly distributed (`boundaries_cancel`). As an invariant chain, the
-    sum of all boundaries then equals minus itself, so it vanishes: n does not jump across any segment
-    and is constant. Its mean over a lattice cell is sum_k area(T_k) |G| / |S_k| over |det B|. If that
-    is one, n = 1: with the T_k simple, the tiles cover the plane once. This uses no class table, only
-    polygons and group.
+    them alike and let n(x) be the number of tiles that contain x; n is invariant under the group
+    and constant off the boundaries. Suppose that each boundary segment is the reverse of an image
+    of its partner, and that partners are evenly distributed (`boundaries_cancel`). As an invariant
+    chain, the sum of all boundaries then equals minus itself, so it vanishes: n does not jump
+    across any segment and is constant. Its mean over a lattice cell is sum_k area(T_k) |G| / |S_k|
+    over |det B|. If that is one, n = 1: with the T_k simple, the tiles cover the plane once. This
+    uses no class table, only polygons and group.
 
     When partner edges are the same curves with different vertices (bricks laid in half bond, say),
     no such pairing exists. Then boundaries must lie within tolerance of the other tiles' boundaries
-    as curves, and the proof rests on the areas alone: no tile overlaps a prototile, and a ring around
-    each prototile is covered, so the covered set is open and closed. Both areas are also computed, as
-    an independent check, when the segments match.
+    as curves, and the proof rests on the areas alone: no tile overlaps a prototile, and a ring
+    around each prototile is covered, so the covered set is open and closed. Both areas are also
+    computed, as an independent check, when the segments match.
 
     Args:
         tile: A tile or a tiling, of any scale and position; double precision cannot hold the default
@@ -141,73 +138,50 @@ def certify(tile: Tiles, *, tolerance: float = 1e-9) -> Certificate:
     """
     tiling = as_tiling(tile)
     tolerance = number(tolerance, "tolerance", 0, above=True)
-    figures = _Figures(tiling, tolerance)
+    shares = np.bincount(tiling.aspects.prototiles, minlength=len(tiling.prototiles))
+    area = float(shares @ [p.signed_area for p in tiling.prototiles] / shares.sum())
+    size, nan = tiling.tile_area, math.nan
+    off = abs(abs(area) - size) / size
+    found = Certificate(False, area, size, off, nan, "none", nan, nan, nan, 0, tolerance, ())
     numbers = range(len(tiling.prototiles))
     try:
         around = [surroundings(tiling, k, _MARGIN) for k in numbers]
     except OrbiflowError as error:
-        return figures.refuse(str(error))
+        return replace(found, reasons=(str(error),))
     mismatch, matching = _edge_mismatch(tiling, around, tolerance)
+    found = replace(found, edge_mismatch=mismatch, edge_matching=matching)
     for k in numbers:
         crossing = _self_crossing(tiling, k, around[k].ring)
         if crossing:
-            return figures.refuse(crossing, mismatch, matching)
+            return replace(found, reasons=(crossing,))
     areas = np.array([_areas(a) for a in around])
+    overlap, total, bare = (float(x) for x in areas.max(axis=0))
     count = max(int(touching(a, max(1e-7, tolerance))[1].sum()) for a in around)
-    return figures.certificate(mismatch, matching, areas, count)
+    found = replace(found, simple=True, overlap=overlap, total_overlap=total, uncovered=bare)
+    return replace(found, neighbours=count, reasons=_reasons(found, areas, tiling))
 
 
-class _Figures:
-    """The figures that can always be computed, and the certificates made from them."""
-
-    def __init__(self, tiling: Tiling, tolerance: float) -> None:
-        own = tiling.prototiles
-        shares = np.bincount(tiling.aspects.prototiles, minlength=len(own))
-        areas = np.array([p.signed_area for p in own])
-        self.area = float(shares @ areas / shares.sum())
-        self.size = tiling.tile_area
-        self.error = abs(abs(self.area) - self.size) / self.size
-        self.tolerance = tolerance
-        self.several = len(own) > 1
-        self.symmetry = max(s.order for s in tiling.stabilisers)
-
-    def refuse(
-        self, reason: str, mismatch: float = math.nan, matching: EdgeMatching = "none"
-    ) -> Certificate:
-        nan = math.nan
-        return Certificate(
-            False, self.area, self.size, self.error, mismatch, matching,
-            nan, nan, nan, 0, self.tolerance, (reason,),
-        )  # fmt: skip
-
-    def certificate(
-        self, mismatch: float, matching: EdgeMatching, areas: Array, count: int
-    ) -> Certificate:
-        """Return the certificate for `areas` (K, 3): overlap, total overlap and uncovered area."""
-        overlap, total, uncovered = (float(x) for x in areas.max(axis=0))
-        reasons: list[str] = []
-        if not self.error <= self.tolerance:
-            reasons.append(self._area_reason())
-        if not mismatch <= self.tolerance:
-            reasons.append(f"its edges miss their partners by {mismatch:.1e} of its size")
-        if not total <= self.tolerance:
-            who = f"prototile {areas[:, 1].argmax()}" if self.several else "it"
-            reasons.append(f"{who} overlaps its neighbours by {total:.1e} of its area")
-        if not uncovered <= self.tolerance:
-            who = f" prototile {areas[:, 2].argmax()}" if self.several else " it"
-            reasons.append(f"its images leave {uncovered:.1e} of its area uncovered around{who}")
-        return Certificate(
-            True, self.area, self.size, self.error, mismatch, matching,
-            overlap, total, uncovered, count, self.tolerance, tuple(reasons),
-        )  # fmt: skip
-
-    def _area_reason(self) -> str:
-        whose = "the mean area of its tiles" if self.several else "its area"
-        own = f" for a tile with a symmetry of order {self.symmetry}" if self.symmetry > 1 else ""
-        return (
-            f"{whose} {abs(self.area):.9g} is not the group's {self.size:.9g}"
-            f"{'' if self.several else own} (relative error {self.error:.1e})"
+def _reasons(found: Certificate, areas: Array, tiling: Tiling) -> tuple[str, ...]:
+    """Return what fails, given the areas (K, 3): overlap, total overlap and uncovered area."""
+    several, bound = len(tiling.prototiles) > 1, found.tolerance
+    reasons: list[str] = []
+    if not found.area_error <= bound:
+        symmetry = max(s.order for s in tiling.stabilisers)
+        own = f" for a tile with a symmetry of order {symmetry}" if symmetry > 1 else ""
+        reasons.append(
+            f"{'the mean area of its tiles' if several else 'its area'} "
+            f"{abs(found.signed_area):.9g} is not the group's {found.expected_area:.9g}"
+            f"{'' if several else own} (relative error {found.area_error:.1e})"
         )
+    if not found.edge_mismatch <= bound:
+        reasons.append(f"its edges miss their partners by {found.edge_mismatch:.1e} of its size")
+    if not found.total_overlap <= bound:
+        who = f"prototile {areas[:, 1].argmax()}" if several else "it"
+        reasons.append(f"{who} overlaps its neighbours by {found.total_overlap:.1e} of its area")
+    if not found.uncovered <= bound:
+        who = f"prototile {areas[:, 2].argmax()}" if several else "it"
+        reasons.append(f"its images leave {found.uncovered:.1e} of its area uncovered around {who}")
+    return tuple(reasons)
 
 
 def _self_crossing(tiling: Tiling, prototile: int, ring: Array) -> str:

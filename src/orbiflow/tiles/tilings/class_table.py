@@ -8,8 +8,6 @@ order times the template's area is |det B|, and that the identified edges are th
 onto each other.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Literal, NamedTuple, TypeAlias
 
@@ -45,8 +43,8 @@ OperatorRow: TypeAlias = RotationRow | TransflectionRow
 class ClassRow(NamedTuple):
     """A row of the table.
 
-    Operators are in the order in which the paper nests them, outermost first. Edges are identified in
-    pairs, equal where an edge is its own partner; the group has the isometry.
+    Operators are in the order in which the paper nests them, outermost first. Edges are identified
+    in pairs, equal where an edge is its own partner; the group has the isometry.
     """
 
     group: str
@@ -58,6 +56,7 @@ class ClassRow(NamedTuple):
 
 _HEXAGON_CELL = LatticeVector({0: 3}), LatticeVector({1: 1, 2: 1})
 
+# source: the paper, table "The Symmetrization for the nine isohedral classes"
 CLASS_TABLE: dict[str, ClassRow] = {
     "IH1": ClassRow(
         group="p1",
@@ -144,4 +143,3 @@ CLASS_TABLE: dict[str, ClassRow] = {
         edges=((0, 4), (1, 2), (3, 3)),
     ),
 }
-"""Source: the paper, table "The Symmetrization for the nine isohedral classes"."""

@@ -1,8 +1,6 @@
 """Colourings in which tiles that share an edge differ: periodic, with few colours."""
 
-from __future__ import annotations
-
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -14,16 +12,15 @@ from orbiflow.tiles.tilings.surroundings import neighbours
 from orbiflow.tiles.tilings.tile_copies import Copies, prototile_of
 from orbiflow.tiles.tilings.tiling import Cell, Tiles, Tiling, as_tiling
 
-Graph: TypeAlias = list[set[int]]
-"""The neighbours of each vertex, symmetric and without loops."""
+Graph: TypeAlias = list[set[int]]  # the neighbours of each vertex, symmetric and without loops
 
 
 def colour_graph(graph: Graph, count: int, *, max_steps: int = 4000) -> list[int] | None:
     """Return a proper colouring with colours 0 ... count - 1, or None.
 
     Backtracking in the order of saturation (Brélaz, "New methods to color the vertices of a graph",
-    CACM 22, 1979). None means that there is none, or that none was found in `max_steps` assignments;
-    with more colours than the largest degree it is always found, without backtracking.
+    CACM 22, 1979). None means that there is none, or that none was found in `max_steps`
+    assignments; with more colours than the largest degree it is always found, without backtracking.
 
     >>> colour_graph([{1, 2}, {0, 2}, {0, 1}], 3)
     [0, 1, 2]
@@ -65,8 +62,8 @@ def _advance(trail: list[tuple[int, list[int]]], colours: list[int]) -> bool:
     return False
 
 
+# (a, b, c): spanned by a B_1 and b B_1 + c B_2, with 0 <= b < a; its index is a c
 Sublattice: TypeAlias = tuple[int, int, int]
-"""(a, b, c): spanned by a B_1 and b B_1 + c B_2, with 0 <= b < a; its index is a c."""
 
 _MAX_INDEX = 9
 
@@ -90,8 +87,7 @@ class Colouring:
     def colour(self, element: Isometry) -> int:
         """Return the colour, 0 ... count - 1, of the tile that `element` makes of its prototile.
 
-        Raises:
-            OrbiflowError: for an isometry that is not in the tile's group.
+        Raises `OrbiflowError` for an isometry that is not in the tile's group.
         """
         own = self.tiling
         aspect, cell, _ = own.aspects.find(own.group, element, prototile_of(element))
@@ -120,8 +116,7 @@ def colouring(tile: Tiles) -> Colouring:
     Args:
         tile: A tile or a tiling.
 
-    Raises:
-        OrbiflowError: if polygon and group are of very different size.
+    Raises `OrbiflowError` if polygon and group are of very different size.
 
     >>> from orbiflow.tiles import Tile
     >>> from orbiflow.tiles import isohedral_class
@@ -137,7 +132,9 @@ def colouring(tile: Tiles) -> Colouring:
             colours = colour_graph(graph, count)
             if colours is not None:
                 shape = (len(tiling.aspects), sublattice[0], sublattice[2])
-                table = _most_frequent_first(np.array(colours)).reshape(shape)
+                # the most frequent colour first
+                order = np.argsort(-np.bincount(colours), kind="stable")
+                table = np.argsort(order)[np.array(colours)].reshape(shape)
                 return Colouring(tiling, count, sublattice, table)
     raise RuntimeError("unreachable: maximal degree + 1 colours always suffice")
 
@@ -194,10 +191,3 @@ def _quotient(links: _Links, sublattice: Sublattice) -> Graph:
                 cells = [(k, reduce_cell((m + u, n + v), sublattice)) for k, (u, v) in near]
                 graph.append({(k * a + p) * c + q for k, (p, q) in cells})
     return graph
-
-
-def _most_frequent_first(colours: Integers) -> Integers:
-    order: Sequence[int] = np.argsort(-np.bincount(colours), kind="stable").tolist()
-    rank = np.empty(len(order), dtype=np.int64)
-    rank[order] = np.arange(len(order))
-    return rank[colours]

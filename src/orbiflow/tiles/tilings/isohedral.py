@@ -1,7 +1,5 @@
 """The nine isohedral classes, with their templates, groups, operators and lattice freedom."""
 
-from __future__ import annotations
-
 import math
 import re
 from dataclasses import dataclass
@@ -73,10 +71,8 @@ PENTAGONS: dict[str, PentagonGauge] = {
 
 def hexagon() -> Array:
     """Return (6, 2) vertices p_k = (cos 60k, sin 60k), float64, counter-clockwise."""
-    half, high = 0.5, math.sqrt(3.0) / 2
-    return np.array(
-        [(1.0, 0.0), (half, high), (-half, high), (-1.0, 0.0), (-half, -high), (half, -high)]
-    )
+    x, y = 0.5, math.sqrt(3.0) / 2
+    return np.array([(1.0, 0.0), (x, y), (-x, y), (-1.0, 0.0), (-x, -y), (x, -y)])
 
 
 def pentagon(gauge: PentagonGauge, shape: Points) -> Points:
@@ -120,12 +116,9 @@ _ROUNDING_ERROR = 1e-9
 def commutant(linear_parts: Array) -> Array:
     """Return an orthonormal basis (m, 2) of the (a, b) whose [[a, b], [b, -a]] commutes with a group.
 
-    The mean over the group projects on them: R X R^T turns (a, b) as R turns directions, twice as far.
-    The basis is made by Gram-Schmidt in the order a, b, so that it depends only on the group; saved
-    parameters are coordinates in it.
-
-    Args:
-        linear_parts: The linear parts (n, 2, 2) of all cosets.
+    The mean over the group projects on them: R X R^T turns (a, b) as R turns directions, twice as
+    far. The basis is made by Gram-Schmidt in the order a, b, so that it depends only on the group;
+    saved parameters are coordinates in it.
 
     >>> commutant(np.array([np.eye(2), np.diag([1.0, -1.0])])).tolist()
     [[1.0, 0.0]]
@@ -166,25 +159,22 @@ def _functions(values: Any) -> Any:
     return torch
 
 
-class _OfTheCLibrary:
-    """Functions of NumPy arrays rounded as torch rounds them."""
-
-    cosh = np.vectorize(math.cosh, otypes=[float])
-    sinh = np.vectorize(math.sinh, otypes=[float])
+# of NumPy arrays, rounded as torch rounds them
+_cosh, _sinh = (np.vectorize(f, otypes=[float]) for f in (math.cosh, math.sinh))
 
 
 def _cosh_sinhc(square: Any) -> tuple[Any, Any]:
     """cosh r and sinh(r) / r as functions of r^2, by their series where the root would hurt."""
     own = _functions(square)
-    hyperbolic = own if is_tensor(square) else _OfTheCLibrary
+    hyperbolic_cosh, hyperbolic_sinh = (own.cosh, own.sinh) if is_tensor(square) else (_cosh, _sinh)
     small = square < 1e-2
     root = own.sqrt(own.where(small, own.ones_like(square), square))
     s = own.where(small, square, own.zeros_like(square))
     cosh = 1 + s / 2 * (1 + s / 12 * (1 + s / 30 * (1 + s / 56 * (1 + s / 90))))
     sinhc = 1 + s / 6 * (1 + s / 20 * (1 + s / 42 * (1 + s / 72 * (1 + s / 110))))
     return (
-        own.where(small, cosh, hyperbolic.cosh(root)),
-        own.where(small, sinhc, hyperbolic.sinh(root) / root),
+        own.where(small, cosh, hyperbolic_cosh(root)),
+        own.where(small, sinhc, hyperbolic_sinh(root) / root),
     )
 
 
@@ -248,8 +238,7 @@ class IsohedralClass:
             shape: Parameters (..., shape_dim), NumPy or torch (then differentiable); for the pentagons
                 the displacement of p1 from its default. None means the default, as a NumPy array.
 
-        Raises:
-            OrbiflowError: if the last axis of `shape` is not `shape_dim` long.
+        Raises `OrbiflowError` if the last axis of `shape` is not `shape_dim` long.
         """
         if shape is None:
             return self._default.copy()
@@ -262,12 +251,10 @@ class IsohedralClass:
         Args:
             parameters: Parameters (..., stretch_dim), NumPy or torch (then differentiable).
 
-        Raises:
-            OrbiflowError: if the last axis of `parameters` is not `stretch_dim` long.
+        Raises `OrbiflowError` if the last axis of `parameters` is not `stretch_dim` long.
         """
-        return stretch_matrix(
-            self._freedom, self._parameters(parameters, self.stretch_dim, "stretch")
-        )
+        own = self._parameters(parameters, self.stretch_dim, "stretch")
+        return stretch_matrix(self._freedom, own)
 
     def group(self) -> CrystallographicGroup:
         """Return the group of the template; the same for all shape parameters."""
@@ -347,8 +334,7 @@ def isohedral_class(name: str | int | IsohedralClass) -> IsohedralClass:
 
     "IH4", "ih4", "IH04", "4" and 4 are the same; a class is returned as it is.
 
-    Raises:
-        OrbiflowError: for anything but the nine.
+    Raises `OrbiflowError` for anything but the nine.
 
     >>> isohedral_class("ih04")
     IsohedralClass(IH4, p2)

@@ -3,8 +3,6 @@
 # pyright: reportUnknownMemberType=false
 # shapely's stubs leave the keyword arguments of its functions of arrays without types.
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -19,8 +17,8 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import CrystallographicGroup, Isometry
 from orbiflow.tiles.geometry import signed_area
 
+# the distance, in radii of the tile, below which consecutive vertices count as one
 _REPEATED_DISTANCE = 1e-12
-"""The distance, in radii of the tile, below which consecutive vertices count as one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,14 +161,11 @@ def _image_order(element: Isometry, ring: Array) -> tuple[Integers | None, float
     order = (first + step * np.arange(count)) % count
     error = float(np.linalg.norm(image - ring[order], axis=1).max())
     curve = shapely.linearrings(ring)
-    there = shapely.distance(
-        curve, shapely.points(np.concatenate([image, element.inverse()(ring)]))
-    )
-    as_curve = float(there.max())
+    both = shapely.points(np.concatenate([image, element.inverse()(ring)]))
+    as_curve = float(shapely.distance(curve, both).max())
     # vertices correspond if they are about as near to vertices as to the curve
-    return (
-        (order, error) if error <= 4 * as_curve + 1e-9 * float(np.ptp(ring)) else (None, as_curve)
-    )
+    near = error <= 4 * as_curve + 1e-9 * float(np.ptp(ring))
+    return (order, error) if near else (None, as_curve)
 
 
 def _closed(elements: list[Isometry]) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -27,19 +27,8 @@ from orbiflow.tiles.tilings.tile_copies import (
 )
 from orbiflow.tiles.tilings.tiling import Tiles, Tiling, as_tiling
 
+# the largest radius, in square roots of the expected area, of a tile whose images are listed
 MAX_SPAN = 12.0
-"""The largest radius, in square roots of the expected area, of a tile whose images are listed."""
-
-
-def expected_area(tile: Tiles) -> float:
-    """Return |det B| over the number of tiles in a lattice cell: the area of a tile of this group."""
-    return as_tiling(tile).tile_area
-
-
-def span(tile: Tiles) -> float:
-    """Return the tile's radius over the square root of the expected area: 0.6 for a hexagon."""
-    tiling = as_tiling(tile)
-    return tiling.radius / math.sqrt(tiling.tile_area)
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,13 +83,12 @@ class Surroundings:
 
     def select(self, keep: NDArray[np.bool_]) -> Surroundings:
         """Return the tiles where `keep`, (M,), is true."""
-        return Surroundings(
-            self.prototile,
-            self.ring,
-            self.copies.select(keep),
-            self.points[keep[self.owner]],
-            self.counts[keep],
-            self.mirrored[keep],
+        return replace(
+            self,
+            copies=self.copies.select(keep),
+            points=self.points[keep[self.owner]],
+            counts=self.counts[keep],
+            mirrored=self.mirrored[keep],
         )
 
 
@@ -108,15 +96,12 @@ def surroundings(tiling: Tiling, prototile: int, margin: float) -> Surroundings:
     """Return the tiles whose bounding box comes within `margin` of a prototile's, nearest first.
 
     The unit is the side of a square of a tile's area.
-
-    Raises:
-        OrbiflowError: for a tile of span over `MAX_SPAN`, or with fewer than three vertices.
     """
     scale = math.sqrt(tiling.tile_area)
-    if span(tiling) > MAX_SPAN:
+    if tiling.radius > MAX_SPAN * scale:
         raise OrbiflowError(
-            f"the tile's radius is {span(tiling):.0f} times the size that its group allows for: "
-            "check that polygon and group belong together and have the same units"
+            f"the tile's radius is {tiling.radius / scale:.0f} times the size that its group allows "
+            "for: check that polygon and group belong together and have the same units"
         )
     own = tiling.prototiles[prototile]
     if any(len(p.ring) < 3 for p in tiling.prototiles):
@@ -128,29 +113,14 @@ def surroundings(tiling: Tiling, prototile: int, margin: float) -> Surroundings:
     away[itself] = np.inf
     order = np.argsort(away, kind="stable")[: len(near) - int(itself.sum())]
     near = near.select(order)
-    rings = [p.ring for p in tiling.prototiles]
-    counts = np.array([len(ring) for ring in rings])[near.prototiles]
-    points = np.empty((int(counts.sum()), 2))
-    first = np.cumsum(counts) - counts
-    for k, ring in enumerate(rings):
-        mine = np.flatnonzero(near.prototiles == k)
-        rows = first[mine, None] + np.arange(len(ring))
-        points[rows] = near.select(mine).images(ring)
-    linear = tiling.group.linear_parts
-    signs = linear[:, 0, 0] * linear[:, 1, 1] - linear[:, 0, 1] * linear[:, 1, 0]
-    return Surroundings(
-        prototile,
-        _flushed((own.ring - own.center) / scale),
-        near,
-        _flushed((points - own.center) / scale),
-        counts,
-        (signs < 0)[near.cosets],
-    )
-
-
-def _flushed(points: Array) -> Array:
+    rings = near.rings([p.ring for p in tiling.prototiles])
+    counts = np.array([len(ring) for ring in rings], dtype=np.int64)
+    points = np.concatenate([*rings, np.empty((0, 2))])
+    local = ((part - own.center) / scale for part in (own.ring, points))
     # squares of coordinates such as 1e-200 underflow in GEOS and give areas that are plainly wrong
-    return np.where(np.abs(points) < 1e-15, 0.0, points)
+    ring, points = (np.where(np.abs(part) < 1e-15, 0.0, part) for part in local)
+    mirrored = (np.linalg.det(tiling.group.linear_parts) < 0)[near.cosets]
+    return Surroundings(prototile, ring, near, points, counts, mirrored)
 
 
 class SegmentMatch(NamedTuple):
@@ -177,10 +147,8 @@ def match_segments(around: Surroundings, tolerance: float) -> SegmentMatch:
     plain = ~around.mirrored[around.owner, None]
     starts, ends = around.points, around.ahead
     reverse = np.concatenate([np.where(plain, ends, starts), np.where(plain, starts, ends)], axis=1)
-    low, high = ring.min(axis=0) - tolerance, ring.max(axis=0) + tolerance
-    inside = np.flatnonzero(
-        ((reverse >= np.tile(low, 2)) & (reverse <= np.tile(high, 2))).all(axis=1)
-    )
+    low, high = np.tile([ring.min(axis=0) - tolerance, ring.max(axis=0) + tolerance], 2)
+    inside = np.flatnonzero(((reverse >= low) & (reverse <= high)).all(axis=1))
     if not len(inside):
         nowhere = np.full(count, -1)
         return SegmentMatch(np.full(count, np.inf), nowhere, nowhere)
@@ -195,25 +163,17 @@ def boundaries_cancel(
 ) -> bool:
     """Return whether the matched segments of all prototiles, with their signs, add up to zero.
 
-    Args:
-        tiling: The tiling.
-        around, matches: The surroundings and the match of each prototile.
-
     The boundary of all tiles together is, per orbit of the group, the sum of [e] / |S_k| over the
     segments e of each T_k. If e is the reverse of an image of its partner, it is also minus the sum
-    of [partner of e] / |S_k|. The two agree if every segment, modulo the stabiliser of its prototile,
-    is a partner as often as it occurs, counted so; then the sum is its own negative. With one
-    prototile and no stabiliser: if the partners are a permutation.
+    of [partner of e] / |S_k|. The two agree if every segment, modulo the stabiliser of its
+    prototile, is a partner as often as it occurs, counted so; then the sum is its own negative.
+    With one prototile and no stabiliser: if the partners are a permutation.
     """
     sizes = np.array([len(a.ring) for a in around])
     first: Integers = np.cumsum(sizes) - sizes
     weights = np.repeat([1.0 / own.order for own in tiling.stabilisers], sizes)
-    partners = np.concatenate(
-        [
-            first[a.copies.prototiles[match.tile]] + match.partner
-            for a, match in zip(around, matches, strict=True)
-        ]
-    )
+    pairs = zip(around, matches, strict=True)
+    partners = np.concatenate([first[a.copies.prototiles[m.tile]] + m.partner for a, m in pairs])
     labels = _orbits(tiling, first)
     if labels is None:
         return False
@@ -243,13 +203,14 @@ def curve_distance(around: Surroundings) -> float:
     """Return the largest distance of a prototile's vertex to the boundaries of the tiles around.
 
     With the tiles' vertices seen from the prototile being its vertices seen from them, over all
-    prototiles this is the Hausdorff distance between a boundary and the union of the others near it.
+    prototiles this is the Hausdorff distance between a boundary and the union of the others near
+    it.
     """
     if not len(around):
         return float("inf")
-    tree = segment_tree(around)
-    _, distance = tree.query_nearest(
-        shapely.points(around.ring), all_matches=False, return_distance=True
+    points = shapely.points(around.ring)
+    _, distance = segment_tree(around).query_nearest(
+        points, all_matches=False, return_distance=True
     )
     return float(distance.max())
 
@@ -260,9 +221,8 @@ def segment_tree(around: Surroundings) -> shapely.STRtree:
     return shapely.STRtree(np.asarray(shapely.linestrings(ends)))
 
 
-_BOUNDARY_SAMPLES = (
-    200  # points on the boundary at least, so that coarse polygons are seen as curves
-)
+# points on the boundary at least, so that coarse polygons are seen as curves
+_BOUNDARY_SAMPLES = 200
 
 
 class Neighbours(NamedTuple):
@@ -285,8 +245,7 @@ def neighbours(tile: Tiles, prototile: int = 0, *, tolerance: float = 1e-7) -> N
         prototile: The number of the prototile; each neighbour names the prototile that it is a copy of.
         tolerance: The distance that counts as touching, in square roots of the tile's area.
 
-    Raises:
-        OrbiflowError: if polygon and group are of very different size.
+    Raises `OrbiflowError` if polygon and group are of very different size.
 
     >>> from orbiflow.tiles import Tile
     >>> from orbiflow.tiles import isohedral_class
@@ -312,20 +271,14 @@ def touching(around: Surroundings, tolerance: float) -> tuple[Surroundings, NDAr
     near = around.select(np.asarray(shapely.dwithin(outline, around.rings, tolerance)))
     shares: NDArray[np.bool_] = np.zeros(len(near), dtype=bool)
     if len(near):
-        points = shapely.points(_boundary_samples(near.ring))
+        # interior points of the segments, midpoints among them: never the corners
+        count = len(near.ring)
+        pieces = 2 * math.ceil(_BOUNDARY_SAMPLES / (2 * count)) + 1
+        pieces = pieces if count < _BOUNDARY_SAMPLES else 1
+        points = shapely.points(subdivided(near.ring, pieces, phase=0.5))
         _, hits = segment_tree(near).query(points, predicate="dwithin", distance=tolerance)
         shares[near.owner[hits]] = True
     return near, shares
-
-
-def _boundary_samples(ring: Array) -> Array:
-    """Return interior points of the segments, midpoints among them: never the corners."""
-    per_segment = (
-        2 * math.ceil(_BOUNDARY_SAMPLES / (2 * len(ring))) + 1
-        if len(ring) < _BOUNDARY_SAMPLES
-        else 1
-    )
-    return subdivided(ring, per_segment, phase=0.5)
 
 
 def patch(tile: Tiles, window: Sequence[float]) -> list[Placed]:
@@ -335,8 +288,7 @@ def patch(tile: Tiles, window: Sequence[float]) -> list[Placed]:
         tile: A tile or a tiling, which need not be certified.
         window: A rectangle (xmin, ymin, xmax, ymax) in the tile's units.
 
-    Raises:
-        OrbiflowError: for an empty window, or one of more than `MAX_TILES` tiles.
+    Raises `OrbiflowError` for an empty window, or one of more than `MAX_TILES` tiles.
 
     >>> from orbiflow.tiles import Tile
     >>> from orbiflow.tiles import isohedral_class
@@ -358,8 +310,7 @@ def aspects(tile: Tiles, elements: Sequence[Isometry]) -> list[int]:
         tile: A tile or a tiling.
         elements: The elements; a plain isometry moves prototile 0.
 
-    Raises:
-        OrbiflowError: for an isometry that is not in the tile's group.
+    Raises `OrbiflowError` for an isometry that is not in the tile's group.
     """
     tiling = as_tiling(tile)
     find, group = tiling.aspects.find, tiling.group

@@ -44,9 +44,7 @@ class Placed(Isometry):
         return Placed(product.linear, product.translation, self.prototile)
 
     def __repr__(self) -> str:
-        return f"{Isometry.__repr__(self)[:-1]}, prototile={self.prototile})".replace(
-            "Isometry", "Placed", 1
-        )
+        return f"Placed{Isometry.__repr__(self)[8:-1]}, prototile={self.prototile})"
 
 
 def prototile_of(element: Isometry) -> int:
@@ -54,8 +52,7 @@ def prototile_of(element: Isometry) -> int:
     return element.prototile if isinstance(element, Placed) else 0
 
 
-MAX_TILES = 20_000
-"""The largest number of tiles in a patch."""
+MAX_TILES = 20_000  # the largest number of tiles in a patch
 
 
 class CopiesAcross(NamedTuple):
@@ -116,12 +113,12 @@ class Copies:
         turned = np.einsum("gij,nj->gni", self.group.linear_parts, points)
         return turned[self.cosets] + self.translations[:, None, :]
 
-    def rings(self) -> list[Array]:
-        """Return each copy's polygon."""
+    def rings(self, of: Sequence[Array] | None = None) -> list[Array]:
+        """Return each copy's polygon, or the image of what is given for its prototile."""
         found: list[Array] = [np.empty((0, 2))] * len(self)
-        for k, prototile in enumerate(self.tiling.prototiles):
+        for k, points in enumerate(of or [p.polygon for p in self.tiling.prototiles]):
             own = np.flatnonzero(self.prototiles == k)
-            for index, ring in zip(own, self.select(own).images(prototile.polygon), strict=True):
+            for index, ring in zip(own, self.select(own).images(points), strict=True):
                 found[index] = ring
         return found
 
@@ -206,8 +203,7 @@ def copies_inside(tile: Tiles, window: Sequence[float]) -> Copies:
         tile: A tile or a tiling, which need not be certified.
         window: A rectangle (xmin, ymin, xmax, ymax) in the tile's units.
 
-    Raises:
-        OrbiflowError: for an empty window, or one of more than `MAX_TILES` tiles.
+    Raises `OrbiflowError` for an empty window, or one of more than `MAX_TILES` tiles.
     """
     tiling, box = as_tiling(tile), checked_window(window)
     _refuse_too_many(tiling, box)
@@ -277,10 +273,8 @@ def _cells_within(lattice: Array, least: Array, most: Array) -> tuple[Integers, 
         if abs(step) < 1e-12 * abs(inverse).max() * abs(np.linalg.det(lattice)):
             continue
         one, other = ((ends[box, axis] - across * second) / step for ends in (least, most))
-        low, high = (
-            np.maximum(low, np.minimum(one, other)),
-            np.minimum(high, np.maximum(one, other)),
-        )
+        low = np.maximum(low, np.minimum(one, other))
+        high = np.minimum(high, np.maximum(one, other))
     row, first = _ranges(low, high)
     cells = np.stack([first, second[row]], axis=1)
     box = box[row]
@@ -290,11 +284,7 @@ def _cells_within(lattice: Array, least: Array, most: Array) -> tuple[Integers, 
 
 
 def _ranges(low: Array, high: Array) -> tuple[Integers, Array]:
-    """Return all whole numbers in some intervals, and one more at either end for rounding.
-
-    Returns:
-        The number (M,) of the interval, and the whole number (M,).
-    """
+    """Return all whole numbers in some intervals, and one more at either end for rounding."""
     first = np.ceil(low - 1e-9)
     counts = np.maximum(np.floor(high + 1e-9) + 1 - first, 0).astype(np.int64)
     own = np.repeat(np.arange(len(counts)), counts)
@@ -309,10 +299,10 @@ def _by_rows(copies: Copies) -> Copies:
 def _refuse_too_many(tiling: Tiling, window: Window) -> None:
     width, height = window[2] - window[0], window[3] - window[1]
     size, reach = tiling.tile_area, 2 * tiling.radius
-    expected = (width + reach) * (height + reach) / size
-    if expected > 2 * MAX_TILES or width * height / size > MAX_TILES:
+    count = width * height / size
+    if (width + reach) * (height + reach) / size > 2 * MAX_TILES or count > MAX_TILES:
         raise OrbiflowError(
-            f"the window of {width:.4g} by {height:.4g} would hold about "
-            f"{width * height / size:.0f} tiles; the most is {MAX_TILES}: choose larger tiles "
+            f"the window of {width:.4g} by {height:.4g} would hold about {count:.0f} "
+            f"tiles; the most is {MAX_TILES}: choose larger tiles "
             "or a smaller window"
         )

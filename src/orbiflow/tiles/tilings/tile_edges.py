@@ -1,9 +1,10 @@
-"""The edges of a tiling and the isometries that identify them, from polygons and group alone."""
+"""The edges of a tiling and the isometries that identify them, from polygons and group alone.
+
+The skeleton of a tiling is the edges of a set of tiles, shared edges only once.
+"""
 
 # pyright: reportUnknownMemberType=false
 # shapely's stubs leave the keyword arguments of its functions of arrays without types.
-
-from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
@@ -25,7 +26,7 @@ from orbiflow.tiles.tilings.surroundings import (
     match_segments,
     surroundings,
 )
-from orbiflow.tiles.tilings.tile_copies import Placed
+from orbiflow.tiles.tilings.tile_copies import Copies, CopiesAcross, Placed
 from orbiflow.tiles.tilings.tiling import Tiles, Tiling, as_tiling
 
 EdgeKind: TypeAlias = Literal["translation", "rotation", "glide", "mirror"]
@@ -34,8 +35,8 @@ EdgeKind: TypeAlias = Literal["translation", "rotation", "glide", "mirror"]
 class EdgeIdentification(NamedTuple):
     """`isometry` takes edge `first` onto edge `second`, and its tile to the other side of it.
 
-    So across its edge `second` a tile T meets the copy isometry(T'), along that copy's `first`. An edge
-    may be its own partner: turned about its middle, or on a mirror that leaves it in place.
+    So across its edge `second` a tile T meets the copy isometry(T'), along that copy's `first`. An
+    edge may be its own partner: turned about its middle, or on a mirror that leaves it in place.
     """
 
     first: int
@@ -81,8 +82,8 @@ class EdgeIdentification(NamedTuple):
         return f"{self.first}{sign}{self.second}"
 
 
+# the largest distance of equal vertices of two copies, in square roots of the area
 VERTEX_TOLERANCE = 1e-7
-"""The largest distance of equal vertices of two copies, in square roots of the area."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,8 +142,7 @@ def edges(tile: Tiles) -> Edges:
         tile: A tile or tiling whose images match vertex by vertex, as for every tile that orbiflow
             finds; `edge_to_edge` adds the vertices that others lack.
 
-    Raises:
-        OrbiflowError: if the images do not match vertex by vertex.
+    Raises `OrbiflowError` if the images do not match vertex by vertex.
 
     >>> from orbiflow.tiles import Tile
     >>> from orbiflow.tiles import isohedral_class
@@ -157,24 +157,18 @@ def edges(tile: Tiles) -> Edges:
     _require_match(tiling, matches)
     begins = [_begins(tiling, a, match) for a, match in zip(around, matches, strict=True)]
     first = np.cumsum([0] + [len(b) for b in begins])
-    owners: list[int] = []
-    starts: list[int] = []
-    across: list[Placed] = []
-    partners: list[int] = []
+    found: list[tuple[int, int, Placed, int]] = []
     for k in numbers:
         match, near = matches[k], around[k].copies
         for segment in begins[k]:
             beyond = near.isometry(int(match.tile[segment]))
-            there = beyond.prototile
-            owners.append(k)
-            starts.append(int(tiling.prototiles[k].kept[segment]))
-            across.append(beyond)
-            partner = _edge_of(begins[there], int(match.partner[segment]))
-            partners.append(int(first[there]) + partner)
+            partner = _edge_of(begins[beyond.prototile], int(match.partner[segment]))
+            start = int(tiling.prototiles[k].kept[segment])
+            found.append((k, start, beyond, int(first[beyond.prototile]) + partner))
+    owners, starts, across, partners = zip(*found, strict=True)
     turned = tuple(_turned(tiling, k, begins[k], first) for k in numbers)
     # make partners mutual where possible, with isometries that are inverses of each other
-    own = Edges(tiling, tuple(owners), tuple(starts), tuple(across), tuple(partners), turned)
-    return _mutual(own)
+    return _mutual(Edges(tiling, owners, starts, across, partners, turned))
 
 
 def _require_match(tiling: Tiling, matches: Sequence[SegmentMatch]) -> None:
@@ -232,9 +226,8 @@ def _mutual(own: Edges) -> Edges:
         signs = [s.determinant for s in own.tiling.stabilisers[there].elements]
         choice = np.flatnonzero(images == edge)
         # prefer a mirror to a half-turn: it shows that the edge is straight
-        choice = choice[
-            np.argsort(np.array(signs)[choice] * across[edge].determinant, kind="stable")
-        ]
+        order = np.array(signs)[choice] * across[edge].determinant
+        choice = choice[np.argsort(order, kind="stable")]
         if not len(choice):
             choice = np.flatnonzero(~done[images])
         done[edge] = True
@@ -317,7 +310,12 @@ def edge_classes(own: Edges) -> tuple[EdgeClass, ...]:
                 fold = EdgeImage(edge, loop, known.reversed != image.reversed)
                 folds.setdefault((loop.determinant, fold.reversed), fold)
         folds.pop((1, False), None)  # the identity
-        classes.append(EdgeClass(edge, tuple(_closed(edge, folds)), tuple(members)))
+        if len(folds) == 2:  # the third follows from both
+            one, other = folds.values()
+            product = one.isometry @ other.isometry
+            third = EdgeImage(edge, product, one.reversed != other.reversed)
+            folds[product.determinant, third.reversed] = third
+        classes.append(EdgeClass(edge, tuple(folds.values()), tuple(members)))
     return tuple(classes)
 
 
@@ -336,26 +334,16 @@ def _links(own: Edges) -> list[list[EdgeImage]]:
     return links
 
 
-def _closed(edge: int, folds: dict[tuple[int, bool], EdgeImage]) -> list[EdgeImage]:
-    """Return the folds, with the third one where there are two."""
-    if len(folds) == 2:
-        one, other = folds.values()
-        third = EdgeImage(edge, one.isometry @ other.isometry, one.reversed != other.reversed)
-        folds[third.isometry.determinant, third.reversed] = third
-    return list(folds.values())
-
-
 def edge_to_edge(tile: Tiles) -> Tiling:
     """Return the same tiling, with a vertex wherever a neighbour, or the tile's own image, has one.
 
-    Then neighbours have the same vertices on their common boundary. A tiling that is edge to edge keeps
-    its vertices.
+    Then neighbours have the same vertices on their common boundary. A tiling that is edge to edge
+    keeps its vertices.
 
     Args:
         tile: A tile or a tiling.
 
-    Raises:
-        OrbiflowError: if polygon and group are of very different size.
+    Raises `OrbiflowError` if polygon and group are of very different size.
 
     >>> from orbiflow.symmetry import wallpaper_group
     >>> bricks = Tiling(wallpaper_group("p1", [[2, 1], [0, 1]]), [[[0, 0], [2, 0], [2, 1], [0, 1]]])
@@ -387,3 +375,80 @@ def _with_vertices(tiling: Tiling, k: int) -> Prototile:
     corners = np.searchsorted(own.kept, own.corners, side="left")
     moved = corners + np.searchsorted(at, corners, side="right")
     return Prototile(np.insert(ring, at, points, axis=0), tuple(int(c) for c in moved))
+
+
+@dataclass(frozen=True, eq=False)
+class Skeleton:
+    """S edges of copies of prototiles.
+
+    - `edges`, `copies`: The tiling's edges, and the copies.
+    - `copy`, `edge`: Edge `edge` of copy `copy`, (S,), in the direction of that copy's boundary.
+    - `other`: The copy (S,) across it, -1 if it is not in the set.
+    - `ends`: The numbers (S, 2) of its first and last vertex: edges that meet within the set share
+      them. A vertex where copies only touch may have several numbers.
+    """
+
+    edges: Edges
+    copies: Copies
+    copy: Integers
+    edge: Integers
+    other: Integers
+    ends: Integers
+
+    def __len__(self) -> int:
+        return len(self.copy)
+
+
+def skeleton(own: Edges, copies: Copies) -> Skeleton:
+    """Return each edge of each copy once.
+
+    Edge k of the copy g is edge partner(k) of g @ across(k).
+
+    The search uses only aspects and cells, no positions, so that no edge is drawn twice or lost,
+    however close edges come to each other.
+
+    Args:
+        own: The edges of the copies' tiling.
+        copies: Any of its tiles.
+
+    >>> from orbiflow.tiles import CLASSES, Tile, copies_inside, edges
+    >>> tile = Tile(CLASSES["IH1"].template(), CLASSES["IH1"].group())
+    >>> both = copies_inside(tile, (-1.01, -1, 2.6, 2))
+    >>> len(both), len(skeleton(edges(tile), both))
+    (2, 11)
+    """
+    beyond = copies.beyond(own.across, own.owners)
+    mine = copies.prototiles[:, None] == np.array(own.owners)
+    numbers = np.arange(len(copies))[:, None]
+    copy, edge = np.nonzero(mine & ((beyond.copy < 0) | (beyond.copy > numbers)))
+    vertices = _vertices(own, beyond)
+    ends = np.stack([vertices[copy, edge], vertices[copy, np.array(own.following)[edge]]], axis=1)
+    return Skeleton(own, copies, copy, edge, beyond.copy[copy, edge], ends)
+
+
+def _vertices(own: Edges, beyond: CopiesAcross) -> Integers:
+    """Return (M, E) number of the vertex in which edge k of each copy starts."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    count, sides = beyond.copy.shape
+    following = np.array(own.following)
+    links: list[Integers] = []
+    for k, (partner, element) in enumerate(zip(own.partners, own.across, strict=True)):
+        copy = np.flatnonzero(beyond.copy[:, k] >= 0)
+        there, turn = beyond.copy[copy, k], beyond.turn[copy, k]
+        # the copy beyond is its own image by an element of its stabiliser: so are its edges
+        mate = own.turned[element.prototile][turn, partner]
+        symmetries = own.tiling.stabilisers[element.prototile].elements
+        signs = np.array([s.determinant for s in symmetries])[turn] * element.determinant
+        begin: Integers = there * sides + mate
+        end: Integers = there * sides + following[mate]
+        start = np.where(signs > 0, end, begin)
+        stop = np.where(signs > 0, begin, end)
+        links.append(np.stack([copy * sides + k, start]))
+        links.append(np.stack([copy * sides + following[k], stop]))
+    first, second = np.concatenate(links, axis=1)
+    size = count * sides
+    graph = coo_array((np.ones(len(first), dtype=np.int8), (first, second)), shape=(size, size))
+    _, labels = connected_components(graph, directed=False)
+    return np.asarray(labels, dtype=np.int64).reshape(count, sides)

@@ -1,4 +1,7 @@
-"""Tilings: a crystallographic group, and prototiles whose images should cover the plane."""
+"""Tilings: a crystallographic group, and prototiles whose images should cover the plane.
+
+Dirichlet cells are tiles of every group.
+"""
 
 from __future__ import annotations
 
@@ -10,22 +13,22 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from orbiflow.arguments import described, instance, is_a
+from orbiflow.arguments import described, instance, is_a, numbers
 from orbiflow.arrays import Array, Integers
 from orbiflow.errors import OrbiflowError
-from orbiflow.symmetry import CrystallographicGroup, Isometry
+from orbiflow.symmetry import CrystallographicGroup, Isometry, reduced_basis
 from orbiflow.tiles.tilings.prototile import Prototile, Stabiliser, stabiliser
 
+# the coordinates of a lattice vector in the basis of the group's lattice
 Cell: TypeAlias = tuple[int, int]
-"""The coordinates of a lattice vector in the basis of the group's lattice."""
 
 
 @dataclass(frozen=True, eq=False)
 class Aspects:
     """The A tiles of a tiling up to translations: pairs of a prototile and a coset of the lattice.
 
-    Elements that differ by an element of a prototile's stabiliser make the same tile of it; the coset
-    of an aspect is the first of them. With one prototile of no symmetry, aspects are cosets.
+    Elements that differ by an element of a prototile's stabiliser make the same tile of it; the
+    coset of an aspect is the first of them. With one prototile of no symmetry, aspects are cosets.
 
     - `prototiles`, `cosets`: The pairs, (A,) each.
     - `table`: The aspect (K, |G|) of coset i's image of prototile k.
@@ -47,8 +50,6 @@ class Aspects:
     def of(cls, group: CrystallographicGroup, stabilisers: Sequence[Stabiliser]) -> Aspects:
         """Return the aspects of prototiles with these stabilisers."""
         count, order = len(stabilisers), group.order
-        if all(own.order == 1 for own in stabilisers):
-            return cls._of_all(count, order)
         table = np.zeros((count, order), dtype=np.int64)
         steps = np.zeros((count, order, 2), dtype=np.int64)
         turns = np.zeros((count, order), dtype=np.int64)
@@ -64,22 +65,10 @@ class Aspects:
             cosets += kept.tolist()
         return cls(np.array(prototiles), np.array(cosets), table, steps, turns)
 
-    @classmethod
-    def _of_all(cls, count: int, order: int) -> Aspects:
-        """Return the aspects of prototiles without symmetry: every pair."""
-        none = np.zeros((count, order), dtype=np.int64)
-        table = np.arange(count * order).reshape(count, order)
-        prototiles, cosets = np.divmod(table.ravel(), order)
-        return cls(prototiles, cosets, table, np.zeros((count, order, 2), dtype=np.int64), none)
-
     def find(
         self, group: CrystallographicGroup, element: Isometry, prototile: int
     ) -> tuple[int, Cell, int]:
-        """Return (aspect, cell, turn) of the tile that `element` makes of a prototile.
-
-        Raises:
-            OrbiflowError: for an isometry that is not in the group.
-        """
+        """Return (aspect, cell, turn) of the tile that `element` makes of a prototile."""
         coset, (first, second) = coset_and_cell(group, element)
         step = self.steps[prototile, coset]
         cell = first + int(step[0]), second + int(step[1])
@@ -97,21 +86,13 @@ def _first_cosets(
         for s in own.elements[1:]:
             coset, cell = coset_and_cell(group, g @ s)
             if coset < first[i]:  # g s = (translation) h, so g = (translation) h s^-1
-                first[i], steps[i], turns[i] = coset, cell, _inverse(own.elements, s)
+                errors = [np.abs(s.linear @ t.linear - np.eye(2)).max() for t in own.elements]
+                first[i], steps[i], turns[i] = coset, cell, int(np.argmin(errors))
     return first, steps, turns
 
 
-def _inverse(elements: tuple[Isometry, ...], s: Isometry) -> int:
-    errors = [np.abs(s.linear @ t.linear - np.eye(2)).max() for t in elements]
-    return int(np.argmin(errors))
-
-
 def coset_and_cell(group: CrystallographicGroup, element: Isometry) -> tuple[int, Cell]:
-    """Return (i, n) with element = translation by B n after the i-th coset representative.
-
-    Raises:
-        OrbiflowError: for an isometry that is not in the group.
-    """
+    """Return (i, n) with element = translation by B n after the i-th coset representative."""
     instance(element, Isometry, "an element of the group")
     steps = (element.translation - group.translations) @ group.inverse_lattice.T
     error = np.abs(steps - np.round(steps)).max(axis=1)
@@ -128,18 +109,17 @@ def coset_and_cell(group: CrystallographicGroup, element: Isometry) -> tuple[int
 class Tiling:
     """Prototiles T_k and a group G in the same coordinates; the tiles are all g(T_k) (design point 16).
 
-    The stabiliser S_k, the elements that take T_k onto itself, is found from the polygon. A `Tiling`
-    need not tile the plane: `certify` checks that. Its tiles cover the plane once if
-    sum_k area(T_k) |G| / |S_k| = |det B| and their boundaries pair off.
+    The stabiliser S_k, the elements that take T_k onto itself, is found from the polygon. A
+    `Tiling` need not tile the plane: `certify` checks that. Its tiles cover the plane once if sum_k
+    area(T_k) |G| / |S_k| = |det B| and their boundaries pair off.
 
     Args:
         group: A group of the plane.
         prototiles: At least one `Prototile` or polygon (N, 2), none an image of another. All must
             have the same orientation.
 
-    Raises:
-        OrbiflowError: if the group is not planar, there is no prototile, a polygon is invalid, or
-            orientations differ.
+    Raises `OrbiflowError` if the group is not planar, there is no prototile, a polygon is invalid,
+    or orientations differ.
 
     >>> from orbiflow.symmetry import wallpaper_group
     >>> eighth = Tiling(wallpaper_group("p4m"), [[[0, 0], [0.5, 0], [0.5, 0.5]]])
@@ -225,8 +205,8 @@ class Tiling:
 class Tile:
     """A closed polygon with a crystallographic group acting in the same coordinates.
 
-    This is a `Tiling` by one prototile, `tiling`, with its isohedral class. A `Tile` need not tile the
-    plane: `certify` checks that.
+    This is a `Tiling` by one prototile, `tiling`, with its isohedral class. A `Tile` need not tile
+    the plane: `certify` checks that.
 
     Args:
         polygon: The vertices (N, 2) in order, in either orientation, without repeating the first.
@@ -234,8 +214,7 @@ class Tile:
         isohedral_class: The class, such as "IH4", or "" if it is unknown.
         corners: The indices in `polygon` of the tiling vertices of the class, in order.
 
-    Raises:
-        OrbiflowError: if the polygon is not (N >= 3, 2) finite numbers or the group not planar.
+    Raises `OrbiflowError` if the polygon is not (N >= 3, 2) finite numbers or the group not planar.
     """
 
     polygon: Array
@@ -280,8 +259,7 @@ Tiles: TypeAlias = Tile | Tiling
 def as_tiling(tiles: Tiles) -> Tiling:
     """Return a tile or a tiling as a tiling.
 
-    Raises:
-        OrbiflowError: for anything else.
+    Raises `OrbiflowError` for anything else.
     """
     if isinstance(tiles, Tiling):
         return tiles
@@ -290,3 +268,81 @@ def as_tiling(tiles: Tiles) -> Tiling:
     raise OrbiflowError(
         f"the tile must be a Tile or a Tiling, got {described(tiles)}; Tile(polygon, group) makes one"
     )
+
+
+_SAME_DISTANCE = 1e-7  # the distance, in square roots of |det B|, below which points count as one
+
+
+def dirichlet_tile(group: CrystallographicGroup, point: ArrayLike) -> Tile:
+    """Return the points nearer to `point` than to any other of its images, as a tile.
+
+    The tile is convex and tiles edge to edge. Its stabiliser is that of the point: about a rotation
+    centre or on a mirror the cell has that symmetry.
+
+    Args:
+        group: A group of the plane.
+        point: A point (2,), in the group's units.
+
+    Raises `OrbiflowError` if `point` is not a point, or the group is not of the plane.
+
+    >>> from orbiflow.symmetry import wallpaper_group
+    >>> hexagon = dirichlet_tile(wallpaper_group("p6m"), (0.0, 0.0))
+    >>> len(hexagon.polygon), hexagon.tiling.stabilisers[0].order
+    (6, 12)
+    """
+    site = numbers(point, "the point of a Dirichlet cell", (2,))
+    return Tile(dirichlet_tiling(group, [site]).prototiles[0].polygon, group)
+
+
+def dirichlet_tiling(group: CrystallographicGroup, points: Sequence[ArrayLike]) -> Tiling:
+    """Return the Dirichlet cells of several points among all their images: a prototile for each.
+
+    Args:
+        group: A group of the plane.
+        points: Points (K, 2), none an image of another.
+
+    Raises `OrbiflowError` if `points` are not points or are images of each other, or if the group
+    is not of the plane.
+
+    >>> from orbiflow.symmetry import wallpaper_group
+    >>> squares = dirichlet_tiling(wallpaper_group("p4m"), [(0, 0), (0.5, 0.5)])
+    >>> [len(prototile.polygon) for prototile in squares.prototiles]
+    [4, 4]
+    """
+    instance(group, CrystallographicGroup, "the group", "wallpaper_group(name) makes one")
+    if group.dim != 2:
+        raise OrbiflowError(f"a tile needs a group of the plane, got dimension {group.dim}")
+    given = numbers(points, "the points of Dirichlet cells", ("K", 2))
+    if not len(given):
+        raise OrbiflowError("a Dirichlet tiling needs at least one point")
+    same = _SAME_DISTANCE * float(np.sqrt(group.cell_volume))
+    return Tiling(group, [_cell(group, given, k, same) for k in range(len(given))])
+
+
+def _cell(group: CrystallographicGroup, points: Array, k: int, same: float) -> Array:
+    """Return (N, 2) the cell of point k, counter-clockwise."""
+    from scipy.spatial import KDTree, Voronoi
+
+    site = points[k]
+    # no point of the cell is further from the site than half the two shortest lattice vectors
+    # together, and what bounds the cell no further than twice that
+    reach = 1.01 * float(np.linalg.norm(reduced_basis(group.lattice), axis=0).sum())
+    images: list[Array] = []
+    for number, point in enumerate(points):
+        found = [g(point) - site for g in group.elements_near(site, reach, source=point)]
+        if number != k and found and float(np.linalg.norm(found[0])) < same:
+            raise OrbiflowError(
+                f"points {k} and {number} of a Dirichlet tiling have the same images"
+            )
+        images += found
+    others = np.array(images)
+    others = others[np.linalg.norm(others, axis=1) > same]
+    pairs = KDTree(others).query_pairs(same, output_type="ndarray")
+    sites = np.concatenate([np.zeros((1, 2)), np.delete(others, pairs[:, 1], axis=0)])
+    cell = Voronoi(sites)
+    region = cell.regions[int(cell.point_region[0])]
+    corners = cell.vertices[region]
+    corners = corners[np.argsort(np.arctan2(corners[:, 1], corners[:, 0]))]
+    # Qhull divides a vertex of four and more cells into several, rounding apart
+    steps = np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1)
+    return corners[steps > same / 100] + site

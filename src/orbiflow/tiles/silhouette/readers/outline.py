@@ -1,32 +1,34 @@
-"""The reader of all silhouette files, which finds out a file's kind from its content or name."""
+"""The reader of all silhouette files, which finds out a file's kind from its content or name.
 
+Polygons written out as numbers are read here: the `.dat` files of Nagata and Imahori, JSON and GeoJSON.
+"""
+
+import json
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from orbiflow.arguments import path as as_path
 from orbiflow.errors import InputFileError, OrbiflowError
+from orbiflow.runtime import is_list, is_object
+from orbiflow.tiles.silhouette.outlines import MAX_VERTICES, clean_ring
 from orbiflow.tiles.silhouette.readers.pictures import read_image
-from orbiflow.tiles.silhouette.readers.polygon_files import read_dat, read_json
 from orbiflow.tiles.silhouette.readers.reading import (
     FileContent,
     Reading,
     Source,
     check_file,
+    read_bytes,
     read_head,
 )
 from orbiflow.tiles.silhouette.readers.svg import read_svg
 
 _HEAD_BYTES = 65536
 _IMAGE_MAGIC = (
-    b"\x89PNG\r\n\x1a\n",
-    b"\xff\xd8\xff",
-    b"BM",
-    b"GIF87a",
-    b"GIF89a",
-    b"II*\0",
-    b"MM\0*",
+    *(b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff", b"BM"),
+    *(b"GIF87a", b"GIF89a", b"II*\0", b"MM\0*"),
 )
 _CONVERTIBLE = {
     b"\x1f\x8b": "is gzip-compressed (an .svgz?); decompress it first",
@@ -55,9 +57,8 @@ def read_outline(
         return read_image(path, threshold=threshold, invert=invert)
     for name, value in (("threshold", threshold), ("invert", invert)):
         if value is not None:
-            raise OrbiflowError(
-                f"{name} applies to images only and {path} is a polygon or drawing; leave it out"
-            )
+            where = f"images only and {path} is a polygon or drawing"
+            raise OrbiflowError(f"{name} applies to {where}; leave it out")
     # extreme coordinates overflow in the geometry, whose result is then refused
     with np.errstate(all="ignore"):
         return {"svg": read_svg, "json": read_json, "dat": read_dat}[kind](path)
@@ -95,3 +96,159 @@ def _what(path: Source, head: bytes, text: str | None) -> str:
             return what
     suffix = f" although its name ends in {path.suffix}" if path.suffix else ""
     return f"holds {'text' if text is not None else 'data'} of an unknown kind{suffix}"
+
+
+MAX_BYTES = 16 * 2**20
+POLYGON_KEYS = ("polygon", "tile", "outline")
+
+
+def read_dat(path: Source) -> Reading:
+    """Read a goal polygon of Nagata and Imahori: a line `n`, then n lines `x y`, with y down.
+
+    Blank lines are passed over; lines after those n are left unread, with a note. Source of the
+    format: https://github.com/nagata-yuichi/EscherTiling.
+
+    Raises `InputFileError` naming the line that cannot be read.
+    """
+    try:
+        text = read_bytes(path, MAX_BYTES).decode("utf-8-sig")
+    except UnicodeDecodeError as exc:
+        raise InputFileError(
+            f"{path}: not a text file (byte {exc.start} is not UTF-8); a .dat polygon is plain text"
+        ) from exc
+    lines = [(i, line) for i, line in enumerate(text.splitlines(), start=1) if line.strip()]
+    n = _vertex_count(path, lines)
+    if len(lines) - 1 < n:
+        raise InputFileError(
+            f"{path}: line {lines[0][0]} promises {n} vertices and {len(lines) - 1} follow; "
+            "the file is cut short or its first line is wrong"
+        )
+    points = [_vertex(path, *line) for line in lines[1 : n + 1]]
+    outline, notes = clean_ring(points, str(path), InputFileError)
+    extra = len(lines) - 1 - n
+    if extra:
+        what = f"left {extra} line{'s' * (extra > 1)} after the vertices unread"
+        notes.append(f"{what} (line {lines[n + 1][0]} on)")
+    return Reading(outline, True, "dat", None, tuple(notes))
+
+
+def _vertex_count(path: Source, lines: list[tuple[int, str]]) -> int:
+    if not lines:
+        raise InputFileError(f"{path}: the file holds only blank lines; export it again")
+    number, first = lines[0]
+    try:
+        n = int(first)
+    except ValueError as exc:
+        raise InputFileError(
+            f"{path}: line {number}: {_quote(first)} is not a number of vertices; "
+            "a .dat polygon begins with a line that holds just that"
+        ) from exc
+    if not 3 <= n <= MAX_VERTICES:
+        raise InputFileError(
+            f"{path}: line {number}: {n} vertices; from 3 to {MAX_VERTICES} can be read"
+        )
+    return n
+
+
+def _vertex(path: Source, number: int, line: str) -> tuple[float, float]:
+    try:
+        x, y = (float(word) for word in line.split())
+    except ValueError as exc:
+        raise InputFileError(
+            f"{path}: line {number}: {_quote(line)} is not a vertex; write two numbers, `x y`"
+        ) from exc
+    if not np.isfinite([x, y]).all():
+        raise InputFileError(
+            f"{path}: line {number}: {_quote(line)}: every coordinate must be a finite number"
+        )
+    return x, y
+
+
+def read_json(path: Source) -> Reading:
+    """Read a polygon from JSON, with y up unless the file says otherwise.
+
+    Taken are: a list of [x, y] pairs; an object with such a list under "polygon", "tile" or
+    "outline", and optionally `"y_down": true`; the outer ring of a GeoJSON Polygon or of a Feature
+    that holds one.
+
+    Raises `InputFileError` naming the vertex, counted from 0, that cannot be used.
+    """
+    data = read_bytes(path, MAX_BYTES)
+    try:
+        content = json.loads(data)
+    except json.JSONDecodeError as exc:
+        raise InputFileError(
+            f"{path}: line {exc.lineno}, column {exc.colno}: not valid JSON ({exc.msg})"
+        ) from exc
+    except RecursionError as exc:
+        raise InputFileError(f"{path}: nested too deeply to be a polygon") from exc
+    except ValueError as exc:
+        raise InputFileError(f"{path}: not valid JSON ({exc})") from exc
+    points, y_down, notes = _find_polygon(path, content)
+    _check_pairs(path, points)
+    outline, dropped = clean_ring(points, str(path), InputFileError)
+    return Reading(outline, y_down, "json", None, (*notes, *dropped))
+
+
+def _find_polygon(path: Source, content: object) -> tuple[list[Any], bool, list[str]]:
+    """Return the list of vertices in `content`, whether y points down, and notes."""
+    if is_list(content):
+        return content, False, []
+    if not is_object(content):
+        raise InputFileError(f"{path}: holds a single value, not a polygon; write [[x, y], ...]")
+    if "type" in content and not any(key in content for key in POLYGON_KEYS):
+        points, notes = _geojson_ring(path, content)
+        return points, False, notes
+    keys = [key for key in POLYGON_KEYS if key in content]
+    if not keys:
+        found = ", ".join(_quote(str(key)) for key in list(content)[:8]) or "nothing"
+        raise InputFileError(
+            f'{path}: none of "polygon", "tile", "outline" is in it (it has {found}); '
+            "put the list of vertices under one of them"
+        )
+    points, y_down = content[keys[0]], content.get("y_down", False)
+    if not isinstance(y_down, bool):
+        raise InputFileError(f'{path}: "y_down" must be true or false')
+    if not is_list(points):
+        raise InputFileError(f'{path}: "{keys[0]}" must be a list of [x, y] pairs')
+    notes = [f'took "{keys[0]}", left {", ".join(keys[1:])} unread'] if len(keys) > 1 else []
+    return points, y_down, notes
+
+
+def _geojson_ring(path: Source, content: dict[str, Any]) -> tuple[list[Any], list[str]]:
+    geometry = content.get("geometry") if content["type"] == "Feature" else content
+    if not is_object(geometry) or geometry.get("type") != "Polygon":
+        kind = geometry.get("type") if is_object(geometry) else content["type"]
+        raise InputFileError(
+            f"{path}: GeoJSON of type {_quote(str(kind))}; save one Polygon, or a Feature with one"
+        )
+    rings = geometry.get("coordinates")
+    if not is_list(rings) or not rings or not is_list(rings[0]):
+        raise InputFileError(f'{path}: the GeoJSON Polygon has no ring under "coordinates"')
+    notes: list[str] = []
+    if len(rings) > 1:
+        notes.append(f"filled {len(rings) - 1} hole{'s' * (len(rings) > 2)}")
+    # A GeoJSON position may carry an altitude.
+    if any(is_list(position) and len(position) == 3 for position in rings[0]):
+        notes.append("left the altitudes unread")
+        return [p[:2] if is_list(p) else p for p in rings[0]], notes
+    return rings[0], notes
+
+
+def _check_pairs(path: Source, points: list[Any]) -> None:
+    if len(points) > MAX_VERTICES:
+        raise InputFileError(
+            f"{path}: {len(points)} vertices, at most {MAX_VERTICES} are read; simplify the outline"
+        )
+    for i, pair in enumerate(points):
+        if not is_list(pair) or len(pair) != 2 or not all(type(n) in (int, float) for n in pair):
+            raise InputFileError(
+                f"{path}: vertex {i} (counted from 0) is {_quote(json.dumps(pair))}, not a pair of "
+                "numbers [x, y]"
+            )
+
+
+def _quote(text: str) -> str:
+    """Return `text` for a message: short, and on one line."""
+    text = text.strip()
+    return ascii(text if len(text) <= 40 else text[:37] + "...")

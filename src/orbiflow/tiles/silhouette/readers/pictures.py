@@ -1,4 +1,7 @@
-"""Images: decoding within bounds, and the choice of which part of the picture is the shape."""
+"""Images: decoding within bounds, and the choice of which part of the picture is the shape.
+
+Masks are pictures whose light or opaque part is selected.
+"""
 
 import re
 import warnings
@@ -28,16 +31,14 @@ MAX_BYTES = 64 * 2**20
 MAX_PIXELS = 40_000_000
 MAX_SIDE = 1500  # pixels; beyond this an image is averaged down before it is traced
 MIN_CONTRAST = 0.04  # of full scale, between the shape's and the background's usual level
-
 _FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "GIF", "TIFF")
 # What Pillow raises on a damaged file depends on the format.
 _DAMAGED = (
     *(OSError, SyntaxError, ValueError, EOFError, KeyError, IndexError, TypeError),
     *(OverflowError, MemoryError, ArithmeticError, Image.DecompressionBombError),
 )
-
+# channels that say by themselves where the shape is: their high part and their low part
 _PARTS = {"alpha": ("opaque", "transparent"), "mask": ("marked", "unmarked")}
-"""Channels that say by themselves where the shape is: their high part and their low part."""
 
 _Decoded = TypeVar("_Decoded")
 
@@ -70,17 +71,17 @@ def read_image(
     Raises `InputFileError` for a file over 64 MB, an image over 40 megapixels, one that cannot be
     decoded, and one without a shape of its own; `OrbiflowError` for a threshold out of range.
     """
-    checked_threshold(threshold)
-    picture = open_image(path, _decode)
+    return _traced(path, open_image(path, _decode), threshold, invert)
+
+
+def _traced(
+    path: Source, picture: Picture, threshold: float | None, invert: bool | None
+) -> Reading:
+    if threshold is not None and not (isinstance(threshold, Real) and 0 < threshold < 1):
+        raise OrbiflowError(f"threshold must lie between 0 and 1, got {threshold}")
     level, notes = choose_shape(path, picture, threshold, invert)
     outline, traced = trace(path, level, scale=picture.reduced, size=picture.size)
     return Reading(outline, True, "image", picture.size, (*picture.notes, *notes, *traced))
-
-
-def checked_threshold(threshold: float | None) -> None:
-    """Raise OrbiflowError for a threshold out of range."""
-    if threshold is not None and not (isinstance(threshold, Real) and 0 < threshold < 1):
-        raise OrbiflowError(f"threshold must lie between 0 and 1, got {threshold}")
 
 
 def open_image(path: Source, decode: Callable[[Any, Image.Image], _Decoded]) -> _Decoded:
@@ -145,23 +146,23 @@ def upright(image: Image.Image) -> tuple[Image.Image, list[str]]:
     return turned, notes
 
 
-def averaged(band: Image.Image) -> tuple[Array, int]:
+def _reduced(band: Image.Image) -> tuple[Array, int, list[str]]:
     """Return levels of `band` ("L" or "F"), 0 to 1, with at most 1500 pixels along a side.
 
-    Also how many pixels of `band`, along each axis, were averaged into one.
+    Also how many pixels of `band`, along each axis, were averaged into one, and a note of it.
     """
     reduced = -(-max(band.size) // MAX_SIDE)
     full_scale = 255.0 if band.mode == "L" else 1.0
-    return np.asarray(band.reduce(reduced), dtype=np.float64) / full_scale, reduced
+    note = f"averaged {reduced} x {reduced} pixels into one before tracing"
+    levels = np.asarray(band.reduce(reduced), dtype=np.float64) / full_scale
+    return levels, reduced, [note] * (reduced > 1)
 
 
 def _decode(path: Source, image: Image.Image) -> Picture:
     turned, notes = upright(image)
     band, name, band_notes = _channel(path, turned)
-    channel, reduced = averaged(band)
-    if reduced > 1:
-        notes.append(f"averaged {reduced} x {reduced} pixels into one before tracing")
-    return Picture(channel, name, turned.size, reduced, (*notes, *band_notes))
+    channel, reduced, averaging = _reduced(band)
+    return Picture(channel, name, turned.size, reduced, (*notes, *averaging, *band_notes))
 
 
 def _channel(path: Source, image: Image.Image) -> tuple[Image.Image, str, list[str]]:
@@ -269,32 +270,26 @@ def read_mask_array(
 ) -> Reading:
     """Return the outline of the shape in an array (H, W), in pixels with y down.
 
-    Booleans, and integers that are 0 and 1 alone, say where the shape is; with `invert`, where it is
-    not. Other integers of 8 or 16 bits are gray levels of that full scale, floats of full scale 1:
-    `threshold` and `invert` mean what they do for images (see `read_image`).
+    Booleans, and integers that are 0 and 1 alone, say where the shape is; with `invert`, where it
+    is not. Other integers of 8 or 16 bits are gray levels of that full scale, floats of full scale
+    1: `threshold` and `invert` mean what they do for images (see `read_image`).
 
     Raises:
         OrbiflowError: for another shape or type, levels out of range, or a setting that does not fit.
         InputFileError: for over 40 megapixels, and an array without a shape of its own.
     """
-    checked_threshold(threshold)
     source = FileContent(b"", name)
     array = _array(values, name)
-    check_size(source, (array.shape[1], array.shape[0]))
+    size = array.shape[1], array.shape[0]
+    check_size(source, size)
     levels, is_mask = _levels(array, name)
     if is_mask and threshold is not None:
         raise OrbiflowError(
             f"{name}: threshold parts gray levels, and this is a mask; leave it out"
         )
-    channel, reduced = averaged(Image.fromarray(levels))
-    size = array.shape[1], array.shape[0]
-    notes = (
-        [f"averaged {reduced} x {reduced} pixels into one before tracing"] if reduced > 1 else []
-    )
+    channel, reduced, notes = _reduced(Image.fromarray(levels))
     picture = Picture(channel, "mask" if is_mask else "luminance", size, reduced, tuple(notes))
-    level, chosen = choose_shape(source, picture, threshold, invert)
-    outline, traced = trace(source, level, scale=reduced, size=size)
-    return Reading(outline, True, "image", size, (*picture.notes, *chosen, *traced))
+    return _traced(source, picture, threshold, invert)
 
 
 def _array(values: Any, name: str) -> Array:
@@ -332,3 +327,51 @@ def _levels(array: Array, name: str) -> tuple[NDArray[np.float32], bool]:
             f"{name}: levels of type {array.dtype} lie from {what}, got {low:g} to {high:g}; scale them"
         )
     return (array / full).astype(np.float32), False
+
+
+_PAINT = "paint what must survive white and the rest black"
+
+
+def read_mask(path: Source) -> Picture:
+    """Read a mask from a PNG, JPEG or WebP image, turned as its EXIF orientation asks.
+
+    The level is the opacity where some of the mask is more transparent than the rest, else the
+    luminance. Raises `InputFileError` for a file over 64 MB or 40 megapixels, one that is no image
+    or is damaged, and a mask that is all of one level.
+    """
+    return open_image(path, _decode_mask)
+
+
+def _decode_mask(path: Source, image: Image.Image) -> Picture:
+    turned, notes = upright(image)
+    band, band_notes = _emphasised_channel(path, turned)
+    levels, reduced, _ = _reduced(band)
+    low, high = float(levels.min()), float(levels.max())
+    if high < MIN_CONTRAST:
+        raise InputFileError(f"{path}: the mask is all black and emphasises nothing; {_PAINT}")
+    if high - low < MIN_CONTRAST:
+        raise InputFileError(
+            f"{path}: the mask is uniform, its levels are {low:.2f} to {high:.2f} of white, and "
+            f"emphasises nothing above the rest; {_PAINT}"
+        )
+    return Picture(levels, "mask", turned.size, reduced, (*notes, *band_notes))
+
+
+def _emphasised_channel(path: Source, image: Image.Image) -> tuple[Image.Image, list[str]]:
+    """Return the channel that emphasises: mode "L" (0 to 255) or "F" (0 to 1)."""
+    if image.mode.startswith(("I", "F")):
+        return deep_channel(path, image), []
+    if not image.has_transparency_data:
+        return image.convert("L"), []
+    rgba = image.convert("RGBA")
+    alpha = rgba.getchannel("A")
+    values = np.asarray(alpha)
+    low, high = int(values.min()), int(values.max())
+    if high - low >= MIN_CONTRAST * 255:
+        return alpha, ["took the mask's alpha channel: opaque is emphasised, whatever its colour"]
+    if high < MIN_CONTRAST * 255:
+        raise InputFileError(
+            f"{path}: the mask is wholly transparent and emphasises nothing; paint what must "
+            "survive opaque"
+        )
+    return rgba.convert("RGB").convert("L"), []

@@ -35,9 +35,8 @@ FLATNESS_FLOOR = 1 / 20_000
 CLOSING_GAP = 1e-6  # of the size of the drawing: ends nearer than this are one point
 OVERLAY_GRID = 1e-9  # of the size of the drawing: the grid that the united outline is snapped to
 OVERLAY_GRID_FLOOR = 1e-12  # of the largest coordinate
-COLLINEAR_TOLERANCE = (
-    1e-6  # of the size of the drawing: vertices nearer their chord than this are dropped
-)
+# of the size of the drawing: vertices nearer their chord than this are dropped
+COLLINEAR_TOLERANCE = 1e-6
 
 
 def read_svg(path: Source) -> Reading:
@@ -58,14 +57,15 @@ def read_svg(path: Source) -> Reading:
     regions, n_open = _regions(drawing, size)
     if not regions:
         raise InputFileError(f"{path}: {_why_empty(drawing, n_open)}")
-    notes = [_left_open(n_open)] if n_open else []
+    notes = [f"left out {n_open} open path{'s' * (n_open > 1)}"] * (n_open > 0)
     regions, dropped = _drop_backgrounds(regions, drawing.box)
     shape, kept = outer_outline(_overlay(path, regions))
     outline, cleaned = clean_ring(_thinned(shape, size), str(path), InputFileError)
     box = drawing.box
-    page = None if box is None else (box[2] - box[0], box[3] - box[1])
-    corner = (0.0, 0.0) if box is None else (box[0], box[1])
-    return Reading(outline, True, "svg", page, (*notes, *dropped, *kept, *cleaned), corner)
+    notes = (*notes, *dropped, *kept, *cleaned)
+    if box is None:
+        return Reading(outline, True, "svg", None, notes)
+    return Reading(outline, True, "svg", (box[2] - box[0], box[3] - box[1]), notes, box[:2])
 
 
 def _drawing_size(drawing: Drawing) -> float:
@@ -74,10 +74,8 @@ def _drawing_size(drawing: Drawing) -> float:
         return 0.0
     points = np.concatenate(reach)
     if not np.isfinite(points).all() or np.abs(points).max() > MAX_COORDINATE:
-        raise InputFileError(
-            f"{drawing.path}: a path reaches beyond {MAX_COORDINATE:g} user units; rescale the "
-            "drawing"
-        )
+        reach = f"a path reaches beyond {MAX_COORDINATE:g} user units"
+        raise InputFileError(f"{drawing.path}: {reach}; rescale the drawing")
     return float(np.ptp(points, axis=0).max())
 
 
@@ -86,7 +84,7 @@ def _regions(drawing: Drawing, size: float) -> tuple[list[BaseGeometry], int]:
     regions: list[BaseGeometry] = []
     n_open, n_points = 0, 0
     for shape in drawing.shapes:
-        closed = [path for path in shape.paths if _is_closed(path, size)]
+        closed = [p for p in shape.paths if p.closed or p.gap() <= CLOSING_GAP * size]
         n_open += len(shape.paths) - len(closed)
         try:
             rings = _flatten(closed, size)
@@ -107,15 +105,9 @@ def _regions(drawing: Drawing, size: float) -> tuple[list[BaseGeometry], int]:
     return regions, n_open
 
 
-def _is_closed(path: SubPath, size: float) -> bool:
-    gap = float(np.hypot(*(path.curves[-1].end - path.start)))
-    return path.closed or gap <= CLOSING_GAP * size
-
-
 def _flatten(paths: list[SubPath], size: float) -> list[Array]:
-    if not paths:
-        return []
-    own = float(np.ptp(np.concatenate([path.reach() for path in paths]), axis=0).max())
+    reach = [path.reach() for path in paths]
+    own = float(np.ptp(np.concatenate(reach), axis=0).max()) if reach else 0.0
     if own == 0:
         return []
     tolerance = max(own * FLATNESS, size * FLATNESS_FLOOR)
@@ -128,20 +120,17 @@ def _drop_backgrounds(
     """Return `regions` without rectangles that cover the page, as long as something else is there."""
     xmin, ymin, xmax, ymax = shapely.total_bounds(regions) if box is None else box
     page = shapely.box(xmin, ymin, xmax, ymax)
-    rest = [region for region in regions if not _covers(region, page)]
+
+    def covers(region: BaseGeometry) -> bool:  # but for 0.1% of the page
+        is_box = region.area >= 0.999 * region.envelope.area
+        return is_box and region.envelope.intersection(page).area >= 0.999 * page.area
+
+    rest = [region for region in regions if not covers(region)]
     n = len(regions) - len(rest)
     if not rest or n == 0:
         return regions, []
-    noun = (
-        "a background rectangle that covers" if n == 1 else f"{n} background rectangles that cover"
-    )
-    return rest, [f"left out {noun} the whole drawing"]
-
-
-def _covers(region: BaseGeometry, page: BaseGeometry) -> bool:
-    """Return whether `region` is a rectangle that covers `page`, but for 0.1% of it."""
-    is_box = region.area >= 0.999 * region.envelope.area
-    return is_box and region.envelope.intersection(page).area >= 0.999 * page.area
+    noun = "a background rectangle" if n == 1 else f"{n} background rectangles"
+    return rest, [f"left out {noun} that cover{'s' * (n == 1)} the whole drawing"]
 
 
 def _overlay(path: Source, regions: list[BaseGeometry]) -> BaseGeometry:
@@ -167,10 +156,6 @@ def _thinned(shape: shapely.Polygon, size: float) -> Array:
         tolerance *= 2
         thin = simplified(shape, tolerance)
     return outer_ring(thin if thin.is_valid else shape)
-
-
-def _left_open(n: int) -> str:
-    return f"left out {n} open path{'s' * (n > 1)}"
 
 
 def _why_empty(drawing: Drawing, n_open: int) -> str:

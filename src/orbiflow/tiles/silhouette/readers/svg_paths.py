@@ -91,6 +91,10 @@ class SubPath:
     curves: list[Bezier | EllipticArc] = field(default_factory=list[Bezier | EllipticArc])
     closed: bool = False
 
+    def gap(self) -> float:
+        """Return the distance of the last point from the first."""
+        return float(np.hypot(*(self.curves[-1].end - self.start)))
+
     def reach(self) -> Array:
         """Return points (M, 2) that span about as much as its curves do."""
         return np.vstack([self.start, *(curve.reach() for curve in self.curves)])
@@ -209,8 +213,7 @@ def _winding(points: Array, ring: Array) -> Integers:
         x, y = points[i]
         up = (start[:, 1] <= y) & (end[:, 1] > y)
         down = (start[:, 1] > y) & (end[:, 1] <= y)
-        side = (end[:, 0] - start[:, 0]) * (y - start[:, 1]) - (x - start[:, 0]) * (
-            end[:, 1] - start[:, 1]
-        )
+        dx, dy = (end - start).T
+        side = dx * (y - start[:, 1]) - (x - start[:, 0]) * dy
         winding[i] = np.count_nonzero(up & (side > 0)) - np.count_nonzero(down & (side < 0))
     return winding

@@ -17,7 +17,7 @@ from orbiflow.tiles.silhouette.readers.svg_paths import SubPath, sub_paths
 MAX_ELEMENTS = 20_000
 MAX_DEPTH = 100
 MAX_STYLE = 200_000  # characters
-
+_COMMENT = re.compile(r"/\*.*?(?:\*/|$)", re.DOTALL)
 _SELECTOR = re.compile(r"\*|[\w-]*(?:[.#][\w-]+)?")
 
 
@@ -98,7 +98,7 @@ class StyleSheet:
             raise InputFileError(
                 f"{path}: <style> of {len(text)} characters; save the drawing as plain SVG"
             )
-        for rule in _without_comments(text).split("}"):
+        for rule in _COMMENT.sub(" ", text).split("}"):
             selectors, _, body = rule.partition("{")
             declarations = _declarations(body)
             for selector in map(str.strip, selectors.split(",")):
@@ -109,22 +109,11 @@ class StyleSheet:
         """Return attributes of `element` overridden by the rules that match it and by its own style."""
         properties = dict(element.attrib)
         tag, names = element.tag, element.get("class", "").split()
-        selectors = [
-            "*",
-            tag,
-            *(f".{name}" for name in names),
-            *(f"{tag}.{name}" for name in names),
-        ]
-        selectors.append(f"#{element.get('id', '')}")
-        for selector in selectors if self.rules else ():
+        classes = [f"{before}.{name}" for before in ("", tag) for name in names]
+        for selector in ("*", tag, *classes, f"#{element.get('id', '')}"):
             properties.update(self.rules.get(selector, {}))
         properties.update(_declarations(element.get("style", "")))
         return properties
-
-
-def _without_comments(text: str) -> str:
-    first, *rest = text.split("/*")
-    return first + " ".join(part.partition("*/")[2] for part in rest)
 
 
 def _declarations(text: str) -> dict[str, str]:
@@ -140,7 +129,6 @@ PIXELS_PER_INCH = 96
 MAX_DRAWN = 10_000  # elements, those drawn again by <use> counted again
 MAX_TRANSFORM = 2000  # characters
 MAX_TOKENS = 400_000  # commands and numbers in all path data; one with a fraction counts twice
-
 _GROUPS = {"svg", "g", "a", "switch"}
 _SHAPES = {
     "path": (svgelements.Path, ("d",)),
@@ -156,8 +144,8 @@ _TOKEN = re.compile(r"[A-Za-z]|\.?\d+")
 _LENGTH = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)(e[-+]?\d+)?(px|pt|pc|mm|cm|in|%)?", re.IGNORECASE)
 
 
+# properties of paint that elements have from those around them
 PAINT = ("fill", "stroke", "stroke-width", "fill-opacity", "stroke-opacity", "color", "visibility")
-"""Properties of paint that elements have from those around them."""
 
 
 @dataclass(frozen=True)
@@ -256,19 +244,16 @@ class Drawing:
             opacity=place.opacity * _share(properties.get("opacity")),
         )
         if element.tag in _GROUPS:
-            self._visit_group(element, place)
+            if element.tag == "svg":
+                place = self._viewport(element, element, place)
+            for child in element:
+                self._visit(child, place)
         elif element.tag == "use":
             self._visit_use(element, place)
         elif element.tag in _SHAPES:
             self._add_shape(element, properties, place)
         elif element.tag in ("image", "text"):
             self.others[element.tag] = self.others.get(element.tag, 0) + 1
-
-    def _visit_group(self, group: Element, place: _Place) -> None:
-        if group.tag == "svg":
-            place = self._viewport(group, group, place)
-        for child in group:
-            self._visit(child, place)
 
     def _visit_use(self, use: Element, place: _Place) -> None:
         target = self.by_id.get(use.get("href", "").strip().removeprefix("#"))
@@ -366,7 +351,5 @@ def _share(text: str | None) -> float:
 
 
 def _as_array(matrix: svgelements.Matrix) -> Array:
-    return np.array(
-        [[matrix.a, matrix.c, matrix.e], [matrix.b, matrix.d, matrix.f], [0, 0, 1]],
-        dtype=np.float64,
-    )
+    rows = [[matrix.a, matrix.c, matrix.e], [matrix.b, matrix.d, matrix.f], [0, 0, 1]]
+    return np.array(rows, dtype=np.float64)

@@ -49,9 +49,12 @@ def trace(
             f"{path}: the shape fills the whole image ({size[0]} x {size[1]} pixels); leave a "
             "margin around it, or set invert to take the other part"
         )
-    if _touches_border(shape):
+    if shape[[0, -1]].any() or shape[:, [0, -1]].any():
         notes.append("the shape touches the image's border and may be cut off there")
-    polygon, stepped = _polygon(_isolate(level, mask, shape), level.cut, level.inside)
+    # the shape's holes filled and all other components taken out
+    values = np.where(shape & ~mask, level.inside, level.values)
+    values = np.where(mask & ~shape, 2 * level.cut - level.inside, values)
+    polygon, stepped = _polygon(values, level.cut, level.inside)
     area = polygon.area * scale**2
     if area < MIN_AREA:
         raise InputFileError(
@@ -87,16 +90,6 @@ def _largest(mask: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], list[str]]:
     return shape, notes
 
 
-def _touches_border(shape: NDArray[np.bool_]) -> bool:
-    return bool(shape[[0, -1]].any() or shape[:, [0, -1]].any())
-
-
-def _isolate(level: Level, mask: NDArray[np.bool_], shape: NDArray[np.bool_]) -> Array:
-    """Return the level with the shape's holes filled and all other components taken out."""
-    values = np.where(shape & ~mask, level.inside, level.values)
-    return np.where(mask & ~shape, 2 * level.cut - level.inside, values)
-
-
 def _polygon(values: Array, cut: float, inside: float) -> tuple[Polygon, bool]:
     """Return the region where `values` exceed `cut`, pixel (0, 0) spanning [0, 1] x [0, 1].
 
@@ -112,15 +105,12 @@ def _polygon(values: Array, cut: float, inside: float) -> tuple[Polygon, bool]:
     # A level that equals the cut at a pixel's centre can pinch the contour there.
     whole = largest if largest.is_valid else largest.buffer(0)
     parts = polygons_in(whole.intersection(box(0, 0, width, height)))
-    return max(parts, key=lambda part: part.area), _is_stepped(outer_ring(largest))
-
-
-def _is_stepped(ring: Array) -> bool:
-    """Return whether nearly every vertex cuts its grid line at the same fraction."""
-    # Each vertex lies on one line of pixel centres and anywhere between two of them.
-    fraction: Array = np.mod(ring - 0.5, 1.0).sum(axis=1)
+    # Each vertex lies on one line of pixel centres and anywhere between two of them: stepped if
+    # nearly all cut their line at the same fraction.
+    fraction: Array = np.mod(outer_ring(largest) - 0.5, 1.0).sum(axis=1)
     usual: float = np.median(fraction)
-    return float(np.mean(abs(fraction - usual) < 0.05)) > 0.95
+    stepped = float(np.mean(abs(fraction - usual) < 0.05)) > 0.95
+    return max(parts, key=lambda part: part.area), stepped
 
 
 def _simplify(polygon: Polygon, tolerance: float) -> tuple[Polygon, list[str]]:
