@@ -128,6 +128,8 @@ def call_by_orbiflow(words: Sequence[str]) -> Call | Refusal | None:
     Everything is read and checked as when the command is run, up to the point where its work would
     begin. There is no call where none is needed, as for `--help`.
     """
+    if words == ["--install-completion"]:  # which would write into the files of one's shell
+        return None
     # what is missing is told first, and a line may leave it out: an unknown option must not pass
     for count in (1, 2):
         name = " ".join(words[:count])

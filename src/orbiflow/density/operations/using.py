@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 from orbiflow import runtime
-from orbiflow.density import inference, tables
+from orbiflow.density import tables
 from orbiflow.density.run_folder import write_file, written_files
 from orbiflow.density.tables import RowSettings, check_table_name
 from orbiflow.errors import literal
@@ -165,6 +165,8 @@ def marginal(
         axes = axes_of(columns, names)
         folder = runtime.ResultFolder(out, written_files)
         on_event(runtime.Progress(0.0, "integrating"))
+        from orbiflow.density import inference
+
         found = inference.marginal(density, axes)
         kept = [names[axis] for axis in axes]
         origin = {"marginal": kept, "model": str(model)}
@@ -206,6 +208,8 @@ def conditional(
         known, turns, kept = condition_of(density.space, names, pairs, columns, on_event)
         folder = runtime.ResultFolder(out, written_files)
         on_event(runtime.Progress(0.0, "integrating"))
+        from orbiflow.density import inference
+
         found = inference.conditional(density, turns, kept)
         evidence = evidence_of(density, turns)
         rare = "; few data lie there, or none" if evidence < -3 else ""
