@@ -77,17 +77,6 @@ def test_distance_is_a_metric_and_the_least_over_many_images(space, seed: int) -
     assert torch.allclose(table.diagonal(), ab**2, atol=1e-9)
 
 
-@pytest.mark.parametrize("space", [Sphere(rotation=TURN), ProjectivePlane(rotation=TURN)])
-@given(seed=seeds)
-def test_round_distance_is_the_angle(space, seed: int) -> None:
-    a, b = square(seed), square(seed + 1)
-    cosine = (space.vectors(a) * space.vectors(b)).sum(axis=1)
-    if space.name == "projective-plane":
-        cosine = abs(cosine)
-    angle = np.arccos(np.clip(cosine, -1, 1))
-    assert np.allclose(space.round_distance(a, b).numpy(), angle, atol=1e-6)
-
-
 @every
 def test_densities_of_the_uniform_distribution(space) -> None:
     points = square(0)

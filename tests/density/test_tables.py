@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from orbiflow.density import append_column, read_table, to_csv
+from orbiflow.density import append_columns, read_table, to_csv
 from orbiflow.density.tables import files, text
 from orbiflow.errors import InputFileError, OrbiflowError
 from table_files import PROPERTY, refuse, write
@@ -214,7 +214,7 @@ def test_any_bytes_are_read_or_refused(tmp_path: Path, content: bytes | str, nam
         return
     assert np.isfinite(table.values).all()
     assert table.values.shape == (len(table.lines), len(table.columns))
-    assert append_column(table, path, "p", np.zeros(len(table.lines)))
+    assert append_columns(table, path, {"p": np.zeros(len(table.lines))})
 
 
 finite = st.floats(-1e300, 1e300)
@@ -228,7 +228,7 @@ def test_no_row_is_lost_without_a_header(
     path = write(tmp_path, "".join(f"{x!r}{mark}{y!r}\n" for x, y in rows))
     table = read_table(path, columns=None, width=2)
     assert table.values.tolist() == [list(row) for row in rows]
-    scored = write(tmp_path, append_column(table, path, "p", table.values[:, 0]), "b.csv")
+    scored = write(tmp_path, append_columns(table, path, {"p": table.values[:, 0]}), "b.csv")
     again = read_table(scored, columns=["1", "2", "3"], width=3)
     np.testing.assert_array_equal(again.values[:, :2], table.values)
     np.testing.assert_allclose(again.values[:, 2], table.values[:, 0], rtol=1e-9)
@@ -247,7 +247,7 @@ def test_no_row_is_lost_without_a_header(
 def test_append_column(tmp_path: Path, content: str, expected: str) -> None:
     path = write(tmp_path, content)
     table = read_table(path, columns=["1", "2"], width=2)
-    assert append_column(table, path, "p", [1 / 3, -np.inf]).decode() == expected
+    assert append_columns(table, path, {"p": [1 / 3, -np.inf]}).decode() == expected
 
 
 @pytest.mark.parametrize("changed", ["x,y\n1,2\n", "x,y\n1,2\n3,4\n5,6\n", "\nx,y\n1,2\n3,4\n"])
@@ -255,10 +255,10 @@ def test_append_column_to_a_changed_file(tmp_path: Path, changed: str) -> None:
     path = write(tmp_path, "x,y\n1,2\n3,4\n")
     table = read_table(path, columns=None, width=2)
     with pytest.raises(ValueError, match=r"shape \(2,\)"):
-        append_column(table, path, "p", [1, 2, 3])
+        append_columns(table, path, {"p": [1, 2, 3]})
     write(tmp_path, changed)
     with pytest.raises(InputFileError, match="changed after it was read"):
-        append_column(table, path, "p", [1, 2])
+        append_columns(table, path, {"p": [1, 2]})
 
 
 def test_to_csv_quotes_names() -> None:

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orbiflow.density import append_column, is_identifier, read_table
+from orbiflow.density import append_columns, is_identifier, read_table
 from orbiflow.errors import InputFileError
 from table_files import write
 
@@ -25,7 +25,7 @@ def test_decimal_commas(content: str, delimiter: str, tmp_path: Path) -> None:
     assert table.values.tolist() == [[1.5, 2.0], [-3.25, 4.0]]
     assert (table.delimiter, table.decimal) == (delimiter, ",")
     assert "read decimal commas" in table.notes
-    scored = write(tmp_path, append_column(table, path, "p", [0.5, 7.0]), "b.csv")
+    scored = write(tmp_path, append_columns(table, path, {"p": [0.5, 7.0]}), "b.csv")
     again = read_table(scored, columns=None, width=3)
     assert again.values.tolist() == [[1.5, 2.0, 0.5], [-3.25, 4.0, 7.0]]
 
@@ -57,7 +57,7 @@ def test_rows_with_missing_values(gap: str, tmp_path: Path) -> None:
     assert table.values.tolist() == [[1, 2], [5, 6]]
     assert table.lines.tolist() == [2, 4]
     assert "left out 2 rows with missing values, the first in line 3" in table.notes
-    scored = append_column(table, path, "p", [0.5, 0.25]).decode().splitlines()
+    scored = append_columns(table, path, {"p": [0.5, 0.25]}).decode().splitlines()
     assert scored == ["lat,lon,note,p", "1,2,,0.5", f"{gap},4,a,", "5,6,b,0.25", f"7,{gap},,"]
 
 

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from orbiflow.density import append_column, read_table
+from orbiflow.density import append_columns, read_table
 from orbiflow.errors import InputFileError, OrbiflowError
 from table_files import PROPERTY, refuse, write
 
@@ -44,7 +44,7 @@ def test_npy(tmp_path: Path, array: np.ndarray, name: str) -> None:
     assert table.columns == (("lat", "lon") if array.dtype.names else ("column1", "column2"))
     assert table.lines.tolist() == [1, 2]
     assert (table.header, table.delimiter) == (None, None)
-    out = append_column(table, path, "LAT", [5, 6]).decode().splitlines()
+    out = append_columns(table, path, {"LAT": [5, 6]}).decode().splitlines()
     assert out[0] == ("lat,lon,LAT_2" if array.dtype.names else "column1,column2,LAT")
     assert out[1:] == ["1,2,5", "3,4,6"]
 
@@ -123,7 +123,9 @@ def test_parquet(tmp_path: Path) -> None:
     assert table.values.tolist() == [[1, 2**60], [3, 4]]
     assert table.columns == ("lat", "lon.x")
     assert table.lines.tolist() == [1, 2]
-    assert append_column(table, path, "p", [5, 6]).startswith(b"lat,lon.x,p\n1,1.152921505e+18,5\n")
+    assert append_columns(table, path, {"p": [5, 6]}).startswith(
+        b"lat,lon.x,p\n1,1.152921505e+18,5\n"
+    )
     refuse(path, "column 'city' holds 'string', not numbers", ["lat", "CITY"])
     refuse(path, "no column 'x'", ["x"])
     with pytest.raises(InputFileError, match="more than 1 rows"):

@@ -106,7 +106,6 @@ from .spaces.round import to_latlon as to_latlon
 from .spaces.round import to_vectors as to_vectors
 from .spaces.space import MEASURES as MEASURES
 from .spaces.space import Space as Space
-from .tables.files import append_column as append_column
 from .tables.files import append_columns as append_columns
 from .tables.files import column_names as column_names
 from .tables.files import is_identifier as is_identifier

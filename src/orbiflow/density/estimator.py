@@ -11,8 +11,8 @@ import numpy as np
 import torch
 from numpy.typing import ArrayLike
 
+from orbiflow.arguments import as_instance
 from orbiflow.arrays import Array
-from orbiflow.density.arguments import check_kind
 from orbiflow.density.fitting import (
     ComponentSettings,
     DensitySettings,
@@ -293,7 +293,7 @@ class DensityEstimator(Parameters):
         Raises:
             OrbiflowError: for what is no density, or a parameter that there is not.
         """
-        check_kind(density, Density, "density")
+        as_instance(density, Density, "density")
         made = cls(density.space).set_params(**params)
         made.space_, made.density_ = density.space, density
         if report is not None:

@@ -12,8 +12,7 @@ import torch
 from numpy.typing import ArrayLike
 from torch import Tensor
 
-from orbiflow.arguments import is_a
-from orbiflow.density.arguments import check_kind, float_tensor
+from orbiflow.arguments import as_instance, as_tensor, is_a
 from orbiflow.density.models import AdaptiveKernels, Density, Mixture, Split, mixture_of
 from orbiflow.density.spaces import CHART, Space, Torus
 from orbiflow.errors import OrbiflowError
@@ -58,7 +57,7 @@ def marginal(density: Density, axes: Iterable[int] | int) -> Mixture:
     >>> marginal(fit.density_, [0]).space
     Torus(dim=1, unit='radians')
     """
-    space = check_torus(check_kind(density, Density, "density").space, "marginal densities")
+    space = check_torus(as_instance(density, Density, "density").space, "marginal densities")
     return _restricted(density, Split(space.dim, kept_axes(axes, space.dim)), space)
 
 
@@ -79,7 +78,7 @@ def conditional(
         OrbiflowError: for other spaces, no such angles, all angles, or three and more that are left
             where a component has no closed form.
     """
-    space = check_torus(check_kind(density, Density, "density").space, "conditional densities")
+    space = check_torus(as_instance(density, Density, "density").space, "conditional densities")
     known, values = given_axes(given, space.dim)
     left = [axis for axis in range(space.dim) if axis not in known]
     kept = kept_axes(left if axes is None else axes, space.dim)
@@ -152,14 +151,14 @@ def log_prob_observed(density: Density, points: Tensor, *, measure: str = CHART)
             integrated.
     """
     space = check_torus(
-        check_kind(density, Density, "density").space, "densities at missing angles"
+        as_instance(density, Density, "density").space, "densities at missing angles"
     )
     return at_observed(density, observed_rows(points, "points", space), measure=measure)
 
 
 def observed_rows(values: Any, name: str, space: Space) -> Tensor:
     """Return a float64 table of angles (N, d), some of which may be missing."""
-    rows = float_tensor(values, name).double()
+    rows = as_tensor(values, name).double()
     if rows.dim() != 2 or rows.shape[1] != space.dim:
         raise OrbiflowError(f"expected {name} (N, {space.dim}), got {tuple(rows.shape)}")
     if bool(rows.isinf().any()):

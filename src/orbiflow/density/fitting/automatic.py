@@ -10,7 +10,7 @@ import torch
 from numpy.typing import ArrayLike
 from torch import Tensor
 
-from orbiflow.density.arguments import check_kind, silent
+from orbiflow.arguments import as_instance
 from orbiflow.density.fitting.evidence import (
     Candidates,
     TriedFlow,
@@ -38,6 +38,7 @@ from orbiflow.density.fitting.report import (
     mass_with,
     mean_nll,
     own_points,
+    silent,
     steps_note,
 )
 from orbiflow.density.fitting.rows import (
@@ -110,7 +111,7 @@ def fit_automatic(
         OrbiflowError: for points of another shape or too few, or parts that the space does not have.
     """
     settings = DensitySettings() if settings is None else settings
-    check_kind(settings, DensitySettings, "settings")
+    as_instance(settings, DensitySettings, "settings")
     say = progress or silent
     budget = Budget(seconds=settings.seconds)
     rows, settings, notes = _rows(space, points, weights, groups, settings, check_missing(missing))

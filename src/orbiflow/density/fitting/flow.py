@@ -11,7 +11,7 @@ import torch
 from scipy.optimize import linear_sum_assignment
 from torch import Tensor
 
-from orbiflow.density.arguments import check_kind, silent
+from orbiflow.arguments import as_instance
 from orbiflow.density.fitting.kernels import blend_kernels
 from orbiflow.density.fitting.likelihood import Budget, Refinement, merged, refine, training
 from orbiflow.density.fitting.report import (
@@ -25,6 +25,7 @@ from orbiflow.density.fitting.report import (
     repeats_note,
     settle,
     sides,
+    silent,
     step_error,
     steps_note,
 )
@@ -158,8 +159,8 @@ def fit_density(
             weights that are none.
     """
     settings = FlowSettings() if settings is None else settings
-    check_kind(settings, FlowSettings, "settings")
-    if check_kind(space, Space, "space", "see `make_space`").dim > MOST_DIM:
+    as_instance(settings, FlowSettings, "settings")
+    if as_instance(space, Space, "space", "see `make_space`").dim > MOST_DIM:
         raise OrbiflowError(
             f"a flow has {MOST_DIM} dimensions at most, this {space.name} has {space.dim}: fit other "
             'components, such as "kernels,mixture,chains,network"'

@@ -11,7 +11,7 @@ import torch
 from scipy.spatial import KDTree
 from torch import Tensor
 
-from orbiflow.density.arguments import check_kind, points_tensor
+from orbiflow.arguments import as_instance, as_points
 from orbiflow.density.fitting.chains import PRIOR, PRIOR_RESULTANT, concentration, far_apart
 from orbiflow.density.fitting.folds import places
 from orbiflow.density.fitting.likelihood import training
@@ -67,9 +67,9 @@ def blend_kernels(
         OrbiflowError: for points of another shape, fewer than three different ones to train on, or none
             held out.
     """
-    space = check_kind(density, Density, "density").space
-    train = points_tensor(train, space.dim, "training points", flat=True).double()
-    held = points_tensor(held, space.dim, "held points", flat=True).double()
+    space = as_instance(density, Density, "density").space
+    train = as_points(train, space.dim, "training points", flat=True).double()
+    held = as_points(held, space.dim, "held points", flat=True).double()
     centers, place, counts = unique(train, dim=0, return_inverse=True, return_counts=True)
     if row_weights is not None:
         counts = row_weights.new_zeros(len(centers)).index_add_(0, place, row_weights)

@@ -10,7 +10,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from orbiflow.density.arguments import check_kind, points_tensor
+from orbiflow.arguments import as_instance, as_points
 from orbiflow.density.fitting.folds import LEAST_PLACES, Repeats, places
 from orbiflow.density.fitting.likelihood import Refinement
 from orbiflow.density.fitting.rows import log_prob_of_rows, mean_of
@@ -27,6 +27,10 @@ as any."""
 
 Progress = Callable[[float, str], None]
 """Told the share of the work done and what is being done."""
+
+
+def silent(_share: float, _what: str) -> None:
+    """Show no progress."""
 
 
 @dataclass(frozen=True)
@@ -141,8 +145,8 @@ def _figures(values: list[float | None]) -> tuple[float, ...]:
 
 def own_points(space: Space, points: Any) -> Tensor:
     """Canonical points (N, d), float64: a copy, for those of `torch.inference_mode` cannot be used."""
-    check_kind(space, Space, "space", "see `make_space`")
-    return space.project(points_tensor(points, space.dim, flat=True).detach().double().clone())
+    as_instance(space, Space, "space", "see `make_space`")
+    return space.project(as_points(points, space.dim, flat=True).detach().double().clone())
 
 
 def sides(points: Tensor, share: float, generator: torch.Generator) -> tuple[Tensor, Tensor, int]:

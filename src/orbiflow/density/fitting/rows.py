@@ -10,8 +10,7 @@ import torch
 from numpy.typing import ArrayLike, NDArray
 from torch import Tensor
 
-from orbiflow.arguments import described
-from orbiflow.density.arguments import check_kind, float_tensor
+from orbiflow.arguments import as_instance, as_tensor, described
 from orbiflow.density.inference import at_observed, check_torus, observed_rows
 from orbiflow.density.models import AdaptiveKernels, Density
 from orbiflow.density.spaces import Space, row_count
@@ -66,7 +65,7 @@ def effective_rows(weights: Tensor) -> float:
 
 def weights_of(weights: Any, known: Tensor) -> Tensor:
     """Return the weights of the rows that are `known` (N,)."""
-    own = float_tensor(weights, "weights")
+    own = as_tensor(weights, "weights")
     if own.shape != known.shape:
         raise OrbiflowError(
             f"expected a weight for each of {len(known)} rows, got an array {tuple(own.shape)}"
@@ -101,7 +100,7 @@ def weighed(points: Tensor, weights: Any, groups: Tensor | None = None) -> Rows:
     """
     if weights is None:
         return Rows(points, None, groups)
-    own = float_tensor(weights, "weights").detach().double().clone()
+    own = as_tensor(weights, "weights").detach().double().clone()
     if own.shape != points.shape[:1]:
         raise OrbiflowError(
             f"expected a weight for each of {len(points)} rows, got an array {tuple(own.shape)}"
@@ -154,7 +153,7 @@ def check_missing(missing: Any) -> str:
 
 def observed_points(space: Space, points: Any) -> tuple[Tensor, Tensor]:
     """Return canonical points (N, d) of a torus, and which rows have an angle at all."""
-    check_kind(space, Space, "space", "see `make_space`")
+    as_instance(space, Space, "space", "see `make_space`")
     check_torus(space, "densities of rows that lack angles")
     own = observed_rows(points, "points", space).detach().clone()
     known = ~own.isnan().all(dim=1)

@@ -10,7 +10,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from orbiflow.density.arguments import float_tensor
+from orbiflow.arguments import as_tensor
 from orbiflow.density.models.chain_integrals import SCALES, chains_at, waves
 from orbiflow.density.models.density import Density, Restriction, Split, in_blocks
 from orbiflow.density.models.headers import checked_integer, checked_tensors
@@ -60,9 +60,9 @@ class VonMisesChains(Density, kind="chains"):
             raise OrbiflowError(f"von Mises chains need a torus, got the {space.name}")
         d = space.dim
         log_weights, means, concentrations = (
-            float_tensor(log_weights, "log_weights"),
-            float_tensor(means, "means"),
-            float_tensor(concentrations, "concentrations"),
+            as_tensor(log_weights, "log_weights"),
+            as_tensor(means, "means"),
+            as_tensor(concentrations, "concentrations"),
         )
         count = concentrations.shape[0] if concentrations.dim() == 2 else 0
         if order is None:

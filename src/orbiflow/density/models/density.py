@@ -13,7 +13,7 @@ import torch
 from torch import Tensor, nn
 from torch.distributions import Distribution, constraints
 
-from orbiflow.density.arguments import check_kind, points_tensor
+from orbiflow.arguments import as_instance, as_points
 from orbiflow.density.spaces import CHART, Space, Torus, check_measure
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import one_thread
@@ -77,7 +77,7 @@ class Density(Distribution):
         KINDS[kind] = cls
 
     def __init__(self, space: Space) -> None:
-        self.space = check_kind(space, Space, "space", "see `make_space`")
+        self.space = as_instance(space, Space, "space", "see `make_space`")
         super().__init__(event_shape=torch.Size([space.dim]), validate_args=False)
 
     # What a component must say, and what it may.
@@ -297,7 +297,7 @@ class Density(Distribution):
 
     def _here(self, value: Any) -> Tensor:
         """Return points (..., d) on the density's device; tensors are never moved from another."""
-        points, device = points_tensor(value, self.space.dim), self.device
+        points, device = as_points(value, self.space.dim), self.device
         if device is None:
             return points
         if not isinstance(value, Tensor):

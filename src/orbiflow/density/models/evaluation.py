@@ -11,8 +11,8 @@ import torch
 from numpy.typing import ArrayLike
 from torch import Tensor
 
+from orbiflow.arguments import as_instance, as_points, as_tensor, as_whole
 from orbiflow.arrays import Array
-from orbiflow.density.arguments import check_kind, check_range, float_tensor, points_tensor
 from orbiflow.density.models.density import Density, destination, log_area_factor, moved
 from orbiflow.density.models.kernels import AdaptiveKernels
 from orbiflow.density.spaces import CHART, Space, rectangle
@@ -46,7 +46,7 @@ def log_density_gradient(density: Density, data: ArrayLike) -> tuple[Array, Arra
     >>> np.sign(slopes[:, 0]).tolist()
     [1.0, -1.0]
     """
-    space = check_kind(density, Density, "density").space
+    space = as_instance(density, Density, "density").space
     points = space.cover(data)
     values: list[Tensor] = []
     slopes: list[Tensor] = []
@@ -70,7 +70,7 @@ def midpoints(space: Space, resolution: int) -> Tensor:
     Raises:
         OrbiflowError: if the space has another dimension than two, or for a resolution below 1.
     """
-    check_range("resolution", resolution, 1, 1e6, integer=True)
+    as_whole(resolution, "resolution", 1, 10**6)
     if space.dim != 2:
         raise OrbiflowError(f"a grid needs two dimensions, this {space.name} has {space.dim}")
     t = (torch.arange(resolution, dtype=torch.float64) + 0.5) / resolution
@@ -87,7 +87,7 @@ def kl_by_quadrature(target: Tensor, log_density: Tensor) -> float:
     Raises:
         OrbiflowError: for other shapes.
     """
-    target, log_density = float_tensor(target, "target"), float_tensor(log_density, "log_density")
+    target, log_density = as_tensor(target, "target"), as_tensor(log_density, "log_density")
     if target.dim() != 1 or target.shape != log_density.shape:
         raise OrbiflowError(
             f"expected two tables (N,), got {tuple(target.shape)} and {tuple(log_density.shape)}"
@@ -134,10 +134,10 @@ class TabulatedDensity:
 
     @one_thread()
     def __init__(self, density: Density, resolution: int = 512) -> None:
-        space = check_kind(density, Density, "density").space
+        space = as_instance(density, Density, "density").space
         if space.dim != 2:
             raise OrbiflowError(f"a table needs two dimensions, this {space.name} has {space.dim}")
-        check_range("resolution", resolution, 8, 4096, integer=True)
+        as_whole(resolution, "resolution", 8, 4096)
         self.space, self.resolution = space, resolution
         self._narrow: AdaptiveKernels | None = None
         smooth = self._smooth_part(density)
@@ -204,7 +204,7 @@ class TabulatedDensity:
         Raises:
             OrbiflowError: for points of another shape or that are not finite, or an unknown measure.
         """
-        points = points_tensor(points, 2)
+        points = as_points(points, 2)
         flat = points.reshape(-1, 2).double()
         cells = flat.mT * self.resolution - 0.5
         parts = [spline_sum(self._table, block)[0] for block in torch.split(cells, BLOCK, dim=1)]

@@ -8,7 +8,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from orbiflow.density.arguments import check_kind
+from orbiflow.arguments import as_instance
 from orbiflow.density.models.chains import VonMisesChains
 from orbiflow.density.models.density import Density
 from orbiflow.density.models.flow import FlowDensity, UniformDensity
@@ -48,7 +48,7 @@ def density_to_bytes(density: Density, **extra: Any) -> bytes:
     Raises:
         OrbiflowError: naming the part that cannot be saved, rather than save another density.
     """
-    header, tensors = density_parts(check_kind(density, Density, "density"), "density")
+    header, tensors = density_parts(as_instance(density, Density, "density"), "density")
     space = _checked_space(density.space)
     document = {
         "format": FORMAT,

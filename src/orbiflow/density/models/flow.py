@@ -11,8 +11,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from orbiflow.arguments import is_a
-from orbiflow.density.arguments import check_kind
+from orbiflow.arguments import as_instance, is_a
 from orbiflow.density.models.density import Density, Restriction, Split, in_blocks
 from orbiflow.density.models.evaluation import midpoints
 from orbiflow.density.models.headers import (
@@ -59,8 +58,8 @@ class FlowDensity(Density, kind="flow"):
 
     def __init__(self, space: Space, flow: Flow, base: Density | None = None) -> None:
         super().__init__(space)
-        self.flow = check_kind(flow, Flow, "flow")
-        self.base = UniformDensity(space) if base is None else check_kind(base, Density, "base")
+        self.flow = as_instance(flow, Flow, "flow")
+        self.base = UniformDensity(space) if base is None else as_instance(base, Density, "base")
 
     @property
     def dtype(self) -> torch.dtype:

@@ -10,8 +10,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from orbiflow.arguments import as_tensor
 from orbiflow.arrays import Array
-from orbiflow.density.arguments import float_tensor
 from orbiflow.density.models.density import Density, Restriction, Split
 from orbiflow.density.models.headers import checked_integer, checked_tensors
 from orbiflow.density.models.near_sums import TOLERANCE, near_log_sum
@@ -49,9 +49,9 @@ class AdaptiveKernels(Density, kind="kernels"):
     ) -> None:
         super().__init__(space)
         centers, concentrations, weights = (
-            float_tensor(centers, "centers"),
-            float_tensor(concentrations, "concentrations"),
-            float_tensor(weights, "weights"),
+            as_tensor(centers, "centers"),
+            as_tensor(concentrations, "concentrations"),
+            as_tensor(weights, "weights"),
         )
         width = 1 if space.is_round else space.dim
         shapes = [tuple(t.shape) for t in (centers, concentrations, weights)]

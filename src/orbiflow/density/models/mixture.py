@@ -10,7 +10,7 @@ from typing import Any, Self
 import torch
 from torch import Tensor
 
-from orbiflow.density.arguments import check_kind, float_tensor
+from orbiflow.arguments import as_instance, as_tensor
 from orbiflow.density.models.density import Density, Restriction, Split
 from orbiflow.density.models.flow import FlowDensity
 from orbiflow.density.models.headers import checked_tensors, density_from, density_parts, within
@@ -44,10 +44,10 @@ class Mixture(Density, kind="mixture"):
         if not components:
             raise OrbiflowError("components must be one density or more")
         for one in components:
-            check_kind(one, Density, "each of the components")
+            as_instance(one, Density, "each of the components")
         super().__init__(components[0].space)
         self.components = tuple(components)
-        weights = float_tensor(weights, "weights").detach().double().cpu()
+        weights = as_tensor(weights, "weights").detach().double().cpu()
         if (
             weights.shape != (len(self.components),)
             or not bool((weights > 0).all())

@@ -11,7 +11,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from orbiflow.density.arguments import check_kind
+from orbiflow.arguments import as_instance
 from orbiflow.density.models.chain_integrals import SCALES, quantiles, waves
 from orbiflow.density.models.chains import BLOCK, VonMisesChains
 from orbiflow.density.models.density import Density, Split, in_blocks
@@ -67,7 +67,7 @@ class VonMisesNetwork(Density, kind="network"):
             raise OrbiflowError(f"a von Mises network needs a torus, got the {space.name}")
         placed: list[int] = []
         for axes, chains in factors:
-            check_kind(chains, VonMisesChains, "a factor's chains")
+            as_instance(chains, VonMisesChains, "a factor's chains")
             if not axes or chains.space.dim != len(axes) or len(set(axes)) < len(axes):
                 raise OrbiflowError(
                     f"a factor of the angles {axes} has chains of {chains.space.dim} angles"

@@ -174,17 +174,6 @@ class RoundSpace(Space):
     def _representatives(self, vectors: Array) -> Array:
         return vectors
 
-    def round_distance(self, start: Tensor, end: Tensor) -> Tensor:
-        """Return the great-circle distance (...,) in radians."""
-        one, other = (
-            uniformization.to_sphere(self.project(points), self.power) for points in (start, end)
-        )
-        # well conditioned at both ends, as acos is not
-        angle = 2 * torch.atan2(
-            linalg.vector_norm(one - other, dim=-1), linalg.vector_norm(one + other, dim=-1)
-        )
-        return angle if self.power == 4 else torch.minimum(angle, math.pi - angle)
-
 
 class Sphere(RoundSpace):
     """The unit sphere of directions; densities are per steradian.

@@ -1,4 +1,3 @@
-from .files import append_column as append_column
 from .files import append_columns as append_columns
 from .files import column_names as column_names
 from .files import is_identifier as is_identifier

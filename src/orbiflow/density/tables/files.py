@@ -69,11 +69,6 @@ def read_table(
     return read(path, Reading(columns, width, max_rows, has_header, drop_missing, keep_missing))
 
 
-def append_column(table: Table, path_of_source: str | Path, name: str, values: ArrayLike) -> bytes:
-    """Return the source file with one more column of values (N,); see `append_columns`."""
-    return append_columns(table, path_of_source, {name: values})
-
-
 def append_columns(
     table: Table, path_of_source: str | Path, columns: Mapping[str, ArrayLike]
 ) -> bytes:
